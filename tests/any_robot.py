@@ -9,11 +9,11 @@ import numpy as np
 from finlab.allocation import Allocation, Allocator, BatchAllocation
 from finlab.allocation.method import Method
 from finlab.allocation.methods import (
-    LEARNED,
     Checkpoint,
     MethodChoice,
     checked_settings,
     choose_method,
+    method_class,
 )
 from finlab.allocation.settings import Settings
 from finlab.assets import shipped_layouts
@@ -29,7 +29,9 @@ class AnyRobot:
         self, method: str | type[Method] = "dual", checkpoint: Checkpoint = None, **settings: Any
     ) -> None:
         self.choice = (
-            choose_method(method, checkpoint if method in LEARNED else None, **settings)
+            choose_method(
+                method, checkpoint if method_class(method).needs_networks else None, **settings
+            )
             if isinstance(method, str)
             else MethodChoice(method, checked_settings(method, settings))
         )

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from finlab import core
-from finlab.allocation import Allocator
+from finlab.allocation.dual.compiled import Compiled
 from finlab.arrays import Array
 from finlab.core.fields import head_of
 from finlab.deploy.thin_block import thinned
@@ -80,7 +80,7 @@ def header(name: str, layout: dict[str, Any], seed: int) -> str:
     plant = OwnPlant(layout)
     has_no_gaps = not any(actuator.kind == "fin" for actuator in plant.actuators)
     rng = np.random.default_rng(seed)
-    block = thinned(Allocator(load(layout))._whole.method.compiled.robot.block)  # type: ignore[attr-defined]
+    block = thinned(Compiled.of(load(layout)).robot.block)
     plant.scales = head_of(block)[
         "wrench_scale"
     ].copy()  # both measure a miss on the same yardstick

@@ -27,7 +27,7 @@ def graph() -> ImportGraph:
         ("finlab/actuators/thruster.py", "tests/actuators/test_laws.py"),
         ("finlab/layout/damage.py", "tests/allocation/test_damage_of_robots.py"),
         ("webapp/panels/swim_tab.py", "tests/webapp/test_app.py"),
-        ("tests/mixed_robots.py", "tests/allocation/dual/test_judged.py"),
+        ("tests/mixed_robots.py", "tests/allocation/dual/test_random_robots.py"),
     ],
 )
 def test_a_change_selects_its_tests(graph: ImportGraph, changed: str, nearest: str) -> None:
@@ -46,7 +46,7 @@ def test_a_registry_imports_what_it_names(graph: ImportGraph) -> None:
     assert "finlab/allocation/dual/method.py" in graph.imports("finlab/allocation/methods.py")
     assert "finlab/actuators/rudder.py" in graph.imports("finlab/actuators/kinds.py")
     tests = near_tests(graph, ["finlab/actuators/azimuth.py"])
-    assert "tests/allocation/dual/test_either_way.py" in {test.file for test in tests}
+    assert "tests/allocation/dual/test_reversing_pods.py" in {test.file for test in tests}
 
 
 def test_nearer_tests_come_first_among_those_that_take_as_long(graph: ImportGraph) -> None:
@@ -60,8 +60,7 @@ def test_a_name_that_a_package_passes_on_leads_to_its_file(graph: ImportGraph) -
         "tests/allocation/test_question.py"
     )  # from finlab.allocation import Allocator
     assert (
-        "finlab/allocation/allocator.py" in imports
-        and "finlab/allocation/binding.py" not in imports
+        "finlab/allocation/allocator.py" in imports and "finlab/allocation/rates.py" not in imports
     )
 
 

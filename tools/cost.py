@@ -1,6 +1,5 @@
 #!/usr/bin/env python3
-"""What methods cost under exact tracking, over the best of many random starts: power in watts, or
-effort.
+"""Compares the costs of methods with the best of many random starts: power in watts, or effort.
 
     python tools/cost.py --split id,limits --methods dual,mdn,sqp --layouts 3 --targets 1 --starts 8
 
@@ -29,17 +28,19 @@ from finlab.research.evaluation.method_specs import (
 from finlab.research.evaluation.scoring import ratio_interval, sigma_of
 from finlab.research.evaluation.splits import SPLITS, SplitCase, make_split
 
-EXACT, TRACKED = 1e-5, 1e-3
-"""Normalized errors up to which the reference and a method count as delivering a target."""
+EXACT_ERROR = 1e-5
+"""Largest normalized error of the reference."""
+TRACKED_ERROR = 1e-3
+"""Largest normalized error of a method that counts as delivering a target."""
 CHEAPER = 1.0 - 1e-4
-"""Cost over the reference's below which a method has won."""
-KEEPS: dict[str, Name] = {
+"""Cost over the reference's below which a method is cheaper."""
+FIXED_OBJECTIVE: dict[str, Name] = {
     **dict.fromkeys(("dual", "px4", "ardusub"), "power"),
     **dict.fromkeys(("mdn", "paper"), "effort"),
 }
-"""What methods without a choice keep least; they are compared in that alone."""
+"""Objectives of methods without a choice; they are compared in that one alone."""
 UNITS: dict[Name, str] = {"power": "W", "effort": "J_en"}
-"""What may be kept least, and what its cost is counted in."""
+"""Objectives and the units of their costs."""
 
 
 def run(
@@ -52,7 +53,7 @@ def run(
     checkpoint: str | None = None,
     seed: int = 0,
 ) -> list[Row]:
-    """One row for each split, objective and method.
+    """Returns a row for each split, objective and method.
 
     Args:
         split: names as in eval wrench, or all.
@@ -71,14 +72,23 @@ def run(
     check_names("objectives", objectives, UNITS)
     rows: list[Row] = []
     kinds = {
-        each: spec.choice.kind for each, spec in load_method_specs(methods, checkpoint).items()
+        method_name: spec.choice.kind
+        for method_name, spec in load_method_specs(methods, checkpoint).items()
     }
     for name in names:
         cases = make_split(name, layouts, targets, seed)
         robot = cases[0].layout
-        fit = [each for each, kind in kinds.items() if len(names) == 1 or kind.fits(robot)]
+        fit = [
+            method_name
+            for method_name, kind in kinds.items()
+            if len(names) == 1 or kind.fits(robot)
+        ]
         for objective in UNITS:
-            able = tuple(each for each in fit if KEEPS.get(each, objective) == objective)
+            able = tuple(
+                method_name
+                for method_name in fit
+                if FIXED_OBJECTIVE.get(method_name, objective) == objective
+            )
             possible = objective == "power" or robot.is_of_fins
             if objective in objectives and able and possible:
                 rows += _rows(name, cases, able, objective, starts, checkpoint, seed)
@@ -96,31 +106,38 @@ def _rows(
 ) -> list[Row]:
     specs = load_method_specs(methods, checkpoint, objective, patient=True)
     best = list[Array]()
-    found: dict[str, list[tuple[Array, Array]]] = {name: [] for name in specs}
+    answers: dict[str, list[tuple[Array, Array]]] = {name: [] for name in specs}
     for case in progress(cases, "layout", f"{split}, {objective}"):
         sigma = sigma_of(case)
         cost, error = _answers(
-            yardstick(case.healthy, objective, starts), case, objective, sigma, seed
+            reference_method(case.healthy, objective, starts), case, objective, sigma, seed
         )
-        best.append(np.where(error <= EXACT, cost, np.nan))
+        best.append(np.where(error <= EXACT_ERROR, cost, np.nan))
         for name, method in specs.items():
-            found[name].append(_answers(method, case, objective, sigma))
+            answers[name].append(_answers(method, case, objective, sigma))
     group = np.repeat(np.arange(len(cases)), [len(case.targets) for case in cases])
     rows: list[Row] = []
-    for name, parts in found.items():
-        cost, error = (np.concatenate(part) for part in zip(*parts, strict=True))
-        about: Row = {
+    for name, case_answers in answers.items():
+        cost, error = (np.concatenate(arrays) for arrays in zip(*case_answers, strict=True))
+        head: Row = {
             "split": split,
             "objective": f"{objective} [{UNITS[objective]}]",
             "method": name,
         }
-        rows.append(about | _figures(cost, error, np.concatenate(best), group))
+        rows.append(head | _figures(cost, error, np.concatenate(best), group))
     return rows
 
 
-def yardstick(layout: Layout, objective: Name, starts: int) -> MethodSpec:
-    """Who finds the least cost of a robot's answers: IPOPT in the space of forces; of effort and of
-    tables SLSQP, from the pseudo-inverse's answer and twice as many random commands."""
+def reference_method(layout: Layout, objective: Name, starts: int) -> MethodSpec:
+    """Returns the method that finds the reference cost of a robot: IPOPT in the space of forces; of
+    effort and of tables SLSQP, from the pseudo-inverse's answer and twice as many random
+    commands.
+
+    Args:
+        layout: the robot.
+        objective: power or effort.
+        starts: random starts.
+    """
     tables = layout.is_of_fins and any(fin.model.type == "table" for fin in layout.fins)
     by_commands = tables or objective == "effort"
     method = load_method_spec("sqp" if by_commands else "ipopt", objective=objective)
@@ -144,21 +161,23 @@ def _answers(
 
 
 def _figures(cost: Array, error: Array, best: Array, group: NDArray[np.int64]) -> Row:
-    tracked = error <= TRACKED
-    known = np.isfinite(best)
-    both = known & tracked
+    tracked = error <= TRACKED_ERROR
+    has_reference = np.isfinite(best)
+    compared = has_reference & tracked
     row: Row = {
         "n": len(cost),
-        "solved_by_starts": int(known.sum()),
+        "solved_by_starts": int(has_reference.sum()),
         "tracked": float(tracked.mean()),
     }
-    if not both.any():
+    if not compared.any():
         return row
-    ratio = cost[both] / best[both]
+    ratio = cost[compared] / best[compared]
     return row | {
-        "cost": float(cost[both].mean()),
-        "cost_ratio": float(cost[both].sum() / best[both].sum()),
-        "cost_ratio_interval": list(ratio_interval(cost[both], best[both], group[both])),
+        "cost": float(cost[compared].mean()),
+        "cost_ratio": float(cost[compared].sum() / best[compared].sum()),
+        "cost_ratio_interval": list(
+            ratio_interval(cost[compared], best[compared], group[compared])
+        ),
         "ratio_p95": float(np.quantile(ratio, 0.95)),
         "ratio_max": float(ratio.max()),
         "cheaper": float((ratio < CHEAPER).mean()),
@@ -186,7 +205,7 @@ experiment = Experiment(
         "The reference is the cheapest exact end of many starts of `ipopt`, of `sqp` for effort "
         "and tables: "
         "solvers that know nothing of how `dual` and `mdn` search. Tracked: "
-        f"error up to {TRACKED:g} by the plant. Effort is the paper's J_en."
+        f"error up to {TRACKED_ERROR:g} by the plant. Effort is the paper's J_en."
     ),
 )
 

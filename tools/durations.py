@@ -1,4 +1,4 @@
-"""Record how long tests take: a plugin of pytest that `make test-durations` loads.
+"""Records how long tests take: a plugin of pytest that `make test-durations` loads.
 
 It writes `tests/durations.json`: processor seconds of each test, its set-up and the processes that
 it starts included, by its node id; of a function whose cases take less than a second together one
@@ -15,15 +15,15 @@ from pathlib import Path
 import pytest
 
 FILE = Path(__file__).resolve().parents[1] / "tests" / "durations.json"
-
-TOGETHER = 1.0
-"""Seconds of a function below which its cases are not told apart."""
-
+"""The file that is written."""
+SPLIT_FROM = 1.0
+"""Processor time of a function from which on its cases are recorded one by one [s]."""
 _seconds: defaultdict[str, float] = defaultdict(float)
+"""Processor time of each test so far [s], by node id."""
 
 
 def _processor_seconds() -> float:
-    """What this process and those that it has waited for took so far."""
+    """Processor time of this process and of those that it has waited for [s]."""
     return sum(os.times()[:4])
 
 
@@ -33,9 +33,9 @@ def pytest_runtest_makereport(
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
     """Put into the report of a set-up, call or tear-down what it took since the last one."""
     report = yield
-    now = _processor_seconds()
-    report.processor_seconds = now - getattr(item.config, "processor_seconds", now)  # type: ignore[attr-defined]
-    item.config.processor_seconds = now  # type: ignore[attr-defined]
+    seconds = _processor_seconds()
+    report.processor_seconds = seconds - getattr(item.config, "processor_seconds", seconds)  # type: ignore[attr-defined]
+    item.config.processor_seconds = seconds  # type: ignore[attr-defined]
     return report
 
 
@@ -52,13 +52,15 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
     sums = defaultdict[str, float](float)
     for name, seconds in _seconds.items():
         sums[function_of(name)] += seconds
-    known = json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else {}
-    known = {name: seconds for name, seconds in known.items() if function_of(name) not in sums}
+    recorded = json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else {}
+    recorded = {
+        name: seconds for name, seconds in recorded.items() if function_of(name) not in sums
+    }
     for name, seconds in _seconds.items():
         function = function_of(name)
-        many = sums[function] >= TOGETHER
-        known[name if many else function] = round(seconds if many else sums[function], 2)
-    FILE.write_text(json.dumps(known, indent=0, sort_keys=True) + "\n", encoding="utf-8")
+        is_slow = sums[function] >= SPLIT_FROM
+        recorded[name if is_slow else function] = round(seconds if is_slow else sums[function], 2)
+    FILE.write_text(json.dumps(recorded, indent=0, sort_keys=True) + "\n", encoding="utf-8")
 
 
 def function_of(name: str) -> str:

@@ -1,6 +1,5 @@
 #!/usr/bin/env python3
-"""Make the tables of figures in README.md and docs again: `make figures`, or `make figures
-PAGE=evaluation`.
+"""Makes the tables of figures in README.md and docs again: `make figures [PAGE=evaluation]`.
 
 A page holds a table between two marks,
 
@@ -24,7 +23,7 @@ from finlab.research.evaluation.experiment import begin, load_experiment
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = {path.stem: path for path in [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]}
 MARK = re.compile(r"(<!-- figures: (\w+)((?: [\w.=/:,-]+)*) -->\n)")
-END = "<!-- end of figures -->"
+END_MARK = "<!-- end of figures -->"
 
 
 def main(names: list[str]) -> int:
@@ -37,10 +36,12 @@ def main(names: list[str]) -> int:
     for page in [PAGES[name] for name in names or PAGES]:
         for mark, name, keys in re.findall(MARK, page.read_text(encoding="utf-8")):
             # changed meanwhile
-            made = table_of(name, keys.split())
+            table = table_of(name, keys.split())
             text = page.read_text(encoding="utf-8")
-            before, _, rest = text.partition(mark)
-            page.write_text(before + mark + made + END + rest.partition(END)[2], encoding="utf-8")
+            head, _, tail = text.partition(mark)
+            page.write_text(
+                head + mark + table + END_MARK + tail.partition(END_MARK)[2], encoding="utf-8"
+            )
             print(page.relative_to(ROOT), flush=True)
     return 0
 
@@ -50,15 +51,15 @@ def table_of(name: str, keys: list[str]) -> str:
     experiment = load_experiment(name)
     began = time.monotonic()
     begin(name)
-    typed = dict(key.split("=") for key in keys if "=" in key)
-    chosen = {**experiment.quick, **{name: _value(value) for name, value in typed.items()}}
+    stated = dict(key.split("=") for key in keys if "=" in key)
+    chosen = {**experiment.quick, **{name: _value(value) for name, value in stated.items()}}
     keys = [key for key in keys if "=" not in key]
     table = experiment.table(experiment.rows(**chosen))
     columns = {column.key: replace(column, interval=None) for column in table.columns}
     shown = ReportTable(tuple(columns[key] for key in keys or columns), table.rows)
     print(f"{name}: {time.monotonic() - began:.0f} s", flush=True)
-    made = to_markdown(shown)
-    return f"\n`{experiment.command(chosen)}`:\n\n{made.rstrip()}\n\n"
+    markdown = to_markdown(shown)
+    return f"\n`{experiment.command(chosen)}`:\n\n{markdown.rstrip()}\n\n"
 
 
 def _value(text: str) -> int | str | tuple[int, ...] | tuple[str, ...]:

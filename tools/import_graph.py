@@ -1,8 +1,8 @@
-"""Which file of the tree imports which, read from the sources: by it `tools/near_tests.py` measures
-nearness.
+"""The imports between the files of the tree, read from their sources.
 
-A file is known by its path from the top of the tree, such as `finlab/layout/damage.py`. Edges go
-from a file to what it imports. What is not said by an import statement is found, too:
+`tools/near_tests.py` measures by them how near a test is to a change. A file is known by its path
+from the top of the tree, such as `finlab/layout/damage.py`; edges go from a file to what it
+imports. Dependencies that no import statement names are edges, too:
 
 - a name that a package only passes on leads to the file that defines it: `from finlab import
   Allocator` to `finlab/allocation/allocator.py`. The package's file itself passes nothing on;
@@ -22,8 +22,10 @@ from pathlib import Path
 ROOMS = ("finlab", "webapp", "tests")
 """Folders whose Python files are in the graph."""
 CORE = "finlab/core/"
+"""The folder of the C files."""
 LOADER = "finlab/core/library.py"
-PASSING_ON = {"__getattr__", "__dir__"}
+"""The file that loads the compiled core."""
+PASSES_NAMES_ON = {"__getattr__", "__dir__"}
 """Functions of a package's `__init__.py` that only passes names on."""
 
 
@@ -58,8 +60,8 @@ class ImportGraph:
         """Files that import a file, by the file."""
         importers = defaultdict[str, set[str]](set)
         for file in self.trees:
-            for other in self.imports(file):
-                importers[other].add(file)
+            for imported in self.imports(file):
+                importers[imported].add(file)
         for c_file in self.c_files:
             importers[c_file].add(LOADER)
             stem = Path(c_file).stem
@@ -70,59 +72,63 @@ class ImportGraph:
         return importers
 
     def distances(self, changed: Iterable[str]) -> dict[str, int]:
-        """How many imports lie between each file and the nearest of some that were changed.
+        """Returns how many imports lie between each file and the nearest changed one.
 
         What tests share counts as a part of the test: an import of a helper in `tests` adds
-        nothing.
+        nothing. Files that no changed one reaches are left out.
+
+        Args:
+            changed: the changed files.
         """
-        found = dict.fromkeys(changed, 0)
-        waiting = deque(found)
-        while waiting:
-            file = waiting.popleft()
+        distances = dict.fromkeys(changed, 0)
+        queue = deque(distances)
+        while queue:
+            file = queue.popleft()
             step = 0 if file.startswith("tests/") else 1
             for importer in self.importers.get(file, ()):
-                distance = found[file] + step
-                if distance < found.get(importer, distance + 1):
-                    found[importer] = distance
-                    (waiting.append if step else waiting.appendleft)(importer)
-        return found
+                distance = distances[file] + step
+                if distance < distances.get(importer, distance + 1):
+                    distances[importer] = distance
+                    (queue.append if step else queue.appendleft)(importer)
+        return distances
 
     def imports(self, file: str) -> set[str]:
         """Files that a file imports, itself left out."""
         tree = self.trees[file]
         if file.endswith("__init__.py") and self._only_passes_on(tree):
             return set()
-        found = set[str]()
+        files = set[str]()
         arguments = set[str]()
         for node in ast.walk(tree):
             if isinstance(node, ast.Import):
                 for alias in node.names:
-                    found |= self._module(alias.name)
+                    files |= self._file_of_module(alias.name)
             elif isinstance(node, ast.ImportFrom) and node.module:
                 for alias in node.names:
-                    found |= self._named(node.module, alias.name)
+                    files |= self._files_of_name(node.module, alias.name)
             elif isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
                 if node.value.id in self.file_of:  # `finlab.Allocator` after `import finlab`
-                    found |= self._named(node.value.id, node.attr)
+                    files |= self._files_of_name(node.value.id, node.attr)
             elif isinstance(node, ast.Constant) and isinstance(node.value, str):
-                found |= self._loaded(node.value)
+                files |= self._files_of_string(node.value)
             elif isinstance(node, ast.arg):
                 arguments.add(node.arg)
         if file.startswith("tests/"):
-            found |= self._conftests(file, arguments)
-        return found - {file}
+            files |= self._conftests(file, arguments)
+        return files - {file}
 
-    def _module(self, module: str) -> set[str]:
+    def _file_of_module(self, module: str) -> set[str]:
+        """The file of a module; empty for one of other packages."""
         return {self.file_of[module]} if module in self.file_of else set()
 
-    def _named(self, module: str, name: str) -> set[str]:
+    def _files_of_name(self, module: str, name: str) -> set[str]:
         """Files that `from module import name` needs: the module, and where it only passes the name
         on, the file that defines it."""
-        found = self._module(module) | self._module(f"{module}.{name}")
+        files = self._file_of_module(module) | self._file_of_module(f"{module}.{name}")
         if module not in self.file_of or f"{module}.{name}" in self.file_of:
-            return found
+            return files
         source = self._passed_on(self.file_of[module]).get(name)
-        return found | self._named(source, name) if source else found
+        return files | self._files_of_name(source, name) if source else files
 
     @cache  # noqa: B019 - one graph, one process
     def _passed_on(self, file: str) -> dict[str, str]:
@@ -130,12 +136,12 @@ class ImportGraph:
         if not file.endswith("__init__.py"):
             return {}
         nodes = [node for node in ast.walk(self.trees[file]) if isinstance(node, ast.ImportFrom)]
-        found = dict[str, str]()
+        modules = dict[str, str]()
         for node in nodes:
-            found |= {alias.name: str(node.module) for alias in node.names}
-        return found
+            modules |= {alias.name: str(node.module) for alias in node.names}
+        return modules
 
-    def _loaded(self, text: str) -> set[str]:
+    def _files_of_string(self, text: str) -> set[str]:
         """Files of a string that is a module's full name, alone or before a colon and the name of
         something in it, as in registries; of one that ends in a dot, such as the beginning of
         `f"finlab.cli.{verb}"`, all modules in that package."""
@@ -146,19 +152,20 @@ class ImportGraph:
             return {
                 path for name, path in self.file_of.items() if name.rpartition(".")[0] == text[:-1]
             }
-        return self._module(module)
+        return self._file_of_module(module)
 
     @staticmethod
     def _only_passes_on(tree: ast.Module) -> bool:
+        """Whether a package's file defines no function of its own."""
         functions = {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
-        return functions <= PASSING_ON
+        return functions <= PASSES_NAMES_ON
 
     def _conftests(self, file: str, arguments: set[str]) -> set[str]:
         """The files of fixtures that a test file's arguments name."""
-        found = set[str]()
+        conftests = set[str]()
         for folder in Path(file).parents:
             conftest = f"{folder.as_posix()}/conftest.py"
             body = self.trees[conftest].body if conftest in self.trees else []
             if any(isinstance(node, ast.FunctionDef) and node.name in arguments for node in body):
-                found.add(conftest)
-        return found
+                conftests.add(conftest)
+        return conftests

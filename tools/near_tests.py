@@ -1,6 +1,5 @@
 #!/usr/bin/env python3
-"""Run the tests near a change: `make test-near`, or `tools/near_tests.py [PATH...] [-- PYTEST
-OPTIONS]`.
+"""Runs the tests near a change: `make test-near`, `tools/near_tests.py [PATH...] [-- PYTEST ARGS]`.
 
 The change is what differs from the branch `main` (from the last commit while on it) and what git
 does not track yet, or the paths that are given.
@@ -30,24 +29,25 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from tools.import_graph import ImportGraph
 
 ROOT = Path(__file__).resolve().parents[1]
+"""The top of the tree."""
 DURATIONS = ROOT / "tests" / "durations.json"
-LEFT_OUT = ("tests/browser/", "tests/packaging/")
-"""Tests of the whole, which run where they were changed themselves."""
+WHOLE_PROGRAM_TESTS = ("tests/browser/", "tests/packaging/")
+"""Folders with tests of the whole program, which run where they were changed themselves."""
 SECONDS = 80.0
 """Sum of the recorded seconds of what is run, by two processes; start and collection take the
 rest."""
-UNKNOWN = 0.5
+DEFAULT_SECONDS = 0.5
 """Seconds of a test that was never timed."""
-QUICK = 0.1
+QUICK_SECONDS = 0.1
 """Seconds below which a test is as good as one that takes less."""
-COLLECTED = 0.5
+COLLECTION_SECONDS = 0.5
 """Seconds that the import of one more test file takes, in both processes."""
-SLOW = 2.0
+SLOW_SECONDS = 2.0
 """Seconds above which a test runs after all others."""
-FARTHER = 3.0
-"""What a test one import farther off has to be faster to run first."""
-FOLDER = 2
-"""Imports that tests in the mirroring folder are off at most."""
+DISTANCE_FACTOR = 3.0
+"""Factor by which a test one import farther off has to be faster to run first."""
+FOLDER_DISTANCE = 2
+"""Largest distance of tests in the folder that mirrors the changed one [imports]."""
 CALLS_THE_CORE = {
     "tests/core": 1,
     "tests/allocation/test_contract.py": 1,
@@ -61,24 +61,28 @@ CALLS_THE_CORE = {
 
 @dataclass(frozen=True)
 class NearTest:
-    """A test, or a function of tests that are quick, and what says how soon it runs."""
+    """A test, or a function whose cases are quick, with its distance and time."""
 
     file: str
     name: str
     distance: int
     """Imports between its file and the change."""
     seconds: float
-    """What it took when it was timed."""
+    """Processor time when it was timed [s]."""
 
     @property
     def node(self) -> str:
-        """What pytest calls it."""
+        """Its node id for pytest."""
         return f"{self.file}::{self.name}"
 
     @property
     def order(self) -> tuple[float, str, str]:
-        """What tests are sorted by."""
-        return max(self.seconds, QUICK) * FARTHER**self.distance, self.file, self.name
+        """The key by which tests are sorted: the first one runs first."""
+        return (
+            max(self.seconds, QUICK_SECONDS) * DISTANCE_FACTOR**self.distance,
+            self.file,
+            self.name,
+        )
 
 
 def main() -> int:
@@ -131,23 +135,23 @@ def one_thread() -> dict[str, str]:
 
 
 def pytest_words(tests: list[NearTest]) -> list[str]:
-    """What pytest is told to run tests: their functions in this order, and which timed cases to
-    leave out."""
+    """Returns the arguments of pytest for some tests: their functions in this order, and the timed
+    cases to leave out."""
     chosen = {test.node for test in tests}
     functions = list(dict.fromkeys(node.split("[")[0] for node in (test.node for test in tests)))
     left_out = [name for name in durations() if "[" in name and name not in chosen]
-    wanted = set(functions)
+    functions_run = set(functions)
     return [
         *functions,
-        *(f"--deselect={name}" for name in left_out if name.split("[")[0] in wanted),
+        *(f"--deselect={name}" for name in left_out if name.split("[")[0] in functions_run),
     ]
 
 
 def by_file(tests: list[NearTest]) -> list[NearTest]:
     """Tests file by file, the nearest file first; slow tests after all others."""
     files = list(dict.fromkeys(test.file for test in tests))
-    own = [test for file in files for test in tests if test.file == file]
-    return sorted(own, key=lambda test: test.seconds > SLOW)
+    ordered = [test for file in files for test in tests if test.file == file]
+    return sorted(ordered, key=lambda test: test.seconds > SLOW_SECONDS)
 
 
 def by_halves(tests: list[NearTest]) -> list[NearTest]:
@@ -183,37 +187,37 @@ def near_tests(graph: ImportGraph, changed: list[str], seconds: float = SECONDS)
         changed: paths from its top.
         seconds: sum of their recorded durations. Tests of changed test files run in any case.
     """
-    known = durations()
+    recorded = durations()
     cases: dict[str, list[str]] = {}
-    for node in known:
+    for node in recorded:
         if "[" in node:
             cases.setdefault(node.split("[")[0], []).append(node.split("::")[1])
     sources = [source for path in changed for source in sources_of(graph, path)]
     distances = graph.distances(sources)
-    found = list[NearTest]()
+    candidates = list[NearTest]()
     for file, tree in graph.trees.items():
-        if not is_test_file(file) or (file.startswith(LEFT_OUT) and file not in changed):
+        if not is_test_file(file) or (file.startswith(WHOLE_PROGRAM_TESTS) and file not in changed):
             continue
-        distance = min([distances.get(file, 99), *(kinship(file, source) for source in sources)])
+        distance = min(
+            [distances.get(file, 99), *(distance_by_name(file, source) for source in sources)]
+        )
         if distance == 99:
             continue
         for node in tree.body:
             if isinstance(node, ast.FunctionDef) and node.name.startswith("test"):
                 names = cases.get(f"{file}::{node.name}", [node.name])
-                took = [known.get(f"{file}::{name}", UNKNOWN) for name in names]
-                found += [
-                    NearTest(file, *each)
-                    for each in zip(names, [distance] * len(names), took, strict=True)
-                ]
+                for name in names:
+                    test_seconds = recorded.get(f"{file}::{name}", DEFAULT_SECONDS)
+                    candidates.append(NearTest(file, name, distance, test_seconds))
     chosen = list[NearTest]()
     files = set[str]()
-    left = seconds
-    for test in sorted(found, key=lambda test: test.order):
-        takes = test.seconds + (0.0 if test.file in files else COLLECTED)
-        if test.file in changed or takes <= left:
+    seconds_left = seconds
+    for test in sorted(candidates, key=lambda test: test.order):
+        cost = test.seconds + (0.0 if test.file in files else COLLECTION_SECONDS)
+        if test.file in changed or cost <= seconds_left:
             chosen.append(test)
             files.add(test.file)
-            left -= takes
+            seconds_left -= cost
     return chosen
 
 
@@ -229,9 +233,9 @@ def sources_of(graph: ImportGraph, path: str) -> list[str]:
     if path in graph.trees or path in graph.c_files:
         return [path]
     for folder in Path(path).parents:
-        beside = [file for file in graph.trees if Path(file).parent == folder]
-        if beside:
-            return beside
+        siblings = [file for file in graph.trees if Path(file).parent == folder]
+        if siblings:
+            return siblings
     return []
 
 
@@ -240,23 +244,33 @@ def is_test_file(file: str) -> bool:
     return file.startswith("tests/") and Path(file).name.startswith("test_")
 
 
-def kinship(test: str, source: str) -> int:
-    """The distance of a test file that its name and its folder say: 0 if it is called after the
-    changed file and its folder mirrors that of the file, FOLDER if its folder alone does, elsewhere
-    99. Of C files, whose tests stand in several folders, the name is enough; for the others see
-    CALLS_THE_CORE."""
+def distance_by_name(test: str, source: str) -> int:
+    """Returns the distance of a test file by its name and folder.
+
+    It is 0 where it is called after the changed file and its folder mirrors that file's,
+    FOLDER_DISTANCE where the folder alone does, and 99 elsewhere. Of C files, whose tests stand in
+    several folders, the name is enough; for other tests of them see CALLS_THE_CORE.
+
+    Args:
+        test: the test file.
+        source: the changed file.
+    """
     if source.endswith((".c", ".h")):
         if Path(test).stem == f"test_{Path(source).stem}" and not test.startswith("tests/webapp/"):
             return 0
-        called = [far for place, far in CALLS_THE_CORE.items() if Path(test).is_relative_to(place)]
-        return min(called, default=99)
-    parts = Path(source).parent.parts
-    mirror = Path("tests", *(parts[1:] if parts[:1] == ("finlab",) else parts))
+        distances = [
+            distance
+            for prefix, distance in CALLS_THE_CORE.items()
+            if Path(test).is_relative_to(prefix)
+        ]
+        return min(distances, default=99)
+    folders = Path(source).parent.parts
+    mirror = Path("tests", *(folders[1:] if folders[:1] == ("finlab",) else folders))
     while mirror.parts != ("tests",) and not (ROOT / mirror).is_dir():
         mirror = mirror.parent
     if mirror.parts == ("tests",) or not Path(test).is_relative_to(mirror):
         return 99
-    return 0 if Path(test).stem == f"test_{Path(source).stem}" else FOLDER
+    return 0 if Path(test).stem == f"test_{Path(source).stem}" else FOLDER_DISTANCE
 
 
 if __name__ == "__main__":

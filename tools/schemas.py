@@ -1,6 +1,5 @@
 #!/usr/bin/env python3
-"""The published JSON Schemas, made of the types that files are read with: `make schemas` writes
-them."""
+"""Writes the published JSON Schemas from the types that files are read with: `make schemas`."""
 
 import json
 from pathlib import Path

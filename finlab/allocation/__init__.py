@@ -17,9 +17,18 @@ if TYPE_CHECKING:
     from finlab.allocation.solution import Candidates as Candidates
     from finlab.allocation.solution import Solution as Solution
 
-_HOME = {"Allocation": "allocation", "BatchAllocation": "allocation", "Allocator": "allocator"}
-_HOME |= {"METHODS": "methods", "MethodName": "methods", "Policy": "policy", "PolicyName": "policy"}
-_HOME |= {"Candidates": "solution", "Solution": "solution"}
+_MODULE_OF_NAME = {
+    "METHODS": "methods",
+    "Allocation": "allocation",
+    "Allocator": "allocator",
+    "BatchAllocation": "allocation",
+    "Candidates": "solution",
+    "MethodName": "methods",
+    "Policy": "policy",
+    "PolicyName": "policy",
+    "Solution": "solution",
+}
+"""Where each public name stands."""
 
 __all__ = [
     "METHODS",
@@ -35,6 +44,6 @@ __all__ = [
 
 
 def __getattr__(name: str) -> object:
-    if name not in _HOME:
+    if name not in _MODULE_OF_NAME:
         raise AttributeError(f"module 'finlab.allocation' has no attribute {name!r}")
-    return resolve_name(f"finlab.allocation.{_HOME[name]}:{name}")
+    return resolve_name(f"finlab.allocation.{_MODULE_OF_NAME[name]}:{name}")

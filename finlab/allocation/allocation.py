@@ -1,9 +1,12 @@
-"""The answer of an allocation method: commands, what they give, and what is left undone."""
+"""The answer of an allocation method: commands, what they give, and what is left undone.
+
+`Allocator` makes one; it is plain data, and can be read where no allocator is.
+"""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, ClassVar, Generic, Protocol, Self, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +15,7 @@ from finlab.actuators.actuator import Command
 from finlab.allocation.policy import CLOSEST, Policy
 from finlab.allocation.report import allocation_blocks, doubts, next_measurement
 from finlab.allocation.settings import USUAL_PERIOD_S
-from finlab.allocation.solution import ARRAYS, Candidates, PlainData
+from finlab.allocation.solution import CANDIDATE_ARRAYS, Candidates, PlainData
 from finlab.arrays import Array
 from finlab.display import html, text
 from finlab.layout.damage import Damage
@@ -20,37 +23,26 @@ from finlab.layout.layout import Layout
 from finlab.physics.objective import REACHED, judged_effort, judged_power
 from finlab.physics.plant import Plant, plant_of
 
+if TYPE_CHECKING:
+    from finlab.allocation.question import AnsweredQuestion
+
 Number = TypeVar("Number", float, Array)
 """A figure of one answer, or of each of many (N,)."""
+NOTHING_ASKED = 1e-14
+"""Square of a normalized target below which nothing is asked."""
 CHUNK = 1024
 """Answers that are judged together; keeps memory flat for any number of targets."""
 
 
-class Later(Protocol):
-    """What an answer computes when it is first read."""
-
-    @property
-    def plant(self) -> Plant:
-        """Judge of commands: the laws of all actuators, lost ones included, in the question's
-        flow."""
-        ...
-
-    def notes(self) -> tuple[str, ...]: ...
-    def candidates(self) -> Candidates | None: ...
-    def samples(self) -> Candidates | None: ...
-    def bound(self) -> Array | None: ...
-    def calm_power(self) -> Array | None: ...
-
-
 def read_only(array: Array) -> Array:
-    """Returns an array, which nobody else writes to, after it was made read-only."""
+    """Makes an array read-only, which nobody else writes to, and returns it."""
     array.setflags(write=False)
     return array
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Answer(PlainData, Generic[Number]):
-    """What answers to one target and to many share, as plain data; many have N rows of each array.
+    """What answers to one target and to many have, as plain data; many have N rows of each array.
 
     Arrays are read-only, and nobody else's: no figure changes because an array was written to.
     Properties that take time are computed when they are first read, and kept; copies have all of
@@ -58,10 +50,17 @@ class Answer(PlainData, Generic[Number]):
     """
 
     LAZY: ClassVar[tuple[str, ...]] = (
-        *("forces", "wrench", "err_norm", "power", "effort", "bound", "expected_miss", "notes"),
+        "forces",
+        "wrench",
+        "err_norm",
+        "power",
+        "effort",
+        "bound",
+        "expected_miss",
+        "notes",
     )
     """Properties that are computed when they are first read."""
-    HELD: ClassVar[tuple[str, ...]] = ("target", "command", "scale", "flow", "wrench_expected")
+    ARRAYS: ClassVar[tuple[str, ...]] = ("target", "command", "scale", "flow", "wrench_expected")
     """Fields with arrays."""
 
     layout: Layout
@@ -73,7 +72,7 @@ class Answer(PlainData, Generic[Number]):
     command: Array
     """Command (n, 3) or (N, n, 3) of every actuator, as its law takes it; NaN if lost."""
     scale: Array
-    """Yardstick (6,) of the error [N, N m]; see `finlab.physics.objective`."""
+    """Wrench scale (6,) of the error [N, N m]; see `finlab.physics.objective`."""
     method: str
     """Name of the method that answered."""
     checkpoint: str | None = None
@@ -89,8 +88,8 @@ class Answer(PlainData, Generic[Number]):
     unknown_fins: tuple[str, ...] = ()
     """Names of fins whose model the method's networks have not learned; answers for them are
     wrong."""
-    later: Later | None = field(default=None, compare=False)
-    """Gives the lazy properties; None in copies, which have them all."""
+    answered: "AnsweredQuestion | None" = field(default=None, compare=False)
+    """Computes the lazy properties; None in copies, which have them all."""
 
     def __post_init__(self) -> None:
         for name, value in self.__dict__.items():
@@ -99,18 +98,15 @@ class Answer(PlainData, Generic[Number]):
 
     @classmethod
     def of(cls, **values: Any) -> Self:
-        """See `PlainData`; the arrays, which are to be the answer's own, are made read-only."""
+        """Makes an answer, see `PlainData`; its arrays, which nobody else may write to, are made
+        read-only."""
         made = super().of(**values)
-        made._keep()
-        return made
-
-    def _keep(self) -> None:
-        """Makes the arrays read-only that the answer has; named, since every tick pays for it."""
-        own = self.__dict__
-        for name in self.HELD:
-            value = own.get(name)
+        # By their names rather than by a search: every tick pays for it.
+        for name in cls.ARRAYS:
+            value = values.get(name)
             if value is not None:
                 value.setflags(write=False)
+        return made
 
     @property
     def lost(self) -> tuple[str, ...]:
@@ -130,12 +126,12 @@ class Answer(PlainData, Generic[Number]):
     @cached_property
     def forces(self) -> Array:
         """Force (n, 3) or (N, n, 3) of each actuator [N], body frame, by its own law; 0 if lost."""
-        return self._by_parts(Plant.body_forces)
+        return self._judged(Plant.body_forces)
 
     @cached_property
     def wrench(self) -> Array:
         """Delivered wrench (6,) or (N, 6) [N, N m] by the actuators' own laws and tables."""
-        return self._by_parts(Plant.wrench)
+        return self._judged(Plant.wrench)
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
@@ -145,7 +141,8 @@ class Answer(PlainData, Generic[Number]):
 
     @cached_property
     def _general_notes(self) -> tuple[str, ...]:
-        return () if self.later is None else self.later.notes()
+        """Sentences about the robot and the method."""
+        return () if self.answered is None else self.answered.notes()
 
     def _doubts(self) -> tuple[str, ...]:
         """Sentences about this very answer."""
@@ -159,7 +156,7 @@ class Answer(PlainData, Generic[Number]):
             return read_only(np.zeros((*self.command.shape[:-2], 6)))
         from finlab.physics.expected_miss import expected_miss
 
-        return self._by_parts(expected_miss)
+        return self._judged(expected_miss)
 
     @cached_property
     def err_norm(self) -> Number:
@@ -176,7 +173,7 @@ class Answer(PlainData, Generic[Number]):
     @cached_property
     def power(self) -> Number:
         """Mean power [W] of a command, by the actuators' own models: of fins mechanical."""
-        return self._number(self._by_parts(judged_power))
+        return self._number(self._judged(judged_power))
 
     @cached_property
     def effort(self) -> Number | None:
@@ -184,43 +181,44 @@ class Answer(PlainData, Generic[Number]):
         fins."""
         if not self.layout.is_of_fins:
             return None
-        return self._number(self._by_parts(lambda plant, rows: judged_effort(plant.layout, rows)))
+        return self._number(self._judged(lambda plant, rows: judged_effort(plant.layout, rows)))
 
     @cached_property
     def bound(self) -> Number | None:
         """Power [W] that no answer for the same wrench can undercut; None for methods that prove
         none."""
-        bound = None if self.later is None else self.later.bound()
+        bound = None if self.answered is None else self.answered.bound()
         return None if bound is None else self._number(bound)
 
     def _number(self, values: Array) -> Number:
-        """A figure of each row; of one answer a plain number."""
+        """Figures (N,) of rows; of one answer the plain number."""
         if self.command.ndim == 3:
             return read_only(values)  # type: ignore[return-value]
         return float(np.ravel(values)[0])  # type: ignore[return-value]
 
     @cached_property
     def _plant(self) -> Plant:
-        """Judge of commands: the laws of all actuators in the question's flow."""
-        return plant_of(self.layout).at(self.flow) if self.later is None else self.later.plant
+        """What judges the commands, in the flow of the question."""
+        return plant_of(self.layout).at(self.flow) if self.answered is None else self.answered.plant
 
-    def _by_parts(self, judge: Callable[[Plant, Array], Array]) -> Array:
-        """Figures of commands, a few at a time."""
+    def _judged(self, figure: Callable[[Plant, Array], Array]) -> Array:
+        """Figures of the commands by the plant, of many in chunks; `figure` takes (N, n, 3)."""
         plant = self._plant
         if self.command.ndim == 2:
-            return read_only(np.asarray(judge(plant, self.command[None])[0]))
+            return read_only(np.asarray(figure(plant, self.command[None])[0]))
         if len(self.command) <= CHUNK:
-            return read_only(judge(plant, self.command))
-        parts = [judge(plant, self.command[rows]) for rows in chunks(len(self.command))]
+            return read_only(figure(plant, self.command))
+        parts = [figure(plant, self.command[rows]) for rows in chunks(len(self.command))]
         return read_only(np.concatenate(parts))
 
     def _equal_names(self) -> list[str]:
+        """Fields, and what is computed of them: two answers are equal if they say the same."""
         return [*super()._equal_names(), *self.LAZY]
 
     def __getstate__(self) -> dict[str, Any]:
         for name in (*self.LAZY, "_general_notes"):
             getattr(self, name)
-        state = {**self.__dict__, "later": None}
+        state = {**self.__dict__, "answered": None}
         state.pop("_plant", None)  # quickly made again
         return state
 
@@ -228,14 +226,16 @@ class Answer(PlainData, Generic[Number]):
         for name, value in state.items():
             if isinstance(value, np.ndarray):
                 value.setflags(write=False)  # a pickle does not keep that
-            self.__dict__[name] = _kept(value) if isinstance(value, Candidates) else value
+            if isinstance(value, Candidates):
+                value = _read_only_candidates(value)
+            self.__dict__[name] = value
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class BatchAllocation(Answer[Array]):
     """Answers to N targets on one layout: plain data, as an `Allocation` is."""
 
-    HELD: ClassVar[tuple[str, ...]] = (*Answer.HELD, "solve_ms")
+    ARRAYS: ClassVar[tuple[str, ...]] = (*Answer.ARRAYS, "solve_ms")
 
     solve_ms: Array = field(compare=False)
     """Time per target (N,) [ms]: the whole time divided by N."""
@@ -246,10 +246,12 @@ class BatchAllocation(Answer[Array]):
         (N,), such as `commands["lift"].force`; with `input`, what a table of thrust says to send.
         None for a lost one."""
         lost = set(self.lost)
-        parts = zip(self.layout.actuators, np.moveaxis(self.command, 1, 0), strict=True)
-        return {
-            part.name: None if part.name in lost else part.commands(rows) for part, rows in parts
-        }
+        rows_of_actuators = np.moveaxis(self.command, 1, 0)
+        commands: dict[str, Command | None] = {}
+        for actuator, rows in zip(self.layout.actuators, rows_of_actuators, strict=True):
+            is_lost = actuator.name in lost
+            commands[actuator.name] = None if is_lost else actuator.commands(rows)
+        return commands
 
     def __getstate__(self) -> dict[str, Any]:
         state = super().__getstate__()
@@ -283,7 +285,7 @@ class Allocation(Answer[float]):
     """
 
     LAZY: ClassVar[tuple[str, ...]] = (*Answer.LAZY, "calm_power", "candidates", "samples")
-    HELD: ClassVar[tuple[str, ...]] = (*Answer.HELD, "previous", "prices")
+    ARRAYS: ClassVar[tuple[str, ...]] = (*Answer.ARRAYS, "previous", "prices")
 
     solve_ms: float = field(compare=False)
     """Time spent solving [ms], judging not included."""
@@ -298,28 +300,29 @@ class Allocation(Answer[float]):
     @property
     def commands(self) -> dict[str, Command | None]:
         """Command of each actuator by its name, in a type of its own; None for a lost one."""
-        parts = zip(self.layout.actuators, self.command, strict=True)
-        return {part.name: part.command(row) for part, row in parts}
+        rows = zip(self.layout.actuators, self.command, strict=True)
+        return {actuator.name: actuator.command(row) for actuator, row in rows}
 
     @cached_property
     def calm_power(self) -> float:
         """Part of the power [W] that goes into less turning, as the setting `calm` weighs it: what
         an answer for the same wrench in the same tick takes less where turning costs nothing. 0
         outside of ticks."""
-        part = None if self.later is None else self.later.calm_power()
-        return 0.0 if part is None else self._number(part)
+        calm_power = None if self.answered is None else self.answered.calm_power()
+        return 0.0 if calm_power is None else self._number(calm_power)
 
     @cached_property
     def candidates(self) -> Candidates | None:
         """Refined candidates, best first; None for methods that have a single answer."""
-        return None if self.later is None else _kept(self.later.candidates())
+        return None if self.answered is None else _read_only_candidates(self.answered.candidates())
 
     @cached_property
     def samples(self) -> Candidates | None:
         """Raw candidates before refinement, best first; None for methods that draw none."""
-        return None if self.later is None else _kept(self.later.samples())
+        return None if self.answered is None else _read_only_candidates(self.answered.samples())
 
     def _doubts(self) -> tuple[str, ...]:
+        """Sentences about its forces, and about whether another one takes less power."""
         return doubts(self)
 
     @cached_property
@@ -338,8 +341,10 @@ class Allocation(Answer[float]):
         """Share of the target that is delivered in its own direction; 1 where nothing is asked."""
         target = np.nan_to_num(self.target / self.scale)
         wrench = self.wrench / self.scale
-        size = float(target @ target)
-        return 1.0 if size < 1e-14 else float(target @ wrench) / size
+        size_squared = float(target @ target)
+        if size_squared < NOTHING_ASKED:
+            return 1.0
+        return float(target @ wrench) / size_squared
 
     @property
     def binding(self) -> tuple[str, ...]:
@@ -358,16 +363,25 @@ class Allocation(Answer[float]):
         return what_binds(self.layout, self.command, missing, self.previous, period_s)
 
     def with_command(self, command: Array) -> Self:
-        """The same question with another command (n, 3) in place of the answer, judged by the
-        plant."""
+        """Returns the same question with another command (n, 3) in place of the answer, judged by
+        the plant."""
         other = replace(self, command=command, wrench_expected=None)
-        if self.later is None:
-            kept = ("bound", "calm_power", "candidates", "samples", "_general_notes")
-            other.__dict__.update({name: getattr(self, name) for name in kept})
+        if self.answered is None:
+            # A copy has computed these already, and has nothing to compute them from again.
+            of_question = ("bound", "calm_power", "candidates", "samples", "_general_notes")
+            other.__dict__.update({name: getattr(self, name) for name in of_question})
         return other
 
     def with_candidates(self, candidates: Candidates | None, samples: Candidates | None) -> Self:
-        """The same answer with other candidates."""
+        """Puts other candidates in place of those of the answer.
+
+        Args:
+            candidates: refined ones; None for none.
+            samples: raw ones; None for none.
+
+        Returns:
+            The same answer with these.
+        """
         return self.of(**{**self.__dict__, "candidates": candidates, "samples": samples})
 
     def __repr__(self) -> str:
@@ -389,16 +403,16 @@ class Allocation(Answer[float]):
         return html(allocation_blocks(self), lambda: robot_picture(self.layout, self.forces))
 
 
-def _kept(candidates: Candidates | None) -> Candidates | None:
+def _read_only_candidates(candidates: Candidates | None) -> Candidates | None:
     """Candidates whose arrays are read-only."""
     if candidates is None:
         return None
     arrays: dict[str, Any] = {}
-    for name in ARRAYS:
+    for name in CANDIDATE_ARRAYS:
         arrays[name] = read_only(getattr(candidates, name).view())
     return replace(candidates, **arrays)
 
 
 def chunks(n: int) -> Iterator[slice]:
-    """Slices of at most `CHUNK` of n rows."""
+    """Yields slices of at most `CHUNK` of n rows."""
     return (slice(start, start + CHUNK) for start in range(0, n, CHUNK))

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,7 +17,9 @@ from finlab.allocation.allocation import Allocation, BatchAllocation, chunks
 from finlab.allocation.method import Checkpoint, Method, Networks
 from finlab.allocation.policy import CLOSEST, Policy, PolicyName, as_policy
 from finlab.allocation.question import (
-    Usable,
+    AnsweredQuestion,
+    CheckedQuestion,
+    RobotState,
     check_flow,
     check_layout,
     check_previous,
@@ -27,9 +29,9 @@ from finlab.allocation.question import (
     check_wrenches,
     damage_of,
     free_mask,
-    usable,
+    without_lost,
+    working_actuators,
 )
-from finlab.allocation.report import answer_notes
 from finlab.allocation.settings import Settings
 from finlab.allocation.solution import Candidates, Rows, Solution, joined
 from finlab.arrays import Array
@@ -38,100 +40,10 @@ from finlab.errors import AllocationError
 from finlab.layout.damage import WHOLE, Damage
 from finlab.layout.layout import Layout
 from finlab.physics.objective import yardstick
-from finlab.physics.plant import Plant, plant_of
+from finlab.physics.plant import plant_of
 
-MOST_PREPARED = 32
-"""Damaged states of the robot that an allocator keeps prepared."""
-
-
-class Ready(NamedTuple):
-    """A state of the robot that is ready for questions."""
-
-    robot: Usable
-    """Which actuators may be used."""
-    method: Method
-    """Made for these, or for all where it takes losses with the question."""
-    plant: Plant
-    """Of all actuators; judges."""
-    free: NDArray[np.bool_] | None
-    """Axes (6,) that do not count; None where all do."""
-
-    def freed(self, wrenches: Array, value: float) -> Array:
-        """Wrenches (..., 6) with a value in the axes that do not count; themselves where all do."""
-        return wrenches if self.free is None else np.where(self.free, value, wrenches)
-
-
-class Question(NamedTuple):
-    """A checked question but for its wrenches."""
-
-    ready: Ready
-    policy: Policy
-    flow: Array | None
-    seed: int
-
-    def solution(
-        self, targets: Array, previous: Array | None = None, offset: int = 0, **options: Any
-    ) -> Solution:
-        """The answer to targets (N, 6) for all actuators, NaN for lost ones; in a tick after
-        commands (n, 3) never outside of what the drives' limits and rates allow, else with rest for
-        actuators that have nothing to do."""
-        robot, method, *_ = self.ready
-        if method.takes_losses:
-            options["lost"] = robot.lost
-            options["free"] = self.ready.free
-        elif previous is not None:
-            options["previous"] = previous[robot.alive]
-        if method.takes_losses and previous is not None:
-            options["previous"] = previous
-        solution = method.solve(
-            targets, policy=self.policy, flow=self.flow, seed=self.seed + offset, **options
-        )
-        if previous is None:
-            return solution._replace(command=method.plant.rested(solution.command))
-        box = method.rates.box(options["previous"])
-        return solution._replace(command=box.held(solution.command, method.plant))
-
-
-class Answered(NamedTuple):
-    """A question with its answer: what a result computes when it is first read."""
-
-    question: Question
-    wrenches: Array
-    """As they came, (6,) or (N, 6)."""
-    solution: Solution
-
-    @property
-    def plant(self) -> Plant:
-        return self.question.ready.plant.at(self.question.flow)
-
-    def notes(self) -> tuple[str, ...]:
-        (robot, method, _, free), _, flow, _ = self.question
-        wanted = self.wrenches
-        if free is not None:  # of an axis that the layout does not command a note tells
-            wanted = np.where(free & robot.layout.commanded, 0.0, wanted)
-        return answer_notes(robot.healthy, method, flow, wanted, self.solution.notes)
-
-    def candidates(self) -> Candidates | None:
-        return self._among_all(self.solution.candidates)
-
-    def samples(self) -> Candidates | None:
-        return self._among_all(self.solution.samples)
-
-    def bound(self) -> Array | None:
-        own = self.solution.bound
-        return None if own is None else own(self.solution.command)
-
-    def calm_power(self) -> Array | None:
-        own = self.solution.calm_power
-        return None if own is None else own(self.solution.command)
-
-    def _among_all(self, make: Callable[[], Candidates] | None) -> Candidates | None:
-        """Candidates of the healthy actuators, put among all."""
-        robot = self.question.ready.robot
-        own = None if make is None else make()
-        return (
-            replace(own, command=robot.among_all(own.command)) if own and robot.damage.lost else own
-        )
+MAX_STATES = 32
+"""States of the robot, other than undamaged with all axes, that an allocator keeps prepared."""
 
 
 class Allocator:
@@ -182,21 +94,23 @@ class Allocator:
         named = {"robust": robust, "period_s": period_s, "calm": calm}
         settings |= {name: value for name, value in named.items() if value is not None}
         if isinstance(method, str):
-            self._made(layout, methods.choose_method(method, checkpoint, **settings))
+            choice = methods.choose_method(method, checkpoint, **settings)
         elif isinstance(method, type) and issubclass(method, Method):
-            known = methods.checked_settings(method, settings)
-            self._made(
-                layout, methods.MethodChoice(method, known, method.read_networks(checkpoint))
-            )
+            checked = methods.checked_settings(method, settings)
+            choice = methods.MethodChoice(method, checked, method.read_networks(checkpoint))
         else:
             raise AllocationError(f"method: expected the name of a method, got {method!r:.60}")
+        self._prepare(layout, choice)
 
     @classmethod
     def from_bundle(cls, path: str | os.PathLike[str]) -> Allocator:
-        """The allocator of a bundle's robot, as `finlab export` wrote it.
+        """Makes the allocator of a bundle's robot, as `finlab export` wrote it.
 
         Args:
             path: of the bundle, a folder or a zip archive.
+
+        Returns:
+            An allocator with the layout, method, networks and settings of the bundle.
 
         Raises:
             DataError: the bundle cannot be read, or was changed.
@@ -211,23 +125,33 @@ class Allocator:
 
     @classmethod
     def of_choice(cls, layout: Layout, choice: methods.MethodChoice) -> Allocator:
-        """The allocator of a robot by a method with its networks and settings."""
+        """Makes the allocator of a robot.
+
+        Args:
+            layout: the robot.
+            choice: the method, with its networks and settings.
+
+        Returns:
+            The allocator, whose robot is undamaged.
+        """
         made = cls.__new__(cls)
-        made._made(layout, choice)
+        made._prepare(layout, choice)
         return made
 
-    def _made(self, layout: Layout, choice: methods.MethodChoice) -> None:
+    def _prepare(self, layout: Layout, choice: methods.MethodChoice) -> None:
+        """Prepares the undamaged robot; all constructors end here."""
         self._layout = layout
         self._choice = choice
         self._scale = yardstick(layout)
-        self._whole = self._make(WHOLE)
-        self._prepared: dict[object, Ready] = {}
+        self._whole = self._make_state(WHOLE)
+        self._states: dict[object, RobotState] = {}
+        """States that were asked for, by damage and free axes; the one asked for last is last."""
 
     def __getstate__(self) -> dict[str, Any]:
         return {"layout": self._layout, "choice": self._choice}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self._made(state["layout"], state["choice"])
+        self._prepare(state["layout"], state["choice"])
 
     def __deepcopy__(self, memo: object) -> Self:
         return type(self).of_choice(self._layout, self._choice)  # type: ignore[return-value]
@@ -274,7 +198,7 @@ class Allocator:
         return self._whole.method.unknown_fins
 
     def on(self, layout: Layout) -> Allocator:
-        """Another allocator by the same method, networks and settings, for another robot."""
+        """Returns an allocator by the same method, networks and settings, for another robot."""
         return self.of_choice(layout, self._choice)
 
     def allocate(
@@ -290,7 +214,7 @@ class Allocator:
         flow: ArrayLike | None = None,
         seed: int = 0,
     ) -> Allocation:
-        """Commands for one target.
+        """Finds the commands for one target.
 
         Args:
             wrench: desired wrench (6,) [N, N m] in the body frame.
@@ -308,8 +232,11 @@ class Allocator:
                 as those do that the layout does not command.
             policy: what to do when the wrench is out of reach; see `Policy`.
             flow: velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at
-            rest.
+                rest.
             seed: the same target and seed give the same answer.
+
+        Returns:
+            Commands of all actuators, and what they give.
 
         Raises:
             CommandError: the wrench is not six finite numbers, no axis counts, or another array has
@@ -318,51 +245,59 @@ class Allocator:
             LayoutError: an unknown actuator, or none left.
             DataError: a fin's force table cannot be read.
         """
-        values = check_target(wrench)
-        known = damage_of(damage, lost)
-        question = self._question(known, policy, flow, seed, free)
-        ready = question.ready
-        robot = ready.robot
-        method = ready.method
+        wrench_asked = check_target(wrench)
+        question = self._question(damage_of(damage, lost), policy, flow, seed, free)
+        state = question.state
+        method = state.method
         options: dict[str, Any] = {}
         if isinstance(previous, Allocation):
             if method.begins_at_prices and previous.prices is not None:
                 options["prices"] = previous.prices
             previous = previous.command
-        before = None if previous is None else check_previous(previous, robot.layout)
+        command_previous = None if previous is None else check_previous(previous, state.layout)
+
         start = time.perf_counter()
-        target = values
+        target = wrench_asked
         if reference is not None:
-            expected = check_reference(reference)
-            target = method.in_time(target, expected)
+            wrenches_expected = check_reference(reference)
+            target = method.in_time(target, wrenches_expected)
             if method.looks_ahead:
-                options["reference"] = ready.freed(expected, 0.0)
-        solution = question.solution(ready.freed(target, 0.0)[None], before, **options)
+                options["reference"] = state.with_free_axes(wrenches_expected, 0.0)
+        targets = state.with_free_axes(target, 0.0)[None]
+        solution = question.solve(targets, command_previous, **options)
         solve_ms = (time.perf_counter() - start) * 1e3
+
+        target_shown = state.with_free_axes(target, np.nan).copy()
         return Allocation.of(
-            **self._about(question, ready.freed(target, np.nan).copy(), values, solution),
-            command=robot.among_all(solution.command)[0].copy(),
+            **self._common_fields(question, target_shown, wrench_asked, solution),
+            command=state.among_all(solution.command)[0].copy(),
             solve_ms=solve_ms,
             settings=vars(self.settings).copy(),
-            previous=before,
+            previous=command_previous,
             wrench_expected=None if solution.wrench is None else solution.wrench[0],
             prices=None if solution.prices is None else solution.prices[0],
         )
 
     def refinement(self, result: Allocation) -> tuple[Candidates, ...]:
-        """What a network proposes for the question of a result, whoever answered it, then the same
-        rows after each step of their refinement; nothing for methods that have no such proposals.
+        """Returns what a network proposes for the question of a result, step by step.
+
+        Args:
+            result: an answer of this allocator, or of another one for the same robot.
+
+        Returns:
+            The proposals, then the same rows after each step of their refinement; nothing for
+            methods without proposals.
 
         Raises:
             AllocationError: the answer is of another robot.
         """
-        ready = self._ready_for(result)
-        ways = ready.method.refinement(
+        state = self._state_of(result)
+        steps = state.method.refinement(
             np.nan_to_num(result.target), flow=result.flow, seed=result.seed
         )
-        if ready.robot.alive.all():
-            return ways
-        return tuple(replace(way, command=ready.robot.among_all(way.command)) for way in ways)
+        if state.works.all():
+            return steps
+        return tuple(replace(step, command=state.among_all(step.command)) for step in steps)
 
     def allocate_batch(
         self,
@@ -375,29 +310,45 @@ class Allocator:
         flow: ArrayLike | None = None,
         seed: int = 0,
     ) -> BatchAllocation:
-        """Commands for many targets (N, 6); arguments and errors as in `allocate`.
+        """Finds the commands for many targets.
 
-        The answer keeps a copy of the targets, and the commands; what else there is to tell is
-        computed when it is asked for.
+        Args:
+            wrenches: desired wrenches (N, 6) [N, N m] in the body frame.
+            lost: as in `allocate`, as are all that follow.
+            damage: actuators that work in part.
+            free: names of axes that may take any wrench.
+            policy: what to do where a wrench is out of reach.
+            flow: velocity (6,) of the body relative to the water [m/s, rad/s]; None at rest.
+            seed: the same target and seed give the same answer, whatever the batch.
+
+        Returns:
+            The targets and the commands; what else there is to tell is computed when it is first
+            read.
+
+        Raises:
+            CommandError: the wrenches are no (N, 6) of finite numbers, or as in `allocate`.
+            AllocationError: the method does not know the policy.
+            LayoutError: an unknown actuator, or none left.
+            DataError: a fin's force table cannot be read.
         """
-        values = check_wrenches(wrenches)
-        known = damage_of(damage, lost)
-        question = self._question(known, policy, flow, seed, free)
-        ready = question.ready
+        wrenches_asked = check_wrenches(wrenches)
+        question = self._question(damage_of(damage, lost), policy, flow, seed, free)
+        state = question.state
         start = time.perf_counter()
 
         def parts() -> Iterator[tuple[Rows, Solution]]:
-            for rows in chunks(len(values)):
-                targets = ready.freed(values[rows], 0.0)
-                yield rows, question.solution(targets, offset=rows.start)
+            for rows in chunks(len(wrenches_asked)):
+                targets = state.with_free_axes(wrenches_asked[rows], 0.0)
+                yield rows, question.solve(targets, offset=rows.start)
 
-        solution = joined(parts(), len(values), ready.robot.alive)
-        targets = ready.freed(values, np.nan)
+        solution = joined(parts(), len(wrenches_asked), state.works)
+        targets_shown = state.with_free_axes(wrenches_asked, np.nan)
         elapsed_ms = (time.perf_counter() - start) * 1e3
+        count = len(targets_shown)
         return BatchAllocation.of(
-            **self._about(question, targets, values, solution),
+            **self._common_fields(question, targets_shown, wrenches_asked, solution),
             command=solution.command,
-            solve_ms=np.broadcast_to(elapsed_ms / max(len(targets), 1), len(targets)),
+            solve_ms=np.broadcast_to(elapsed_ms / max(count, 1), count),
             wrench_expected=solution.wrench,
         )
 
@@ -408,70 +359,88 @@ class Allocator:
         flow: ArrayLike | None,
         seed: int,
         free: Sequence[str] = (),
-    ) -> Question:
-        policy = as_policy(policy)
+    ) -> CheckedQuestion:
+        """Checks the arguments of a question, and prepares the robot in the state they name."""
+        checked_policy = as_policy(policy)
         check_seed(seed)
-        water = check_flow(flow)
-        ready = self._ready(damage, free)
-        ready.method.check_policy(policy)
-        return Question(ready, policy, water, int(seed))
+        checked_flow = check_flow(flow)
+        state = self._state(damage, free)
+        state.method.check_policy(checked_policy)
+        return CheckedQuestion(state, checked_policy, checked_flow, int(seed))
 
-    def _about(
-        self, question: Question, target: Array, values: Array, solution: Solution
+    def _common_fields(
+        self, question: CheckedQuestion, target: Array, wrenches: Array, solution: Solution
     ) -> dict[str, Any]:
-        """Fields that answers to one target and to many share; `values` are the wrenches as they
-        came."""
-        (robot, method, *_), policy, flow, seed = question
+        """Fields that answers to one target and to many share.
+
+        Args:
+            question: all but the wrenches.
+            target: what was answered (6,) or (N, 6), NaN along free axes.
+            wrenches: what was asked, of the same shape.
+            solution: of the method.
+
+        Returns:
+            Values by the names of the fields.
+        """
+        state = question.state
         return dict(
-            layout=robot.layout,
-            damage=robot.damage,
+            layout=state.layout,
+            damage=state.damage,
             target=target,
             scale=self._scale,
-            method=method.name,
+            method=state.method.name,
             checkpoint=self.checkpoint,
-            policy=policy,
-            flow=flow,
-            seed=seed,
-            unknown_fins=method.unknown_fins,
-            later=Answered(question, values, solution),
+            policy=question.policy,
+            flow=question.flow,
+            seed=question.seed,
+            unknown_fins=state.method.unknown_fins,
+            answered=AnsweredQuestion(question, wrenches, solution),
         )
 
-    def _ready_for(self, result: Allocation) -> Ready:
-        """The robot as it was when it was asked."""
-        ready = self._ready(result.damage)
-        if ready.robot.layout != result.layout:
+    def _state_of(self, result: Allocation) -> RobotState:
+        """Returns the state of the robot for which a result was made."""
+        state = self._state(result.damage)
+        if state.layout != result.layout:
             raise AllocationError(
                 f"this answer is of layout {result.layout.name!r:.60}, and this allocator is for "
                 f"{self._layout.name!r:.60} as it was made; ask the allocator that answered"
             )
-        return ready
+        return state
 
-    def _ready(self, damage: Damage, free: Sequence[str] = ()) -> Ready:
-        """The robot in a state, asked for all axes but some, prepared now or kept from an earlier
-        question."""
+    def _state(self, damage: Damage, free: Sequence[str] = ()) -> RobotState:
+        """Returns the robot with a damage, asked for all axes but some: from the cache, or prepared
+        now."""
         if damage == WHOLE and not len(free):
             return self._whole
         mask = free_mask(self._layout, free)
         key = damage, None if mask is None else mask.tobytes()
-        ready = self._prepared.pop(key, None) or self._make(damage, mask)
-        self._prepared[key] = ready  # the newest is last
-        while len(self._prepared) > MOST_PREPARED:
-            self._prepared.pop(next(iter(self._prepared)), None)
-        return ready
+        state = self._states.pop(key, None) or self._make_state(damage, mask)
+        self._states[key] = state  # at the end, so that the first is the one to leave
+        while len(self._states) > MAX_STATES:
+            self._states.pop(next(iter(self._states)), None)
+        return state
 
-    def _make(self, damage: Damage, free: NDArray[np.bool_] | None = None) -> Ready:
-        """The robot in a state. A method that takes losses with the question is that of the state
-        without any, and a loss prepares nothing."""
-        robot = usable(self._layout, damage)
+    def _make_state(self, damage: Damage, free: NDArray[np.bool_] | None = None) -> RobotState:
+        """Prepares the robot with a damage, asked for all axes but some (6,).
+
+        A method that takes losses with the question is that of the state without any: a loss, or a
+        free axis, prepares nothing.
+        """
+        damaged = damage.applied_to(self._layout)
+        works = working_actuators(damaged, damage)
         choice = self._choice
-        counts = self._layout.commanded if free is None else self._layout.commanded & ~free
-        none_count = None if counts.all() else ~counts
-        if choice.kind.takes_losses and (robot.damage.lost or free is not None):
-            rest = self._ready(replace(damage, lost=()))
-            return Ready(robot, rest.method, rest.plant, none_count)
-        layout = robot.healthy if free is None else replace(robot.healthy, axes=axes_in(counts))
+        commanded = self._layout.commanded if free is None else self._layout.commanded & ~free
+        free_axes = None if commanded.all() else ~commanded
+        if choice.kind.takes_losses and (damage.lost or free is not None):
+            without_loss = self._state(replace(damage, lost=()))
+            return RobotState(
+                damaged, damage, works, without_loss.method, without_loss.plant, free_axes
+            )
+        layout = without_lost(damaged, damage)
+        if free is not None:
+            layout = replace(layout, axes=axes_in(commanded))
         method = choice.kind(layout, choice.settings, self._scale, choice.weights)
-        return Ready(robot, method, plant_of(robot.layout), none_count)
+        return RobotState(damaged, damage, works, method, plant_of(damaged), free_axes)
 
     def __repr__(self) -> str:
         return f"Allocator({self._layout.name!r:.60}, method={self.method!r})"

@@ -1,5 +1,5 @@
 """What keeps a robot from delivering a wrench: limits, rates and dead bands of its actuators, in
-words."""
+sentences; `Allocation.binding` and the judge of logs ask for them."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,106 +12,136 @@ WITHIN = 1e-3
 """Share of a range, or of what a rate allows in a tick, within which a command is at its end."""
 ROUNDING = 1e-9
 """By how much a command may miss the end of a range that has no width."""
+MISSING_SHARE = 0.1
+"""Share of what is missing along the worst axis from which on another axis is named."""
+NO_ANGLE = -1
+"""Index of the angle in commands that have none."""
 
 
 def limits_reached(layout: Layout, command: Array) -> tuple[str, ...]:
-    """Returns sentences about the actuators of a robot that a command (n, 3) has at their limits.
+    """Names the actuators that a command has at their limits.
 
     Args:
-        layout: the robot.
+        layout: the robot of n actuators.
         command: (n, 3), NaN for a lost one.
+
+    Returns:
+        A sentence for each.
     """
-    full, ended = at_limits(layout, command)
-    return limit_words(layout, full, ended)
+    at_full_thrust, at_end_of_arc = at_limits(layout, command)
+    return limit_words(layout, at_full_thrust, at_end_of_arc)
 
 
 def at_limits(layout: Layout, command: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Returns which actuators are at full thrust (..., n), and which at the end of their arc (...,
-    n).
+    """Finds the actuators at their limits.
 
     Args:
-        layout: the robot.
-        command: (..., n, 3), NaN for a lost one, which is at neither.
+        layout: the robot of n actuators.
+        command: (..., n, 3), NaN for a lost one, which is at neither limit.
+
+    Returns:
+        Which actuators are at full thrust (..., n), and which at the end of their arc (..., n).
     """
-    full, ended = (np.zeros(command.shape[:-1], bool) for _ in range(2))
-    for i, part in enumerate(layout.actuators):
+    at_full_thrust = np.zeros(command.shape[:-1], bool)
+    at_end_of_arc = np.zeros(command.shape[:-1], bool)
+    for i, actuator in enumerate(layout.actuators):
         row = command[..., i, :]
-        low = np.array(part.lower)
-        high = np.array(part.upper)
-        pushes = not part.KIND.driven_by_flow
-        angle = -1 if part.KIND.aiming_number is None else part.KIND.aiming_number
-        angle = angle if pushes else 0  # all that a foil is told
+        low = np.array(actuator.lower)
+        high = np.array(actuator.upper)
         slack = WITHIN * (high - low) + ROUNDING
         at_low = row <= low + slack
         at_high = row >= high - slack
+        if actuator.KIND.driven_by_flow:
+            # The deflection is all that a foil is told; the flow says how it pushes.
+            if not is_full_turn(high[0] - low[0]):
+                at_end_of_arc[..., i] = (at_low | at_high)[..., 0]
+            continue
+        angle = NO_ANGLE if actuator.KIND.aiming_number is None else actuator.KIND.aiming_number
         sizes = np.arange(3) != angle
-        if pushes:
-            full[..., i] = (at_high | (at_low & (low < 0.0)))[..., sizes].all(-1)
-        if angle >= 0 and not is_full_turn(high[angle] - low[angle]):
-            rests = at_low[..., sizes].all(-1) if pushes else False
-            ended[..., i] = ~np.asarray(rests) & (at_low | at_high)[..., angle]
-    return full, ended
+        at_full_thrust[..., i] = (at_high | (at_low & (low < 0.0)))[..., sizes].all(-1)
+        if angle != NO_ANGLE and not is_full_turn(high[angle] - low[angle]):
+            is_at_rest = at_low[..., sizes].all(-1)
+            at_end_of_arc[..., i] = ~is_at_rest & (at_low | at_high)[..., angle]
+    return at_full_thrust, at_end_of_arc
 
 
 def limit_words(
-    layout: Layout, full: NDArray[np.bool_], ended: NDArray[np.bool_]
+    layout: Layout, at_full_thrust: NDArray[np.bool_], at_end_of_arc: NDArray[np.bool_]
 ) -> tuple[str, ...]:
-    """Returns the same flags (n,) as sentences."""
+    """Says what `at_limits` has found.
+
+    Args:
+        layout: the robot of n actuators.
+        at_full_thrust: which actuators (n,) are.
+        at_end_of_arc: which actuators (n,) are.
+
+    Returns:
+        A sentence for each.
+    """
     words: list[str] = []
-    for name, is_full, is_ended in zip(layout.names, full, ended, strict=True):
-        if is_full:
+    flags = zip(layout.names, at_full_thrust, at_end_of_arc, strict=True)
+    for name, is_at_full_thrust, is_at_end_of_arc in flags:
+        if is_at_full_thrust:
             words.append(f"{name} at full thrust")
-        if is_ended:
+        if is_at_end_of_arc:
             words.append(f"{name} at the end of its arc")
     return tuple(words)
 
 
 def rate_words(layout: Layout, previous: Array, command: Array, period_s: float) -> tuple[str, ...]:
-    """Returns sentences about the actuators that changed as fast in a tick as their drives allow.
+    """Names the actuators that changed as fast in a tick as their drives allow.
 
     Args:
-        layout: the robot.
+        layout: the robot of n actuators.
         previous: command (n, 3) of the tick before; NaN for an unknown one.
         command: (n, 3), NaN for a lost one.
         period_s: time between ticks [s].
+
+    Returns:
+        A sentence for each.
     """
     words: list[str] = []
-    for part, before, now in zip(layout.actuators, previous, command, strict=True):
-        step = np.array(part.rates) * period_s
-        change = np.abs(now - before)
-        if part.KIND.aiming_number is not None:
-            change[part.KIND.aiming_number] = abs(
-                float(wrapped(now[part.KIND.aiming_number] - before[part.KIND.aiming_number]))
-            )
-        if (np.isfinite(step) & (change >= (1.0 - WITHIN) * step)).any():
-            words.append(f"rate of {part.name}")
+    rows = zip(layout.actuators, previous, command, strict=True)
+    for actuator, row_previous, row in rows:
+        max_change = np.array(actuator.rates) * period_s
+        change = np.abs(row - row_previous)
+        angle = actuator.KIND.aiming_number
+        if angle is not None:
+            change[angle] = abs(float(wrapped(row[angle] - row_previous[angle])))
+        if (np.isfinite(max_change) & (change >= (1.0 - WITHIN) * max_change)).any():
+            words.append(f"rate of {actuator.name}")
     return tuple(words)
 
 
 def band_words(layout: Layout, command: Array) -> tuple[str, ...]:
-    """Returns sentences about the actuators that rest, or are at the edge, of their dead bands, by
-    a command (n, 3)."""
+    """Names the actuators that a command has inside their dead bands, or at their edges.
+
+    Args:
+        layout: the robot of n actuators.
+        command: (n, 3), NaN for a lost one.
+
+    Returns:
+        A sentence for each.
+    """
     words: list[str] = []
-    for part, row in zip(layout.actuators, command, strict=True):
-        band = getattr(part, "dead_band", 0.0)
-        if (
-            band > 0.0
-            and part.KIND.force_number is not None
-            and abs(row[part.KIND.force_number]) <= (1.0 + WITHIN) * band
-        ):
-            words.append(f"dead band of {part.name}")
+    for actuator, row in zip(layout.actuators, command, strict=True):
+        dead_band = getattr(actuator, "dead_band", 0.0)
+        if dead_band <= 0.0 or actuator.KIND.force_number is None:
+            continue
+        if abs(row[actuator.KIND.force_number]) <= (1.0 + WITHIN) * dead_band:
+            words.append(f"dead band of {actuator.name}")
     return tuple(words)
 
 
 def what_binds(
     layout: Layout, command: Array, missing: Array, previous: Array | None, period_s: float
 ) -> tuple[str, ...]:
-    """Returns sentences about what keeps a robot from delivering what is missing.
+    """Says what keeps a robot from delivering what is missing.
 
     Args:
         layout: the robot.
         command: (n, 3), NaN for a lost one.
-        missing: share (6,) of the yardstick that is missing along each axis.
+        missing: what is missing along each axis (6,), over the wrench scale.
         previous: command (n, 3) of the tick before; None outside of ticks.
         period_s: time between ticks [s].
 
@@ -127,6 +157,6 @@ def what_binds(
     words = band_words(layout, command)
     if words:
         return words
-    most = np.abs(missing).max()
-    axes = axes_in(np.abs(missing) >= 0.1 * most)
+    largest = np.abs(missing).max()
+    axes = axes_in(np.abs(missing) >= MISSING_SHARE * largest)
     return (f"{', '.join(axes)} not given apart by these actuators",)

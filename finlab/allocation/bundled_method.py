@@ -8,26 +8,42 @@ from finlab.files.guarded import decoded
 
 
 def bundled_method(files: Files, source: str) -> MethodChoice:
-    """The method of a bundle with what its files hold. Raises CheckpointError: its networks are
-    damaged, or it has none and this finlab has not those that it names; DataError: the bundle is of
-    another format, has a method that runs on no robot, or settings that no robot should try."""
-    place = f"{source}/{ABOUT}"
-    document = parse_json(decoded(files[ABOUT], place, "JSON"), place)
+    """Reads which method a bundle's robot answers with.
+
+    Args:
+        files: of the bundle, by name.
+        source: what errors call the bundle, such as its path.
+
+    Returns:
+        The method, with the networks and settings that the files hold.
+
+    Raises:
+        CheckpointError: its networks are damaged, or it has none and this finlab has not those that
+            it names.
+        DataError: the bundle is of another format, has a method that runs on no robot, or settings
+            that no robot should try.
+    """
+    where = f"{source}/{ABOUT}"
+    document = parse_json(decoded(files[ABOUT], where, "JSON"), where)
     if not isinstance(document, dict) or document.get("format") != FORMAT:
-        raise DataError(f"{place}: expected format {FORMAT}; a bundle is made by `finlab export`")
-    method, checkpoint, values = (document.get(key) for key in ("method", "checkpoint", "settings"))
+        raise DataError(f"{where}: expected format {FORMAT}; a bundle is made by `finlab export`")
+    method = document.get("method")
+    checkpoint = document.get("checkpoint")
+    values = document.get("settings")
     if not isinstance(method, str) or method not in METHODS_ON_BOARD:
         known = ", ".join(METHODS_ON_BOARD)
-        raise DataError(f"{place}: method must be one of {known}, got {method!r:.40}")
+        raise DataError(f"{where}: method must be one of {known}, got {method!r:.40}")
     if not isinstance(checkpoint, str | None) or not isinstance(values, dict):
-        raise DataError(f"{place}: checkpoint must be a name and settings must be keys and values")
+        raise DataError(f"{where}: checkpoint must be a name and settings must be keys and values")
     kind = method_class(method)
     try:
         settings = checked_settings(kind, values)
     except AllocationError as error:
-        raise DataError(f"{place}: settings: {error}") from None
-    inside = {
-        key.removeprefix(NETWORKS): part for key, part in files.items() if key.startswith(NETWORKS)
+        raise DataError(f"{where}: settings: {error}") from None
+    network_files = {
+        path.removeprefix(NETWORKS): content
+        for path, content in files.items()
+        if path.startswith(NETWORKS)
     }
-    networks = kind.networks_in(inside, f"{source}/{NETWORKS.rstrip('/')}", checkpoint)
+    networks = kind.networks_in(network_files, f"{source}/{NETWORKS.rstrip('/')}", checkpoint)
     return MethodChoice(kind, settings, networks)

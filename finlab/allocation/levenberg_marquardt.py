@@ -1,8 +1,9 @@
 """Levenberg-Marquardt on the commands, through closed-form Jacobians of the forces, inside the
-limits.
+limits (Eq. 11).
 
 The last stage of a search: it works in commands, not forces, and with the actuators' own laws, so
-it removes the error that compiled tables leave. The paper's method uses it with its surrogate.
+it removes the error that compiled tables leave. The baselines use it for all, the paper's method
+with its surrogate.
 """
 
 from dataclasses import dataclass, replace
@@ -17,18 +18,21 @@ from finlab.axes import feasible
 from finlab.physics.plant import Plant
 
 if TYPE_CHECKING:
-    from finlab.allocation.rates import Box
+    from finlab.allocation.rates import CommandBox
 
 RIDGE = (1e-9, 1e-14)
 """Regularization of the 6 x 6 systems: absolute, and relative to their trace. Without the latter
 those of strong fins on long levers are singular to rounding."""
-ZERO_DIRECTION = np.array([False, False, True])
-"""Which numbers of a fin's command are angles."""
+FIRST_DAMPING = 1e-6
+"""Damping of the first step: nearly that of Newton, for starts are near."""
+FIN_DIRECTION = np.array([False, False, True])
+"""Which number of a fin's command is an angle. It wraps in a narrow arc, too, as proposals of
+networks may lie a turn away; a thruster has nothing there."""
 
 
 @dataclass(frozen=True, eq=False)
 class CommandProblem:
-    """One layout as the refinement sees it."""
+    """One layout as the refinement sees it: normalized wrenches of commands, and limits."""
 
     forces: Any
     """Gives forces (..., n, 3) [N] of commands by `force`, with derivatives by
@@ -40,8 +44,10 @@ class CommandProblem:
     """Lower limits (n, 3)."""
     upper: AnyArray
     """Upper limits (n, 3)."""
-    full_turn: NDArray[np.bool_]
-    """True (n,) where the zero direction may turn a full circle."""
+    wraps: NDArray[np.bool_]
+    """Angles (n, 3) that are brought near to the middle of their limits by full turns."""
+    no_limits: NDArray[np.bool_]
+    """Those of them (n, 3) that all angles may follow: at +-pi they are at no limit."""
     sigma: Array | None = None
     """What wrenches are divided by (6,), of a plant whose actuators act on each other; None of any
     other."""
@@ -52,15 +58,35 @@ class CommandProblem:
 
     @classmethod
     def of(cls, plant: Plant, sigma: Array) -> Self:
-        """A robot as its actuators' own laws say, wrenches normalized by `sigma` (6,)."""
-        own = None if plant.interaction is None else sigma
+        """Poses the problem by the actuators' own laws.
+
+        Args:
+            plant: of the robot.
+            sigma: what wrenches (6,) are divided by [N, N m].
+
+        Returns:
+            The problem within the limits of the robot.
+        """
         return cls(
-            plant, plant.effectiveness / sigma, plant.lower, plant.upper, plant.full_turn, own
+            forces=plant,
+            effectiveness=plant.effectiveness / sigma,
+            lower=plant.lower,
+            upper=plant.upper,
+            wraps=plant.turns | FIN_DIRECTION,
+            no_limits=plant.turns,
+            sigma=None if plant.interaction is None else sigma,
         )
 
-    def standing(self, works: NDArray[np.bool_] | None, counts: NDArray[np.bool_] | None) -> Self:
-        """Returns the problem of the same robot where some actuators (n,) work and some axes (6,)
-        count."""
+    def restricted(self, works: NDArray[np.bool_] | None, counts: NDArray[np.bool_] | None) -> Self:
+        """Returns the problem of some actuators and some axes.
+
+        Args:
+            works: which actuators (n,) work; None for all.
+            counts: which axes (6,) count; None for all.
+
+        Returns:
+            The problem in which the others give nothing, and the other axes are 0.
+        """
         effectiveness = self.effectiveness
         if works is not None:
             effectiveness = np.where(works[:, None, None], effectiveness, 0.0)
@@ -68,10 +94,10 @@ class CommandProblem:
             effectiveness = np.where(counts, effectiveness, 0.0)
         return replace(self, effectiveness=effectiveness, works=works, counts=counts)
 
-    def after(self, box: "Box") -> Self:
+    def in_tick(self, box: "CommandBox") -> Self:
         """Returns the problem within what may follow the command of the tick before."""
-        full_turn = box.free[:, 2] & self.full_turn
-        return replace(self, lower=box.lower, upper=box.upper, full_turn=full_turn)
+        no_limits = box.free & self.no_limits
+        return replace(self, lower=box.lower, upper=box.upper, no_limits=no_limits)
 
     @cached_property
     def width(self) -> AnyArray:
@@ -80,53 +106,56 @@ class CommandProblem:
 
     @cached_property
     def edges(self) -> tuple[AnyArray, AnyArray]:
-        """Below the first and above the second (n, 3), a command is at its limit; full circles have
-        none."""
-        low = self.lower + NOTHING
-        high = self.upper - NOTHING
-        low[self.full_turn, 2] = -np.inf
-        high[self.full_turn, 2] = np.inf
+        """Below the first and above the second (n, 3), a command is at its limit; angles without
+        limits never are."""
+        low = np.where(self.no_limits, -np.inf, self.lower + NOTHING)
+        high = np.where(self.no_limits, np.inf, self.upper - NOTHING)
         return low, high
 
     def wrench(self, command: AnyArray) -> AnyArray:
-        """Normalized wrenches (R, 6) of commands (R, n, 3)."""
+        """Returns the normalized wrenches (R, 6) of commands (R, n, 3)."""
         return self.wrench_of(self.forces.force(command))
 
     def wrench_of(self, force: AnyArray) -> AnyArray:
-        """The same of forces (R, n, 3)."""
+        """Returns the normalized wrenches (R, 6) of forces (R, n, 3) [N]."""
         effectiveness = self.effectiveness.reshape(-1, 6)
         wrench: AnyArray = force.reshape(len(force), len(effectiveness)).dot(effectiveness)
         if self.sigma is None:
             return wrench
-        acting = force if self.works is None else np.where(self.works[:, None], force, 0.0)
-        offset = self.forces.offset(acting) / self.sigma
-        return wrench + (offset if self.counts is None else np.where(self.counts, offset, 0.0))
+        offset = self.forces.offset(self._of_working(force)) / self.sigma
+        return wrench + self._in_counted_axes(offset)
 
-    def slope(self, command: AnyArray) -> tuple[AnyArray, AnyArray]:
-        """Normalized wrenches (R, 6) of commands (R, n, 3), and their derivatives (R, n, 3, 6)."""
-        force, jacobian = self.forces.force_and_jacobian(command)
+    def wrench_and_jacobian(self, command: AnyArray) -> tuple[AnyArray, AnyArray]:
+        """Returns the normalized wrenches (R, 6) of commands (R, n, 3), and their derivatives J
+        (R, n, 3, 6) by the commands."""
+        force, force_jacobian = self.forces.force_and_jacobian(command)
         if self.sigma is None:
-            return self.wrench_of(force), np.matmul(jacobian, self.effectiveness)
-        acting = force if self.works is None else np.where(self.works[:, None], force, 0.0)
-        offset, effectiveness = self.forces.effect(acting)
+            return self.wrench_of(force), np.matmul(force_jacobian, self.effectiveness)
+        offset, effectiveness = self.forces.effect(self._of_working(force))
         offset = offset / self.sigma
         effectiveness = effectiveness / self.sigma
         if self.works is not None:
             effectiveness = np.where(self.works[:, None, None], effectiveness, 0.0)
-        if self.counts is not None:
-            offset, effectiveness = (
-                np.where(self.counts, each, 0.0) for each in (offset, effectiveness)
-            )
+        offset = self._in_counted_axes(offset)
+        effectiveness = self._in_counted_axes(effectiveness)
         wrench = np.einsum("rnk,nkw->rw", force, self.effectiveness) + offset
-        return wrench, np.matmul(jacobian, effectiveness)
+        return wrench, np.matmul(force_jacobian, effectiveness)
+
+    def _of_working(self, force: AnyArray) -> AnyArray:
+        """Forces (R, n, 3), 0 of the actuators that do not work."""
+        return force if self.works is None else np.where(self.works[:, None], force, 0.0)
+
+    def _in_counted_axes(self, wrench: AnyArray) -> AnyArray:
+        """Wrenches (..., 6), 0 along the axes that do not count."""
+        return wrench if self.counts is None else np.where(self.counts, wrench, 0.0)
 
     def feasible(self, command: AnyArray) -> AnyArray:
-        """Commands (..., n, 3) inside the limits, zero directions wrapped first."""
-        return feasible(command, self.lower, self.upper, ZERO_DIRECTION)
+        """Returns commands (..., n, 3) inside the limits, angles wrapped first."""
+        return feasible(command, self.lower, self.upper, self.wraps)
 
 
-class Refined(NamedTuple):
-    """R refined commands."""
+class RefinedCommands(NamedTuple):
+    """R refined commands, and what they give."""
 
     command: AnyArray
     """(R, n, 3), inside the limits."""
@@ -138,89 +167,108 @@ class Refined(NamedTuple):
 
 def refine(
     problem: CommandProblem, target: AnyArray, command: AnyArray, steps: int, enough: float = 0.0
-) -> Refined:
-    """Reduces the error of commands (R, n, 3) towards normalized targets (R, 6), or one (1, 6), in
-    some steps; a row whose error is `enough` takes no more.
+) -> RefinedCommands:
+    """Reduces the error of commands by Levenberg-Marquardt steps.
 
     Each step is the smallest change, in units of the limit ranges, that cancels the error to first
     order; commands at a limit that would leave it are held.
+
+    Args:
+        problem: the robot.
+        target: normalized wrenches (R, 6), or one (1, 6) for all.
+        command: (R, n, 3) where the steps begin.
+        steps: most steps, those included that are undone.
+        enough: normalized error at which a row takes no further step.
+
+    Returns:
+        For each row the best command on the way, never worse than the first one within the limits.
     """
 
     from finlab.least_squares import Damping, levenberg_marquardt
 
-    def moved(at: _Evaluated, damping: AnyArray, last: bool) -> _Evaluated:
-        # (R, n, 3 commands, 6): change of the normalized wrench per unit of each limit range.
+    def after_step(at: _Iterate, damping: AnyArray, is_last: bool) -> _Iterate:
+        # (R, n, 3, 6): change of the normalized wrench per unit of each limit range.
         jacobian = at.jacobian * problem.width[..., None]
-        there = _step(problem, at, jacobian, damping)
-        there *= problem.width
-        there += at.command
-        return _evaluated(problem, target, problem.feasible(there), at.jacobian if last else None)
+        moved = _step(problem, at, jacobian, damping)
+        moved *= problem.width
+        moved += at.command
+        known_jacobian = at.jacobian if is_last else None
+        return _iterate(problem, target, problem.feasible(moved), known_jacobian)
 
-    # Where nothing better is found this is the answer: it must not lie outside by a turn or a
-    # rounding error.
-    start = _evaluated(problem, target, problem.feasible(command), None if steps else _NO_GRADIENT)
-    best = levenberg_marquardt(start, moved, steps, Damping(1e-6), enough=enough**2)
-    return Refined(best.command, best.wrench, np.sqrt(best.cost))
+    # Where nothing better is found the first command is the answer: it must not lie outside by a
+    # turn or a rounding error.
+    known_jacobian = None if steps else _NO_JACOBIAN
+    start = _iterate(problem, target, problem.feasible(command), known_jacobian)
+    best = levenberg_marquardt(start, after_step, steps, Damping(FIRST_DAMPING), enough=enough**2)
+    return RefinedCommands(best.command, best.wrench, np.sqrt(best.cost))
 
 
-class _Evaluated(NamedTuple):
-    """R commands, normalized wrenches (R, 6), targets minus these, squared sizes of that (R,), and
-    the derivatives of the wrenches (R, n, 3 commands, 6)."""
+class _Iterate(NamedTuple):
+    """R commands between two steps, and what they give."""
 
     command: AnyArray
+    """(R, n, 3)."""
     wrench: AnyArray
+    """Normalized wrenches (R, 6)."""
     residual: AnyArray
+    """Targets minus these wrenches (R, 6)."""
     cost: AnyArray
+    """Squared sizes (R,) of the residuals."""
     jacobian: AnyArray
+    """Derivatives (R, n, 3, 6) of the wrenches by the commands."""
 
 
-_NO_GRADIENT = np.empty((1, 1, 1, 1))
+_NO_JACOBIAN = np.empty((1, 1, 1, 1))
+"""Stands for derivatives that nobody reads, where no step is taken."""
 
 
-def _evaluated(
-    problem: CommandProblem, target: AnyArray, command: AnyArray, jacobian: AnyArray | None
-) -> _Evaluated:
-    """Errors of commands; slopes that are given are not computed again."""
-    if jacobian is None:
-        wrench, jacobian = problem.slope(command)
+def _iterate(
+    problem: CommandProblem, target: AnyArray, command: AnyArray, known_jacobian: AnyArray | None
+) -> _Iterate:
+    """Evaluates commands (R, n, 3); derivatives that are known are not computed again."""
+    if known_jacobian is None:
+        wrench, jacobian = problem.wrench_and_jacobian(command)
     else:
         wrench = problem.wrench(command)
+        jacobian = known_jacobian
     residual = target - wrench
-    return _Evaluated(
-        command, wrench, residual, np.einsum("ri,ri->r", residual, residual), jacobian
-    )
+    cost = np.einsum("ri,ri->r", residual, residual)
+    return _Iterate(command, wrench, residual, cost, jacobian)
 
 
-def _step(
-    problem: CommandProblem, at: _Evaluated, jacobian: AnyArray, damping: AnyArray
-) -> AnyArray:
-    """Damped smallest change (R, n, 3), in units of the limit ranges, that leaves no limit."""
+def _step(problem: CommandProblem, at: _Iterate, jacobian: AnyArray, damping: AnyArray) -> AnyArray:
+    """Damped smallest change (R, n, 3), in units of the limit ranges, that leaves no limit.
+
+    Commands that a first step takes out of their limits are held, and a second step is found by the
+    others; what that one takes out stays where it is.
+    """
     rows, n, _ = at.command.shape
-    free = jacobian.reshape(rows, 3 * n, 6)
-    right = at.residual[..., None]
+    jacobian = jacobian.reshape(rows, 3 * n, 6)
+    residual = at.residual[..., None]
     low, high = problem.edges
     at_low = at.command <= low
     at_high = at.command >= high
 
-    def leaving(step: AnyArray) -> AnyArray:
-        """Which commands (R, n, 3) at a limit a step takes out."""
+    def leaves_limits(step: AnyArray) -> AnyArray:
+        """Which commands (R, n, 3) at a limit a step takes out of it."""
         return np.asarray((at_low & (step < 0.0)) | (at_high & (step > 0.0)))
 
-    step = _smallest_change(free, right, damping).reshape(rows, n, 3)
-    held = leaving(step)
+    step = _smallest_change(jacobian, residual, damping).reshape(rows, n, 3)
+    held = leaves_limits(step)
     if not held.any():
         return step
-    step = _smallest_change(free * ~held.reshape(rows, 3 * n, 1), right, damping).reshape(
-        rows, n, 3
-    )
-    return np.where(leaving(step), 0.0, step)
+    jacobian_of_others = jacobian * ~held.reshape(rows, 3 * n, 1)
+    step = _smallest_change(jacobian_of_others, residual, damping).reshape(rows, n, 3)
+    return np.where(leaves_limits(step), 0.0, step)
 
 
-def _smallest_change(free: AnyArray, right: AnyArray, damping: AnyArray) -> AnyArray:
-    """The change (R, 3n, 1) that gives the wrenches (R, 6, 1) by a Jacobian (R, 3n, 6)."""
-    gram = free.swapaxes(1, 2) @ free
+def _smallest_change(jacobian: AnyArray, residual: AnyArray, damping: AnyArray) -> AnyArray:
+    """The change J^T (J J^T + mu I)^-1 r (R, 3n, 1) of Eq. 11 for residuals r (R, 6, 1); the
+    Jacobians (R, 3n, 6) are given as J^T, the damping mu as (R,)."""
+    gram = jacobian.swapaxes(1, 2) @ jacobian
     diagonal = gram.reshape(-1, 36)[:, ::7]
-    # By the derivatives themselves: no bound holds for fins whose force falls again, or rises from
-    # rest.
-    diagonal += (damping + RIDGE[0] + RIDGE[1] * np.einsum("ri->r", diagonal))[:, None]
-    return np.asarray(free @ solve(gram, right))
+    # Measured by the derivatives themselves: no bound of them holds for fins whose force falls
+    # again, or rises from rest.
+    trace = np.einsum("ri->r", diagonal)
+    diagonal += (damping + RIDGE[0] + RIDGE[1] * trace)[:, None]
+    return np.asarray(jacobian @ solve(gram, residual))

@@ -1,5 +1,9 @@
 """Base of all allocation methods: made once for a layout of healthy actuators, each solves for
-wrenches."""
+wrenches.
+
+`finlab.Allocator` is its only caller. Who writes a method of his own begins with
+docs/howto/allocation-method.md.
+"""
 
 import os
 from abc import ABC, abstractmethod
@@ -66,18 +70,28 @@ class Method(ABC):
     """Whether `solve` takes the `prices` of an earlier answer, to begin there."""
     looks_ahead: ClassVar[bool] = False
     """Whether `solve` takes the `reference` of the next ticks."""
+    needs_networks: ClassVar[bool] = False
+    """Whether it is made with trained networks, of a checkpoint."""
     weights: Networks | None
     """Trained networks; None for methods without."""
 
     def __init__(
         self, layout: Layout, settings: Settings, scale: Array, weights: Networks | None = None
     ) -> None:
-        """Prepares the method for a layout of healthy actuators and the axes that count, with
-        settings of its `settings_class`, the yardstick `scale` (6,) [N, N m] of the whole robot,
-        and trained networks, where it has any. Raises AllocationError: the method cannot work with
-        these settings; CheckpointError: the networks are of another kind; DataError: a fin's force
-        table cannot be read; LayoutError: the robot has an actuator that the method does not
-        take."""
+        """Prepares the method for a robot.
+
+        Args:
+            layout: of healthy actuators, with the axes that count.
+            settings: of its `settings_class`.
+            scale: wrench scale (6,) [N, N m] of the whole robot, by which errors are normalized.
+            weights: trained networks; None for a method without.
+
+        Raises:
+            AllocationError: the method cannot work with these settings.
+            CheckpointError: the networks are of another kind.
+            DataError: a fin's force table cannot be read.
+            LayoutError: the robot has an actuator that the method does not take.
+        """
         self.check_robot(layout)
         self.layout = layout
         self.settings = settings
@@ -99,7 +113,7 @@ class Method(ABC):
 
     @classmethod
     def fits(cls, layout: Layout) -> bool:
-        """Whether the method takes all actuators of a robot."""
+        """Returns whether the method takes all actuators of a robot."""
         try:
             cls.check_robot(layout)
         except LayoutError:
@@ -119,7 +133,16 @@ class Method(ABC):
     def networks_in(
         cls, files: Mapping[str, bytes], source: str, name: str | None
     ) -> Networks | None:
-        """Returns the networks that came with a bundle; None for methods without."""
+        """Reads the networks that came with a bundle.
+
+        Args:
+            files: of the networks, by name; none where they come with finlab.
+            source: what errors call the bundle.
+            name: of the checkpoint; None for the shipped one.
+
+        Returns:
+            The networks; None for methods without.
+        """
         return None
 
     @classmethod
@@ -131,7 +154,7 @@ class Method(ABC):
 
     @classmethod
     def option_names(cls) -> list[str]:
-        """Names of what can be set."""
+        """Returns the names of what can be set."""
         return [field.name for field in fields(cls.settings_class)]
 
     @abstractmethod
@@ -152,29 +175,53 @@ class Method(ABC):
             previous: command (n, 3) of the previous tick, for a single target, or None.
             flow: velocity (6,) of the body relative to the water [m/s, rad/s], or None at rest.
             seed: makes the answer repeatable.
+
+        Returns:
+            Commands (N, n, 3) within the limits, and what else the method has to tell.
         """
 
     def refinement(self, target: Array, *, flow: Array | None, seed: int) -> tuple[Candidates, ...]:
-        """What a network proposes for one target (6,), then the same rows after each step of their
-        refinement; nothing for methods without proposals, or that do not tell."""
+        """Returns what a network proposes for one target, step by step.
+
+        Args:
+            target: desired wrench (6,) [N, N m]; 0 along axes that do not count.
+            flow: velocity (6,) of the body relative to the water [m/s, rad/s]; None at rest.
+            seed: as of the answer.
+
+        Returns:
+            The proposals, then the same rows after each step of their refinement; nothing for
+            methods without proposals, or that do not tell.
+        """
         return ()
 
     def in_time(self, target: Array, reference: Array) -> Array:
-        """Which wrench (6,) is answered: a target (6,), or, where the time between ticks is a
-        setting, that of the moment at which the slowest actuator will have followed, among those of
-        the next K ticks (K, 6); after the last, the last. A command held for a period is late by
-        half of it besides."""
-        if self._late is None:
+        """Returns which wrench is answered.
+
+        Args:
+            target: desired wrench (6,) [N, N m].
+            reference: those of the next K ticks (K, 6).
+
+        Returns:
+            The target; or, where the time between ticks is a setting, the wrench (6,) of the moment
+            at which the slowest actuator will have followed, interpolated between ticks; after the
+            last of them, the last.
+        """
+        if self._delay_ticks is None:
             return target
-        late = int(self._late)
-        last = len(reference)
-        before = reference[min(late, last) - 1] if late and last else target
-        after = reference[min(late + 1, last) - 1] if last else target
-        return np.asarray(before + (self._late - late) * (after - before))
+        whole_ticks = int(self._delay_ticks)
+        count = len(reference)
+        before = target
+        after = target
+        if whole_ticks and count:
+            before = reference[min(whole_ticks, count) - 1]
+        if count:
+            after = reference[min(whole_ticks + 1, count) - 1]
+        return np.asarray(before + (self._delay_ticks - whole_ticks) * (after - before))
 
     @cached_property
-    def _late(self) -> float | None:
-        """By how many ticks commands are late; None where the time between ticks is no setting."""
+    def _delay_ticks(self) -> float | None:
+        """By how many ticks commands are late, half of one since a command is held for a period;
+        None where the time between ticks is no setting."""
         period_s = vars(self.settings).get("period_s")
         return None if period_s is None else self.layout.delay_s / period_s + 0.5
 
@@ -183,13 +230,18 @@ class Method(ABC):
         if not (self.every_policy or policy.is_plain):
             raise AllocationError(
                 f"policy: method {self.name!r} minimizes the plain error and knows nothing else; "
-                "use method "
-                "'dual', or policy 'closest' without axis weights"
+                "use method 'dual', or policy 'closest' without axis weights"
             )
 
     def at(self, flow: Array | None) -> Self:
-        """The same method for a robot that moves through the water with (6,); itself where it feels
-        nothing."""
+        """Returns the method for a robot that moves through the water.
+
+        Args:
+            flow: velocity (6,) of the body relative to the water [m/s, rad/s]; None at rest.
+
+        Returns:
+            Another one, without what was cached; itself where the robot feels nothing.
+        """
         plant = self.plant.at(flow)
         if plant is self.plant:
             return self
@@ -241,8 +293,10 @@ class LeastErrorMethod(Method):
         """Solve for targets (N, 6); see `Method.solve`."""
 
     def solve(self, targets: Array, *, flow: Array | None = None, **question: Any) -> Solution:
+        """Solves for targets in a flow; see `Method.solve`. The policy is the plain one."""
         if len(targets) == 0:
             return Solution(np.empty((0, self.layout.n, 3)))
-        if (moved := self.at(flow)) is not self:
-            return moved.solve(targets, **question)
+        in_flow = self.at(flow)
+        if in_flow is not self:
+            return in_flow.solve(targets, **question)
         return self._solve(targets, seed=question.get("seed", 0), previous=question.get("previous"))

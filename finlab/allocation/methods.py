@@ -1,4 +1,8 @@
-"""All allocation methods by name, and what they are made with."""
+"""All allocation methods by name, and what they are made with.
+
+A new method is a line in `METHODS` and a word of `MethodName`; one that a robot may run from a
+bundle is in `METHODS_ON_BOARD`, too. All else that is to be known of it are facts of its class.
+"""
 
 from __future__ import annotations
 
@@ -38,10 +42,10 @@ METHODS: dict[str, str] = {
     "ipopt": "finlab.allocation.baselines.ipopt:Ipopt",
 }
 """Name -> where its class stands, `module:Class`; it is imported when the method is asked for."""
-LEARNED = ("mdn", "paper")
-"""Methods that need a trained network."""
 METHODS_ON_BOARD = ("dual", "mdn", "paper")
-"""Methods that a bundle can answer with."""
+"""Methods that a bundle can answer with. Their names stand here, and no fact in their classes: a
+bundle is a file of strangers, and what it names is not imported unless it is one of these. They
+need numpy and msgspec alone."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +61,17 @@ class MethodChoice:
 
 
 def method_class(method: str) -> type[Method]:
-    """The class of a method in `METHODS`. Raises AllocationError: there is no such method."""
+    """Imports the class of a method.
+
+    Args:
+        method: a name in `METHODS`.
+
+    Returns:
+        Its class.
+
+    Raises:
+        AllocationError: there is no such method.
+    """
     if method not in METHODS:
         raise AllocationError(f"method: expected one of {', '.join(METHODS)}, got {method!r:.60}")
     kind: type[Method] = resolve_name(METHODS[method])
@@ -65,13 +79,25 @@ def method_class(method: str) -> type[Method]:
 
 
 def choose_method(method: str, checkpoint: Checkpoint = None, **settings: Any) -> MethodChoice:
-    """A method of `METHODS` by name, with its networks and settings. Raises AllocationError:
-    unknown method or setting, or a checkpoint for a method without networks; CheckpointError:
-    missing, corrupt or foreign checkpoint."""
+    """Chooses a method by name, with its networks and settings.
+
+    Args:
+        method: a name in `METHODS`.
+        checkpoint: where its networks come from; None for the shipped ones, or for a method
+            without.
+        settings: by name; those that are not given have their usual values.
+
+    Returns:
+        All that the method needs beside a layout.
+
+    Raises:
+        AllocationError: unknown method or setting, or a checkpoint for a method without networks.
+        CheckpointError: missing, corrupt or foreign checkpoint.
+    """
     kind = method_class(method)
-    if method not in LEARNED and checkpoint is not None:
+    if checkpoint is not None and not kind.needs_networks:
         raise AllocationError(
-            f"checkpoint: method {method!r} has no networks, only {' and '.join(LEARNED)} have; "
+            f"checkpoint: method {method!r} has no networks, only methods with networks take one; "
             "leave it out"
         )
     networks = kind.read_networks(checkpoint)
@@ -79,16 +105,26 @@ def choose_method(method: str, checkpoint: Checkpoint = None, **settings: Any) -
 
 
 def checked_settings(kind: type[Method], settings: dict[str, Any]) -> Settings:
-    """The settings of a method, by name. Raises AllocationError: the method knows no such setting,
-    or cannot work with its value."""
+    """Makes the settings of a method.
+
+    Args:
+        kind: class of the method.
+        settings: values by name.
+
+    Returns:
+        An object of its `settings_class`, which has checked itself.
+
+    Raises:
+        AllocationError: the method knows no such setting, or cannot work with its value.
+    """
     known = kind.option_names()
     if "objective" in settings and "objective" not in known:
         raise AllocationError(
             f"objective: method {kind.name!r} has no choice; 'dual' keeps watts least, 'mdn' and "
-            "'paper' the "
-            "paper's effort, and 'sqp' what it is told"
+            "'paper' the paper's effort, and 'sqp' what it is told"
         )
-    if unknown := [name for name in settings if name not in known]:
+    unknown = [name for name in settings if name not in known]
+    if unknown:
         raise AllocationError(
             f"method {kind.name!r} knows the settings {', '.join(known) or 'none'}, got "
             f"{unknown[0]!r}"

@@ -1,4 +1,4 @@
-"""Policies for wrenches that a robot cannot deliver."""
+"""Policies: what to give for wrenches that a robot cannot deliver (Eqs. 12 to 15)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ PolicyName = Literal["closest", "direction", "priority"]
 """`closest`: least weighted error. `direction`: the same direction, scaled down. `priority`: groups
 of axes, each served as far as those before it allow."""
 KINDS: tuple[PolicyName, ...] = get_args(PolicyName)
-"""All of them."""
+"""Names of all policies."""
 
 
 def check_order(groups: Any, argument: str) -> None:
@@ -79,33 +79,37 @@ class Policy:
     def groups(self) -> list[NDArray[np.bool_]]:
         """For `priority`: masks (6,) of the groups of axes in order; those that are not named come
         last."""
-        named = {axis for group in self.order for axis in group}
-        rest = tuple(axis for axis in AXES if axis not in named)
-        groups = (*self.order, *((rest,) if rest else ()))
-        return [mask_of(group) for group in groups if group]
+        unnamed = set(AXES)
+        for group in self.order:
+            unnamed -= set(group)
+        last = tuple(axis for axis in AXES if axis in unnamed)
+        return [mask_of(group) for group in (*self.order, last) if group]
 
 
 CLOSEST = Policy()
-"""The default."""
+"""The least plain error, the default: all axes weigh the same."""
 
 
 def as_policy(policy: Policy | PolicyName) -> Policy:
-    """A policy from its name."""
+    """Returns a policy from its name, or itself. Raises CommandError: no policy is called so."""
     return policy if isinstance(policy, Policy) else Policy(policy)
 
 
 def policy_from(
     kind: str, axis_weights: Any = None, priority: Sequence[str] | None = None
 ) -> Policy:
-    """A policy as the command line names it.
+    """Makes a policy as the command line names it.
 
     Args:
         kind: one of `KINDS`.
         axis_weights: for `closest`: six weights; all 1 when None.
         priority: for `priority`: groups of axes joined by commas, such as `["Fz", "Tx,Ty"]`.
 
+    Returns:
+        The policy.
+
     Raises:
-        CommandError: one of them is none.
+        CommandError: one of them is not as it should be.
     """
     options: dict[str, Any] = {}
     if axis_weights is not None:

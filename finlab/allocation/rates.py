@@ -1,5 +1,7 @@
-"""What commands may follow a previous one: from tick to tick they change no faster than the drives
-allow."""
+"""What commands may follow those of the tick before: they change no faster than the drives allow.
+
+Used by `Method.rates`, and by the fault monitor, which knows what a healthy drive can do.
+"""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -12,28 +14,37 @@ from finlab.axes import wrapped
 from finlab.physics.plant import Plant
 
 
-class Box(NamedTuple):
-    """Commands that may follow a previous one."""
+class CommandBox(NamedTuple):
+    """Commands of n actuators that may follow those of the tick before: an interval of each number,
+    in the units of the commands."""
 
     lower: Array
-    """Least commands (n, 3); angles that turn freely are counted from the previous one."""
+    """Least commands (n, 3); those of angles in `turns` are counted from the previous angle, and
+    may lie beyond a full turn."""
     upper: Array
-    """Largest commands (n, 3)."""
+    """Largest commands (n, 3), counted in the same way."""
     free: NDArray[np.bool_]
-    """Angles (n, 3) that may be any."""
+    """Angles (n, 3) that may be any: they reach all around the circle in one tick."""
     turns: NDArray[np.bool_]
-    """Angles (n, 3) that are counted around the circle."""
+    """Angles (n, 3) without limits of their own, of which the rates leave an interval."""
 
-    def held(self, command: Array, plant: Plant) -> Array:
-        """Returns commands (..., n, 3) brought into the box, their angles within the limits of a
-        robot; NaN of a lost actuator stays."""
-        return plant.feasible(self.clipped(command))
+    def clip_feasible(self, command: Array, plant: Plant) -> Array:
+        """Brings commands into the box, and their angles within the limits of the robot.
 
-    def clipped(self, command: Array) -> Array:
-        """Commands (..., n, 3) brought into the box."""
+        Args:
+            command: (..., n, 3); NaN of a lost actuator stays.
+            plant: of the robot.
+
+        Returns:
+            Commands (..., n, 3) that the drives can follow and the robot takes.
+        """
+        return plant.feasible(self.clip(command))
+
+    def clip(self, command: Array) -> Array:
+        """Returns commands (..., n, 3) brought into the box, angles by the shorter way round."""
         middle = 0.5 * (self.lower + self.upper)
-        turned = np.where(self.turns, middle + wrapped(command - middle), command)
-        return np.clip(turned, self.lower, self.upper)
+        nearest_turn = np.where(self.turns, middle + wrapped(command - middle), command)
+        return np.clip(nearest_turn, self.lower, self.upper)
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,28 +54,37 @@ class Rates:
     plant: Plant
     """The robot."""
     step: Array
-    """Largest changes (n, 3) in a tick; infinite where nothing limits them."""
+    """Largest changes (n, 3) in a tick, in the units of the commands; infinite where nothing limits
+    them."""
 
     def allow(self, previous: Array, command: Array) -> bool:
-        """Whether a command (n, 3) may follow a previous one (n, 3), of which actuators may be
-        NaN."""
+        """Returns whether a command may follow the one of the tick before.
+
+        Args:
+            previous: (n, 3), NaN where it is unknown, which forbids nothing.
+            command: (n, 3), NaN of lost actuators.
+
+        Returns:
+            True where no number changes by more than `step`, angles by the shorter way round.
+        """
         change = np.abs(command - previous)
         around = np.minimum(change, np.abs(2.0 * np.pi - change))
         return not (np.where(self.plant.turns, around, change) > self.step).any()
 
-    def box(self, previous: Array) -> Box:
-        """What may follow a previous command (n, 3); an actuator with NaN is left free."""
+    def box(self, previous: Array) -> CommandBox:
+        """Returns what may follow the command (n, 3) of the tick before; an actuator with NaN there
+        is held by its limits alone."""
         lower = self.plant.lower
         upper = self.plant.upper
         step = self.step
-        known = np.asarray(np.isfinite(previous).all(axis=1))[:, None]
-        turns = self.plant.turns & known & (step < np.pi)
-        center = np.where(known, np.where(turns, previous, np.clip(previous, lower, upper)), lower)
-        low = np.maximum(center - step, lower)
-        high = np.minimum(center + step, upper)
-        low = np.where(turns, center - step, low)
-        high = np.where(turns, center + step, high)
-        low = np.where(known, low, lower)
-        high = np.where(known, high, upper)
+        is_known = np.asarray(np.isfinite(previous).all(axis=1))[:, None]
+        # A step of half a turn reaches every angle.
+        turns = self.plant.turns & is_known & (step < np.pi)
         free = self.plant.turns & ~turns
-        return Box(np.where(free, lower, low), np.where(free, upper, high), free, turns)
+        center = np.where(turns, previous, np.clip(previous, lower, upper))
+        center = np.where(is_known, center, lower)
+        low = np.where(turns, center - step, np.maximum(center - step, lower))
+        high = np.where(turns, center + step, np.minimum(center + step, upper))
+        low = np.where(is_known & ~free, low, lower)
+        high = np.where(is_known & ~free, high, upper)
+        return CommandBox(low, high, free, turns)

@@ -1,18 +1,19 @@
-"""Settings of methods: one frozen dataclass for each, whose fields carry range, unit and meaning.
+"""What settings of methods are made of: a frozen dataclass for each method, whose fields carry
+range, unit and meaning.
 
 All that asks for settings (a call, a bundle, the app) makes such an object, which checks itself.
+The settings of a method stand in the file of its class.
 """
 
 from dataclasses import Field, dataclass, field, fields
 from numbers import Integral, Real
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 from finlab.errors import AllocationError
-from finlab.physics.objective import Name
 
 USUAL_PERIOD_S = 0.1
 """Time between ticks of methods for which it is no setting [s]."""
-MOST_CANDIDATES = 4096
+MAX_CANDIDATES = 4096
 """Most candidates that may be drawn; more would keep a robot from answering."""
 
 
@@ -32,8 +33,8 @@ class Range(NamedTuple):
 
     def __str__(self) -> str:
         kind = "a whole number" if isinstance(self.low, int) else "a number"
-        first, then = ("above", "up to") if self.above else ("from", "to")
-        return f"{kind} {first} {self.low:g} {then} {self.high:g} {self.unit}".rstrip()
+        low = f"above {self.low:g} up to" if self.above else f"from {self.low:g} to"
+        return f"{kind} {low} {self.high:g} {self.unit}".rstrip()
 
 
 def number(
@@ -45,25 +46,56 @@ def number(
     *,
     above: bool = False,
 ) -> Any:
-    """A field that is a number within a range, a whole one where `low` is; None only as the
-    default."""
+    """Makes a field that is a number within a range.
+
+    Args:
+        default: its usual value; where it is None, None is taken besides.
+        low: least value; only whole numbers are taken where it is one.
+        high: largest value.
+        meaning: what it is, in words that follow its name.
+        unit: of the value.
+        above: whether the least value itself is too little.
+
+    Returns:
+        The field of a dataclass.
+    """
     return field(default=default, metadata={"range": Range(low, high, meaning, unit, above)})
 
 
 def choice(default: str, choices: tuple[str, ...], meaning: str) -> Any:
-    """A field that is one of some words."""
+    """Makes a field that is one of some words.
+
+    Args:
+        default: its usual value.
+        choices: all of them.
+        meaning: what it is, in words that follow its name.
+
+    Returns:
+        The field of a dataclass.
+    """
     return field(default=default, metadata={"choices": choices, "meaning": meaning})
 
 
 def switch(default: bool, meaning: str) -> Any:
-    """A field that is true or false."""
+    """Makes a field that is true or false.
+
+    Args:
+        default: its usual value.
+        meaning: what it is, in words that follow its name.
+
+    Returns:
+        The field of a dataclass.
+    """
     return field(default=default, metadata={"meaning": meaning})
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of a method that has none; base of all others. Raises AllocationError: a value of
-    the wrong kind, or out of its range."""
+    """Settings of a method that has none; base of all others.
+
+    Raises:
+        AllocationError: a value is of the wrong kind, or out of its range.
+    """
 
     def __post_init__(self) -> None:
         for each in fields(self):
@@ -71,42 +103,33 @@ class Settings:
 
 
 def _checked(setting: "Field[Any]", value: Any) -> Any:
-    """The value of a field, of the kind that is meant."""
-    choices = setting.metadata.get("choices")
+    """Returns the value of a field, of the kind that is meant."""
     limits = setting.metadata.get("range")
     if limits is not None:
         return _within(setting, limits, value)
-    if isinstance(value, bool) if choices is None else value in choices:
+    choices = setting.metadata.get("choices")
+    if choices is None:
+        is_right = isinstance(value, bool)
+        expected = "true or false"
+    else:
+        is_right = value in choices
+        expected = f"one of {', '.join(choices)}"
+    if is_right:
         return value
-    expected = "true or false" if choices is None else f"one of {', '.join(choices)}"
     raise AllocationError(f"{setting.name}: expected {expected}, got {value!r:.60}")
 
 
 def _within(setting: "Field[Any]", limits: Range, value: Any) -> float | None:
+    """Returns the number of a field, whole where that is meant."""
     if value is None and setting.default is None:
         return None
-    integer = isinstance(limits.low, int)
-    kind: Any = Integral if integer else Real
-    right = isinstance(value, kind) and not isinstance(value, bool)
-    if right and limits.low <= value <= limits.high and not (limits.above and value == limits.low):
-        return int(value) if integer else float(value)
+    is_whole = isinstance(limits.low, int)
+    kind: Any = Integral if is_whole else Real
+    is_number = isinstance(value, kind) and not isinstance(value, bool)
+    if is_number and limits.low <= value <= limits.high:
+        is_too_little = limits.above and value == limits.low
+        if not is_too_little:
+            return int(value) if is_whole else float(value)
     raise AllocationError(
         f"{setting.name}: expected {limits}, got {value!r:.60} ({limits.meaning})"
     )
-
-
-@dataclass(frozen=True)
-class MdnSettings(Settings):
-    """Settings of method `mdn`: how many ways the mixture proposes, and how many of them are
-    refined."""
-
-    objective: ClassVar[Name] = "effort"
-    """What is kept least."""
-    n_candidates: int = number(
-        48, 1, MOST_CANDIDATES, "proposals K: the components' means by falling weight, then samples"
-    )
-    n_refined: int = number(6, 1, 256, "proposals that are refined and offered as candidates")
-    temperature: float = number(
-        1.0, 0.0, 100.0, "what the variances of the samples are multiplied by"
-    )
-    period_s: float = number(0.1, 0.0, 1000.0, "time between ticks", "s", above=True)

@@ -1,4 +1,7 @@
-"""Solutions that methods hand over before they are judged, and the base of plain data."""
+"""Solutions that methods hand over before they are judged, and the base of plain data.
+
+`Method.solve` returns a `Solution`; `question.py` and `allocation.py` make results of it.
+"""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
@@ -9,8 +12,8 @@ from numpy.typing import NDArray
 
 from finlab.arrays import Array
 
-ARRAYS = ("command", "wrench", "err_norm", "effort", "power")
-"""What candidates have a row of each."""
+CANDIDATE_ARRAYS = ("command", "wrench", "err_norm", "effort", "power")
+"""Fields of `Candidates` that are arrays with a row of each."""
 
 
 class PlainData:
@@ -23,29 +26,40 @@ class PlainData:
         return all(equal(getattr(self, name), getattr(other, name)) for name in self._equal_names())
 
     def _equal_names(self) -> list[str]:
-        """What must be equal."""
+        """Names of the fields and properties that must be equal."""
         return [field.name for field in fields(self) if field.compare]  # type: ignore[arg-type]
 
     __hash__ = None  # type: ignore[assignment]
 
     @classmethod
     def of(cls, **values: Any) -> Self:
-        """One of the values of all its fields, in a fifth of the constructor's time."""
+        """Makes one of the values of all its fields, by name, in a fifth of the constructor's time;
+        nothing is checked."""
         made = object.__new__(cls)
         made.__dict__.update(values)
         return made
 
 
 def equal(a: Any, b: Any) -> bool:
-    """Whether two values are equal: arrays element by element, tuples part by part, NaN to NaN."""
+    """Compares two values, of which either may be an array.
+
+    Args:
+        a: any value.
+        b: any other.
+
+    Returns:
+        Whether they are equal: arrays element by element, tuples part by part, NaN to NaN.
+    """
+    if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
+        may_hold_nan = a.dtype.kind == b.dtype.kind == "f"
+        return np.array_equal(a, b, equal_nan=may_hold_nan)
     if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
-        if not (isinstance(a, np.ndarray) and isinstance(b, np.ndarray)):
-            return False
-        return np.array_equal(a, b, equal_nan=a.dtype.kind == b.dtype.kind == "f")
+        return False
     if isinstance(a, tuple) and isinstance(b, tuple):
         return len(a) == len(b) and all(equal(x, y) for x, y in zip(a, b, strict=True))
     if isinstance(a, float) and isinstance(b, float):
-        return a == b or (a != a and b != b)
+        both_nan = a != a and b != b
+        return a == b or both_nan
     return bool(a == b)
 
 
@@ -69,10 +83,10 @@ class Candidates(PlainData):
     def __len__(self) -> int:
         return len(self.command)
 
-    def rows(self, places: Sequence[int] | slice) -> "Candidates":
-        """Some of them, by their places."""
-        some = places if isinstance(places, slice) else list(places)
-        arrays = {name: getattr(self, name)[some] for name in ARRAYS}
+    def rows(self, indices: Sequence[int] | slice) -> "Candidates":
+        """Returns some of them, by their indices."""
+        some = indices if isinstance(indices, slice) else list(indices)
+        arrays = {name: getattr(self, name)[some] for name in CANDIDATE_ARRAYS}
         return Candidates(**arrays, source=tuple(np.array(self.source, object)[some]))
 
     def split(self, count: int) -> "tuple[Candidates, ...]":
@@ -93,20 +107,20 @@ class Candidates(PlainData):
         return tuple(parts)
 
     def exact(self, within: float) -> "Candidates":
-        """Those whose error is at most that, the ones of least effort first."""
+        """Returns those whose normalized error is at most that, the ones of least effort first."""
         order = self.effort.argsort(kind="stable").tolist()
         return self.rows([k for k in order if self.err_norm[k] <= within])
 
-    def beside(self, others: "Candidates") -> "Candidates":
-        """These, then others."""
-        both = {
-            name: np.concatenate([getattr(self, name), getattr(others, name)]) for name in ARRAYS
-        }
-        return Candidates(**both, source=self.source + others.source)
+    def followed_by(self, others: "Candidates") -> "Candidates":
+        """Returns these, then others."""
+        arrays = {}
+        for name in CANDIDATE_ARRAYS:
+            arrays[name] = np.concatenate([getattr(self, name), getattr(others, name)])
+        return Candidates(**arrays, source=self.source + others.source)
 
 
 class Solution(NamedTuple):
-    """What a method answers to N targets with the n healthy fins of its layout."""
+    """What a method answers to N targets with the n actuators of its layout."""
 
     command: Array
     """Chosen commands (N, n, 3)."""
@@ -129,34 +143,49 @@ class Solution(NamedTuple):
     """Sentences about these answers."""
 
 
-def among_all(command: Array, alive: NDArray[np.bool_]) -> Array:
-    """Commands (..., m, 3) of the actuators that are alive (n,) put among all n; the lost ones hold
-    NaN."""
-    if len(alive) == command.shape[-2]:
+def among_all(command: Array, works: NDArray[np.bool_]) -> Array:
+    """Puts commands of the actuators that work among those of all.
+
+    Args:
+        command: (..., m, 3) of the m that work.
+        works: which of n actuators (n,) do.
+
+    Returns:
+        (..., n, 3), NaN for the lost ones; the same array where all work.
+    """
+    if len(works) == command.shape[-2]:
         return command
-    full = np.full((*command.shape[:-2], len(alive), 3), np.nan)
-    full[..., alive, :] = command
+    full = np.full((*command.shape[:-2], len(works), 3), np.nan)
+    full[..., works, :] = command
     return full
 
 
 Rows = slice | NDArray[np.intp]
-"""Places of targets."""
+"""Indices of targets."""
 
 
 def joined(
-    parts: Iterable[tuple[Rows, Solution]], count: int, alive: NDArray[np.bool_]
+    parts: Iterable[tuple[Rows, Solution]], count: int, works: NDArray[np.bool_]
 ) -> Solution:
-    """Returns one solution for `count` targets and all n actuators, of which some are alive (n,),
-    of solutions for some targets and those that are alive."""
-    command = np.full((count, len(alive), 3), np.nan)
-    places = np.flatnonzero(alive)
-    all_rows = True
+    """Joins solutions for parts of the targets.
+
+    Args:
+        parts: which targets each is for, and the solution, of the actuators that work or of all.
+        count: N, how many targets there are.
+        works: which actuators (n,) work.
+
+    Returns:
+        One solution for N targets and all n actuators, with commands, bound, wrenches and notes.
+    """
+    command = np.full((count, len(works), 3), np.nan)
+    working = np.flatnonzero(works)
+    parts_have_all = True
     bounds: list[tuple[Rows, Callable[[Array], Array]]] = []
     wrench: Array | None = None
     notes: dict[str, None] = {}
     for rows, part in parts:
-        all_rows = part.command.shape[-2] == len(alive)
-        command[rows] = among_all(part.command, alive)
+        parts_have_all = part.command.shape[-2] == len(works)
+        command[rows] = among_all(part.command, works)
         notes |= dict.fromkeys(part.notes)
         if part.bound is not None:
             bounds.append((rows, part.bound))
@@ -166,9 +195,11 @@ def joined(
 
     def bound(command: Array) -> Array:
         result = np.empty(count)
-        for rows, part in bounds:
-            own = command[rows]
-            result[rows] = part(own if all_rows else own[:, places])
+        for rows, bound_of_part in bounds:
+            command_of_part = command[rows]
+            if not parts_have_all:
+                command_of_part = command_of_part[:, working]
+            result[rows] = bound_of_part(command_of_part)
         return result
 
     return Solution(command, bound if bounds else None, wrench=wrench, notes=tuple(notes))

@@ -1,4 +1,4 @@
-"""Axes that the actuators hold, how evenly, and what the loss of each single one costs."""
+"""Axes along which the actuators can push, how evenly, and what the loss of each one costs."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
@@ -16,6 +16,7 @@ from finlab.forces.reach import RANK_TOLERANCE, max_wrench_along_exactly, singul
 from finlab.layout import Layout
 
 MotionAxis = Literal["surge", "sway", "heave", "roll", "pitch", "yaw"]
+"""An axis of motion, in the order of a wrench."""
 AXES: tuple[MotionAxis, ...] = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 NOTHING = 1e-4
 """Largest wrench [N, scaled] below which an axis counts as out of reach; the solver is exact to
@@ -24,16 +25,19 @@ about 1e-5."""
 
 @dataclass(frozen=True)
 class HeldAxes:
-    """Axes that actuators hold, before any limit. Torques are scaled by the lever 0.2 m."""
+    """Axes along which actuators can push, before any limit. Torques are scaled by the lever
+    0.2 m."""
 
     rank: int
+    """Rank of the effectiveness matrix in the axes that count."""
     condition: float | None
     """Largest over smallest singular value; None below the rank of all axes that count."""
-    free: tuple[MotionAxis, ...]  # axes that the robot does not command, which do not count
-    without_authority: tuple[
-        MotionAxis, ...
-    ]  # axes that are commanded and that no actuator pushes at all
-    coupled: tuple[MotionAxis, ...]  # axes that are pushed, but never without pushing others too
+    free: tuple[MotionAxis, ...]
+    """Axes that the robot does not command, which do not count."""
+    without_authority: tuple[MotionAxis, ...]
+    """Axes that are commanded and that no actuator pushes at all."""
+    coupled: tuple[MotionAxis, ...]
+    """Axes that are pushed, but never without pushing others, too."""
 
     @property
     def alone(self) -> tuple[MotionAxis, ...]:
@@ -50,14 +54,15 @@ class HeldAxes:
 
 @dataclass(frozen=True)
 class Authority(HeldAxes):
-    """What a set of actuators holds, within their limits too."""
+    """Axes along which actuators can push, and how far within their limits."""
 
     singular_values: tuple[float, ...]
     """Of the matrix whose columns are the actuators' scaled wrenches at full thrust [N], falling;
     as many as axes count."""
     largest: tuple[float, ...]
     """Largest wrench along each axis with the other five at zero (6,) [N, N m]."""
-    most_negative: tuple[float, ...]  # the same along the negative axes, as a size (6,) [N, N m]
+    most_negative: tuple[float, ...]
+    """The same along the negative axes, as a size (6,) [N, N m]."""
     weakest: float
     """Scaled wrench [N] that is within reach in every direction of the axes that count; 0 below
     that rank."""
@@ -67,28 +72,33 @@ class Authority(HeldAxes):
     @property
     def reachable(self) -> tuple[MotionAxis, ...]:
         """Axes along which something can be had both ways with the other five at zero."""
-        both = zip(AXES, self.largest, self.most_negative, SCALE, strict=True)
-        return tuple(name for name, a, b, unit in both if min(a, b) > NOTHING * unit)
+        ranges = zip(AXES, self.largest, self.most_negative, SCALE, strict=True)
+        return tuple(name for name, a, b, unit in ranges if min(a, b) > NOTHING * unit)
 
 
 @dataclass(frozen=True)
 class Loss:
-    """What the loss of one actuator costs."""
+    """The cost of the loss of one actuator."""
 
     actuator: str
+    """Its name."""
     rank: int
-    reachable: tuple[MotionAxis, ...]  # axes still reachable alone
-    lost: tuple[MotionAxis, ...]  # axes that were and no longer are
+    """Rank that is left."""
+    reachable: tuple[MotionAxis, ...]
+    """Axes that are still reachable alone."""
+    lost: tuple[MotionAxis, ...]
+    """Axes that were reachable alone and no longer are."""
     share_left: tuple[float | None, ...]
     """Share of the largest wrench along each axis that is left (6,), the smaller of both signs;
     None where there was nothing."""
-    weakest: float  # scaled wrench [N] that is within reach in every direction afterwards
+    weakest: float
+    """Scaled wrench [N] that is within reach in every direction afterwards."""
 
 
 def authority(
     layout: Layout, lost: Collection[str] = (), flow: ArrayLike | None = None
 ) -> Authority:
-    """Returns what the working actuators hold; arguments and errors as for `losses`."""
+    """Returns the authority of the working actuators; arguments and errors as for `losses`."""
     return _authorities(layout, [lost], flow)[0]
 
 
@@ -98,42 +108,55 @@ def losses(
     before: Authority | None = None,
     flow: ArrayLike | None = None,
 ) -> tuple[Loss, ...]:
-    """Returns what the loss of each working actuator, on top of `lost`, would cost; none when only
-    one is left. What these hold `before` may be known; `flow` is the velocity (6,) of the body
-    relative to the water [m/s, rad/s], body frame, None at rest. Raises LayoutError: there is no
-    actuator of a name in `lost`."""
-    held = authority(layout, lost, flow) if before is None else before
+    """Returns the cost of the loss of each working actuator; none when only one is left.
+
+    Args:
+        layout: the layout.
+        lost: actuators that are lost already.
+        before: the authority of the others, where it is known.
+        flow: velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at
+            rest.
+
+    Raises:
+        LayoutError: there is no actuator of a name in `lost`.
+    """
+    present = authority(layout, lost, flow) if before is None else before
     working = [name for name in layout.names if name not in lost]
     if len(working) < 2:
         return ()
-    left = _authorities(layout, [(*lost, name) for name in working], flow)
-    return tuple(_loss(held, name, after) for name, after in zip(working, left, strict=True))
+    after_losses = _authorities(layout, [(*lost, name) for name in working], flow)
+    return tuple(
+        _loss(present, name, after) for name, after in zip(working, after_losses, strict=True)
+    )
 
 
 def _authorities(
     layout: Layout, failures: Sequence[Collection[str]], flow: ArrayLike | None
 ) -> list[Authority]:
-    """What is held after each of several failures; one call for all is quicker than many."""
+    """The authority after each of several losses; one call for all is quicker than many."""
     sets = force_sets(layout, flow=flow).tile(len(failures))
     for row, lost in enumerate(failures):
         sets.lose(row, list(layout.indices(tuple(lost), "lost")))
-    counting = sets.along(counted := np.flatnonzero(layout.commanded))
+    counted_rows = np.flatnonzero(layout.commanded)
+    counting = sets.along(counted_rows)
     values, vectors = singular_values(counting)
-    held = [_held(commanded_axes(layout), *pair) for pair in zip(values, vectors, strict=True)]
+    held_of = [_held(commanded_axes(layout), *pair) for pair in zip(values, vectors, strict=True)]
     axes = np.concatenate([np.eye(6), -np.eye(6)])
     size, _ = max_wrench_along_exactly(sets, axes)
     if flow is not None and layout.by_flow:
         # The hull of a rudder's lift and drag has drag without lift, which pushes alone what
         # nothing does.
-        alone = np.array([[axis in own.alone for axis in AXES] for own in held])
-        size = np.where(np.tile(alone, 2), size, 0.0)
+        pushed_alone = np.array(
+            [[axis in held_axes_of.alone for axis in AXES] for held_axes_of in held_of]
+        )
+        size = np.where(np.tile(pushed_alone, 2), size, 0.0)
     size = np.where(size > NOTHING, size, 0.0)
     least = weakest(counting)
     direction = np.zeros((len(failures), 6))
-    direction[:, counted] = least.direction
+    direction[:, counted_rows] = least.direction
     return [
         Authority(
-            **vars(held[k]),
+            **vars(held_of[k]),
             singular_values=tuple(values[k].tolist()),
             largest=tuple((size[k, :6] * SCALE).tolist()),
             most_negative=tuple((size[k, 6:] * SCALE).tolist()),
@@ -150,8 +173,11 @@ def commanded_axes(layout: Layout) -> tuple[MotionAxis, ...]:
 
 
 def named_axes(names: Sequence[MotionAxis]) -> tuple[Axis, ...]:
-    """Returns the axes of a wrench, each once, in order, of some of `AXES`. Raises LayoutError:
-    there is none, or one of another name."""
+    """Returns the axes of a wrench for some of `AXES`, each once and in order.
+
+    Raises:
+        LayoutError: there is none, or one of another name.
+    """
     wrong = [name for name in names if name not in AXES]
     if wrong or not names:
         raise LayoutError(
@@ -161,23 +187,24 @@ def named_axes(names: Sequence[MotionAxis]) -> tuple[Axis, ...]:
 
 
 def held_axes(layout: Layout, sets: ForceSets) -> list[HeldAxes]:
-    """Returns what the sets of variants of a layout hold of the axes that it commands."""
+    """Returns the axes along which the sets of variants of a layout can push, of those that it
+    commands."""
     axes = commanded_axes(layout)
     values, vectors = singular_values(sets.along(np.flatnonzero(layout.commanded)))
     return [_held(axes, *pair) for pair in zip(values, vectors, strict=True)]
 
 
 def _held(axes: tuple[MotionAxis, ...], values: Array, vectors: Array) -> HeldAxes:
-    """What singular values (m,), falling, and left vectors (m, m) hold of m axes."""
-    kept = values > RANK_TOLERANCE * max(values[0], 1e-9)
-    # How much of each axis lies in the span of all wrenches: one that is held whole can be pushed
-    # alone.
-    held = np.linalg.norm(vectors[:, kept], axis=1)
-    pushed = held > RANK_TOLERANCE
-    coupled = pushed & (held <= 1.0 - RANK_TOLERANCE)
+    """The axes that can be pushed, by singular values (m,), falling, and left singular vectors
+    (m, m) of m axes."""
+    is_held = values > RANK_TOLERANCE * max(values[0], 1e-9)
+    # The share of each axis that lies in the span of all wrenches: 1 where it can be pushed alone.
+    share = np.linalg.norm(vectors[:, is_held], axis=1)
+    pushed = share > RANK_TOLERANCE
+    coupled = pushed & (share <= 1.0 - RANK_TOLERANCE)
     return HeldAxes(
-        rank=int(kept.sum()),
-        condition=float(values[0] / values[-1]) if kept.all() else None,
+        rank=int(is_held.sum()),
+        condition=float(values[0] / values[-1]) if is_held.all() else None,
         free=tuple(axis for axis in AXES if axis not in axes),
         without_authority=tuple(np.array(axes)[~pushed].tolist()),
         coupled=tuple(np.array(axes)[coupled].tolist()),
@@ -185,9 +212,14 @@ def _held(axes: tuple[MotionAxis, ...], values: Array, vectors: Array) -> HeldAx
 
 
 def _loss(before: Authority, name: str, after: Authority) -> Loss:
-    had = np.array([before.largest, before.most_negative])
-    left = np.array([after.largest, after.most_negative])
-    share = np.where(had > 0.0, left / np.where(had > 0.0, had, 1.0), np.inf).min(axis=0)
+    """The cost of the loss of an actuator by the authority before and after it."""
+    largest_before = np.array([before.largest, before.most_negative])
+    largest_after = np.array([after.largest, after.most_negative])
+    share = np.where(
+        largest_before > 0.0,
+        largest_after / np.where(largest_before > 0.0, largest_before, 1.0),
+        np.inf,
+    ).min(axis=0)
     return Loss(
         actuator=name,
         rank=after.rank,

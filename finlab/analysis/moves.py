@@ -1,5 +1,6 @@
-"""Moves of actuators: which may move, how far, and which one is the mirror image of which.
+"""Moves of actuators: which may move, how far, and which are each other's mirror image.
 
+`optimize` searches over vectors of free numbers; `Moves` turns them into layouts and force sets.
 An actuator goes along x, y and z, turns about the vertical, and tilts about the horizontal line
 across its main axis: shaft, axis of a thruster, or turn_axis.
 """
@@ -26,20 +27,26 @@ from finlab.layout.effectiveness import moved_effectiveness
 MIRROR_TOLERANCE = 1e-3
 """How far [m, rad] two actuators may be from each other's mirror image and still count as a
 pair."""
-PROBE = 0.1  # share of its bounds by which a number is changed to see what it costs
+PROBE_SHARE = 0.1
+"""Share of its bounds by which a number is changed to see whether it costs an axis."""
 
 
 @dataclass(frozen=True)
 class Bounds:
-    """Where one actuator may go. Equal ends hold a number fixed. Checked on construction."""
+    """Bounds of one actuator's position and angles; equal ones hold a number fixed. Checked on
+    construction."""
 
-    x: tuple[float, float]  # forward [m], (minimum, maximum)
-    y: tuple[float, float]  # to the left [m]
-    z: tuple[float, float]  # up [m]
+    x: tuple[float, float]
+    """Least and most forward position [m]."""
+    y: tuple[float, float]
+    """The same to the left [m]."""
+    z: tuple[float, float]
+    """The same upward [m]."""
     mounting_angle: tuple[float, float]
     """Azimuth of the shaft [rad]; may reach beyond half a turn, as in 170 to 190 degrees. Of an
     actuator without a mounting angle, how far it turns about the vertical from where it points."""
-    tilt: tuple[float, float] = (0.0, 0.0)  # how far its main axis rises [rad] from where it points
+    tilt: tuple[float, float] = (0.0, 0.0)
+    """Rise of its main axis from where it points [rad]."""
 
     def __post_init__(self) -> None:
         for name in ("x", "y", "z", "mounting_angle", "tilt"):
@@ -51,15 +58,25 @@ class Bounds:
 
     @staticmethod
     def around(
-        part: Actuator, reach: float | Sequence[float] = 0.05, turn: float = math.pi
+        actuator: Actuator, reach: float | Sequence[float] = 0.05, turn: float = math.pi
     ) -> Bounds:
-        """Returns bounds of `reach` [m], one number or three, and `turn` [rad] either way of where
-        an actuator is; horizontal shafts stay horizontal, others also tilt, by up to a quarter
-        turn."""
-        by = np.broadcast_to(np.asarray(reach, dtype=np.float64), 3)
-        x, y, z = ((p - float(r), p + float(r)) for p, r in zip(part.position, by, strict=True))
-        tilt = min(turn, 0.5 * math.pi) if getattr(part, "mounting_angle", None) is None else 0.0
-        angle = azimuth(part)
+        """Returns bounds about the present position and angles of an actuator.
+
+        Horizontal shafts stay horizontal, others also tilt, by up to a quarter turn.
+
+        Args:
+            actuator: the actuator.
+            reach: largest change of each coordinate [m]; one number, or three.
+            turn: largest change of the angles [rad].
+        """
+        reaches = np.broadcast_to(np.asarray(reach, dtype=np.float64), 3)
+        x, y, z = (
+            (p - float(r), p + float(r)) for p, r in zip(actuator.position, reaches, strict=True)
+        )
+        tilt = (
+            min(turn, 0.5 * math.pi) if getattr(actuator, "mounting_angle", None) is None else 0.0
+        )
+        angle = azimuth(actuator)
         return Bounds(x, y, z, (angle - turn, angle + turn), (-tilt, tilt))
 
     @property
@@ -68,35 +85,41 @@ class Bounds:
         return np.array([self.x, self.y, self.z, self.mounting_angle, self.tilt])
 
 
-def azimuth(part: Actuator) -> float:
+def azimuth(actuator: Actuator) -> float:
     """Returns the angle [rad] that `Bounds.mounting_angle` is about, as it is now: 0 of an actuator
     without a mounting angle."""
-    return (getattr(part, "mounting_angle", None) or 0.0) + 0.0
+    return (getattr(actuator, "mounting_angle", None) or 0.0) + 0.0
 
 
 def mirror_pairs(layout: Layout) -> tuple[tuple[str, str], ...]:
     """Returns the pairs of actuators that are each other's image in the plane y = 0: y and the
     azimuth change sign."""
     pairs: list[tuple[str, str]] = []
-    for i, part in enumerate(layout.actuators):
+    for i, first in enumerate(layout.actuators):
         taken = {name for pair in pairs for name in pair}
-        for other in layout.actuators[i + 1 :]:
-            if not {part.name, other.name} & taken and is_mirrored(part, other):
-                pairs.append((part.name, other.name))
+        for second in layout.actuators[i + 1 :]:
+            if not {first.name, second.name} & taken and is_mirrored(first, second):
+                pairs.append((first.name, second.name))
                 break
     return tuple(pairs)
 
 
-def is_mirrored(part: Actuator, other: Actuator, tolerance: float = MIRROR_TOLERANCE) -> bool:
-    """Says whether two actuators of a type are each other's mirror image, within [m, rad]: fins
-    with their shafts, others whichever way their axes count."""
-    count = len(part.KIND.axes)
-    image = np.array(part.frame)[:count] * MIRROR
-    axes = np.array(other.frame)[:count]
-    apart = np.abs(np.subtract(other.position, MIRROR * part.position)).max()
-    turned = np.linalg.norm(np.cross(image, axes), axis=-1).max()
-    same_way = part.type != "fin" or image[0] @ axes[0] > 0.0
-    return part.type == other.type and same_way and bool(max(apart, turned) <= tolerance)
+def is_mirrored(first: Actuator, second: Actuator, tolerance: float = MIRROR_TOLERANCE) -> bool:
+    """Whether two actuators of a type are each other's mirror image in the plane y = 0.
+
+    Args:
+        first: an actuator.
+        second: another one.
+        tolerance: largest difference of positions [m] and directions [rad]. Shafts of fins have to
+            point the same way, other axes may point either way.
+    """
+    count = len(first.KIND.axes)
+    image = np.array(first.frame)[:count] * MIRROR
+    axes = np.array(second.frame)[:count]
+    distance = np.abs(np.subtract(second.position, MIRROR * first.position)).max()
+    angle = np.linalg.norm(np.cross(image, axes), axis=-1).max()
+    same_way = first.type != "fin" or image[0] @ axes[0] > 0.0
+    return first.type == second.type and same_way and bool(max(distance, angle) <= tolerance)
 
 
 class Moves:
@@ -111,17 +134,26 @@ class Moves:
         grid: tuple[float, float] = (0.0, 0.0),
         flow: Array | None = None,
     ) -> None:
-        """Takes the actuators to be moved, their bounds, and mirror pairs whose second follows the
-        first: one that moves along with its twin needs no bounds of its own. Free coordinates and
-        angles are multiples of the steps [m], [rad] of `grid` where these are above zero and the
-        bounds hold one. `flow` as for `force_sets`. Raises LayoutError: an actuator is unknown,
-        none is named, one has no bounds, a pair is not mirrored or shares one with another pair, or
-        nothing is free to move."""
+        """Sets up the free numbers.
+
+        Args:
+            layout: the robot at the start.
+            names: actuators to be moved.
+            bounds: their bounds by name; one that follows its mirror image needs none.
+            pairs: mirror pairs; of each the one that is named later follows the other.
+            grid: steps [m], [rad] of coordinates and angles, which then are multiples of them where
+                the bounds hold one; 0 for any number.
+            flow: velocity (6,) relative to the water [m/s, rad/s]; None at rest.
+
+        Raises:
+            LayoutError: an actuator is unknown, none is named, one has no bounds, a pair is not
+                mirrored or shares one with another pair, or nothing is free to move.
+        """
         kind = "fin" if layout.is_of_fins else "actuator"
         if not names:
             raise LayoutError(f"names: expected at least one {kind} to move, got none")
         layout.indices(tuple(names), "names")
-        twins = _twins(layout, pairs)
+        twins = _twins_of(layout, pairs)
         self.layout = layout
         leaders: list[str] = []
         for name in names:
@@ -133,8 +165,8 @@ class Moves:
                 f"bounds: {kind} {missing[0]} is to be moved but has none; give it some"
             )
         self.leaders = tuple(leaders)
-        self._lead = list(layout.indices(leaders))
-        self._twin = np.array(
+        self._leader_rows = list(layout.indices(leaders))
+        self._twin_rows = np.array(
             [layout.index(twins[name]) if name in twins else -1 for name in leaders]
         )
         self.names = tuple(
@@ -145,22 +177,24 @@ class Moves:
         self._shapes = shapes_of(layout, flow)
         self.start_position = layout.position
         """Where all actuators are now (n, 3) [m]."""
-        self._angle = np.array([azimuth(part) for part in layout.actuators])
+        self._azimuths = np.array([azimuth(part) for part in layout.actuators])
         box = np.concatenate([bounds[name].pairs for name in leaders])  # (5 leaders, 2)
-        held = np.concatenate([[*self.start_position[i], self._angle[i], 0.0] for i in self._lead])
-        self._held = np.clip(held, box[:, 0], box[:, 1])
+        held = np.concatenate(
+            [[*self.start_position[i], self._azimuths[i], 0.0] for i in self._leader_rows]
+        )
+        self._values = np.clip(held, box[:, 0], box[:, 1])
         self._free = box[:, 1] - box[:, 0] > 0.0
         if not self._free.any():
             raise LayoutError("bounds: nothing is left free to move; widen them")
         self.lower, self.upper = box[self._free].T
         """Bounds of the free numbers (D,)."""
-        self.bends = flow is not None and any(
+        self.changes_forces = flow is not None and any(
             law.feels_flow for _, law in laws_of(layout.actuators)
         )
         """Whether what actuators push changes as they move."""
         self.step = np.tile([grid[0]] * 3 + [grid[1]] * 2, len(leaders))[self._free]
         """Steps (D,) of the grid, 0 for any number."""
-        self.start = self._held[self._free]
+        self.start = self._values[self._free]
         """Where the actuators are now, brought within bounds (D,)."""
 
     @property
@@ -173,67 +207,74 @@ class Moves:
     def keep_alone(self, axes: Sequence[str]) -> None:
         """Holds the free numbers that cost one of some axes, which are pushed alone now, when they
         change by themselves; all stay free where each of them does."""
-        step = PROBE * np.diag(self.upper - self.lower)
-        tried = np.clip(
+        step = PROBE_SHARE * np.diag(self.upper - self.lower)
+        probes = np.clip(
             np.concatenate([self.start - step, self.start + step]), self.lower, self.upper
         )
-        held = held_axes(self.layout, self.sets(tried))
-        kept = np.array([set(axes) <= set(each.alone) for each in held]).reshape(2, -1).all(axis=0)
-        if kept.any():
-            self._free[np.flatnonzero(self._free)[~kept]] = False
-            self.lower = self.lower[kept]
-            self.upper = self.upper[kept]
-            self.start = self.start[kept]
-            self.step = self.step[kept]
+        authorities = held_axes(self.layout, self.sets(probes))
+        is_kept = (
+            np.array([set(axes) <= set(authority.alone) for authority in authorities])
+            .reshape(2, -1)
+            .all(axis=0)
+        )
+        if is_kept.any():
+            self._free[np.flatnonzero(self._free)[~is_kept]] = False
+            self.lower = self.lower[is_kept]
+            self.upper = self.upper[is_kept]
+            self.start = self.start[is_kept]
+            self.step = self.step[is_kept]
 
     def positions(self, vectors: Array) -> Array:
         """Returns positions (P, n, 3) [m] of vectors (P, D)."""
-        return self._placed(self._numbers(vectors))
+        return self._positions(self._numbers(vectors))
 
     def geometry(self, vectors: Array) -> tuple[Array, Array]:
         """Returns positions (P, n, 3) [m] and own axes (P, n, 3, 3) of vectors (P, D)."""
-        moved = self._numbers(vectors)
+        numbers = self._numbers(vectors)
         frames = np.tile(self.layout.frames, (len(vectors), 1, 1, 1))
-        turned = _turned(
-            self.layout.frames[self._lead, 0],
-            moved[..., 3] - self._angle[self._lead],
-            moved[..., 4],
+        turns = _turn_matrices(
+            self.layout.frames[self._leader_rows, 0],
+            numbers[..., 3] - self._azimuths[self._leader_rows],
+            numbers[..., 4],
         )
-        frames[:, self._lead] = frames[:, self._lead] @ turned
-        follows = self._twin >= 0
-        twin = self._twin[self._twin >= 0]
-        frames[:, twin] = frames[:, twin] @ (turned[:, follows] * MIRROR * MIRROR[:, None])
-        return self._placed(moved), frames
+        frames[:, self._leader_rows] = frames[:, self._leader_rows] @ turns
+        follows = self._twin_rows >= 0
+        twin = self._twin_rows[self._twin_rows >= 0]
+        frames[:, twin] = frames[:, twin] @ (turns[:, follows] * MIRROR * MIRROR[:, None])
+        return self._positions(numbers), frames
 
     def _numbers(self, vectors: Array) -> Array:
         """All numbers (P, leaders, 5) of vectors (P, D)."""
-        numbers = np.tile(self._held, (len(vectors), 1))
+        numbers = np.tile(self._values, (len(vectors), 1))
         numbers[:, self._free] = self.on_grid(vectors)
-        return numbers.reshape(len(vectors), len(self._lead), 5)
+        return numbers.reshape(len(vectors), len(self._leader_rows), 5)
 
-    def _placed(self, numbers: Array) -> Array:
+    def _positions(self, numbers: Array) -> Array:
+        """Positions (P, n, 3) [m] of all actuators by all numbers (P, leaders, 5)."""
         position = np.tile(self.start_position, (len(numbers), 1, 1))
-        position[:, self._lead] = numbers[..., :3]
-        follows = self._twin >= 0
-        position[:, self._twin[follows]] = numbers[:, follows, :3] * MIRROR
+        position[:, self._leader_rows] = numbers[..., :3]
+        follows = self._twin_rows >= 0
+        position[:, self._twin_rows[follows]] = numbers[:, follows, :3] * MIRROR
         return position
 
     def mirrored(self, vectors: Array) -> Array:
         """Returns vectors (P, D) in which one of each two actuators that are each other's mirror
         image now follows the other, as far as its bounds let it."""
         numbers = self._numbers(vectors)
-        for first, second in mirror_pairs(self.layout):
-            if first in self.leaders and second in self.leaders:
-                one = self.leaders.index(first)
-                other = self.leaders.index(second)
-                i = self._lead[one]
-                j = self._lead[other]
-                way = np.sign(self.layout.frames[i, 0] * MIRROR @ self.layout.frames[j, 0])
-                image = (numbers[:, one, 3:] - [self._angle[i], 0.0]) * [-1.0, way] + [
-                    self._angle[j],
+        for name_1, name_2 in mirror_pairs(self.layout):
+            if name_1 in self.leaders and name_2 in self.leaders:
+                column_1 = self.leaders.index(name_1)
+                column_2 = self.leaders.index(name_2)
+                i = self._leader_rows[column_1]
+                j = self._leader_rows[column_2]
+                sign = np.sign(self.layout.frames[i, 0] * MIRROR @ self.layout.frames[j, 0])
+                image = (numbers[:, column_1, 3:] - [self._azimuths[i], 0.0]) * [-1.0, sign] + [
+                    self._azimuths[j],
                     0.0,
                 ]
-                numbers[:, other] = np.concatenate([numbers[:, one, :3] * MIRROR, image], axis=-1)
+                numbers[:, column_2] = np.concatenate(
+                    [numbers[:, column_1, :3] * MIRROR, image], axis=-1
+                )
         return np.clip(numbers.reshape(len(vectors), -1)[:, self._free], self.lower, self.upper)
 
     def on_grid(self, vectors: Array) -> Array:
@@ -248,13 +289,13 @@ class Moves:
         """Returns what the actuators can push once moved by vectors (P, D)."""
         position, frames = self.geometry(vectors)
         effectiveness = moved_effectiveness(self.layout, position, frames) * self.layout.commanded
-        if self.bends:
+        if self.changes_forces:
             return assembled(
                 [shapes_of(self.moved(vector), self._flow) for vector in vectors], effectiveness
             )
-        alike = assembled([self._shapes], effectiveness[:1]).repeat(len(vectors))
+        unmoved = assembled([self._shapes], effectiveness[:1]).repeat(len(vectors))
         directions = np.array([shape.directions for shape in self._shapes])
-        return alike._replace(
+        return unmoved._replace(
             effectiveness=np.ascontiguousarray(directions @ effectiveness / SCALE)
         )
 
@@ -267,7 +308,7 @@ class Moves:
         return result
 
 
-def _turned(axis: Array, turn: Array, tilt: Array) -> Array:
+def _turn_matrices(axis: Array, turn: Array, tilt: Array) -> Array:
     """Matrices (P, L, 3, 3), from the right of rows, that raise main axes (L, 3) by angles (P, L)
     [rad] and then turn them about the vertical by others; those that are vertical tilt towards
     x."""
@@ -277,19 +318,19 @@ def _turned(axis: Array, turn: Array, tilt: Array) -> Array:
         level, MIRROR_TOLERANCE
     )
     across = np.where(level > MIRROR_TOLERANCE, sideways, upright)
-    return _about(across, tilt) @ _about(np.eye(3)[2:], turn)
+    return _rotation_matrices(across, tilt) @ _rotation_matrices(np.eye(3)[2:], turn)
 
 
-def _about(axis: Array, angle: Array) -> Array:
+def _rotation_matrices(axis: Array, angle: Array) -> Array:
     """Rodrigues' matrices (P, L, 3, 3), from the right of rows, of turns about unit axes by angles
     (P, L)."""
     cross = np.cross(np.eye(3), axis[:, None, :])
     sine = np.sin(angle)[..., None, None]
-    rest = 1.0 - np.cos(angle)[..., None, None]
-    return np.asarray(np.eye(3) - sine * cross + rest * (cross @ cross))
+    versine = 1.0 - np.cos(angle)[..., None, None]
+    return np.asarray(np.eye(3) - sine * cross + versine * (cross @ cross))
 
 
-def _twins(layout: Layout, pairs: Sequence[tuple[str, str]]) -> dict[str, str]:
+def _twins_of(layout: Layout, pairs: Sequence[tuple[str, str]]) -> dict[str, str]:
     twins: dict[str, str] = {}
     kind = "a fin" if layout.is_of_fins else "an actuator"
     for pair in pairs:

@@ -1,4 +1,8 @@
-"""Improve a layout: move chosen actuators within bounds until a goal is as good as it gets."""
+"""Improves a layout: moves chosen actuators within bounds to raise a goal.
+
+`climb` follows the goal's slopes from several starts; where it finds nothing better, or the goal
+has no slopes, SciPy's differential evolution searches.
+"""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -11,61 +15,81 @@ from scipy.optimize import differential_evolution
 
 from finlab.allocation.question import check_flow
 from finlab.analysis.authority import MotionAxis, commanded_axes, named_axes
-from finlab.analysis.climb import LEAST, PENALTY, Climb, Rule, Rules
+from finlab.analysis.climb import PENALTY, RADIUS_MIN, Climb, Rule, Rules
 from finlab.analysis.goals import MISSION, Goal, axes_to_raise, make_goal
 from finlab.analysis.moves import Bounds, Moves, mirror_pairs
 from finlab.analysis.score_card import ScoreCard, score_card
-from finlab.analysis.slopes import Directions, Hill, Look, Power
+from finlab.analysis.slopes import GoalPoint, MissionPower, SlopedGoal, WeakestDirection
 from finlab.arrays import Array
 from finlab.forces.force_sets import force_sets
 from finlab.layout import Layout
 
-Mapped = Callable[[Callable[[Any], Any], Sequence[Any]], Iterable[Any]]
-"""A function and the parts of a piece of work -> its results, in their order."""
-CHUNK = 16  # variants that are looked at together: places of 64 actuators take much room
-STEPS = 10  # steps of a climb in a round
-# random vectors, of which at most so many times the starts are ranked
-DRAWS = 64
-RANK = 6
-# climbs, times the square of the free numbers; at least and at most
-STARTS = 2800
-FEWEST = 3
-MOST = 20
-# of each climb, and of those that go on
+MapParts = Callable[[Callable[[Any], Any], Sequence[Any]], Iterable[Any]]
+"""Applies a function to the parts of a piece of work; returns its results, in order."""
+CHUNK_VARIANTS = 16
+"""Variants that are measured together: sets of 64 actuators take much memory."""
+STEPS_PER_ROUND = 10
+"""Steps of a climb that count as a round."""
+RANDOM_VECTORS = 64
+"""Random vectors from which starts are chosen."""
+RANKED_PER_START = 6
+"""Most vectors that are ranked for each start."""
+STARTS_SCALE = 2800
+"""Number of climbs times the square of the free numbers: a step's time grows with that square."""
+MIN_STARTS = 3
+"""Fewest climbs."""
+MAX_STARTS = 20
+"""Most climbs."""
 FIRST_STEPS = 12
-MOST_STEPS = 60
-LITTLE = 1e-4  # share of the goal that a climb has to gain to count
-FINALISTS = 3  # of so many climbs the best one goes on
+"""Steps of each climb before they are compared."""
+MAX_STEPS = 60
+"""Most steps of a climb that goes on."""
+MIN_GAIN = 1e-4
+"""Share of the goal that a climb has to gain to count."""
+FINALISTS = 3
+"""One of so many climbs goes on: the best."""
 
 
 @dataclass(frozen=True)
 class Progress:
-    """Where a search stands."""
+    """The state of a search after a round."""
 
     round: int
+    """Rounds that are done."""
     n_rounds: int
-    before: float  # the goal's measure at the start, more is better
-    best: float  # the best so far, to about a percent
+    """Most rounds."""
+    before: float
+    """The goal at the start; more is better."""
+    best: float
+    """The best goal so far, to about a percent."""
     layout: Layout
-    """What has it."""
+    """The layout that has it."""
 
 
 @dataclass(frozen=True)
 class Improvement:
-    """What a search found."""
+    """The result of a search."""
 
     layout: Layout
+    """The best layout; the one at the start where none is better."""
     improved: bool
+    """Whether it is better than the one at the start."""
     cancelled: bool
+    """Whether the search was stopped."""
     goal: str
-    value_before: float  # the goal's measure at the start: more is better; energies are negative
-    value_after: float  # the same for `layout`
+    """Name of the goal."""
+    value_before: float
+    """The goal at the start: more is better; powers are negative."""
+    value_after: float
+    """The goal of `layout`."""
     moved: tuple[str, ...]
+    """Actuators that could move."""
     axes: tuple[str, ...]
-    """Those whose directions count for the goals of directions; on the others, anything may
-    come."""
+    """Axes whose directions count for the goals of directions; the others are free."""
     card_before: ScoreCard
+    """Score card at the start."""
     card_after: ScoreCard
+    """Score card of `layout`."""
 
 
 def optimize_layout(
@@ -84,16 +108,14 @@ def optimize_layout(
     flow: ArrayLike | None = None,
     progress: Callable[[Progress], None] | None = None,
     cancelled: Callable[[], bool] | None = None,
-    mapped: Mapped = map,
+    mapped: MapParts = map,
 ) -> Improvement:
     """Moves actuators to raise a goal: by its slopes from several starts, and, where these find
     nothing better or the flow changes what actuators push, by SciPy's differential evolution.
 
     The same arguments and seed give the same layout. The present layout is among the first
     candidates, so the result is never worse, unless the present one breaks the rule: then the best
-    that keeps it is the result. Raises LayoutError: something about the actuators, bounds, pairs,
-    goal or axes does not fit; it says what; CommandError: `flow` is not six finite numbers, or
-    `mission` not such wrenches.
+    that keeps it is the result.
 
     Args:
         layout: where to start; its limits and models stay.
@@ -110,55 +132,54 @@ def optimize_layout(
             others; all that the layout commands when None, or, with too few actuators for them,
             those that are pushed alone now, of which no move of a single coordinate costs one.
         flow: velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at
-        rest.
+            rest.
         progress: called after each round.
-        cancelled: asked after each round, and within long ones; the search stops when it answers
-        True.
-        mapped: gives a function's results for parts of the work, in order, as `map` does in this
-            process; `finlab.research.executor.map_parts` does on a cluster.
+        cancelled: called after each round, and within long ones; the search stops when it returns
+            True.
+        mapped: applies a function to parts of the work, as `map` does in this process;
+            `finlab.research.executor.map_parts` does on a cluster.
+
+    Raises:
+        LayoutError: an actuator, bounds, pairs, the goal or axes do not fit.
+        CommandError: `flow` is not six finite numbers, or `mission` not such wrenches.
     """
     bounds = bounds or {}
     water = check_flow(flow)
     start = layout
     if axes is not None:
         layout = replace(layout, axes=named_axes(axes))
-    known = {
+    bounds_of = {
         name: bounds.get(name) or Bounds.around(layout.actuators[layout.index(name)])
         for name in names
     }
     pairs = mirror_pairs(layout) if mirror is None else mirror
-    moves = Moves(layout, names, known, pairs, grid, water)
+    moves = Moves(layout, names, bounds_of, pairs, grid, water)
     if axes is None and goal != "mission_power":
         axes = axes_to_raise(layout, water)
         if len(axes) < len(layout.axes):
             moves.keep_alone(axes)
-    measure, quick = (
-        make_goal(goal, layout, mission, fine=fine, axes=axes, flow=water) for fine in (True, False)
-    )
+    measure = make_goal(goal, layout, mission, fine=True, axes=axes, flow=water)
+    quick = make_goal(goal, layout, mission, fine=False, axes=axes, flow=water)
 
     def measured(robot: Layout) -> float:
         return float(measure(force_sets(robot, flow=water), lambda _: robot)[0])
 
     before = measured(layout)
     search = _Search(moves, Rules(moves.smooth, rule), before, rounds, progress, cancelled, mapped)
-    if not moves.bends:
-        search.climb(
-            Power(moves.smooth, mission, water)
-            if goal == "mission_power"
-            else Directions(
-                moves.smooth, axes or commanded_axes(layout), goal == "worst_single_failure"
-            ),
-            seed,
-        )
+    if not moves.changes_forces:
+        counted = axes or commanded_axes(layout)
+        search.climb(_sloped_goal(goal, moves.smooth, counted, mission, water), seed)
     if not search.gained and not search.stopped:
         search.evolve(quick, seed)
     best = moves.moved(search.vector)
     after = measured(best)
     best = replace(best, axes=start.axes)
-    wrong = [
-        0.0 if rule is None else rule(p.position[None], p.frames[None])[0] for p in (layout, best)
-    ]
-    improved = bool(wrong[1] <= 0.0 and (wrong[0] > 0.0 or after > before + 1e-9 * abs(before)))
+
+    def violation(robot: Layout) -> float:
+        return 0.0 if rule is None else float(rule(robot.position[None], robot.frames[None])[0])
+
+    is_better = after > before + 1e-9 * abs(before)
+    improved = violation(best) <= 0.0 and (violation(layout) > 0.0 or is_better)
     card = score_card(start, flow=water)
     return Improvement(
         layout=best if improved else start,
@@ -174,8 +195,17 @@ def optimize_layout(
     )
 
 
+def _sloped_goal(
+    goal: str, moves: Moves, axes: Sequence[MotionAxis], mission: ArrayLike, flow: Array | None
+) -> SlopedGoal:
+    """The goal of a name with its slopes; arguments as those of `optimize_layout`."""
+    if goal == "mission_power":
+        return MissionPower(moves, mission, flow)
+    return WeakestDirection(moves, axes, after_loss=goal == "worst_single_failure")
+
+
 class _Search:
-    """One search: what is the best so far, and how long it has taken."""
+    """One search: the best vector so far, and the rounds that it has taken."""
 
     def __init__(
         self,
@@ -185,7 +215,7 @@ class _Search:
         rounds: int,
         progress: Callable[[Progress], None] | None,
         cancelled: Callable[[], bool] | None,
-        mapped: Mapped,
+        mapped: MapParts,
     ) -> None:
         self._moves = moves
         self._rules = rules
@@ -198,21 +228,21 @@ class _Search:
         self.best = before
         self.gained = False
         self.stopped = False
-        self._kept = rules.broken(moves.start[None])[0] <= 0.0
-        if not self._kept:
+        self._starts_within_rules = rules.violation(moves.start[None])[0] <= 0.0
+        if not self._starts_within_rules:
             self.best = -np.inf
         self._done = self._steps = 0
 
     def _note(self, value: float, vector: Array) -> None:
-        """A vector that keeps all rules."""
+        """Keeps a vector that keeps all rules, where it is the best so far."""
         if value > self.best:
             self.best = value
             self.vector = vector
-        if not self._kept or value > self._before + LITTLE * abs(self._before):
+        if not self._starts_within_rules or value > self._before + MIN_GAIN * abs(self._before):
             self.gained = True
 
     def _after_round(self, *_: object) -> bool:
-        """Says whether to stop."""
+        """Counts a round and reports it; returns whether to stop."""
         self._done += 1
         if self._progress is not None:
             best = max(self.best, self._before)
@@ -221,86 +251,86 @@ class _Search:
         self.stopped = self._cancelled()
         return self.stopped or self._done >= self._rounds
 
-    def climb(self, hill: Hill, seed: int) -> None:
-        """Climb a little from several starts, then on from the best of them; round what was
-        found."""
+    def climb(self, goal: SlopedGoal, seed: int) -> None:
+        """Climbs a few steps from several starts, then on from the best of them, and rounds the
+        results to the grid."""
         best = self.best
         self.stopped = self._cancelled()
         climbs = list[Climb]()
-        for start in self._starts(hill, seed) if not self.stopped else ():
-            climbs.append(Climb(hill, self._rules, start))
+        for start in self._starts(goal, seed) if not self.stopped else ():
+            climbs.append(Climb(goal, self._rules, start))
             if self._climbed(climbs[-1], FIRST_STEPS):
                 break
         else:
-            climbs.sort(key=lambda one: -one.at.value)
+            climbs.sort(key=lambda climb: -climb.point.value)
             for climb in climbs[: max(1, len(climbs) // FINALISTS)]:
-                self._climbed(climb, MOST_STEPS)
+                self._climbed(climb, MAX_STEPS)
         if self._moves.step.any() and self.gained:
             self.best = best
             self.vector = self._moves.start
             self.gained = False
-            for climb in sorted(climbs, key=lambda one: -one.at.value)[:3]:
+            for climb in sorted(climbs, key=lambda climb: -climb.point.value)[:3]:
                 self._note(*climb.rounded(self._moves))
 
-    def _starts(self, hill: Hill, seed: int) -> Iterator[Look]:
-        """The present vector and the best of some random ones, as they are and as symmetric as the
-        robot is now, of those that keep all rules."""
+    def _starts(self, goal: SlopedGoal, seed: int) -> Iterator[GoalPoint]:
+        """Yields the present vector and the best of some random ones that keep all rules; of these
+        half as they are, and half mirrored like the robot."""
         moves = self._moves
         random = np.random.default_rng(seed)
-        if self._kept:
-            yield hill.look(moves.start)
-        drawn = random.uniform(moves.lower, moves.upper, (DRAWS, len(moves.start)))
-        mirrored = moves.mirrored(drawn)
-        ways = [drawn] if np.array_equal(drawn, mirrored) else [drawn, mirrored]
-        count = int(np.clip(round(STARTS / len(moves.start) ** 2), FEWEST, MOST)) - 1
-        most = -(-count // len(ways))
-        for way in ways:
-            nearer = [moves.start + share * (way - moves.start) for share in (1.0, 0.5, 0.25)]
-            kept = np.concatenate([some[self._rules.broken(some) <= 0.0] for some in nearer])[
-                : RANK * most
-            ]
-            for k in np.argsort(-hill.guess(kept), kind="stable")[:most]:
-                yield hill.look(kept[k])
+        if self._starts_within_rules:
+            yield goal.evaluate(moves.start)
+        vectors = random.uniform(moves.lower, moves.upper, (RANDOM_VECTORS, len(moves.start)))
+        mirrored = moves.mirrored(vectors)
+        variants = [vectors] if np.array_equal(vectors, mirrored) else [vectors, mirrored]
+        count = (
+            int(np.clip(round(STARTS_SCALE / len(moves.start) ** 2), MIN_STARTS, MAX_STARTS)) - 1
+        )
+        n_best = -(-count // len(variants))
+        for variant in variants:
+            scaled = [moves.start + share * (variant - moves.start) for share in (1.0, 0.5, 0.25)]
+            within_rules = [rows[self._rules.violation(rows) <= 0.0] for rows in scaled]
+            valid = np.concatenate(within_rules)[: RANKED_PER_START * n_best]
+            for k in np.argsort(-goal.guess(valid), kind="stable")[:n_best]:
+                yield goal.evaluate(valid[k])
 
     def _climbed(self, climb: Climb, steps: int) -> bool:
-        """Whether the search has to stop."""
-        while climb.radius >= LEAST and climb.steps < steps:
+        """Takes steps of a climb; returns whether the search has to stop."""
+        while climb.radius >= RADIUS_MIN and climb.steps < steps:
             climb.step()
-            self._note(climb.at.value, climb.at.vector)
+            self._note(climb.point.value, climb.point.vector)
             self._steps += 1
             self.stopped = self._cancelled()
-            if self.stopped or (self._steps % STEPS == 0 and self._after_round()):
+            if self.stopped or (self._steps % STEPS_PER_ROUND == 0 and self._after_round()):
                 return True
         return False
 
     def evolve(self, measure: Goal, seed: int) -> None:
-        """Differential evolution, for goals and rules without slopes."""
+        """Searches by differential evolution, for goals and rules without slopes."""
         moves = self._moves
-        least = np.inf
+        cost_min = np.inf
 
         def chunk_cost(vectors: Array) -> tuple[Array, float]:
             """Costs (P,), and the best measure of a variant that keeps all rules."""
             value = measure(moves.sets(vectors), lambda row: moves.moved(vectors[row]))
-            close = self._rules.broken(moves.on_grid(vectors))
-            return np.asarray(-value + PENALTY * close), float(
-                value[close <= 0.0].max(initial=-np.inf)
-            )
+            violation = self._rules.violation(moves.on_grid(vectors))
+            best = value[violation <= 0.0].max(initial=-np.inf)
+            return np.asarray(-value + PENALTY * violation), float(best)
 
         def cost(vectors: Array) -> Array:
-            nonlocal least
+            nonlocal cost_min
             rows = vectors.reshape(len(moves.start), -1).T
             costs = list[Array]()
-            chunks = [rows[k : k + CHUNK] for k in range(0, len(rows), CHUNK)]
+            chunks = [rows[k : k + CHUNK_VARIANTS] for k in range(0, len(rows), CHUNK_VARIANTS)]
             valued = iter(self._mapped(chunk_cost, chunks))
             for chunk in chunks:
                 if self._cancelled():
                     return np.full(len(rows), np.inf)
-                some, fine = next(valued)
-                costs.append(some)
-                self.best = max(self.best, fine)
-                if some.min() < least:
-                    least = some.min()
-                    self.vector = chunk[np.argmin(some)]
+                chunk_costs, chunk_best = next(valued)
+                costs.append(chunk_costs)
+                self.best = max(self.best, chunk_best)
+                if chunk_costs.min() < cost_min:
+                    cost_min = chunk_costs.min()
+                    self.vector = chunk[np.argmin(chunk_costs)]
             return np.concatenate(costs)
 
         self._done = 0
@@ -317,4 +347,4 @@ class _Search:
             updating="deferred",
             callback=self._after_round,  # type: ignore[arg-type]  # True stops it
         )
-        # Rows that were not looked at any more count as bad: the best is the one kept above.
+        # Rows that were not measured any more count as bad: the best is the one kept above.

@@ -1,4 +1,4 @@
-"""Score card of a layout, for one glance, and what of it is computed in a millisecond."""
+"""The score card of a layout: authority, losses and powers; and a quick check without powers."""
 
 from collections.abc import Collection
 from dataclasses import asdict, dataclass
@@ -35,44 +35,60 @@ def least_power(
     lost: Collection[str] = (),
     flow: ArrayLike | None = None,
 ) -> Array:
-    """Returns the least power [W] for each wrench (N, 6) [N, N m]: (N,), NaN where it is out of
-    reach; `flow` as for an allocator. Raises LayoutError: there is no actuator of a name in
-    `lost`."""
-    wanted = np.asarray(wrenches, dtype=np.float64).reshape(-1, 6)
+    """Returns the least power for each wrench, (N,) [W]; NaN where it is out of reach.
+
+    Args:
+        layout: the layout.
+        wrenches: wrenches (N, 6) [N, N m].
+        lost: names of actuators that are lost.
+        flow: velocity (6,) of the body relative to the water [m/s, rad/s]; None at rest.
+
+    Raises:
+        LayoutError: there is no actuator of a name in `lost`.
+    """
+    wrenches_asked = np.asarray(wrenches, dtype=np.float64).reshape(-1, 6)
     if len(set(layout.indices(tuple(lost), "lost"))) == layout.n:
-        return np.where((wanted == 0.0).all(-1), 0.0, np.nan)
-    answer = Allocator(layout).allocate_batch(wanted, lost=tuple(lost), flow=flow)
+        return np.where((wrenches_asked == 0.0).all(-1), 0.0, np.nan)
+    answer = Allocator(layout).allocate_batch(wrenches_asked, lost=tuple(lost), flow=flow)
     return np.where(answer.err_norm <= REACHED, answer.power, np.nan)
 
 
-UNIT = (1.0, 1.0, 1.0, 0.1, 0.1, 0.1)  # wrench along each axis whose least power is given [N, N m]
+UNIT_WRENCH = (1.0, 1.0, 1.0, 0.1, 0.1, 0.1)
+"""Wrench along each axis whose least power is on the card [N, N m]."""
 
 
 @dataclass(frozen=True)
 class ScoreCard:
-    """What a layout's working actuators can do. Torques meet forces at the lever 0.2 m."""
+    """Authority, losses and powers of a layout's working actuators. Torques meet forces at the
+    lever 0.2 m."""
 
     layout: str
+    """Name of the layout."""
     lost: tuple[str, ...]
+    """Names of actuators that are lost."""
     flow: tuple[float, ...] | None
     """Velocity of the body relative to the water (6,) [m/s, rad/s], body frame; None at rest."""
-    n_actuators: int  # how many work
-    counted: str  # the same by type, such as `8 thrusters`
-    authority: Authority  # rank, conditioning, largest wrenches, weakest direction
+    n_actuators: int
+    """Number of working actuators."""
+    counted: str
+    """The same by type, such as `8 thrusters`."""
+    authority: Authority
+    """Rank, condition, largest wrenches and weakest direction."""
     losses: tuple[Loss, ...]
-    """What losing one more actuator costs, one by one; none when but one works."""
+    """Cost of the loss of each working actuator; none when only one works."""
     unit_wrench: tuple[float, ...]
     """Size of the wrench along each axis whose least power follows (6,) [N, N m]."""
     unit_power: tuple[float | None, ...]
     """Least power [W] for it along each positive axis (6,), other axes zero; None where out of
     reach."""
-    notes: tuple[str, ...]  # sentences on where these numbers are not exact; none when they are
+    notes: tuple[str, ...]
+    """Sentences on where these numbers are not exact; none when they are."""
 
     @property
     def worst_loss(self) -> Loss | None:
         """The loss that leaves least: the lowest rank, then the weakest direction, then the
         smallest shares."""
-        return min(self.losses, key=_left, default=None)
+        return min(self.losses, key=_rank_of_loss, default=None)
 
     def __str__(self) -> str:
         return text(card_blocks(self))
@@ -93,51 +109,62 @@ class ScoreCard:
 def score_card(
     layout: Layout, lost: Collection[str] = (), flow: ArrayLike | None = None
 ) -> ScoreCard:
-    """Returns the score card of a layout whose actuators called `lost` push nothing, in a flow as
-    for `losses`. Raises LayoutError: there is no actuator of a name in `lost`; CommandError: `flow`
-    is not six finite numbers."""
+    """Returns the score card of a layout.
+
+    Args:
+        layout: the layout.
+        lost: names of actuators that are lost.
+        flow: velocity (6,) of the body relative to the water [m/s, rad/s]; None at rest.
+
+    Raises:
+        LayoutError: there is no actuator of a name in `lost`.
+        CommandError: `flow` is not six finite numbers.
+    """
     water = check_flow(flow)
-    held = authority(layout, lost, water)
-    power = least_power(layout, np.diag(UNIT), lost=lost, flow=water)
-    power = np.where(held.largest, power, np.nan)
-    gone = set(lost)
+    present = authority(layout, lost, water)
+    power = least_power(layout, np.diag(UNIT_WRENCH), lost=lost, flow=water)
+    power = np.where(present.largest, power, np.nan)
+    lost_names = set(lost)
     return ScoreCard(
         layout=layout.name,
-        lost=tuple(name for name in layout.names if name in gone),
+        lost=tuple(name for name in layout.names if name in lost_names),
         flow=None if water is None else tuple(water.tolist()),
-        n_actuators=layout.n - len(gone),
-        counted=layout.without(gone).counted if len(gone) < layout.n else "0 actuators",
-        authority=held,
-        losses=losses(layout, lost, held, water),
-        unit_wrench=UNIT,
+        n_actuators=layout.n - len(lost_names),
+        counted=layout.without(lost_names).counted if len(lost_names) < layout.n else "0 actuators",
+        authority=present,
+        losses=losses(layout, lost, present, water),
+        unit_wrench=UNIT_WRENCH,
         unit_power=tuple(None if np.isnan(value) else float(value) for value in power),
         notes=_notes(layout, lost, water),
     )
 
 
-def _left(loss: Loss) -> tuple[float, ...]:
-    """What is left after a loss, to compare losses by."""
+def _rank_of_loss(loss: Loss) -> tuple[float, ...]:
+    """A key that orders losses: the least is the worst."""
     shares = [share for share in loss.share_left if share is not None]
     return loss.rank, round(loss.weakest, 6), len(loss.reachable), round(sum(shares), 6)
 
 
 def _notes(layout: Layout, lost: Collection[str], flow: Array | None) -> tuple[str, ...]:
+    """Sentences on where the numbers of the card are not exact."""
     sets = force_sets(layout, lost, flow)
     notes = []
     n_wide = len(wide_arcs(sets))
     if n_wide:
-        what = "The weakest direction is"
+        subject = "The weakest direction is"
         if n_wide > MAX_CUT:
-            what = "Largest wrenches, the weakest direction and energies are"
+            subject = "Largest wrenches, the weakest direction and energies are"
         notes.append(
-            f"{what} of the convex hull: some arcs are wider than half a turn but not full circles."
+            f"{subject} of the convex hull: some arcs are wider than half a turn but not full "
+            "circles."
         )
-    still = [name for name in layout.by_flow if name not in lost]
-    if flow is not None and still:
+    pushed_by_flow = [name for name in layout.by_flow if name not in lost]
+    if flow is not None and pushed_by_flow:
         notes.append("Forces of the flow count with the convex hull of their lift and drag.")
-    if flow is None and still:
+    if flow is None and pushed_by_flow:
         notes.append(
-            f"At rest {', '.join(still)} give nothing; say how fast the robot moves (--flow)."
+            f"At rest {', '.join(pushed_by_flow)} give nothing; say how fast the robot moves "
+            "(--flow)."
         )
     if any(fin.model.type == "table" for fin in layout.fins if fin.name not in lost):
         notes.append(
@@ -152,7 +179,7 @@ def _notes(layout: Layout, lost: Collection[str], flow: Array | None) -> tuple[s
 
 @dataclass(frozen=True)
 class QuickCheck(HeldAxes):
-    """Axes that the working actuators hold, and those that a loss costs."""
+    """Axes along which the working actuators can push, and those that a loss costs."""
 
     lost: tuple[tuple[str, tuple[MotionAxis, ...]], ...]
     """Working actuators with the axes that the loss of each costs; those that cost none are left
@@ -162,18 +189,27 @@ class QuickCheck(HeldAxes):
 def quick_check(
     layout: Layout, lost: Collection[str] = (), flow: ArrayLike | None = None
 ) -> QuickCheck:
-    """Returns what the working actuators hold in a flow as of `score_card`, from singular values
-    alone. Raises LayoutError: there is no actuator of a name in `lost`."""
+    """Returns the axes along which the working actuators can push, from singular values alone: in a
+    millisecond.
+
+    Args:
+        layout: the layout.
+        lost: names of actuators that are lost.
+        flow: as for `score_card`.
+
+    Raises:
+        LayoutError: there is no actuator of a name in `lost`.
+    """
     working = [name for name in layout.names if name not in lost]
-    single = working if len(working) > 1 else []
-    sets = force_sets(layout, lost, check_flow(flow)).tile(1 + len(single))
-    for row, name in enumerate(single, start=1):
+    single_losses = working if len(working) > 1 else []
+    sets = force_sets(layout, lost, check_flow(flow)).tile(1 + len(single_losses))
+    for row, name in enumerate(single_losses, start=1):
         sets.lose(row, layout.index(name))
-    held, *left = held_axes(layout, sets)
+    present, *after_losses = held_axes(layout, sets)
     costs = {
-        name: tuple(axis for axis in held.alone if axis not in after.alone)
-        for name, after in zip(single, left, strict=True)
+        name: tuple(axis for axis in present.alone if axis not in after.alone)
+        for name, after in zip(single_losses, after_losses, strict=True)
     }
     return QuickCheck(
-        **vars(held), lost=tuple((name, axes) for name, axes in costs.items() if axes)
+        **vars(present), lost=tuple((name, axes) for name, axes in costs.items() if axes)
     )

@@ -1,9 +1,9 @@
-"""The `finlab` command: verbs that parse, call one library function and print, and their pages of
-help.
+"""The `finlab` command: its verbs, each of which parses, calls one library function and prints.
 
-`VERBS` says where each verb stands. A module imports the library only inside its functions, so that
-`finlab --help` stays fast and `finlab layout check` never loads torch. It writes its files before
-it prints, so that a reader that goes away (`finlab ... | head`) costs none of them.
+`VERBS` names the function of each verb, by module. A module imports the library only inside its
+functions, so that `finlab --help` stays fast and `finlab layout check` never loads torch. It writes
+its files before it prints, so that a reader that goes away (`finlab ... | head`) costs none of
+them.
 """
 
 import io
@@ -85,26 +85,30 @@ options."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command, by the arguments after the program's name, those of this process by default;
-    the exit code, 0, or 2 after one plain sentence on stderr."""
+    """Runs one command and returns its exit code: 0, or 2 after one plain sentence on stderr.
+
+    Args:
+        argv: the arguments after the program's name; those of this process when None.
+    """
     return exit_code("finlab", lambda: _run(list(sys.argv[1:] if argv is None else argv)))
 
 
 def _run(argv: list[str]) -> int:
+    """Runs a command, or prints the version or a page of help with examples."""
     if argv == ["--version"]:
         print(f"finlab {__version__}")
         return 0
     if not {"--help", "-h"}.isdisjoint(argv):
         caught = io.StringIO()
         with redirect_stdout(caught):  # what is no terminal gets no boxes
-            code = _parsed(argv)
+            code = _run_parsed(argv)
         print(caught.getvalue().rstrip().replace("•", "-"))
         print()
         for line in examples(argv):
             print(f"example: {line}")
         return code
     try:
-        return _parsed(with_json_file(argv))
+        return _run_parsed(with_json_file(argv))
     except ModuleNotFoundError as error:
         package = str(error.name).split(".")[0]
         if package not in EXTRAS:
@@ -112,10 +116,10 @@ def _run(argv: list[str]) -> int:
         raise FinlabError(f"{package} is not installed; run: {install(EXTRAS[package])}") from None
 
 
-def _parsed(argv: list[str]) -> int:
-    """Parse and run; turn the parser's exit into a code."""
+def _run_parsed(argv: list[str]) -> int:
+    """Parses arguments and runs the verb; turns the parser's exit into a code."""
     try:
-        code: int | None = _ran(argv)
+        code: int | None = _run_verb(argv)
     except SystemExit as exit_:
         return exit_.code if isinstance(exit_.code, int) else FAILED
     return code or 0
@@ -145,8 +149,8 @@ VERBS = {
     "export": "finlab.cli.robot_verbs:export",
     "app": "finlab.cli.app_verb:app",
 }
-"""Verb -> where its function stands, `module:function`; only that of the asked verb is imported.
-`eval` makes its verbs of the experiments that there are."""
+"""Functions of the verbs by name, as `module:function`; only the one that runs is imported. `eval`
+makes its verbs from the registered experiments."""
 GROUPS = {
     "layout": "Check, show and optimize layout files.",
     "data": "Generate what the paper's networks learn from.",
@@ -155,20 +159,20 @@ GROUPS = {
     "fit": "Fit actuators and robots to measurements.",
 }
 """First words of several verbs, and the line of help of each."""
-OTHER_NAMES = {"fit actuator": "The same as `fit thruster`, by its earlier name."}
+ALIASES = {"fit actuator": "The same as `fit thruster`, by its earlier name."}
 """Verbs that are others by a further name, and the line of help of each."""
 
 
-def _ran(argv: list[str]) -> Any:
-    """What the verb returns that arguments name, which alone is imported: an exit code, None means
+def _run_verb(argv: list[str]) -> Any:
+    """Runs the verb that arguments name, which alone is imported; returns its exit code, None for
     0."""
     name = argv[0] if argv else ""
     if name in VERBS or name in GROUPS:
         verb = _verb(name, argv)
         run = verb.cli if isinstance(verb, SubcommandApp) else partial(tyro.cli, verb)
         return run(prog=f"finlab {name}", description=GROUPS.get(name), args=argv[1:])
-    about = "Control allocation for underwater robots: a target wrench in, commands out."
-    return _command_line(argv).cli(prog="finlab", description=about, args=argv)
+    summary = "Control allocation for underwater robots: a target wrench in, commands out."
+    return _command_line(argv).cli(prog="finlab", description=summary, args=argv)
 
 
 def _command_line(argv: Sequence[str]) -> SubcommandApp:
@@ -187,9 +191,9 @@ def _verb(name: str, argv: Sequence[str]) -> Any:
         return resolve_name(VERBS[name])
     group = SubcommandApp()
     for verb, home in VERBS.items():
-        first, _, second = verb.partition(" ")
-        if first == name:
-            group.command(resolve_name(home), name=second, help=OTHER_NAMES.get(verb))
+        group_name, _, verb_name = verb.partition(" ")
+        if group_name == name:
+            group.command(resolve_name(home), name=verb_name, help=ALIASES.get(verb))
     return group
 
 

@@ -26,17 +26,17 @@ def verbs(argv: Sequence[str]) -> SubcommandApp:
     """
     from finlab.research.evaluation.experiment import EXPERIMENTS, load_experiment
 
-    made = SubcommandApp()
-    wanted = argv[1] if argv[:1] == ["eval"] and len(argv) > 1 else ""
+    app = SubcommandApp()
+    name_asked = argv[1] if argv[:1] == ["eval"] and len(argv) > 1 else ""
     for name in EXPERIMENTS:
-        known = name == wanted or wanted.startswith("-")
-        made.command(name=name)(verb_of(load_experiment(name)) if known else lambda: None)
-    made.command(report)
-    return made
+        is_asked = name == name_asked or name_asked.startswith("-")
+        app.command(name=name)(verb_of(load_experiment(name)) if is_asked else lambda: None)
+    app.command(report)
+    return app
 
 
 def verb_of(experiment: Experiment) -> Callable[..., None]:
-    """A function whose signature says to the parser which options there are."""
+    """Returns a function whose signature tells the parser the options of an experiment."""
     from finlab.display.figures import check_figure_file, write_figure
     from finlab.research.evaluation.document import to_text
     from finlab.research.evaluation.experiment import begin
@@ -49,7 +49,7 @@ def verb_of(experiment: Experiment) -> Callable[..., None]:
         check_json_file(json)
         check_figure_file(plot)
         begin(experiment.name)
-        chosen = {name: _parsed(name, options[name], value) for name, value in typed.items()}
+        chosen = {name: _parsed_option(name, options[name], value) for name, value in typed.items()}
         if plot is not None:
             chosen |= experiment.for_picture
         rows = []
@@ -63,24 +63,24 @@ def verb_of(experiment: Experiment) -> Callable[..., None]:
         if plot is not None and picture is not None:
             write_figure(lambda: picture(rows), plot)
 
-    shown = {name: _shown(each) for name, each in options.items()}
+    parameters = {name: _parser_option(option) for name, option in options.items()}
     rows_file = Annotated[
         JsonFile, arg(help="file for the rows, {'rows': [...]}; the rows alone without one")
     ]
     files: dict[str, Any] = {"json": rows_file, "cluster": Cluster}
     if experiment.picture is not None:
-        about = "file for a picture, .png, .svg or .pdf (needs matplotlib, extra plot)"
-        files["plot"] = Annotated[Path | None, arg(metavar="FILE", help=about)]
+        help_text = "file for a picture, .png, .svg or .pdf (needs matplotlib, extra plot)"
+        files["plot"] = Annotated[Path | None, arg(metavar="FILE", help=help_text)]
     for name, kind in files.items():
-        shown[name] = inspect.Parameter(
+        parameters[name] = inspect.Parameter(
             name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=kind
         )
     arguments = (
         inspect.cleandoc(experiment.run.__doc__ or "").partition("Args:")[2].partition("\n\n")[0]
     )
     verb.__doc__ = f"{experiment.question}\n\nArgs:{arguments}"
-    verb.__signature__ = inspect.Signature(list(shown.values()))  # type: ignore[attr-defined]
-    verb.__annotations__ = {name: each.annotation for name, each in shown.items()}
+    verb.__signature__ = inspect.Signature(list(parameters.values()))  # type: ignore[attr-defined]
+    verb.__annotations__ = {name: option.annotation for name, option in parameters.items()}
     return verb
 
 
@@ -97,14 +97,14 @@ def examples_of(name: str) -> tuple[str, ...]:
     return experiment.command(experiment.quick), f"finlab eval {experiment.name} --json rows.json"
 
 
-def _shown(option: inspect.Parameter) -> inspect.Parameter:
+def _parser_option(option: inspect.Parameter) -> inspect.Parameter:
     """An option as the parser takes it: lists are texts with commas between."""
     from finlab.research.evaluation.experiment import item_type
 
     kind = option.annotation
     default = option.default
-    item, several = item_type(kind)
-    if several:
+    item, is_list = item_type(kind)
+    if is_list:
         text = None if default is None else ",".join(map(str, default))
         kind = Annotated[str if text else str | None, arg(metavar="A,B,...")]
         default = text
@@ -115,19 +115,20 @@ def _shown(option: inspect.Parameter) -> inspect.Parameter:
     return option.replace(kind=inspect.Parameter.KEYWORD_ONLY, annotation=kind, default=default)
 
 
-def _parsed(name: str, option: inspect.Parameter, value: Any) -> Any:
+def _parsed_option(name: str, option: inspect.Parameter, value: Any) -> Any:
+    """The value of an option as its experiment takes it: a text with commas becomes a tuple."""
     from finlab.research.evaluation.experiment import item_type
 
-    kind, several = item_type(option.annotation)
-    if not several or value is None:
+    kind, is_list = item_type(option.annotation)
+    if not is_list or value is None:
         return value
     with suppress(ValueError):
         words = dict.fromkeys(kind(word) for word in map(str.strip, value.split(",")) if word)
         if words:
             return tuple(words)
-    what = "names" if kind is str else "numbers"
+    expected = "names" if kind is str else "numbers"
     raise DataError(
-        f"{name.replace('_', '-')}: expected {what} with commas between, got {value!r:.60}"
+        f"{name.replace('_', '-')}: expected {expected} with commas between, got {value!r:.60}"
     )
 
 
@@ -155,7 +156,8 @@ def report(
     print(make_report(output, size="quick" if quick else "full", seed=seed, names=names))
 
 
-QUICK = ("id", "ood", "limits", "failure")  # splits of a quick run
+QUICK_SPLITS = ("id", "ood", "limits", "failure")
+"""Splits of a quick run of `finlab bench`."""
 
 
 def bench(
@@ -183,7 +185,7 @@ def bench(
     from finlab.research.evaluation.experiments.wrench import HARD, experiment
     from finlab.research.executor import on_cluster
 
-    names = tuple(splits.split(",")) if splits else QUICK if quick else HARD
+    names = tuple(splits.split(",")) if splits else QUICK_SPLITS if quick else HARD
     size = {"layouts": 5, "targets": 4} if quick else {"layouts": 20, "targets": 10}
     with on_cluster(cluster):
         rows = experiment.rows(split=names, methods=methods, seed=seed, **size)

@@ -1,4 +1,4 @@
-"""`finlab fit thruster|fin|interaction`: from measurements to what layouts say."""
+"""`finlab fit thruster|fin|interaction`: fits models of actuators to measurements."""
 
 from pathlib import Path
 from typing import Annotated
@@ -51,7 +51,7 @@ def thruster(
         data: CSV files or workbooks of one thruster.
         output: the table of thrust.
         voltage: which of several counts [V]; between two of them forces and powers are
-        interpolated.
+            interpolated.
     """
     from finlab.errors import DataError
     from finlab.files.worker import in_worker

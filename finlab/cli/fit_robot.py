@@ -1,4 +1,4 @@
-"""`finlab fit robot`: from swims to what a layout says of a robot and its body."""
+"""`finlab fit robot`: fits a robot's actuators and body to swims."""
 
 from pathlib import Path
 from typing import Annotated
@@ -25,7 +25,7 @@ def robot(
         layout: the robot as it is believed to be: layout file or the name of a shipped layout.
         logs: swims of that robot.
         output: the layout as the swims show it; fins whose law is another one become tables beside
-        it.
+            it.
         other_law: of robots of fins look for another law of thrust, too, and use it where it helps
             on parts not seen.
     """

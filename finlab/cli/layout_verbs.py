@@ -1,4 +1,4 @@
-"""`finlab layout check|show|optimize|convert`: look at layout files, improve and exchange them."""
+"""`finlab layout check|show|optimize|convert`: checks, shows, improves and converts layouts."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from finlab.analysis.authority import MotionAxis
 
 REMARKS = ("finlab.swim.vehicle.righting:righting_words",)
-"""What else there is to say of a layout that is right: where functions stand, `module:function`,
-that give a sentence or None."""
+"""Functions that return a remark on a valid layout, or None, as `module:function`: the wings add
+theirs here."""
 
 
 def check(layouts: Annotated[Positional[tuple[str, ...]], arg(metavar="LAYOUT...")]) -> int:
@@ -61,8 +61,8 @@ def show(
     from finlab.analysis import score_card
 
     shared_options.check_json_file(json)
-    robot, gone = shared_options.open_robot(layout, lost)
-    card = score_card(robot, gone, flow)
+    robot, lost_names = shared_options.open_robot(layout, lost)
+    card = score_card(robot, lost_names, flow)
     shared_options.put_json(card.to_dict(), json, f"{robot}\n\n{card}")
 
 
@@ -82,13 +82,13 @@ def convert_layout(
 
     Args:
         file: robot description (URDF, SDF), parameters of PX4 or ArduSub, factors, matrix, or
-        layout.
+            layout.
         output: file to write; its end says the form.
         to: form of the output, where its end is not enough.
         fins: links of a robot description that are fins.
         thrusters: links that are thrusters although no plugin drives them.
         origin: where the layout's origin goes: the centre of gravity of all links, or the root
-        link's frame.
+            link's frame.
         force: least and most force [N] of every thruster, in place of the file's.
         frame: frame of a matrix or of places: x forward, and y left, z up (FLU) or y right, z down
             (FRD); what the file says, else FLU, by default.
@@ -153,8 +153,10 @@ def optimize(
         raise FinlabError(
             f"expected --reach from 0 m and --turn from 0 to 180 degrees, got {reach:g}, {turn:g}"
         )
-    parts = [robot.actuators[i] for i in robot.indices(actuators)]
-    space = {part.name: Bounds.around(part, reach, math.radians(turn)) for part in parts}
+    moving = [robot.actuators[i] for i in robot.indices(actuators)]
+    space = {
+        actuator.name: Bounds.around(actuator, reach, math.radians(turn)) for actuator in moving
+    }
     bar = tqdm(total=rounds, desc=goal, unit="round", disable=None, leave=False, file=sys.stderr)
 
     def report(progress: Progress) -> None:
@@ -187,9 +189,9 @@ def _improvement_text(improvement: Improvement, output: Path) -> str:
         "",
     ]
     for name in improvement.moved:
-        part = improvement.layout.part(name)
-        place = "  ".join(f"{value:6.3f}" for value in part.position)
-        lines.append(f"{name:<16}  {place} m  {part.direction_words}")
+        actuator = improvement.layout.part(name)
+        position = "  ".join(f"{value:6.3f}" for value in actuator.position)
+        lines.append(f"{name:<16}  {position} m  {actuator.direction_words}")
     lines += ["", str(improvement.card_after), ""]
     lines.append(
         f"{output}: written."

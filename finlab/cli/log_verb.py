@@ -1,4 +1,4 @@
-"""`finlab log`: why a thruster saturated, which axis was lost, what would have held it."""
+"""`finlab log`: judges a log: which axis was lost, at which limits, and what would have held it."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ def log(
     Args:
         file: log, or folder of a bag.
         robot: layout file or name of a shipped layout; the robot of the log's own parameters by
-        default.
+            default.
         scale: what a setpoint of 1 asks for on each axis [N, N m]; the autopilot's own rule by
-        default.
+            default.
         demand: topic of a bag with the wrench, where there are several.
         outputs: topic of a bag with what actuators were sent, where there are several.
         priority: for policy priority: a group of axes with commas between, most important first;
@@ -47,19 +47,19 @@ def log(
     from finlab.files.worker import in_worker
     from finlab.layout import save_layout
     from finlab.log import judge, read_log
-    from finlab.log.words import judgement_text, timeline_picture
+    from finlab.log.judgement_text import judgement_text, timeline_picture
 
     shared_options.check_json_file(json)
     shared_options.check_json_file(output, "output")
     check_figure_file(plot)
-    known = None if robot is None else shared_options.open_robot(robot)[0]
+    layout = None if robot is None else shared_options.open_robot(robot)[0]
     read = partial(read_log, scale=scale, demand=demand, outputs=outputs)
     groups = cast(
         "list[list[Axis]]", [group.split(",") for group in priority]
     )  # `judge` checks them
-    judged = judge(in_worker(read, file, known), priority=groups, improve=improve)
+    judgement = judge(in_worker(read, file, layout), priority=groups, improve=improve)
     if plot is not None:
-        write_figure(lambda: timeline_picture(judged), plot)
-    if output is not None and judged.improved is not None:
-        save_layout(judged.improved, output)
-    shared_options.put_json(judged.to_dict() if json else None, json, judgement_text(judged))
+        write_figure(lambda: timeline_picture(judgement), plot)
+    if output is not None and judgement.improved is not None:
+        save_layout(judgement.improved, output)
+    shared_options.put_json(judgement.to_dict() if json else None, json, judgement_text(judgement))

@@ -42,14 +42,14 @@ def allocate(
         lost: name of an actuator that does not work.
         free: an axis that may take any wrench, such as Ty.
         method: dual, mdn, paper, qp, sqp, paper_sqp, px4, ardusub, analytic, fixed_frequency or
-        ipopt.
+            ipopt.
         robust: for method dual: watts that an expected error of 1 % of the wrench scale is worth.
         checkpoint: trained checkpoint; the shipped one of the method by default.
         policy: for a wrench out of reach: closest, direction (same direction, scaled down) or
-        priority.
+            priority.
         axis_weights: for `closest`: weight of each axis of the error.
         priority: for `priority`: a group of axes with commas between, most important first, such as
-        Fz,Tz.
+            Fz,Tz.
         weak: an actuator of less strength: share that is left of its limits, such as bow=0.5.
         torn: a fin or rudder that gives a share of its force at every command.
         stuck: where one stays: the angle at which a fin or azimuth no longer turns [deg], or the
@@ -101,9 +101,9 @@ def export(
     Args:
         output: folder to write the bundle to.
         graph: file to write the graph of actuators to (JSON, node-link form), for networkx and
-        learners.
+            learners.
         c: folder to write the C99 sources of method dual for this robot to, with a self-test and
-        examples.
+            examples.
         zip: write one archive, DIR.zip, instead of a folder.
         lost: name of an actuator that does not work.
         method: who answers on the robot: dual keeps watts least, mdn and paper the paper's effort.
@@ -126,7 +126,7 @@ def export(
     robot, gone = shared_options.open_robot(layout, lost)  # before a network is loaded
     left = robot.without(gone) if gone else robot
     if graph is not None:
-        from finlab.deploy.bundle import write_graph
+        from finlab.deploy.robot_graph import write_graph
 
         write_graph(left, graph)
         print(f"{graph}: {robot.counted}, {left.n} nodes")

@@ -94,20 +94,20 @@ def simulate(options: OmitArgPrefixes[Options]) -> None:
 
         check_figure_file(options.plot)
         loop = _excitation(options) if options.excite else _swim(options)
-        held = options.excite or "Ty" in loop.controller.axes
-        if not held and (words := righting_words(loop.layout)) is not None:
+        is_righted = options.excite or "Ty" in loop.controller.axes
+        if not is_righted and (words := righting_words(loop.layout)) is not None:
             bar.write(f"finlab: {loop.layout.name}: {words}", file=sys.stderr)
-        seen = [(0.0, monitored(loop))]
+        verdicts = [(0.0, monitored(loop))]
         bar.reset(round(loop.task.duration_s, 1))
         bar.bar_format = "{l_bar}{bar}| {n:.0f}/{total:.0f} s [{elapsed}<{remaining}]"
         while not loop.done:
             loop.step()
-            if (now := monitored(loop)) != seen[-1][1]:
-                seen.append((loop.time - loop.period_s, now))
+            if (verdict := monitored(loop)) != verdicts[-1][1]:
+                verdicts.append((loop.time - loop.period_s, verdict))
             bar.update(loop.period_s)
     lines = [excitation_summary(loop.log) if options.excite else summary(loop.log)]
     lines += [] if loop.learner is None else cast("OnlineFit", loop.learner).notes
-    lines += [f"{time:.1f} s: the monitor takes {what}" for time, what in seen[1:]]
+    lines += [f"{time:.1f} s: the monitor takes {verdict}" for time, verdict in verdicts[1:]]
     if options.output is not None:
         loop.log.save(options.output / "log.npz")
         lines.append(f"\n{options.output}: written log.npz.")
@@ -193,22 +193,22 @@ def summary(log: RunLog) -> str:
     row = follow_row(log)
     keeps_course = log.controller != "velocity"
     lost = [name for name, works in zip(log.names, log.alive[-1], strict=True) if not works]
-    place = (
+    path_line = (
         f"ATE {row['ate']:.4f} m   RTE over {RTE_DELTA_S:g} s {row['rte']:.4f} m   "
         f"depth RMSE {row['depth_rmse']:.4f} m   farthest {row['max']:.3f} m"
     )
-    speed = (
+    speed_line = (
         f"MAE of the speed {speed_error(log).mean():.4f} m/s   depth RMSE {row['depth_rmse']:.4f} m"
     )
     lines = [
         f"{log.layout} along {log.task} by {log.method}, {log.time[-1]:.0f} s"
         + (f", lost: {', '.join(lost)}" if lost else ""),
-        place if keeps_course else speed,
+        path_line if keeps_course else speed_line,
         f"power {row['driving_w']:.2f} W with motor losses, {row['inertial_w']:.2f} W inertial   "
         f"allocation {row['solve_ms']:.2f} ms (median)",
     ]
-    if (when := log.capsized_s) is not None:
-        lines.append(f"the robot capsized at {when:.1f} s")
+    if (capsized_s := log.capsized_s) is not None:
+        lines.append(f"the robot capsized at {capsized_s:.1f} s")
     if keeps_course and row["max"] >= LOST_M:
         lines.append(f"the robot lost its reference: it was more than {LOST_M:g} m away")
     return "\n".join(lines)
@@ -220,13 +220,13 @@ def excitation_summary(log: RunLog) -> str:
 
     from finlab.swim.vehicle.attitude import euler
 
-    away = np.abs(log.position - log.position[0]).max(axis=0)
+    distance = np.abs(log.position - log.position[0]).max(axis=0)
     tilt = np.degrees(np.abs(euler(log.quaternion)[:, :2]).max())
+    horizontal = np.hypot(distance[0], distance[1])
+    speed = np.abs(log.motion[:, :3]).max()
     return (
-        f"{log.layout} shaken on the spot, {log.time[-1]:.0f} s: at most "
-        f"{np.hypot(away[0], away[1]):.2f} m away, {away[2]:.2f} m up or down, {tilt:.0f} deg of "
-        "roll or "
-        f"pitch, {np.abs(log.motion[:, :3]).max():.2f} m/s"
+        f"{log.layout} shaken on the spot, {log.time[-1]:.0f} s: at most {horizontal:.2f} m away, "
+        f"{distance[2]:.2f} m up or down, {tilt:.0f} deg of roll or pitch, {speed:.2f} m/s"
     )
 
 
@@ -255,9 +255,10 @@ def monitored(loop: ClosedLoop) -> str:
     if loop.monitor is not None and not loop.monitor.tells:
         words += ["that it cannot tell: the robot moves otherwise than its model"]
     words += [f"{name} torn" for name in (*damage.torn, *damage.weak)]
-    for name, held in damage.stuck.items():
-        turns = loop.layout.part(name).KIND.sticks_at_angle
+    for name, value in damage.stuck.items():
+        is_angle = loop.layout.part(name).KIND.sticks_at_angle
         words.append(
-            f"{name} stuck at " + (f"{math.degrees(held):.0f} deg" if turns else f"{held:.3g} N")
+            f"{name} stuck at "
+            + (f"{math.degrees(value):.0f} deg" if is_angle else f"{value:.3g} N")
         )
     return ", ".join(words) or "all fins whole"

@@ -1,118 +1,256 @@
-"""Calls of the core in C for one robot: its block of numbers and a work area."""
+"""Calls of the core in C for one robot: its block of numbers, a work area, a question, an answer.
+
+The default method asks a `Core` for forces, multipliers and commands; other methods ask it for the
+commands that give their forces. The structs are those of finlab/core/fl_fields.h.
+"""
 
 import ctypes
+from collections.abc import Sequence
 from functools import lru_cache
 from threading import Lock
-from typing import Any, NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finlab.arrays import Array
-from finlab.core.fields import Record, actuators_of, head_of, struct, tables_begin
+from finlab.core.fields import Record, struct
 from finlab.core.library import library
 from finlab.errors import CommandError, DataError
 
 MAGIC = 41721.0
-"""First number of a block; its version is the second."""
+"""First number of a block, FL_MAGIC of the core; the second is its version."""
+
 CODES = (
-    *(
-        "",
-        "no block of a robot",
-        "a block of another version",
-        "a number out of range",
-        "a bad argument",
-    ),
+    "",
+    "no block of a robot",
+    "a block of another version",
+    "a number out of range",
+    "a bad argument",
 )
+"""What the core found, by the error codes FL_OK, FL_BAD_BLOCK, ... that its functions return."""
+
+POLICIES = ("closest", "direction", "priority")
+"""Kinds of policies, in the order of FL_CLOSEST, FL_DIRECTION, FL_PRIORITY."""
+
+SIZE_OF_WORK_AREA = 3
+"""What `fl_sizes` is to be asked for the bytes of an `fl_work`."""
 
 
-_REFUSED = (
-    "the core cannot work with these numbers: it found {}; check the wrench and the previous "
-    "command"
-)
-
-
-class Found(NamedTuple):
-    """Forces for N targets."""
+class CoreAnswer(NamedTuple):
+    """Answers of the core to N wrenches; the fields of `fl_answer` that Python reads."""
 
     force: Array
-    """(N, n, 2) [N], along each actuator's directions; the second of a foil is its drag."""
-    prices: Array
-    """Multipliers (N, 6) of the wrench [W/N, W/(N m)]."""
+    """Forces y (N, n, 2) [N], along each actuator's directions; the second of a foil is its
+    drag."""
+    lam: Array
+    """Multipliers (N, 6) of the wrench [W/N, W/(N m)] (Eq. 3)."""
     wrench_served: Array
-    """The wrenches (N, 6) [N, N m] that they give: the targets, or those that the policy gives."""
+    """Wrenches (N, 6) [N, N m] that the forces give: those asked for, or those that the policy
+    gives in their place."""
     gap_power_bound: Array
-    """Power (N,) [W] that gaps in the sets are proved to need; 0 where there is none."""
+    """Power (N,) [W] that gaps in the sets of forces are proved to need, the least dual value of
+    the cuts that were left out; 0 where there is no gap."""
     is_attainable: NDArray[np.bool_]
-    """Targets within reach (N,)."""
+    """Which wrenches (N,) that were asked for are within reach."""
     command: Array
-    """Commands (N, n, 3) that give them, as near as the tables of the laws are."""
+    """Commands (N, n, 3) that give the forces, as near as the grids of the laws are."""
     error: Array
-    """Distance (N,) of what the commands give from `wrench_served`, on the yardstick, by the laws'
-    tables."""
+    """Distance (N,) of what the commands give from `wrench_served`, over the wrench scale, by the
+    grids of the laws."""
     is_truncated: bool
-    """Whether a search ended at its bound of steps."""
+    """Whether a search ended at its limit of steps before it was done."""
 
 
-class Worth(NamedTuple):
-    """What the forces of n actuators are worth at N prices."""
+class Conjugates(NamedTuple):
+    """Conjugates of the costs of n actuators at N multipliers (Eq. 4), by the core's tables; the
+    fields of `fl_actuator_worth`."""
 
     price_ahead: Array
-    """Price along the force (N, n) [W/N]."""
+    """Price v (N, n) [W/N] along the direction of the force; 0 where an actuator pushes in
+    reverse."""
     price_reverse: Array
-    """The same of a force in reverse (N, n)."""
+    """Price (N, n) [W/N] along the force of an actuator that pushes in reverse; 0 of any other."""
     conjugate: Array
-    """Most that a force is worth (N, n), less its power [W], by the tables."""
+    """Conjugate (N, n) [W]: the largest value of a force at its price, less its power."""
     force_min: Array
-    """Least force (1, n) [N] now, of planes below 0 in reverse."""
+    """Least force (1, n) [N] that may be given, of planes below 0 in reverse."""
     force_max: Array
-    """Largest force (1, n) [N] now."""
+    """Largest force (1, n) [N] that may be given."""
 
 
-class Now(NamedTuple):
-    """What holds of a robot of n actuators when it is asked."""
+class Conditions(NamedTuple):
+    """What holds of a robot of n actuators while it is asked, beside what is asked."""
 
-    previous: Array | None = None
-    """Commands (n, 3) of the tick before, NaN where one is unknown; None outside of ticks."""
+    command_previous: Array | None = None
+    """Commands u^- (n, 3) of the tick before, NaN where one is unknown; None outside of ticks."""
     lost: NDArray[np.bool_] | None = None
     """Which actuators (n,) do not work; None where all do."""
     free: NDArray[np.bool_] | None = None
     """Which axes (6,) may take any wrench, beside those that the robot does not command; None for
     none."""
     calm: float = 0.0
-    """What turning costs in a tick; see `DualSettings.calm`."""
+    """What turning costs in a tick, from which Eq. 16 makes the cost of an angle; see
+    `DualSettings.calm`."""
     ticks: int = 1
-    """How many ticks after `previous` the commands are for."""
-    toward: Array | None = None
-    """Angles (n,) [rad] near which pods are to stand, NaN for others; None for nowhere else than
-    before."""
+    """How many ticks after `command_previous` the commands are for; the rates allow as many times
+    the change."""
+    angles_wanted: Array | None = None
+    """Angles (n,) [rad] from which turning of pods costs, in place of those of `command_previous`;
+    NaN of an actuator without; None for none."""
 
 
-STILL = Now()
-"""No tick, nothing lost, no axis free."""
+NOMINAL = Conditions()
+"""Outside of ticks, nothing lost, no axis free."""
 
 
-class _Served(NamedTuple):
-    """A policy as the core reads it, and where it lies."""
+class PolicyFields(Protocol):
+    """A `finlab.allocation.Policy`, as far as the core has to know it."""
 
-    record: Record
-    address: int
+    def __hash__(self) -> int:
+        """Policies are values: equal ones have one record."""
+        ...
+
+    @property
+    def kind(self) -> str:
+        """One of `POLICIES`."""
+        ...
+
+    @property
+    def axis_weights(self) -> tuple[float, ...]:
+        """Weights (6,) of the axes, for `closest`."""
+        ...
+
+    @property
+    def groups(self) -> Sequence[NDArray[np.bool_]]:
+        """Masks (6,) of the groups of axes in order, for `priority`."""
+        ...
 
 
 @lru_cache(maxsize=64)
-def _served(policy: Any) -> _Served:
+def _policy_record(policy: PolicyFields) -> Record:
+    """The `fl_policy` (1,) of a policy; who hands its address to the core keeps the record."""
     weights = np.array(policy.axis_weights)
     record = np.zeros(1, struct("fl_policy"))
-    record["policy"] = ("closest", "direction", "priority").index(policy.kind)
+    record["policy"] = POLICIES.index(policy.kind)
     record["group_count"] = len(policy.groups)
     record["axis_weight"] = weights / weights.max()
-    for place, axes in enumerate(policy.groups):
-        record["group"][:, place] = axes
-    return _Served(record, record.ctypes.data)
+    for index, axes in enumerate(policy.groups):
+        record["group"][:, index] = axes
+    return record
+
+
+class _Question:
+    """One `fl_question`, the arrays that it points at, and their addresses.
+
+    A pointer is written as the address of an array of ours, into which the values are copied, or as
+    0 for none: so no array of a caller has to outlive the call.
+    """
+
+    def __init__(self, count: int) -> None:
+        """Makes the question of a robot of `count` actuators."""
+        record = np.zeros(1, struct("fl_question"))
+        self._record = record
+        self.address = record.ctypes.data
+
+        # Views of the fields, since every tick would pay for looking them up by name.
+        self._wrench = record["wrench"]
+        self._policy_pointer = record["policy"]
+        self._lam_pointer = record["prices"]
+        self._previous_pointer = record["previous"]
+        self._lost_pointer = record["lost"]
+        self._free_pointer = record["free"]
+        self._calm = record["calm"]
+        self._ticks = record["ticks"]
+        self._angles_wanted_pointer = record["angles_wanted"]
+
+        self._policy: Record | None = None
+        self._lam = np.zeros(6)
+        self._previous = np.zeros((count, 3))
+        self._lost = np.zeros(count, np.uint8)
+        self._free = np.zeros(6, np.uint8)
+        self._angles_wanted = np.zeros(count)
+        self._lam_address = self._lam.ctypes.data
+        self._previous_address = self._previous.ctypes.data
+        self._lost_address = self._lost.ctypes.data
+        self._free_address = self._free.ctypes.data
+        self._angles_wanted_address = self._angles_wanted.ctypes.data
+
+    def write_wrench(self, wrench: Array) -> None:
+        """Writes what is asked for, (6,) [N, N m]."""
+        self._wrench[0] = wrench
+
+    def write(self, policy: PolicyFields | None, lam: Array | None, conditions: Conditions) -> None:
+        """Writes all but the wrench.
+
+        Args:
+            policy: what to give out of reach; None for nothing else than what is asked.
+            lam: multipliers (6,) [W/N, W/(N m)] at which Newton's method begins; None for its own.
+            conditions: what holds.
+        """
+        self._policy = None if policy is None else _policy_record(policy)
+        self._policy_pointer[0] = 0 if self._policy is None else self._policy.ctypes.data
+        self._lam_pointer[0] = 0
+        if lam is not None:
+            self._lam[:] = lam
+            self._lam_pointer[0] = self._lam_address
+        self.write_conditions(conditions)
+
+    def write_conditions(self, conditions: Conditions) -> None:
+        """Writes what holds of the robot."""
+        self._calm[0] = conditions.calm
+        self._ticks[0] = conditions.ticks
+        self._angles_wanted_pointer[0] = 0
+        if conditions.angles_wanted is not None:
+            self._angles_wanted[:] = conditions.angles_wanted
+            self._angles_wanted_pointer[0] = self._angles_wanted_address
+        self._previous_pointer[0] = 0
+        if conditions.command_previous is not None:
+            self._previous[:] = conditions.command_previous
+            self._previous_pointer[0] = self._previous_address
+        self._lost_pointer[0] = 0
+        if conditions.lost is not None:
+            self._lost[:] = conditions.lost
+            self._lost_pointer[0] = self._lost_address
+        self._free_pointer[0] = 0
+        if conditions.free is not None:
+            self._free[:] = conditions.free
+            self._free_pointer[0] = self._free_address
+
+
+class _Answer:
+    """One `fl_answer`, and its address."""
+
+    def __init__(self, count: int) -> None:
+        """Makes the answer of a robot of `count` actuators."""
+        record = np.zeros(1, struct("fl_answer"))
+        self._record = record
+        self.address = record.ctypes.data
+        self._force = record["force"][:, :count]
+        self._lam = record["prices"]
+        self._wrench_served = record["wrench_served"]
+        self._gap_power_bound = record["gap_power_bound"]
+        self._error = record["error"]
+        self._command = record["command"][:, :count]
+        self._is_attainable = record["is_attainable"]
+        self._is_truncated = record["is_truncated"]
+
+    def read(self) -> CoreAnswer:
+        """Returns a copy of what the core has written."""
+        return CoreAnswer(
+            force=self._force.copy(),
+            lam=self._lam.copy(),
+            wrench_served=self._wrench_served.copy(),
+            gap_power_bound=self._gap_power_bound.copy(),
+            is_attainable=self._is_attainable.astype(bool),
+            command=self._command.copy(),
+            error=self._error.copy(),
+            is_truncated=bool(self._is_truncated[0]),
+        )
 
 
 class Core:
-    """One robot in the core."""
+    """One robot in the core. Threads may share it: one call after the other is made."""
 
     def __init__(self, block: Array, count: int) -> None:
         """Takes the block of a robot.
@@ -128,231 +266,191 @@ class Core:
         self._core = core
         self._block = block
         self._count = count
-        self._work = ctypes.create_string_buffer(core.fl_sizes(3))
+        self._work = ctypes.create_string_buffer(core.fl_sizes(SIZE_OF_WORK_AREA))
         self._lock = Lock()
-        self._at = block.ctypes.data
-        self._area = ctypes.addressof(self._work)
+        """Held during a call: work area, question and answer are the same for all threads."""
+        self._block_address = block.ctypes.data
+        self._work_address = ctypes.addressof(self._work)
+        self._question = _Question(count)
+        self._answer = _Answer(count)
 
-        # Question and answer lie in one place; these are views of it.
-        question = np.zeros(1, struct("fl_question"))
-        self._question = question
-        self._to = question.ctypes.data
-        self._wrench = question["wrench"]
-        self._policy_at = question["policy"]
-        self._price_at = question["prices"]
-        self._previous_at = question["previous"]
-        self._lost_at = question["lost"]
-        self._free_at = question["free"]
-        self._calm = question["calm"]
-        self._ticks = question["ticks"]
-        self._toward_at = question["angles_wanted"]
-        answer = np.zeros(1, struct("fl_answer"))
-        self._from = answer.ctypes.data
-        self._force = answer["force"][:, :count]
-        self._answer_prices = answer["prices"]
-        self._wrench_served = answer["wrench_served"]
-        self._gap_power_bound = answer["gap_power_bound"]
-        self._error = answer["error"]
-        self._command = answer["command"][:, :count]
-        self._is_attainable = answer["is_attainable"]
-        self._is_truncated = answer["is_truncated"]
-
-        # What the question points at, and where it lies.
-        self._price = np.zeros(6)
-        self._previous = np.zeros((count, 3))
-        self._lost = np.zeros(count, np.uint8)
-        self._free = np.zeros(6, np.uint8)
-        self._toward = np.zeros(count)
-        self._price_lies = self._price.ctypes.data
-        self._previous_lies = self._previous.ctypes.data
-        self._lost_lies = self._lost.ctypes.data
-        self._free_lies = self._free.ctypes.data
-        self._toward_lies = self._toward.ctypes.data
-
-        error = core.fl_check(self._at, len(block)) or core.fl_prepare(self._at, self._area)
+        error = core.fl_check(self._block_address, len(block))
+        if not error:
+            error = core.fl_prepare(self._block_address, self._work_address)
         if error:
             raise DataError(
                 f"the core takes the robot for {CODES[error]}; check its forces, powers and sizes"
             )
 
-    def _ask_for(self, policy: Any, price: Array | None, now: Now) -> _Served | None:
-        """Writes into the question all but the wrench; what is returned is to be kept until the
-        call ends."""
-        served = None if policy is None else _served(policy)
-        self._policy_at[0] = 0 if served is None else served.address
-        self._price_at[0] = 0
-        if price is not None:
-            self._price[:] = price
-            self._price_at[0] = self._price_lies
-        self._stand(now)
-        return served
-
-    def _stand(self, now: Now) -> None:
-        """Writes what holds now into the question."""
-        self._calm[0] = now.calm
-        self._ticks[0] = now.ticks
-        self._toward_at[0] = 0
-        if now.toward is not None:
-            self._toward[:] = now.toward
-            self._toward_at[0] = self._toward_lies
-        self._previous_at[0] = 0
-        if now.previous is not None:
-            self._previous[:] = now.previous
-            self._previous_at[0] = self._previous_lies
-        self._lost_at[0] = 0
-        if now.lost is not None:
-            self._lost[:] = now.lost
-            self._lost_at[0] = self._lost_lies
-        self._free_at[0] = 0
-        if now.free is not None:
-            self._free[:] = now.free
-            self._free_at[0] = self._free_lies
-
-    def one(
-        self, wrench: Array, policy: Any, price: Array | None = None, now: Now = STILL
-    ) -> Found:
+    def answer_one(
+        self,
+        wrench: Array,
+        policy: PolicyFields | None,
+        lam: Array | None = None,
+        conditions: Conditions = NOMINAL,
+    ) -> CoreAnswer:
         """Answers one wrench.
 
         Args:
-            wrench: wanted (6,) [N, N m].
-            policy: what to give out of reach; None for nothing else.
-            price: of the wrench (6,) [W/N, W/(N m)] to begin with.
-            now: what holds.
+            wrench: desired (6,) [N, N m].
+            policy: what to give out of reach; None for nothing else than the wrench.
+            lam: multipliers (6,) [W/N, W/(N m)] at which Newton's method begins; None for its own.
+            conditions: what holds of the robot.
 
         Returns:
-            One row of forces, prices and commands.
+            An answer with N = 1.
 
         Raises:
             CommandError: the core cannot work with these numbers.
         """
-        with self._lock:  # question and answer lie in one place for all threads
-            self._wrench[0] = wrench
-            served = self._ask_for(policy, price, now)
-            error = self._ask()
-            del served
-            if error:
-                raise CommandError(_REFUSED.format(CODES[error]))
-            return Found(
-                force=self._force.copy(),
-                prices=self._answer_prices.copy(),
-                wrench_served=self._wrench_served.copy(),
-                gap_power_bound=self._gap_power_bound.copy(),
-                is_attainable=self._is_attainable.astype(bool),
-                command=self._command.copy(),
-                error=self._error.copy(),
-                is_truncated=bool(self._is_truncated[0]),
-            )
+        with self._lock:
+            self._question.write_wrench(wrench)
+            self._question.write(policy, lam, conditions)
+            _raise_refusal(self._call())
+            return self._answer.read()
 
-    def _ask(self) -> int:
-        code: int = self._core.fl_answer_one(self._at, self._area, self._to, self._from)
+    def _call(self) -> int:
+        """Answers the question that is written; returns an error code."""
+        code: int = self._core.fl_answer_one(
+            self._block_address, self._work_address, self._question.address, self._answer.address
+        )
         return code
 
-    def many(self, wrenches: Array, policy: Any, now: Now = STILL) -> Found:
-        """Returns the answers to wrenches (N, 6); see `one`."""
-        wrenches, count = np.ascontiguousarray(wrenches), len(wrenches)
-        found = Found(
-            force=np.empty((count, self._count, 2)),
-            prices=np.empty((count, 6)),
-            wrench_served=np.empty((count, 6)),
-            gap_power_bound=np.empty(count),
-            is_attainable=np.empty(count, np.bool_),
-            command=np.empty((count, self._count, 3)),
-            error=np.empty(count),
-            is_truncated=False,
-        )
-        outputs = [
-            found.force,
-            found.prices,
-            found.wrench_served,
-            found.gap_power_bound,
-            found.command,
-            found.is_attainable,
-            found.error,
-        ]
-        outs = [values.ctypes.data for values in outputs]
+    def answer_many(
+        self, wrenches: Array, policy: PolicyFields | None, conditions: Conditions = NOMINAL
+    ) -> CoreAnswer:
+        """Answers many wrenches, one after the other in C.
+
+        Args:
+            wrenches: desired (N, 6) [N, N m].
+            policy: what to give out of reach; None for nothing else than the wrenches.
+            conditions: what holds of the robot.
+
+        Returns:
+            The same N answers as `answer_one` gives.
+
+        Raises:
+            CommandError: the core cannot work with these numbers.
+        """
+        wrenches = np.ascontiguousarray(wrenches)
+        count = len(wrenches)
+        force = np.empty((count, self._count, 2))
+        lam = np.empty((count, 6))
+        wrench_served = np.empty((count, 6))
+        gap_power_bound = np.empty(count)
+        command = np.empty((count, self._count, 3))
+        is_attainable = np.empty(count, np.bool_)
+        error = np.empty(count)
         with self._lock:
-            served = self._ask_for(policy, None, now)
-            ins = self._at, self._area, self._to, wrenches.ctypes.data, count
-            code = self._core.fl_answer_many(*ins, *outs)
-            del served
-        if code > 0:
-            raise CommandError(_REFUSED.format(CODES[code]))
-        return found._replace(is_truncated=code < 0)
+            self._question.write(policy, None, conditions)
+            code = self._core.fl_answer_many(
+                self._block_address,
+                self._work_address,
+                self._question.address,
+                wrenches.ctypes.data,
+                count,
+                force.ctypes.data,
+                lam.ctypes.data,
+                wrench_served.ctypes.data,
+                gap_power_bound.ctypes.data,
+                command.ctypes.data,
+                is_attainable.ctypes.data,
+                error.ctypes.data,
+            )
+        is_truncated = code < 0
+        _raise_refusal(max(code, 0))
+        return CoreAnswer(
+            force, lam, wrench_served, gap_power_bound, is_attainable, command, error, is_truncated
+        )
 
     def commands(self, force: Array, previous: Array | None = None) -> Array:
-        """Returns commands (N, n, 3) for forces (N, n, 2) [N]; angles without a force keep
-        `previous` ones (n, 3)."""
-        force, command = np.ascontiguousarray(force), np.empty((len(force), self._count, 3))
-        before = None if previous is None else np.ascontiguousarray(previous)
-        start = None if before is None else before.ctypes.data
-        data = (force.ctypes.data, len(force), start, command.ctypes.data)
+        """Finds the commands for forces, by the grids of the laws.
+
+        Args:
+            force: (N, n, 2) [N] along each actuator's directions.
+            previous: commands (n, 3) whose angles are kept where there is no force; None for 0.
+
+        Returns:
+            Commands (N, n, 3).
+        """
+        force = np.ascontiguousarray(force)
+        command = np.empty((len(force), self._count, 3))
+        previous_address = None
+        if previous is not None:
+            previous = np.ascontiguousarray(previous)
+            previous_address = previous.ctypes.data
         with self._lock:
-            self._core.fl_commands(self._at, self._area, *data)
+            self._core.fl_commands(
+                self._block_address,
+                self._work_address,
+                force.ctypes.data,
+                len(force),
+                previous_address,
+                command.ctypes.data,
+            )
         return command
 
     def dual_value(self, wrench: Array, lambda_reduced: Array) -> tuple[Array, float]:
-        """Evaluates the dual.
+        """Evaluates the dual function (Eq. 3) at reduced multipliers.
 
         Args:
             wrench: desired (6,) [N, N m].
-            lambda_reduced: multipliers (6,) in the basis [W].
+            lambda_reduced: multipliers (6,) [W] in the basis of what the actuators span.
 
         Returns:
-            Responses (n, 2) [N], and the dual value [W].
+            The responses (n, 2) [N] (Eq. 5), and the dual value [W].
         """
         wrench = np.ascontiguousarray(wrench)
         lambda_reduced = np.ascontiguousarray(lambda_reduced)
         force = np.empty((self._count, 2))
-        data = (wrench.ctypes.data, lambda_reduced.ctypes.data, force.ctypes.data)
-        return force, self._core.fl_dual_value(self._at, self._area, *data)
+        value = self._core.fl_dual_value(
+            self._block_address,
+            self._work_address,
+            wrench.ctypes.data,
+            lambda_reduced.ctypes.data,
+            force.ctypes.data,
+        )
+        return force, value
 
-    def worth(self, price: Array, now: Now = STILL) -> Worth:
-        """Returns what forces are worth at prices (N, 6) of the wrench [W/N, W/(N m)], of all that
-        may be given now. Raises CommandError: the core cannot work with these numbers."""
-        price = np.ascontiguousarray(price)
-        worth = np.empty((len(price), self._count), struct("fl_actuator_worth"))
+    def conjugates(self, lam: Array, conditions: Conditions = NOMINAL) -> Conjugates:
+        """Evaluates the conjugates of all costs (Eq. 4), by the core's tables.
+
+        Args:
+            lam: multipliers (N, 6) of the wrench [W/N, W/(N m)].
+            conditions: what holds of the robot, which limits the sets of forces.
+
+        Returns:
+            Conjugates of n actuators at N multipliers.
+
+        Raises:
+            CommandError: the core cannot work with these numbers.
+        """
+        lam = np.ascontiguousarray(lam)
+        records = np.empty((len(lam), self._count), struct("fl_actuator_worth"))
         with self._lock:
-            self._stand(now)
-            ins = self._at, self._area, self._to, price.ctypes.data, len(price)
-            error = self._core.fl_worth(*ins, worth.ctypes.data)
-        if error:
-            raise CommandError(_REFUSED.format(CODES[error]))
-        return Worth(
-            worth["price_ahead"],
-            worth["price_reverse"],
-            worth["conjugate"],
-            worth["force_min"][:1],
-            worth["force_max"][:1],
+            self._question.write_conditions(conditions)
+            error = self._core.fl_worth(
+                self._block_address,
+                self._work_address,
+                self._question.address,
+                lam.ctypes.data,
+                len(lam),
+                records.ctypes.data,
+            )
+        _raise_refusal(error)
+        return Conjugates(
+            price_ahead=records["price_ahead"],
+            price_reverse=records["price_reverse"],
+            conjugate=records["conjugate"],
+            force_min=records["force_min"][:1],
+            force_max=records["force_max"][:1],
         )
 
 
-def planes(count: int) -> Array:
-    """A block of n = `count` actuators of which it says that they push in planes, and no more."""
-    block = np.zeros(tables_begin(count))
-    head_of(block)["n"] = count
-    actuators_of(block)["rows"] = 2.0
-    return block
-
-
-def reach(
-    block: Array, own: Array, origin: Array, ray: Array, close: float
-) -> tuple[Array, Array, Array]:
-    """How far (R,) rays (R, 6) from points (R, 6) go in what R robots push, minus infinity where
-    they miss it: at most, and as `close`; normals (R, 6) of the planes that prove it, and forces
-    (R, n, 2) there.
-
-    Args:
-        block: of `planes`, and polygons behind: how many corners, then these.
-        own: of each actuator (R, n, 16) the place of its polygon, or 0 and radius, middle and half
-            of a sector, then the wrench (2, 6) per newton along its directions.
-    """
-    core = library()
-    count, n, _ = own.shape
-    size = np.empty(count)
-    normal = np.empty((count, 6))
-    force = np.empty((count, n, 2))
-    work = ctypes.create_string_buffer(core.fl_sizes(3))
-    ins = [values.ctypes.data for values in (own, origin, ray)]
-    outs = [values.ctypes.data for values in (size, normal, force)]
-    core.fl_reach(block.ctypes.data, ctypes.addressof(work), *ins, count, min(close, 1e30), *outs)
-    return np.where(size > -1e30, size, -np.inf), normal, force
+def _raise_refusal(code: int) -> None:
+    """Raises a `CommandError` at a code other than FL_OK of a question."""
+    if code:
+        raise CommandError(
+            f"the core cannot work with these numbers: it found {CODES[code]}; check the wrench "
+            "and the previous command"
+        )

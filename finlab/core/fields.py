@@ -14,7 +14,8 @@ from finlab.core.library import library
 Record = NDArray[np.void]
 """An array of structs, whose fields are read by name."""
 _FIELD = re.compile(r"(\w+) (\w+)((?:\[\d+\])*);")
-_TYPES: dict[str, Any] = {
+"""A field as the library says it: type, name, lengths in brackets."""
+_NUMPY_TYPES: dict[str, Any] = {
     "fl_real": np.float64,
     "fl_byte": np.uint8,
     "int": np.int32,
@@ -22,7 +23,7 @@ _TYPES: dict[str, Any] = {
     "fl_bytes": np.uintp,
     "fl_policy_at": np.uintp,
 }
-"""Types of fields; addresses are whole numbers."""
+"""Types of fields in numpy by those in C; addresses are whole numbers."""
 
 
 @cache
@@ -47,15 +48,17 @@ def struct(name: str) -> np.dtype[np.void]:
 
 
 def _dtype(fields: str) -> np.dtype[np.void]:
+    """The dtype of a struct's fields, as the library says them: `fl_real scale[6];...`."""
     columns = []
-    for kind, name, shape in _FIELD.findall(fields):
+    for c_type, name, shape in _FIELD.findall(fields):
         lengths = tuple(int(length) for length in re.findall(r"\d+", shape))
-        columns.append((name, _TYPES[kind], lengths))
+        columns.append((name, _NUMPY_TYPES[c_type], lengths))
     return np.dtype(columns, align=True)
 
 
 def count_of(name: str) -> int:
-    """Returns how many numbers a struct of numbers alone has."""
+    """Returns how many numbers a struct has, such as `fl_actuator`, all of whose fields are
+    numbers."""
     return struct(name).itemsize // np.dtype(np.float64).itemsize
 
 
@@ -73,7 +76,7 @@ def actuators_of(block: Array) -> Record:
 
 
 def tables_begin(n: int) -> int:
-    """Returns the place where the tables of a block of n actuators begin."""
+    """Returns the offset at which the tables of a block of n actuators begin."""
     return count_of("fl_head") + n * count_of("fl_actuator")
 
 

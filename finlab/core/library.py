@@ -33,9 +33,11 @@ _TYPES = {
     "s": ctypes.c_char_p,
     "v": None,
 }
-PATH = Path(__file__).with_name(
-    "libfinlab." + {"win32": "dll", "darwin": "dylib"}.get(sys.platform, "so")
-)
+"""Types of ctypes by the letters of `SIGNATURES`."""
+_SUFFIX = {"win32": "dll", "darwin": "dylib"}.get(sys.platform, "so")
+"""Of libraries on this system."""
+PATH = Path(__file__).with_name(f"libfinlab.{_SUFFIX}")
+"""Where the compiled core stands."""
 
 
 @cache
@@ -60,6 +62,5 @@ def library() -> ctypes.PyDLL:
         problem = f"has version {version}, and this finlab needs {VERSION}"
     raise FinlabError(
         f"the compiled core {PATH} {problem}; run `make setup` or `pip install .` in a source "
-        "tree, "
-        "elsewhere install finlab again"
+        "tree, elsewhere install finlab again"
     )

@@ -1,1 +1,1 @@
-"""The robot's side: the bundle (layout graph, the fins' physics, settings) and the runtime."""
+"""What a robot runs: the bundle and `finlab-runtime`, and the allocator as C sources."""

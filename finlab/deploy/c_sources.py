@@ -1,4 +1,4 @@
-"""The robot's allocator as C99: the core, the robot's block of numbers, a self-test and examples.
+"""Exports an allocator as C99: the core, the robot's block, a self-test and examples.
 
 `robot.c` holds two blocks: the library's own in double precision, and one with few knots in its
 tables where FL_SINGLE is defined. The same layout gives the same bytes.
@@ -28,11 +28,12 @@ from finlab.whole_file import write_folder
 
 SAMPLES = 24
 """Questions of a self-test."""
-ALONE = 3e-7
-"""Error of the core's commands, on the yardstick, up to which the library has nothing to add."""
-NOT_ABOARD = "jets.c", "sequential_convex.c", "attainable_set.c", "for_python.c"
-"""Files of the core for robots with `interaction`, and for what a layout can do and prices
-prove."""
+MAX_CORE_ERROR = 3e-7
+"""Largest normalized error of the core's commands for a question of the self-test: beyond it the
+library would refine them, and its answer were not the core's."""
+FILES_LEFT_OUT = ("jets.c", "sequential_convex.c", "attainable_set.c", "for_python.c")
+"""Files of the core that an export does not need: `interaction`, attainable sets, and what Python
+alone calls."""
 QUESTIONS: tuple[tuple[PolicyName, float], ...] = (
     ("closest", 0.9),
     ("closest", 3.0),
@@ -40,21 +41,29 @@ QUESTIONS: tuple[tuple[PolicyName, float], ...] = (
     ("priority", 3.0),
     ("closest", 0.6),
 )
-"""Those of a self-test in turn: policy, times a wrench within reach; the last one follows a tick
-before."""
+"""Questions of a self-test in turn: policy, and factor of a wrench within reach; below 0.9 it is a
+tick, with the command for half that wrench before it."""
 TEMPLATES = Path(__file__).with_name("c_files")
+"""Files that go into an export as they are, but for the README's fields."""
 
 
 def c_sources(
     layout: Layout, samples: int = SAMPLES, flow: ArrayLike | None = None
 ) -> dict[str, bytes]:
-    """Returns files by name: the core, `robot.c` and `robot.h`, a self-test of so many questions, a
-    README, CMakeLists.txt, examples.
+    """Returns the files of an export by name: the core, `robot.c` and `robot.h`, a self-test, a
+    README, CMakeLists.txt and examples.
 
-    The robot's block is that of one velocity (6,) relative to the water [m/s, rad/s], body frame:
-    foils push by it, propellers lose to it; None is a robot at rest. Raises AllocationError: the
-    actuators act on each other, which the core does not know; CommandError: `flow` is not six
-    finite numbers; DataError: a force table cannot be read."""
+    Args:
+        layout: the robot.
+        samples: how many questions the self-test has.
+        flow: velocity relative to the water (6,) [m/s, rad/s], body frame, for which the block
+            holds: foils push by it, propellers lose to it. None for a robot at rest.
+
+    Raises:
+        AllocationError: the actuators act on each other, which an export does not hold.
+        CommandError: `flow` is not six finite numbers.
+        DataError: a force table cannot be read.
+    """
     if layout.interaction is not None:
         raise AllocationError(
             f"layout {layout.name!r}: has `interaction`, which the C files do not know; export it "
@@ -66,15 +75,17 @@ def c_sources(
     thin = thinned(block)
     folder = Path(core.__path__[0])
     files = [*folder.glob("*.h"), *folder.glob("src/*.[ch]")]
-    sources = {path.name: path.read_text("utf-8") for path in files if path.name not in NOT_ABOARD}
+    sources = {
+        path.name: path.read_text("utf-8") for path in files if path.name not in FILES_LEFT_OUT
+    }
     name = _identifier(layout.name)
-    sources["fl_names.h"] = _names(sources["finlab.h"] + sources["internal.h"], name)
-    sources["finlab.h"] = _sized(sources["finlab.h"], layout.n)
+    sources["fl_names.h"] = _prefixed_names(sources["finlab.h"] + sources["internal.h"], name)
+    sources["finlab.h"] = _with_size(sources["finlab.h"], layout.n)
     sources["robot.c"] = _robot(block, thin)
     sources["robot.h"] = _header(layout, name)
     sources[f"fl_{name}.h"] = _plain_header(layout, name)
     sources["allocate.c"] = _plain_source(layout, name)
-    sources["samples.h"] = _samples(layout, method, samples)
+    sources["samples.h"] = _self_test(layout, method, samples)
     for path in TEMPLATES.rglob("*.*"):
         sources[path.relative_to(TEMPLATES).as_posix()] = path.read_text("utf-8")
     law = max(sum(len(table.numbers) for table in row.values()) for row in tables_of(thin))
@@ -96,13 +107,20 @@ def c_sources(
 
 
 def write_c(files: dict[str, bytes], folder: str | os.PathLike[str]) -> None:
-    """Writes the files into a folder, which is made; those of an earlier export are replaced.
-    Raises DataError: it has other C files, or cannot be written."""
-    strangers = (own for own in Path(folder).glob("*.[ch]") if own.name not in files)
-    write_folder(folder, files, strangers, "an export")
+    """Writes the files of an export into a folder, which is made; an earlier export is replaced.
+
+    Args:
+        files: contents by name.
+        folder: the folder.
+
+    Raises:
+        DataError: the folder has other C files, or cannot be written.
+    """
+    foreign = (file for file in Path(folder).glob("*.[ch]") if file.name not in files)
+    write_folder(folder, files, foreign, "an export")
 
 
-def _sized(header: str, count: int) -> str:
+def _with_size(header: str, count: int) -> str:
     """finlab.h for so many actuators, in single precision where a processor has no unit for
     double."""
     header = re.sub(r"(#define FL_MOST) \d+", rf"\1 {count}", header, count=1)
@@ -131,7 +149,7 @@ def _identifier(name: str) -> str:
     return re.sub(r"[^a-z0-9]", "_", name.lower())
 
 
-def _names(headers: str, name: str) -> str:
+def _prefixed_names(headers: str, name: str) -> str:
     """fl_names.h, by which all functions of the core have the robot's name: two robots link into
     one program, each with a core of its own size."""
     functions = sorted(set(re.findall(r"\b(fl_[a-z_0-9]+)\(", headers)))
@@ -165,8 +183,8 @@ def _robot(block: Array, thin: Array) -> str:
 def _rows_of_commands(layout: Layout, prefix: str) -> str:
     """An enumeration of the rows of commands, with the meaning of their numbers."""
     lines = []
-    for name, part in zip(layout.names, layout.actuators, strict=True):
-        numbers = ", ".join(number.label for number in part.KIND.numbers)
+    for name, actuator in zip(layout.names, layout.actuators, strict=True):
+        numbers = ", ".join(number.label for number in actuator.KIND.numbers)
         lines.append(f"  {prefix}_{_identifier(name).upper()}, /* {name}: {numbers} */")
     rows = "\n".join(lines)
     return f"enum {{ /* rows of commands, and their numbers */\n{rows}\n  {prefix}_COUNT\n}};\n"
@@ -278,30 +296,34 @@ def _plain_source(layout: Layout, name: str) -> str:
     return _PLAIN_SOURCE.format(name=name, calm=DualSettings().calm)
 
 
-def _samples(layout: Layout, method: Dual, count: int) -> str:
-    """Wrenches within reach, out of it by each policy, and ticks; where the core leaves nothing to
-    the library, which has more ways around gaps."""
+def _self_test(layout: Layout, method: Dual, count: int) -> str:
+    """The questions of the self-test with their answers: wrenches within reach, out of reach by
+    each policy, and ticks.
+
+    Questions where the library refines the core's commands are left out: the export has no such
+    step.
+    """
     allocator = Allocator(layout)
     flow = method.plant.flow
     rng = np.random.default_rng(0)
-    before: list[str] = []
+    previous_rows: list[str] = []
     rows: list[str] = []
     for k in range(8 * count):
         if len(rows) == count:
             break
-        policy, far = QUESTIONS[k % len(QUESTIONS)]
+        policy, reach = QUESTIONS[k % len(QUESTIONS)]
         wrench = method.plant.wrench(method.plant.sample(rng, (1,)))[0] * layout.commanded
-        tick = allocator.allocate(0.5 * wrench, flow=flow).command if far < 0.9 else None
-        answer = allocator.allocate(far * wrench, policy=policy, previous=tick, flow=flow)
-        given = answer.wrench * layout.commanded
-        alone = method.forces(far * wrench[None], Policy(policy)).command
-        if tick is None and method.error(alone, given[None])[0] > ALONE:
+        tick = allocator.allocate(0.5 * wrench, flow=flow).command if reach < 0.9 else None
+        answer = allocator.allocate(reach * wrench, policy=policy, previous=tick, flow=flow)
+        delivered = answer.wrench * layout.commanded
+        core_command = method.forces(reach * wrench[None], Policy(policy)).command
+        if tick is None and method.error(core_command, delivered[None])[0] > MAX_CORE_ERROR:
             continue
-        error, last = (0.0, "0") if tick is None else (answer.err_norm, f"previous_{k}")
+        error, previous = (0.0, "0") if tick is None else (answer.err_norm, f"previous_{k}")
         if tick is not None:
-            before.append(f"static const fl_real {last}[][3] = {_rows(tick)};")
-        answered = f"{_row(given)}, {error!r}, {_rows(answer.command)}"
-        rows.append(f"  {{FL_{policy.upper()}, {_row(far * wrench)}, {answered}, {last}}},")
+            previous_rows.append(f"static const fl_real {previous}[][3] = {_rows(tick)};")
+        answered = f"{_row(delivered)}, {error!r}, {_rows(answer.command)}"
+        rows.append(f"  {{FL_{policy.upper()}, {_row(reach * wrench)}, {answered}, {previous}}},")
     calm = method.settings.calm
-    about = f"#define CALM {calm!r}\nenum {{ SAMPLES = {len(rows)} }};"
-    return "\n".join([*before, "static const sample samples[] = {", *rows, "};", about, ""])
+    counts = f"#define CALM {calm!r}\nenum {{ SAMPLES = {len(rows)} }};"
+    return "\n".join([*previous_rows, "static const sample samples[] = {", *rows, "};", counts, ""])

@@ -127,44 +127,44 @@ def _parser() -> argparse.ArgumentParser:
     def verb(
         run: Callable[[argparse.Namespace], int], text: str, example: str
     ) -> argparse.ArgumentParser:
-        made: argparse.ArgumentParser = verbs.add_parser(
+        subparser: argparse.ArgumentParser = verbs.add_parser(
             run.__name__, help=text, description=text, epilog=f"example: {example}"
         )
-        made.set_defaults(run=run)
-        about = "folder or zip archive made by `finlab export`"
-        made.add_argument("bundle", metavar="BUNDLE", help=about)
-        return made
+        subparser.set_defaults(run=run)
+        bundle_help = "folder or zip archive made by `finlab export`"
+        subparser.add_argument("bundle", metavar="BUNDLE", help=bundle_help)
+        return subparser
 
     verb(
         check,
         "Run the self-test; do this on the robot before first use.",
         f"{program} check my_robot",
     )
-    one = verb(
+    add = verb(
         allocate,
         "Commands for one target.",
         f"{program} allocate my_robot --wrench 1 0 0.5 0 0 0.1",
     ).add_argument
     names = ("FX", "FY", "FZ", "TX", "TY", "TZ")
-    one("--wrench", nargs=6, type=float, required=True, metavar=names, help="[N, N m]")
-    one("--lost", action="append", default=[], metavar="NAME", help="actuator that is lost")
-    axes = "axis that may take any wrench, such as Ty"
-    one("--free", action="append", default=[], metavar="AXIS", help=axes)
-    one("--policy", choices=POLICIES, default="closest", help="what to do out of reach")
+    add("--wrench", nargs=6, type=float, required=True, metavar=names, help="[N, N m]")
+    add("--lost", action="append", default=[], metavar="NAME", help="actuator that is lost")
+    free_help = "axis that may take any wrench, such as Ty"
+    add("--free", action="append", default=[], metavar="AXIS", help=free_help)
+    add("--policy", choices=POLICIES, default="closest", help="what to do out of reach")
     speeds = ("VX", "VY", "VZ", "WX", "WY", "WZ")
-    through = "velocity relative to the water [m/s, rad/s]"
-    one("--flow", nargs=6, type=float, metavar=speeds, help=through)
-    one("--seed", type=int, default=0, help="seed of the candidates")
-    one("--json", action="store_true", help="print one JSON object")
-    loop = verb(
+    flow_help = "velocity relative to the water [m/s, rad/s]"
+    add("--flow", nargs=6, type=float, metavar=speeds, help=flow_help)
+    add("--seed", type=int, default=0, help="seed of the candidates")
+    add("--json", action="store_true", help="print one JSON object")
+    serve_parser = verb(
         serve,
         "Read targets as JSON lines, write commands as JSON lines.",
         f"""echo '{{"wrench": [1, 0, 0.5, 0, 0, 0.1]}}' | {program} serve my_robot""",
     )
-    silence = loop.add_mutually_exclusive_group().add_argument
-    about = "silence before the fins rest, 1 s if not said"
-    silence("--watchdog-s", type=_seconds, default=1.0, metavar="S", help=about)
-    silence(
+    add_silence = serve_parser.add_mutually_exclusive_group().add_argument
+    silence_help = "silence before the fins rest, 1 s if not said"
+    add_silence("--watchdog-s", type=_seconds, default=1.0, metavar="S", help=silence_help)
+    add_silence(
         "--no-watchdog",
         action="store_true",
         help="keep the last commands however long no target comes",

@@ -1,8 +1,8 @@
-"""A robot out of its bundle, and the check whether this computer answers as the desk did, and
-truly.
+"""Loads a robot from its bundle, and checks that its answers on this computer are right.
 
-To be asked on the robot before first use. Are the actuators' laws and tables the same here, do they
-confirm this computer's answers, and is there an answer to the extremes.
+`finlab-runtime check` runs the checks on the robot before first use: the actuators' laws and tables
+give the same wrenches here as where the bundle was made, they confirm this computer's answers, and
+targets far out of reach have an answer.
 """
 
 import os
@@ -29,36 +29,47 @@ from finlab.layout.load import parse_layout
 from finlab.physics import plant_of
 from finlab.physics.objective import REACHED
 
-N_SELF_TEST = 4  # self-test wrenches in a bundle: enough to notice a wrong file, few enough to read
+N_SELF_TEST = 4
+"""Wrenches of the self-test in a bundle: enough to notice a wrong file, few enough to read."""
 SELF_TEST_TOLERANCE = 1e-6
 """Allowed normalized error between the wrench of a self-test's command and what another machine
 computes for it; both are written with nine digits."""
-AS_GOOD = 1.5
+MAX_ERROR_RATIO = 1.5
 """Largest error of own answers over that of the stored ones, where these do not reach their
 targets."""
-FAR = 10.0  # size of an extreme target in yardsticks: beyond the reach of any robot
+EXTREME_SIZE = 10.0
+"""Size of an extreme target over the wrench scale: beyond the reach of any robot."""
 
 
 @dataclass(frozen=True)
 class DeployedRobot:
-    """What `finlab-runtime` works with."""
+    """A robot in its bundle, as `finlab-runtime` uses it."""
 
-    allocator: Allocator  # made of the bundle's settings and, where there are any, networks
-    lost: tuple[str, ...] = ()  # actuators that the bundle names as lost
+    allocator: Allocator
+    """The allocator of the bundle's settings and, where there are any, networks."""
+    lost: tuple[str, ...] = ()
+    """Actuators that the bundle names as lost."""
     self_test: tuple[Case, ...] = ()
     """Targets with the answers of the computer that made the bundle."""
 
     @property
     def layout(self) -> Layout:
-        """All fins."""
+        """The layout with all actuators."""
         return self.allocator.layout
 
     def allocate(
         self, wrench: ArrayLike, *, lost: Sequence[str] = (), **options: Any
     ) -> Allocation:
-        """Commands for a target (6,) [N, N m] in the body frame; arguments and errors as in
-        `finlab.Allocator.allocate`. What the bundle names as lost stays lost, whatever `lost` adds.
-        Raises DataError: the answer is no number, as a broken bundle gives it."""
+        """Returns the answer to a target; further arguments and errors as in `Allocator.allocate`.
+
+        Args:
+            wrench: target (6,) [N, N m] in the body frame.
+            lost: actuators that are lost besides those that the bundle names.
+            **options: further arguments of `finlab.Allocator.allocate`.
+
+        Raises:
+            DataError: the answer is no number, as a broken bundle gives it.
+        """
         all_lost = (*self.lost, *(name for name in lost if name not in self.lost))
         answer = self.allocator.allocate(wrench, lost=all_lost, **options)
         works = [name not in all_lost for name in self.layout.names]
@@ -68,20 +79,30 @@ class DeployedRobot:
             )
         return answer
 
-    def neutral(self, lost: Sequence[str] = (), now: Array | None = None) -> Array:
-        """Commands (n, 3) that push least, see `Actuator.neutral`, given the present ones (n, 3) if
-        any."""
-        rows = [None] * self.layout.n if now is None else now
+    def neutral(self, lost: Sequence[str] = (), present: Array | None = None) -> Array:
+        """Returns the commands (n, 3) that push least, see `Actuator.neutral`; NaN for lost ones.
+
+        Args:
+            lost: actuators that are lost besides those that the bundle names.
+            present: present commands (n, 3); None where there are none.
+        """
+        rows = [None] * self.layout.n if present is None else present
         command = np.array(
-            [part.neutral(row) for part, row in zip(self.layout.actuators, rows, strict=True)]
+            [
+                actuator.neutral(row)
+                for actuator, row in zip(self.layout.actuators, rows, strict=True)
+            ]
         )
         command[[name in (*self.lost, *lost) for name in self.layout.names]] = np.nan
         return command
 
 
 def load_robot(path: str | os.PathLike[str]) -> DeployedRobot:
-    """The robot in a bundle, a folder or a zip archive. Raises FinlabError: it is none, was
-    changed, or cannot be run."""
+    """Returns the robot in a bundle, a folder or a zip archive.
+
+    Raises:
+        FinlabError: it is no bundle, was changed, or cannot be run.
+    """
     if (
         not is_bundle(path)
         and str(path).endswith((".json", ".yaml", ".yml"))
@@ -97,8 +118,12 @@ def load_robot(path: str | os.PathLike[str]) -> DeployedRobot:
 
 
 def parse_robot(files: Files, source: str = "bundle") -> DeployedRobot:
-    """The robot in the contents of a bundle's files; errors as in `load_robot`. Force tables are
-    read from the folder or archive `source` once they are needed."""
+    """Returns the robot in the contents of a bundle's files; errors as in `load_robot`.
+
+    Args:
+        files: the contents by name.
+        source: the folder or archive from which force tables are read when they are needed.
+    """
     check_bundle_files(files, source)
     robot = robot_of(files, source, parse_layout)
     allocator = Allocator.of_choice(robot.layout, bundled_method(files, source))
@@ -110,11 +135,14 @@ def parse_robot(files: Files, source: str = "bundle") -> DeployedRobot:
 
 
 class Finding(NamedTuple):
-    """One question and its answer."""
+    """The result of one check."""
 
-    question: str  # what was compared
-    value: float  # largest difference found; NaN where an answer was no number
-    limit: float  # largest difference allowed
+    question: str
+    """What was compared."""
+    value: float
+    """Largest difference; NaN where an answer was no number."""
+    limit: float
+    """Largest difference allowed."""
 
     @property
     def good(self) -> bool:
@@ -123,10 +151,18 @@ class Finding(NamedTuple):
 
 
 def self_tests(allocator: Allocator, lost: tuple[str, ...]) -> tuple[Case, ...]:
-    """Targets that can be reached, wrenches of random commands, with an allocator's answers.
+    """Returns targets within reach, wrenches of random commands, with an allocator's answers.
 
-    They depend on the layout and the allocator alone. Raises LayoutError: an unknown lost actuator,
-    or none left; DataError: a fin's force table cannot be read."""
+    They depend on the layout and the allocator alone.
+
+    Args:
+        allocator: the allocator of a bundle.
+        lost: actuators that the bundle names as lost.
+
+    Raises:
+        LayoutError: an unknown lost actuator, or none left.
+        DataError: a force table cannot be read.
+    """
     layout = allocator.layout
     plant = plant_of(layout.without(lost) if lost else layout)
     cases = []
@@ -143,27 +179,34 @@ def self_tests(allocator: Allocator, lost: tuple[str, ...]) -> tuple[Case, ...]:
 
 
 def self_check(robot: DeployedRobot) -> list[Finding]:
-    """Ask what the bundle knows the answers of. Raises DataError: the bundle has no self-tests, or
-    a force table cannot be read."""
+    """Repeats the self-test of the bundle on this computer.
+
+    Raises:
+        DataError: the bundle has no self-test, or a force table cannot be read.
+    """
     if not robot.self_test:
         raise DataError("the bundle has no self-tests; export it again")
     layout = robot.layout
     lost = robot.lost
-    alive = [i for i, name in enumerate(layout.names) if name not in lost]
+    working = [i for i, name in enumerate(layout.names) if name not in lost]
     plant = plant_of(layout.without(lost) if lost else layout)
     scale = robot.allocator.scale
-    differs = []
+    differences = []
     errors = []
     allowed = REACHED
     for case in robot.self_test:
-        stored = plant.wrench(np.array([case.command[i] for i in alive], dtype=np.float64))
-        differs.append(float(np.linalg.norm((stored - np.array(case.delivered_wrench)) / scale)))
+        stored = plant.wrench(np.array([case.command[i] for i in working], dtype=np.float64))
+        differences.append(
+            float(np.linalg.norm((stored - np.array(case.delivered_wrench)) / scale))
+        )
         errors.append(robot.allocator.allocate(case.wrench, lost=lost).err_norm)
         missing = (stored - np.array(case.wrench)) * layout.commanded / scale
-        allowed = max(allowed, AS_GOOD * float(np.linalg.norm(missing)))
+        allowed = max(allowed, MAX_ERROR_RATIO * float(np.linalg.norm(missing)))
     return [
         Finding(
-            "wrench of the stored commands (err_norm)", float(np.max(differs)), SELF_TEST_TOLERANCE
+            "wrench of the stored commands (err_norm)",
+            float(np.max(differences)),
+            SELF_TEST_TOLERANCE,
         ),
         Finding(
             "own answers, judged by the actuators' own laws (err_norm)",
@@ -174,30 +217,30 @@ def self_check(robot: DeployedRobot) -> list[Finding]:
 
 
 def extremes(robot: DeployedRobot) -> Finding:
-    """Ask for each axis both ways, far out of reach, by the method's policies, with each actuator
-    lost; the value is how many of these have no answer, and the question names the first of
-    them."""
+    """Asks for wrenches far out of reach: along each axis both ways, by each policy of the method,
+    with each actuator lost. The value counts those without an answer; the question names the
+    first of them."""
     layout = robot.layout
-    silent = []
+    unanswered = []
     n = 0
     kinds = KINDS if method_class(robot.allocator.method).every_policy else KINDS[:1]
     alive = [name for name in layout.names if name not in robot.lost]
     for lost in [(), *([name] for name in alive if len(alive) > 1)]:
         for policy, i in product(kinds, np.flatnonzero(layout.commanded)):
-            for way in (-1.0, 1.0):
+            for sign in (-1.0, 1.0):
                 target = np.zeros(6)
-                target[i] = way * FAR * robot.allocator.scale[i]
+                target[i] = sign * EXTREME_SIZE * robot.allocator.scale[i]
                 n = n + 1
                 try:
                     robot.allocate(target, lost=lost, policy=policy)
                 except Exception as error:  # each is a finding
-                    what = (
-                        f"{policy} {'+' if way > 0.0 else '-'}{AXES[i]}, "
+                    first = (
+                        f"{policy} {'+' if sign > 0.0 else '-'}{AXES[i]}, "
                         f"{' '.join(lost) or 'none'} lost"
                     )
-                    silent.append(f"{what}: {type(error).__name__}: {error!s:.100}")
-    first = f", first {silent[0]}" if silent else ""
-    return Finding(f"extremes without an answer, of {n}{first}", float(len(silent)), 0.0)
+                    unanswered.append(f"{first}: {type(error).__name__}: {error!s:.100}")
+    first = f", first {unanswered[0]}" if unanswered else ""
+    return Finding(f"extremes without an answer, of {n}{first}", float(len(unanswered)), 0.0)
 
 
 def _rounded(values: Array) -> Array:

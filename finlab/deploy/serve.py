@@ -40,15 +40,16 @@ from finlab.files.guarded import decoded
 from finlab.files.schema import checked
 from finlab.physics import plant_of
 
-RECENT_S = 0.5  # age [s] up to which the last commands bind the next ones by the servos' rates
-
-MAX_ID = 1_000  # longest `id`, as JSON [characters]
+RECENT_S = 0.5
+"""Age up to which the last commands limit the next ones by the drives' rates [s]."""
+MAX_ID = 1_000
+"""Longest `id`, as JSON [characters]."""
 _REFUSED = (CommandError, LayoutError, AllocationError)
-"""What is wrong with a request; anything else is a fault of the robot's files or of ours."""
+"""Errors of a request; any other one is a fault of the robot's files or of finlab."""
 
 
 class Request(Struct, forbid_unknown_fields=True):
-    """What a request may hold. The allocator checks its arrays."""
+    """The content of a request. The allocator checks its arrays."""
 
     wrench: Any
     id: Any = None
@@ -93,22 +94,23 @@ class Server:
         try:
             self._loop(transport)
         except EOFError:
-            transport.send(_line(self._rest()))
+            transport.send(_line(self._rest_reply()))
         except Unsent:
             raise
         except BaseException:  # an unforeseen error is raised after the fins rest
-            transport.send(_line(self._rest()))
+            transport.send(_line(self._rest_reply()))
             raise
 
     def _loop(self, transport: StandardStreams) -> None:
-        fresh = time.monotonic()  # when the last good target came
+        """Answers requests until they end; rests the robot where none comes in time."""
+        fresh = time.monotonic()  # when the last good target arrived
         while True:
             patience = self._watchdog
             if patience is not None:
                 patience = max(patience - (time.monotonic() - fresh), 0.0)
             line = transport.newest(patience)
             if line is None or self._is_late(fresh, line.since):
-                transport.send(_line(self._rest()))
+                transport.send(_line(self._rest_reply()))
                 fresh = time.monotonic()
             if line is None or self._is_late(line.since, time.monotonic()):
                 continue
@@ -116,17 +118,21 @@ class Server:
             if replies[-1]["status"] == "ok":  # an invalid request does not keep the fins beating
                 now = time.monotonic()
                 if self._is_late(line.since, now):  # the process paused while it solved
-                    replies = [self._rest()]
+                    replies = [self._rest_reply()]
                 fresh = now
             for reply in replies:
                 transport.send(_line(reply))
 
     def _is_late(self, since: float, now: float) -> bool:
+        """Whether more time than the watchdog allows lies between two times [s]."""
         return now - since > (math.inf if self._watchdog is None else self._watchdog)
 
     def answers(self, line: bytes) -> list[dict[str, Any]]:
-        """The answer to one request, as plain values; where it is good and the solve failed, rest
-        comes first, and then the error."""
+        """Returns the replies to one request as plain values.
+
+        It is one reply; where a valid request could not be answered, the neutral command comes
+        before the error.
+        """
         name: Any = None
         fresh = time.monotonic() - self._sent_at < RECENT_S
         try:
@@ -142,17 +148,18 @@ class Server:
                 policy=request.policy,
                 flow=request.flow,
             )
-            reply = self._reply(name, "ok", answer.command, answer.forces) | _about(answer)
+            reply = self._reply(name, "ok", answer.command, answer.forces) | _answer_record(answer)
             _line(reply)
         except _REFUSED as error:
             return [_error(name, str(error))]
         except Exception as error:  # the robot goes on, whatever is wrong
-            place = traceback.extract_tb(error.__traceback__)[-1]
-            what = f"{type(error).__name__}, {place.name}, line {place.lineno}: {error!s:.200}"
+            frame = traceback.extract_tb(error.__traceback__)[-1]
+            problem = f"{type(error).__name__}, {frame.name}, line {frame.lineno}: {error!s:.200}"
             return [
-                self._rest(),
+                self._rest_reply(),
                 _error(
-                    name, f"the target could not be answered ({what}); the robot rests, ask again"
+                    name,
+                    f"the target could not be answered ({problem}); the robot rests, ask again",
                 ),
             ]
         self._lost = tuple(request.lost)
@@ -160,13 +167,13 @@ class Server:
         self._sent_at = time.monotonic()
         return [reply]
 
-    def _rest(self) -> dict[str, Any]:
-        now = self._sent.command if isinstance(self._sent, Allocation) else self._sent
-        rest = self._robot.neutral(self._lost, now)
+    def _rest_reply(self) -> dict[str, Any]:
+        sent = self._sent.command if isinstance(self._sent, Allocation) else self._sent
+        neutral = self._robot.neutral(self._lost, sent)
         if self._sent is not None:  # what follows begins at rest
-            self._sent = rest
+            self._sent = neutral
             self._sent_at = time.monotonic()
-        return self._reply(None, "neutral", rest)
+        return self._reply(None, "neutral", neutral)
 
     def _reply(
         self, name: Any, status: str, command: Array, forces: Array | None = None
@@ -178,7 +185,7 @@ class Server:
         return {"id": name, "status": status, **command_record(layout, command, forces)}
 
 
-def _about(answer: Allocation) -> dict[str, Any]:
+def _answer_record(answer: Allocation) -> dict[str, Any]:
     return {
         "target": plain_target(answer.target),
         "wrench": answer.wrench.tolist(),

@@ -18,9 +18,9 @@ from finlab.core.fields import Record, actuators_of, head_of, tables_begin
 TOLERANCE = 1e-5
 """Largest error of the grid of a law, over its largest value."""
 CELLS = 128
-"""Cells of a table at most; of a foil's angles and lifts twice as many knots."""
+"""Most cells of a table; of a foil's angles and lifts twice as many knots."""
 POINTS = 64
-"""Directions of a gauge at most."""
+"""Most directions of a gauge."""
 TABLES = ("force_table", "force_table_reverse", "gauge_table", "law_grid", "command_table")
 """Fields of an actuator that name a table: force over price, the same in reverse, gauge, law, and a
 fin's beat or a foil's curve."""
@@ -37,16 +37,16 @@ class Table(NamedTuple):
 
 
 def tables_of(block: Array) -> list[dict[int, Table]]:
-    """Returns of each actuator the tables that a block has, by their places."""
+    """Returns the tables that a block has of each actuator, by their offsets."""
     tables = []
     for actuator in actuators_of(block):
-        by_place = {}
+        by_offset = {}
         for field in TABLES:
-            place = int(actuator[field])
-            if place > 0:
-                length = _length(field, block[place:], is_fin=actuator["command_kind"] == FIN)
-                by_place[place] = Table(field, block[place : place + length])
-        tables.append(by_place)
+            offset = int(actuator[field])
+            if offset > 0:
+                length = _length(field, block[offset:], is_fin=actuator["command_kind"] == FIN)
+                by_offset[offset] = Table(field, block[offset : offset + length])
+        tables.append(by_offset)
     return tables
 
 
@@ -76,24 +76,24 @@ def thinned(block: Array) -> Array:
     """
     actuators = actuators_of(block)
     tables: dict[int, Table] = {}
-    for by_place in tables_of(block):
-        tables.update(by_place)
+    for by_offset in tables_of(block):
+        tables.update(by_offset)
 
     begin = tables_begin(len(actuators))
     thin_tables = []
-    moved_to = {0: 0}
-    place_new = begin
-    for place, table in tables.items():
-        thin = _thinned_table(table, actuators[actuators["law_grid"] == place])
+    new_offset = {0: 0}
+    offset_new = begin
+    for offset, table in tables.items():
+        thin = _thinned_table(table, actuators[actuators["law_grid"] == offset])
         thin_tables.append(thin)
-        moved_to[place] = place_new
-        place_new += len(thin)
+        new_offset[offset] = offset_new
+        offset_new += len(thin)
 
     block = np.concatenate([block[:begin], *thin_tables])
     head_of(block)["length"] = len(block)
     for actuator in actuators_of(block):
         for field in TABLES:
-            actuator[field] = moved_to[int(actuator[field])]
+            actuator[field] = new_offset[int(actuator[field])]
         if not actuator["is_free_angle"]:
             actuator["command_min"] = _rounded(actuator["command_min"], up=True)
             actuator["command_max"] = _rounded(actuator["command_max"], up=False)
@@ -102,10 +102,10 @@ def thinned(block: Array) -> Array:
 
 def _rounded(limits: Array, up: bool) -> NDArray[np.float32]:
     """Returns limits (3,) in single precision, none outside of what they were."""
-    near = limits.astype(np.float32)
-    outside = near < limits if up else near > limits
+    rounded = limits.astype(np.float32)
+    outside = rounded < limits if up else rounded > limits
     inward = np.float32(np.inf if up else -np.inf)
-    return np.where(outside, np.nextafter(near, inward), near)
+    return np.where(outside, np.nextafter(rounded, inward), rounded)
 
 
 def _thinned_table(table: Table, users: Record) -> Array:
@@ -120,15 +120,18 @@ def _thinned_table(table: Table, users: Record) -> Array:
 
 
 def _radial(table: Array) -> Array:
+    """A table of force over price with every so many of its knots; slopes are limited so that the
+    cubic between two knots stays monotonic."""
     step = max(int(table[1]) // CELLS, 1)
     force, slope, _ = table[3:].reshape(-1, 3)[::step].T
     price = table[0] * np.linspace(0.0, 1.0, len(force)) ** 4
     chord = np.diff(force) / np.diff(price)
-    most = 3.0 * np.minimum(np.append(chord, chord[-1]), np.insert(chord, 0, chord[0]))
-    return table_numbers(float(table[0]), force, np.minimum(slope, most), float(table[2]))
+    slope_max = 3.0 * np.minimum(np.append(chord, chord[-1]), np.insert(chord, 0, chord[0]))
+    return table_numbers(float(table[0]), force, np.minimum(slope, slope_max), float(table[2]))
 
 
 def _gauge(table: Array) -> Array:
+    """A gauge with every so many of its directions."""
     rows = table[1:].reshape(-1, 4)
     rows = rows[:: max(len(rows) // POINTS, 1)]
     return np.concatenate([[len(rows)], rows.ravel()])
@@ -150,9 +153,9 @@ def _grid(grid: Array, users: Record) -> Array:
     period = grid[3]
     if count[0] == count[1] == 1 < count[2]:
         axes[2], value, period = _reached(axes[2], values[0, 0], period, users)
-        kept = _angles(axes[2], value, period)
-        axes[2] = axes[2][kept]
-        values = value[None, None, kept]
+        chosen = _angles(axes[2], value, period)
+        axes[2] = axes[2][chosen]
+        values = value[None, None, chosen]
     elif values.shape[2:] == (1, 1):
         axes[0], values = _sizes(axes[0], values, 2 if grid[6] else 1)
     return np.concatenate([[*map(len, axes)], [period], grid[4:7], *axes, values.ravel()])
@@ -183,43 +186,57 @@ def _reached(knot: Array, value: Array, period: float, foils: Record) -> tuple[A
 
 
 def _angles(knot: Array, value: Array, period: float) -> NDArray[np.intp]:
-    """Which knots (K,) of a period, or of an axis where it is 0, say all values (K, c) nearly: more
-    and more, where most is missing."""
-    kept = np.arange(0, len(knot), max(len(knot) // 16, 1))
-    ends = [0, 1, len(knot) - 2, len(knot) - 1]
-    kept = kept if period else np.union1d(kept, ends)
-    while len(kept) < min(2 * CELLS, len(knot)):
-        rows = kept
-        around = knot[kept]
+    """Indices of few knots whose cubic is within TOLERANCE of all values; knots are added where the
+    error is largest.
+
+    Args:
+        knot: angles (K,) [rad].
+        value: coefficients (K, c) there.
+        period: of the angles [rad]; 0 for none.
+    """
+    chosen = np.arange(0, len(knot), max(len(knot) // 16, 1))
+    edges = [0, 1, len(knot) - 2, len(knot) - 1]
+    chosen = chosen if period else np.union1d(chosen, edges)
+    while len(chosen) < min(2 * CELLS, len(knot)):
+        rows = chosen
+        neighbours = knot[chosen]
         if period:
-            rows = np.concatenate([kept[-2:], kept, kept[:2]])
-            around = np.concatenate([knot[kept[-2:]] - period, around, knot[kept[:2]] + period])
-        miss = np.abs(_cubic(around, value[rows])(knot) - value) / np.abs(value).max(axis=0)
+            rows = np.concatenate([chosen[-2:], chosen, chosen[:2]])
+            neighbours = np.concatenate(
+                [knot[chosen[-2:]] - period, neighbours, knot[chosen[:2]] + period]
+            )
+        error = np.abs(_cubic(neighbours, value[rows])(knot) - value) / np.abs(value).max(axis=0)
         if not period:
-            miss[[0, -1]] = 0.0
-        if miss.max() <= TOLERANCE:
+            error[[0, -1]] = 0.0
+        if error.max() <= TOLERANCE:
             break
-        kept = np.sort(np.append(kept, miss.max(axis=1).argmax()))
-    return kept
+        chosen = np.sort(np.append(chosen, error.max(axis=1).argmax()))
+    return chosen
 
 
 def _sizes(knot: Array, value: Array, power: int) -> tuple[Array, Array]:
-    """As few of the knots (K,) of sizes (K, f, 1, 1) as do, and one beyond each end for the slope
-    there."""
-    ends = np.array([1, -2])
+    """Knots and values of a fin's law with as few of its sizes as are within TOLERANCE, and one
+    knot beyond each end for the slope there.
+
+    Args:
+        knot: sizes of the beat (K,).
+        value: forces (K, f, 1, 1) there.
+        power: the power of the values by which the error is measured.
+    """
+    edges = np.array([1, -2])
     slope = (value[[2, -1]] - value[[0, -3]]).T / (knot[[2, -1]] - knot[[0, -3]])
-    wanted = value[1:-1] ** power
+    target = value[1:-1] ** power
     best = (knot, value)
     step = 2
     while (len(knot) - 3) % step == 0:
         x = knot[1:-1][::step]
         v = value[1:-1][::step]
-        width = x[ends] - x[[0, -1]]
-        low, high = np.split(v[ends] - 2.0 * (slope * width).T, 2)
+        width = x[edges] - x[[0, -1]]
+        low, high = np.split(v[edges] - 2.0 * (slope * width).T, 2)
         x = np.concatenate([x[:1] - width[:1], x, x[-1:] - width[1:]])
         v = np.concatenate([low, v, high])
-        miss = np.abs(_cubic(x, v)(knot[1:-1]) ** power - wanted).max()
-        if miss > TOLERANCE * max(np.abs(wanted).max(), NOTHING):
+        error = np.abs(_cubic(x, v)(knot[1:-1]) ** power - target).max()
+        if error > TOLERANCE * max(np.abs(target).max(), NOTHING):
             break
         best = (x, v)
         step = 2 * step
@@ -227,15 +244,16 @@ def _sizes(knot: Array, value: Array, power: int) -> tuple[Array, Array]:
 
 
 def _curve(table: Array) -> Array:
-    """Every so many rows of a beat; of pairs those that say all nearly."""
+    """A beat with every so many of its rows; or a curve with the rows between which the others are
+    within TOLERANCE of straight lines."""
     rows = table[1:].reshape(-1, 2)
     if len(rows) == table[0] + 1:
         rows = rows[:: max((len(rows) - 1) // CELLS, 1)]
         return np.concatenate([[len(rows) - 1], rows.ravel()])
-    kept = np.array([0, len(rows) - 1])
-    while len(kept) < min(2 * CELLS, len(rows)):
-        miss = np.abs(np.interp(rows[:, 0], *rows[kept].T) - rows[:, 1])
-        if miss.max() <= TOLERANCE * np.abs(rows[:, 1]).max():
+    chosen = np.array([0, len(rows) - 1])
+    while len(chosen) < min(2 * CELLS, len(rows)):
+        error = np.abs(np.interp(rows[:, 0], *rows[chosen].T) - rows[:, 1])
+        if error.max() <= TOLERANCE * np.abs(rows[:, 1]).max():
             break
-        kept = np.sort(np.append(kept, miss.argmax()))
-    return np.concatenate([[len(kept)], rows[kept].ravel()])
+        chosen = np.sort(np.append(chosen, error.argmax()))
+    return np.concatenate([[len(chosen)], rows[chosen].ravel()])

@@ -1,4 +1,7 @@
-"""Tables and sentences as plain text, and as HTML with a picture for notebooks."""
+"""Shows values: tables and sentences as plain text, and as HTML with a picture for notebooks.
+
+Layouts, score cards and answers make blocks of text and tables; `pictures` draws.
+"""
 
 from __future__ import annotations
 
@@ -14,13 +17,16 @@ if TYPE_CHECKING:
 
 
 class Table(NamedTuple):
-    """Cells under a head."""
+    """A table of texts."""
 
     head: Sequence[str]
+    """Names of the columns."""
     rows: Sequence[Sequence[str]]
+    """Cells, row by row."""
     words: Sequence[bool]
-    """Which columns are words, to the left; the others are numbers, to the right."""
+    """Whether each column holds words, which are aligned to the left; numbers are to the right."""
     title: str = ""
+    """A line above the table."""
 
 
 Block = Table | str
@@ -33,6 +39,7 @@ def text(blocks: Iterable[Block]) -> str:
 
 
 def _text(block: Block) -> str:
+    """A block as plain text."""
     if isinstance(block, str):
         return block
     table = aligned(block.head, block.rows, block.words)
@@ -40,25 +47,39 @@ def _text(block: Block) -> str:
 
 
 def aligned(head: Sequence[str], rows: Sequence[Sequence[str]], words: Sequence[bool]) -> str:
-    """Cells under a head, padded with spaces: columns of words to the left, others to the right."""
+    """Returns a table as plain text, its cells padded with spaces.
+
+    Args:
+        head: names of the columns.
+        rows: cells, row by row.
+        words: whether each column is aligned to the left.
+    """
     widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
 
     def line(cells: Sequence[str]) -> str:
-        each = zip(cells, widths, words, strict=True)
+        columns = zip(cells, widths, words, strict=True)
         return "  ".join(
-            cell.ljust(width) if left else cell.rjust(width) for cell, width, left in each
+            cell.ljust(width) if is_words else cell.rjust(width)
+            for cell, width, is_words in columns
         ).rstrip()
 
     return "\n".join(map(line, [head, *rows]))
 
 
 def html(blocks: Iterable[Block], picture: Callable[[], Figure]) -> str:
-    """Returns blocks as HTML and a picture as PNG inside it; without matplotlib, how to install it.
-    Names in blocks may come from a stranger: all text is escaped."""
+    """Returns blocks as HTML, with a picture as PNG inside it, or how to install matplotlib.
+
+    Names in blocks may come from a stranger: all text is escaped.
+
+    Args:
+        blocks: texts and tables.
+        picture: draws the picture.
+    """
     return "".join([*map(_html, blocks), _image(picture)])
 
 
 def _html(block: Block) -> str:
+    """A block as HTML."""
     if isinstance(block, str):
         return f"<p>{escape(block)}</p>".replace("\n", "<br>")
     sides = ["left" if words else "right" for words in block.words]
@@ -69,8 +90,8 @@ def _html(block: Block) -> str:
 
 def _row(tag: str, cells: Sequence[str], sides: Sequence[str]) -> str:
     row = zip(cells, sides, strict=True)
-    parts = (f"<{tag} style='text-align:{side}'>{escape(cell)}</{tag}>" for cell, side in row)
-    return f"<tr>{''.join(parts)}</tr>"
+    cells_html = (f"<{tag} style='text-align:{side}'>{escape(cell)}</{tag}>" for cell, side in row)
+    return f"<tr>{''.join(cells_html)}</tr>"
 
 
 def _image(picture: Callable[[], Figure]) -> str:

@@ -24,13 +24,21 @@ HULL_EXPONENT = {"box": 0.2}
 
 
 def robot_picture(layout: Any, forces: Array | None = None) -> Figure:
-    """Returns a robot (a `finlab.Layout`) in the body frame, with an arrow at each actuator: where
-    it points, or its force (n, 3) [N]."""
-    place = layout.position
-    arrow = np.array([part.direction for part in layout.actuators]) if forces is None else forces
-    most = float(np.linalg.norm(arrow, axis=-1).max())
+    """Returns a figure of a robot in the body frame, with an arrow at each actuator.
+
+    Args:
+        layout: a `finlab.Layout`.
+        forces: the forces (n, 3) [N] that the arrows show; the actuators' directions when None.
+    """
+    position = layout.position
+    arrow = (
+        np.array([actuator.direction for actuator in layout.actuators])
+        if forces is None
+        else forces
+    )
+    longest = float(np.linalg.norm(arrow, axis=-1).max())
     hull = None if layout.body is None else layout.body.hull
-    points = [place]
+    points = [position]
     if hull is not None and hull.size_m is not None:
         sides = np.array(hull.size_m)
         center = np.array(hull.center_m)
@@ -45,14 +53,14 @@ def robot_picture(layout: Any, forces: Array | None = None) -> Figure:
         )
         points.append(skin.reshape(-1, 3))
     size = max(float(np.ptp(np.concatenate(points), axis=0).max()), 1e-2)
-    arrow = arrow * ARROW_SHARE * size / max(most, 1e-12)
-    words = layout.name if forces is None else f"{layout.name}\nlongest arrow {most:.3g} N"
-    figure, axes = space(words, np.concatenate([*points, place + arrow]), "m")
+    arrow = arrow * ARROW_SHARE * size / max(longest, 1e-12)
+    words = layout.name if forces is None else f"{layout.name}\nlongest arrow {longest:.3g} N"
+    figure, axes = space(words, np.concatenate([*points, position + arrow]), "m")
     if len(points) > 1:
         axes.plot_surface(*np.moveaxis(skin, -1, 0), color=COLORS[0], alpha=0.12)
-    for k, (name, at, towards) in enumerate(zip(layout.names, place, arrow, strict=True)):
-        axes.quiver(*at, *towards, color=COLORS[k % len(COLORS)], linewidth=2.0)
-        axes.text(*at, name, fontsize="small")
+    for k, (name, point, vector) in enumerate(zip(layout.names, position, arrow, strict=True)):
+        axes.quiver(*point, *vector, color=COLORS[k % len(COLORS)], linewidth=2.0)
+        axes.text(*point, name, fontsize="small")
     return figure
 
 
@@ -71,21 +79,33 @@ def body_picture(title: str, unit: str, body: Any) -> Figure:
 
 
 def path_picture(title: str, reference: Array, path: Array, marks: Mapping[str, Array]) -> Figure:
-    """Returns a path (N, 3) beside its reference (N, 3), with marked places (3,) by their words
-    [m]."""
+    """Returns a figure of a path and its reference.
+
+    Args:
+        title: the figure's title.
+        reference: points (N, 3) [m].
+        path: points (N, 3) [m].
+        marks: points (3,) [m] that are marked, by their labels.
+    """
     figure, axes = space(title, np.concatenate([reference, path]), "m")
     axes.plot(*reference.T, color="0.6", linewidth=3.0, label="reference")
     axes.plot(*path.T, color=COLORS[0], label="robot")
-    for words, at in marks.items():
-        axes.plot(*at[:, None], "kx")
-        axes.text(*at, words, fontsize="small")
+    for words, point in marks.items():
+        axes.plot(*point[:, None], "kx")
+        axes.text(*point, words, fontsize="small")
     axes.legend(frameon=False)
     return figure
 
 
 def ranges_picture(title: str, names: Sequence[str], low: Array, high: Array) -> Figure:
-    """Returns bars from least to most of each axis, forces (3,) [N] and torques (3,) [N m]; none at
-    NaN."""
+    """Returns a figure of the range of each axis as a bar, none at NaN.
+
+    Args:
+        title: the figure's title.
+        names: names of the six axes.
+        low: least wrench (6,) [N, N m].
+        high: largest wrench (6,) [N, N m].
+    """
     figure, axes = panels((6.0, 2.4), 1, 2)
     width = np.nan_to_num(high - low)
     low = np.nan_to_num(low)

@@ -1,15 +1,20 @@
-"""Forms of files by their end and content, and one form made into another."""
+"""Converts between layout files and the formats of others: `finlab layout convert`.
+
+`read_any` recognizes a format by a file's suffix and content and hands its text to the reader of
+that format; `WRITERS` has the writers. The app reads dropped files by `read_robot`.
+"""
 
 import os
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from finlab.assets import shipped_layouts
 from finlab.errors import CommandError, LayoutError, under
 from finlab.exchange import motor_factors
+from finlab.exchange.description_layout import read_description
 from finlab.exchange.description_text import SDF, URDF, description_text
 from finlab.exchange.exchange import Exchange
-from finlab.exchange.gazebo import read_description
 from finlab.exchange.matrix_table import plain_of, table_of
 from finlab.exchange.parameters import read_parameters, read_px4, write_px4
 from finlab.exchange.plain_robot import read_plain, write_matrix
@@ -20,7 +25,7 @@ from finlab.layout.load import parse_layout
 from finlab.whole_file import write_whole
 
 MAX_BYTES = 5_000_000
-"""Largest file that is read; meshes are files of their own and are not touched."""
+"""Largest file that is read [bytes]; meshes are files of their own and are not opened."""
 WRITERS: dict[str, Callable[[Layout, Exchange, str], str]] = {
     "urdf": lambda layout, exchange, _: description_text(layout, exchange, URDF),
     "sdf": lambda layout, exchange, _: description_text(layout, exchange, SDF),
@@ -28,23 +33,29 @@ WRITERS: dict[str, Callable[[Layout, Exchange, str], str]] = {
     "ardusub": motor_factors.write_ardusub,
     "matrix": write_matrix,
 }
-"""Forms beside layout files that are written: the text for a layout and the suffix of the file."""
-FORM_OF = {".urdf": "urdf", ".sdf": "sdf", ".params": "px4"}
-FORM_OF |= {
+"""Writers of all formats but layout files, by the name that `--to` takes. Arguments: the layout,
+the exchange that gets the notes, and the suffix of the file; returns its text."""
+FORMAT_OF_SUFFIX = {
+    ".urdf": "urdf",
+    ".sdf": "sdf",
+    ".params": "px4",
     ".cpp": "ardusub",
     ".csv": "matrix",
     ".yaml": "layout",
     ".yml": "layout",
     ".json": "layout",
 }
-"""What a suffix stands for where the user does not say."""
+"""The format that is written for a suffix where the user names none."""
 TABLES = (".csv", ".tsv", ".txt", ".dat")
+"""Suffixes of files with delimited cells."""
 PROGRAMS = (".cpp", ".h", ".hpp", ".lua")
+"""Suffixes of sources with calls that add motors to ArduSub."""
 PARAMETERS = (".params", ".parm", ".param")
+"""Suffixes of parameter files of PX4 and ArduPilot."""
 FOREIGN = (".urdf", ".sdf", ".world", ".xacro", ".scn", *PARAMETERS, *PROGRAMS)
 """Suffixes of robot descriptions, and of what autopilots read; their content says what they
 hold."""
-UNKNOWN = (
+UNKNOWN_FORMAT = (
     "holds none of the forms that are read: a layout, a robot description (URDF, SDF), parameters "
     "of PX4 or ArduSub, motors of ArduSub, thrusters or a matrix in YAML, JSON or CSV"
 )
@@ -53,14 +64,22 @@ UNKNOWN = (
 def convert(
     file: str, output: str | os.PathLike[str], to: str | None, exchange: Exchange
 ) -> tuple[Layout, list[str]]:
-    """Makes one file into another, and returns the layout that went through, and the exchange's
-    notes.
+    """Converts one file into another format.
 
-    `file` is of any form, a bundle, or the name of a shipped layout; `to` is `layout` or one of
-    `WRITERS`, by the suffix of the output when None. Raises FinlabError: a file cannot be read or
-    written, or the end of the output says no form."""
+    Args:
+        file: a file of any format that is read, a bundle, or the name of a shipped layout.
+        output: the file to write.
+        to: `layout`, or a key of `WRITERS`; by the suffix of the output when None.
+        exchange: defaults for what the file does not say; gets the notes.
+
+    Returns:
+        The layout that was converted, and the exchange's notes.
+
+    Raises:
+        FinlabError: a file cannot be read or written, or the suffix of the output names no format.
+    """
     suffix = Path(output).suffix.lower()
-    form = to or FORM_OF.get(suffix)
+    form = to or FORMAT_OF_SUFFIX.get(suffix)
     if form is None:
         raise CommandError(
             f"{output}: its end says no form; say --to {', '.join(['layout', *WRITERS])}"
@@ -78,8 +97,15 @@ def convert(
 
 
 def read_any(file: str, exchange: Exchange) -> Layout:
-    """Returns the layout in a file of any form; `exchange` says what to take where it is silent.
-    Raises FinlabError: it cannot be read, or holds no form that is known."""
+    """Returns the layout in a file of any format.
+
+    Args:
+        file: the path, or the name of a shipped layout.
+        exchange: defaults for what the file does not say; gets the notes.
+
+    Raises:
+        FinlabError: the file cannot be read, or its format is not recognized.
+    """
     path = Path(file)
     if file in shipped_layouts() or not is_regular(path) or path.suffix.lower() == ".zip":
         return load_layout(file)
@@ -92,49 +118,72 @@ def read_any(file: str, exchange: Exchange) -> Layout:
 
 
 def read_robot(text: str, file: str, exchange: Exchange) -> Layout:
-    """Returns the layout in the text of a file of this name, of any form. Raises LayoutError:
-    something in it is wrong or missing, or it holds no form that is known."""
+    """Returns the layout in a text of any format.
+
+    Args:
+        text: the content of the file.
+        file: the name of the file; its suffix helps to recognize the format, and its stem names
+            the robot where the text does not.
+        exchange: defaults for what the file does not say; gets the notes.
+
+    Raises:
+        LayoutError: a value is wrong or missing, or the format is not recognized.
+    """
     path = Path(file)
     name = path.stem.strip()[:64].strip() or "robot"
     suffix = path.suffix.lower()
     if text.lstrip().startswith("<"):
         return read_description(text, name, exchange)
-    if FORM_OF.get(suffix) != "layout":
+    if FORMAT_OF_SUFFIX.get(suffix) != "layout":
         layout = _read_lines(text, name, suffix, exchange)
         if layout is not None:
             return layout
-    data = (parse_json if suffix == ".json" else parse_yaml)(text, "", LayoutError)
-    parts = data.get("actuators") if isinstance(data, dict) else None
-    typed = isinstance(parts, list) and any(
-        isinstance(part, dict) and "type" in part for part in parts
-    )
-    if isinstance(data, dict) and (typed or {"format", "fins"} & set(data)):
+    parse = parse_json if suffix == ".json" else parse_yaml
+    data = parse(text, "", LayoutError)
+    if isinstance(data, dict) and _is_layout_file(data):
         folder = exchange.path.parent if exchange.path else None
         return parse_layout(data, "", folder, may_open=folder is not None)
     if not isinstance(data, dict | list):
-        raise LayoutError(UNKNOWN)
+        raise LayoutError(UNKNOWN_FORMAT)
     comments = [line for line in text.splitlines() if line.lstrip().startswith("#")]
     return read_plain(data, name, exchange, comments)
 
 
+def _is_layout_file(data: dict[str, Any]) -> bool:
+    """Whether a mapping is a layout of finlab: by its head, or by actuators that have a type."""
+    if "format" in data or "fins" in data:
+        return True
+    actuators = data.get("actuators")
+    if not isinstance(actuators, list):
+        return False
+    return any(isinstance(actuator, dict) and "type" in actuator for actuator in actuators)
+
+
 def _read_lines(text: str, name: str, suffix: str, exchange: Exchange) -> Layout | None:
-    """The layout in lines of parameters, motors or cells; None where the text is none of these."""
+    """The layout in lines of parameters, motors or cells; None where the text is none of these.
+
+    Parameters and motors are recognized by their content under any suffix, tables by the suffix.
+    """
     if "CA_ROTOR" in text:
         return read_px4(text, name, exchange)
     if "add_motor" in text:
-        return motor_factors.of_motors(name, motor_factors.called(text), exchange)
-    if motor_factors.OF_ARDUPILOT.search(text):
+        return motor_factors.layout_of_motors(name, motor_factors.motors_in_source(text), exchange)
+    if motor_factors.ARDUPILOT_PARAMETER.search(text):
         return motor_factors.read_parameters_of_ardusub(text, name, exchange)
     if suffix in TABLES:
         table = table_of(text)
-        if table.of_factors:
-            return motor_factors.of_motors(name, motor_factors.tabled(table), exchange)
+        if table.has_motor_factors:
+            motors = motor_factors.motors_in_table(table)
+            return motor_factors.layout_of_motors(name, motors, exchange)
         return read_plain(plain_of(table), name, exchange, table.comments, table=True)
-    if suffix in PARAMETERS and (n := len(read_parameters(text, ""))):
-        names = (
-            "neither CA_ROTOR_COUNT (PX4) nor FRAME_CONFIG (ArduSub), by which they name thrusters"
-        )
-        raise LayoutError(f"holds {n} parameters of an autopilot, but {names}")
+    if suffix in PARAMETERS:
+        n_parameters = len(read_parameters(text, ""))
+        if n_parameters > 0:
+            names = (
+                "neither CA_ROTOR_COUNT (PX4) nor FRAME_CONFIG (ArduSub), "
+                "by which they name thrusters"
+            )
+            raise LayoutError(f"holds {n_parameters} parameters of an autopilot, but {names}")
     if suffix in PROGRAMS:
         raise LayoutError(
             "is a program without a call of add_motor_raw_6dof, by which ArduSub adds motors"

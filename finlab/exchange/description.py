@@ -1,9 +1,11 @@
-"""Robot descriptions, URDF of ROS or SDF of Gazebo: where links and joints are, what they weigh,
-and plugins.
+"""Parses robot descriptions, URDF of ROS or SDF of Gazebo: joints, masses and plugins.
 
 A description is taken in its zero position, in the frame of its root link or model: x forward, y
 left, z up (REP-103). Nothing but its text is read: models inside a model are parts of it, and what
-is included is named.
+is included is named. `description_layout` makes a layout of the result.
+
+Links, joints, frames and models have keys such as `link arm::hand`: the tag, the scope of the
+models around it, and the name. The key of the description itself is empty.
 """
 
 import math
@@ -18,94 +20,153 @@ from scipy.spatial.transform import Rotation
 from finlab.arrays import Array
 from finlab.errors import LayoutError
 from finlab.exchange.exchange import Exchange
-from finlab.exchange.xacro_files import expanded
-from finlab.exchange.xml_models import Drives, Named, chosen, is_xacro, parts_of, root_of
+from finlab.exchange.xacro_files import expand
+from finlab.exchange.xml_models import (
+    DrivesThruster,
+    Elements,
+    ScopedElement,
+    is_xacro,
+    model_elements,
+    robot_model,
+    root_of,
+)
 
-ADDED = ("xx", "yy", "zz", "pp", "qq", "rr")
-"""Diagonal of SDF's <fluid_added_mass>."""
-MOMENTS = ("xx", "xy", "xz", "yy", "yz", "zz")
-"""Names of the entries of an inertia."""
+ADDED_MASS_TAGS = ("xx", "yy", "zz", "pp", "qq", "rr")
+"""Tags of the diagonal of SDF's <fluid_added_mass>."""
+INERTIA_ENTRIES = ("xx", "xy", "xz", "yy", "yz", "zz")
+"""Entries of the upper triangle of an inertia, row by row."""
 TURNING = ("revolute", "continuous")
 """Kinds of joints that turn."""
+OLD_SDF = ("1.0", "1.1", "1.2", "1.3", "1.4")
+"""Versions of SDF in which the axis of a joint is expressed in the frame of its model."""
+MAX_ATTACHMENTS = 20
+"""Most frames that are attached to one another in a row."""
 
 
 class Joint(NamedTuple):
-    """A joint, in the frame of its description: its place (3,) [m], the axis (3,) that it turns
-    about, of length 1 unless it is fixed, and least and greatest angle [rad], infinite where
-    nothing limits it."""
+    """A joint, in the frame of its description."""
 
     name: str
     kind: str
+    """The type of the joint in URDF and SDF, such as `revolute`."""
     parent: str
+    """The link that it is mounted on."""
     child: str
-    place: Array
+    """The link that it moves."""
+    position: Array
+    """(3,) [m]."""
     axis: Array
-    ends: tuple[float, float]
+    """The axis (3,) that it turns about or slides along; of length 1 unless the joint is fixed."""
+    limits: tuple[float, float]
+    """Least and greatest angle [rad], infinite where nothing limits it."""
 
 
 @dataclass(frozen=True)
 class Description:
-    """What a description says, in its own frame."""
+    """The content of a description, in its own frame."""
 
     name: str
     joints: dict[str, Joint]
-    """Those that move a link, by their own names, and by the names of the links."""
-    movers: dict[str, Joint]
+    """Joints that move a link, by their names."""
+    joint_of_link: dict[str, Joint]
+    """The same joints by the names of the links that they move."""
     mass: float
-    """[kg], 0 where no link has one, and centre of gravity (3,) [m]."""
+    """Mass of all links [kg]; 0 where none has one."""
     center: Array
+    """Centre of gravity of all links, (3,) [m]."""
     inertia: Array | None
     """(3, 3) about the centre of gravity [kg m^2]; None where a link with a mass has none."""
-    added: dict[str, float]
-    """Added mass by the name of its entry (`xx`), all links together [kg, kg m^2]."""
+    added_mass: dict[str, float]
+    """Added mass of all links by ADDED_MASS_TAGS [kg, kg m^2]; without tags that no link has."""
     plugins: list[tuple[str, Element]]
-    """With the scope of the names in them; what the description includes is named, and not read."""
+    """Plugins, with the scope of the names in each."""
     included: list[str]
+    """Names of what is included from other files, and not read."""
 
 
-def parse_description(root: Element, name: str, drives: Drives, exchange: Exchange) -> Description:
-    """Returns what the outermost element of URDF or SDF says; `name` is the robot's where it has
-    none.
+class _Attachment(NamedTuple):
+    """The pose of a link, joint, frame or model in another one."""
 
-    Of several models it is the one that `exchange` names, or the first with a plugin that `drives`
-    one. Raises LayoutError: it is neither, it uses what is not allowed, or something in it is
-    missing or no number."""
+    base: str
+    """Key of the other one; empty for the description itself."""
+    pose: Array
+    """(4, 4) [m]."""
+
+
+def parse_description(
+    root: Element, name: str, drives_thruster: DrivesThruster, exchange: Exchange
+) -> Description:
+    """Returns the content of a description.
+
+    Of several models it is the one that `exchange` names, or the first with thrusters.
+
+    Args:
+        root: the outermost element.
+        name: the robot's name where the description has none.
+        drives_thruster: whether a plugin drives a thruster.
+        exchange: the model, the path of the file, and the links that the user named; gets notes.
+
+    Raises:
+        LayoutError: it is neither URDF nor SDF, uses what is not allowed, or a value is missing or
+            no number.
+    """
     if is_xacro(root):
-        root = root_of(expanded(exchange.path))
+        root = root_of(expand(exchange.path))
         exchange.note("It was expanded by xacro.")
-    top = chosen(root, drives, exchange)
-    named, plugins, included = parts_of(top)
-    movers = {
-        said(part, "child@link"): key for key, (_, part) in named.items() if part.tag == "joint"
+    model = robot_model(root, drives_thruster, exchange)
+    elements, plugins, included = model_elements(model)
+    joint_of_child = {
+        text_at(element, "child@link"): key
+        for key, (_, element) in elements.items()
+        if element.tag == "joint"
     }
-    poses = _placed({key: _hung(*each, named, movers) for key, each in named.items()}, included)
-    old = root.tag == "sdf" and root.get("version", "") in ("1.0", "1.1", "1.2", "1.3", "1.4")
-    known = [each for key, each in named.items() if each[1].tag == "joint" and key in poses]
-    moving = [_joint(*each, named, poses, old) for each in known]
-    joints = {joint.name: joint for joint in moving if f"link {joint.child}" in named}
+    attachments = {
+        key: _attachment(scoped, elements, joint_of_child) for key, scoped in elements.items()
+    }
+    poses = _poses_in_description(attachments, included)
+    axis_in_model = root.tag == "sdf" and root.get("version", "") in OLD_SDF
+    joints: dict[str, Joint] = {}
+    for key, scoped in elements.items():
+        if scoped.element.tag == "joint" and key in poses:
+            joint = _joint(scoped, elements, poses, axis_in_model)
+            if f"link {joint.child}" in elements:
+                joints[joint.name] = joint
     if included:
         exchange.note(f"What it includes is left out, with its mass: {', '.join(included)[:300]}.")
-    by_link = {joint.child: joint for joint in joints.values()}
+    masses = _masses(elements, poses)
     return Description(
-        top.get("name") or name, joints, by_link, *_masses(named, poses), plugins, included
+        name=model.get("name") or name,
+        joints=joints,
+        joint_of_link={joint.child: joint for joint in joints.values()},
+        mass=masses.mass,
+        center=masses.center,
+        inertia=masses.inertia,
+        added_mass=masses.added_mass,
+        plugins=plugins,
+        included=included,
     )
 
 
-def said(element: Element, paths: str, usual: str = "") -> str:
-    """Returns the first text among some paths below an element, an attribute behind @; else what is
-    usual."""
+def text_at(element: Element, paths: str, default: str = "") -> str:
+    """Returns the first text at one of some paths below an element.
+
+    Args:
+        element: the element.
+        paths: paths with blanks between; `path@name` is the attribute of what stands at the path.
+        default: what is returned where nothing stands at any of them.
+    """
     for path in paths.split():
-        place, _, attribute = path.partition("@")
-        part = element.find(place)
-        if part is not None:
-            text = part.get(attribute) if attribute else part.text
+        tags, _, attribute = path.partition("@")
+        child = element.find(tags)
+        if child is not None:
+            text = child.get(attribute) if attribute else child.text
             if text and text.strip():
                 return text.strip()
-    return usual
+    return default
 
 
 def numbers(text: str, count: int, what: str) -> Array:
-    """Returns numbers (count,) with blanks between; `what` they are goes into the error."""
+    """Returns the numbers (count,) in a text, with blanks between; `what` goes into the error."""
     try:
         values = np.array(text.split(), dtype=np.float64)
     except ValueError:
@@ -115,66 +176,85 @@ def numbers(text: str, count: int, what: str) -> Array:
     return values
 
 
-def number(element: Element, paths: str, usual: float = 0.0) -> float:
-    """Returns the number at one of some paths, as `said`; what is usual where there is none."""
-    text = said(element, paths)
-    return float(numbers(text, 1, f"<{paths}>")[0]) if text else usual
+def number(element: Element, paths: str, default: float = 0.0) -> float:
+    """Returns the number at one of some paths, as `text_at`; the default where there is none."""
+    text = text_at(element, paths)
+    return float(numbers(text, 1, f"<{paths}>")[0]) if text else default
 
 
-def _hung(scope: str, part: Element, named: Named, movers: dict[str, str]) -> tuple[str, Array]:
-    """What a frame hangs on ("" for the description itself), and its pose there: in URDF a joint on
-    its parent, and a link where its joint is; in SDF a link or model on the model, and a joint on
-    its child."""
-    base = said(part, "pose@relative_to") or part.get("attached_to", "")
-    if not base and part.tag == "joint":
-        base = said(part, "parent@link child")
-    mover = movers.get(part.get("name", "")) if part.tag == "link" and not base else None
-    return mover or _key(scope, base, named), _pose(part)
+def _attachment(
+    scoped: ScopedElement, elements: Elements, joint_of_child: dict[str, str]
+) -> _Attachment:
+    """The frame that an element is posed in, and its pose there.
+
+    In URDF a joint is posed in its parent, and a link sits where its joint is; in SDF a link or
+    model is posed in the model around it, and a joint in its child.
+    """
+    scope, element = scoped
+    base = text_at(element, "pose@relative_to") or element.get("attached_to", "")
+    if not base and element.tag == "joint":
+        base = text_at(element, "parent@link child")
+    if not base and element.tag == "link":
+        joint = joint_of_child.get(element.get("name", ""))
+        if joint:
+            return _Attachment(joint, _pose(element))
+    return _Attachment(_key(scope, base, elements), _pose(element))
 
 
-def _key(scope: str, name: str, named: Named) -> str:
+def _key(scope: str, name: str, elements: Elements) -> str:
     """The key of the frame that a description calls by a name in a scope."""
     if name in ("", "__model__"):
         return f"model {scope[:-2]}" if scope else ""
-    keys = (f"{tag} {scope}{name}" for tag in ("link", "joint", "frame", "model"))
-    return next((key for key in keys if key in named), f"{scope}{name}")
+    for tag in ("link", "joint", "frame", "model"):
+        key = f"{tag} {scope}{name}"
+        if key in elements:
+            return key
+    return f"{scope}{name}"
 
 
-def _pose(part: Element) -> Array:
-    """The pose (4, 4) that a part has as <origin> in URDF, or as <pose> in SDF."""
-    if part.find("origin") is None and part.find("pose") is None:
+def _pose(element: Element) -> Array:
+    """The pose (4, 4) that an element has as <origin> in URDF, or as <pose> in SDF."""
+    if element.find("origin") is None and element.find("pose") is None:
         return np.eye(4)
-    what = f"the pose of {part.tag} {part.get('name', '')!r:.60}"
-    origin = " ".join(said(part, f"origin@{key}", "0 0 0") for key in ("xyz", "rpy"))
-    quaternion = said(part, "pose@rotation_format") == "quat_xyzw"
-    values = numbers(said(part, "pose", origin), 7 if quaternion else 6, what)
+    what = f"the pose of {element.tag} {element.get('name', '')!r:.60}"
+    origin = " ".join(text_at(element, f"origin@{key}", "0 0 0") for key in ("xyz", "rpy"))
+    is_quaternion = text_at(element, "pose@rotation_format") == "quat_xyzw"
+    values = numbers(text_at(element, "pose", origin), 7 if is_quaternion else 6, what)
     pose = np.eye(4)
-    turn = values[3:]
     pose[:3, 3] = values[:3]
-    if quaternion and not turn.any():
+    rotation = values[3:]
+    if is_quaternion and not rotation.any():
         raise LayoutError(f"{what} has a quaternion without length")
-    if turn.any():
-        angles = np.radians(turn) if said(part, "pose@degrees") == "true" else turn
-        rotation = Rotation.from_quat(turn) if quaternion else Rotation.from_euler("xyz", angles)
-        pose[:3, :3] = rotation.as_matrix()
+    if is_quaternion:
+        pose[:3, :3] = Rotation.from_quat(rotation).as_matrix()
+    elif rotation.any():
+        in_degrees = text_at(element, "pose@degrees") == "true"
+        angles = np.radians(rotation) if in_degrees else rotation
+        pose[:3, :3] = Rotation.from_euler("xyz", angles).as_matrix()
     return pose
 
 
-def _placed(hung: dict[str, tuple[str, Array]], included: list[str]) -> dict[str, Array]:
-    """Poses (4, 4) of frames in the description's own, from what each hangs on and its pose there;
-    without those that hang on what is included."""
+def _poses_in_description(
+    attachments: dict[str, _Attachment], included: list[str]
+) -> dict[str, Array]:
+    """Poses (4, 4) in the description's frame by key, without what is attached to something
+    included, which is not read."""
     poses = {"": np.eye(4)}
-    lost = {*included}
-    outside = tuple(f"{name}::" for name in included)
+    unknown = {*included}
+    scopes_of_included = tuple(f"{name}::" for name in included)
+    bases = {key: [attachment.base] for key, attachment in attachments.items()}
     try:
-        for key in TopologicalSorter(
-            {key: [base] for key, (base, _) in hung.items()}
-        ).static_order():
-            base, pose = hung.get(key, ("", poses[""]))
-            if base in lost or (key not in hung and key.startswith(outside)):
-                lost.add(key)
-            elif key and key not in lost:
-                poses[key] = poses[base] @ hung[key][1]
+        for key in TopologicalSorter(bases).static_order():
+            attachment = attachments.get(key)
+            if attachment is None:  # named as a base, and no element of the description
+                if key.startswith(scopes_of_included):
+                    unknown.add(key)
+                elif key and key not in unknown:
+                    raise KeyError(key)
+            elif attachment.base in unknown:
+                unknown.add(key)
+            elif key not in unknown:
+                poses[key] = poses[attachment.base] @ attachment.pose
     except (CycleError, KeyError) as error:
         where = f"{error.args[-1]!r:.80}"
         raise LayoutError(
@@ -183,89 +263,116 @@ def _placed(hung: dict[str, tuple[str, Array]], included: list[str]) -> dict[str
     return poses
 
 
-def _joint(scope: str, part: Element, named: Named, poses: dict[str, Array], old: bool) -> Joint:
-    """A joint; in `old` SDF an axis is seen from the model, as where use_parent_model_frame says
-    so."""
-    own = part.get("name", "")
-    kind = part.get("type", "")
-    name = f"{scope}{own}"
-    what = f"joint {own!r:.60}"
-    seen_from = said(part, "axis/xyz@expressed_in")
-    of_model = said(part, "axis/use_parent_model_frame", str(int(old))).lower() in ("1", "true")
-    frame = (
-        _key(scope, seen_from or "__model__", named) if seen_from or of_model else f"joint {name}"
-    )
+def _joint(
+    scoped: ScopedElement, elements: Elements, poses: dict[str, Array], axis_in_model: bool
+) -> Joint:
+    """A joint in the description's frame.
+
+    Args:
+        scoped: its element.
+        elements: all elements by key.
+        poses: their poses by key.
+        axis_in_model: whether its axis is expressed in the frame of its model where it does not say
+            so itself (use_parent_model_frame); else in that of the joint.
+    """
+    scope, element = scoped
+    local_name = element.get("name", "")
+    name = f"{scope}{local_name}"
+    kind = element.get("type", "")
+    what = f"joint {local_name!r:.60}"
+    expressed_in = text_at(element, "axis/xyz@expressed_in")
+    in_model = text_at(element, "axis/use_parent_model_frame", str(int(axis_in_model)))
+    if expressed_in or in_model.lower() in ("1", "true"):
+        frame = _key(scope, expressed_in or "__model__", elements)
+    else:
+        frame = f"joint {name}"
     if frame not in poses:
         raise LayoutError(
-            f"has no frame {seen_from!r:.60}, in which the axis of {what} is expressed"
+            f"has no frame {expressed_in!r:.60}, in which the axis of {what} is expressed"
         )
-    usual = "1 0 0" if part.find("parent[@link]") is not None else "0 0 1"
-    axis = poses[frame][:3, :3] @ numbers(
-        said(part, "axis@xyz axis/xyz", usual), 3, f"the axis of {what}"
-    )
+    is_urdf = element.find("parent[@link]") is not None
+    axis_text = text_at(element, "axis@xyz axis/xyz", "1 0 0" if is_urdf else "0 0 1")
+    axis = poses[frame][:3, :3] @ numbers(axis_text, 3, f"the axis of {what}")
     length = float(np.linalg.norm(axis))
     if length == 0.0 and kind in TURNING:
         raise LayoutError(f"the axis of {what} has no length")
     try:
-        low, high = (
-            float(said(part, f"limit@{end} axis/limit/{end}", "inf")) for end in ("lower", "upper")
-        )
+        lower = float(text_at(element, "limit@lower axis/limit/lower", "inf"))
+        upper = float(text_at(element, "limit@upper axis/limit/upper", "inf"))
     except ValueError:
         raise LayoutError(f"a limit of {what} is no number") from None
-    ends = (
-        (low, high)
-        if max(abs(low), abs(high)) < 1e9 and kind != "continuous"
-        else (-math.inf, math.inf)
-    )
-    parent, child = (
-        _link(scope, said(part, f"{end}@link {end}"), named) for end in ("parent", "child")
-    )
+    is_limited = max(abs(lower), abs(upper)) < 1e9 and kind != "continuous"
     return Joint(
-        name, kind, parent, child, poses[f"joint {name}"][:3, 3], axis / (length or 1.0), ends
+        name=name,
+        kind=kind,
+        parent=_link_name(scope, text_at(element, "parent@link parent"), elements),
+        child=_link_name(scope, text_at(element, "child@link child"), elements),
+        position=poses[f"joint {name}"][:3, 3],
+        axis=axis / (length or 1.0),
+        limits=(lower, upper) if is_limited else (-math.inf, math.inf),
     )
 
 
-def _link(scope: str, name: str, named: Named) -> str:
+def _link_name(scope: str, name: str, elements: Elements) -> str:
     """The name of a link with its scope; a frame stands for the link that it is attached to."""
-    for _ in range(20):
-        key = _key(scope, name, named)
+    for _ in range(MAX_ATTACHMENTS):
+        key = _key(scope, name, elements)
         if not key.startswith("frame "):
             return key.removeprefix("link ")
-        scope, part = named[key]
-        name = part.get("attached_to", "")
+        scope, element = elements[key]
+        name = element.get("attached_to", "")
     return name
 
 
-def _masses(
-    named: Named, poses: dict[str, Array]
-) -> tuple[float, Array, Array | None, dict[str, float]]:
-    """Mass, centre of gravity (3,), inertia (3, 3) about it and added mass of all links
-    together."""
-    parts = []
-    added = dict[str, float]()
-    known = True
-    for key, (_, link) in named.items():
-        inertial = link.find("inertial") if key in poses else None
-        if inertial is not None:
-            pose = poses[key] @ _pose(inertial)
-            mass = number(inertial, "mass@value mass")
-            paths = [f"inertia@i{moment} inertia/i{moment}" for moment in MOMENTS]
-            inertia = np.array([number(inertial, path) for path in paths])[
-                [[0, 1, 2], [1, 3, 4], [2, 4, 5]]
-            ]
-            known &= mass == 0.0 or all(said(inertial, paths[k]) for k in (0, 3, 5))
-            parts.append((mass, pose[:3, 3], pose[:3, :3] @ inertia @ pose[:3, :3].T))
-            for axis in ADDED:
-                if said(inertial, f"fluid_added_mass/{axis}"):
-                    added[axis] = added.get(axis, 0.0) + number(
-                        inertial, f"fluid_added_mass/{axis}"
-                    )
-    total = sum(part[0] for part in parts)
+class _Masses(NamedTuple):
+    """Masses of all links together; the fields are those of `Description`."""
+
+    mass: float
+    center: Array
+    inertia: Array | None
+    added_mass: dict[str, float]
+
+
+class _LinkMass(NamedTuple):
+    """The mass of one link, in the axes of the description."""
+
+    mass: float
+    """[kg]."""
+    center: Array
+    """Its centre of gravity, (3,) [m]."""
+    inertia: Array
+    """(3, 3) about that centre [kg m^2]."""
+
+
+def _masses(elements: Elements, poses: dict[str, Array]) -> _Masses:
+    """The masses of all links together; inertias by the theorem of Huygens and Steiner."""
+    links = []
+    added_mass: dict[str, float] = {}
+    is_inertia_known = True
+    for key, (_, element) in elements.items():
+        inertial = element.find("inertial") if key in poses else None
+        if inertial is None:
+            continue
+        pose = poses[key] @ _pose(inertial)
+        mass = number(inertial, "mass@value mass")
+        paths = {entry: f"inertia@i{entry} inertia/i{entry}" for entry in INERTIA_ENTRIES}
+        triangle = np.array([number(inertial, path) for path in paths.values()])
+        inertia = triangle[[[0, 1, 2], [1, 3, 4], [2, 4, 5]]]  # (3, 3), symmetric
+        has_inertia = all(text_at(inertial, paths[entry]) for entry in ("xx", "yy", "zz"))
+        is_inertia_known &= mass == 0.0 or has_inertia
+        rotation = pose[:3, :3]
+        links.append(_LinkMass(mass, pose[:3, 3], rotation @ inertia @ rotation.T))
+        for tag in ADDED_MASS_TAGS:
+            path = f"fluid_added_mass/{tag}"
+            if text_at(inertial, path):
+                added_mass[tag] = added_mass.get(tag, 0.0) + number(inertial, path)
+    total = sum(link.mass for link in links)
     center = np.zeros(3)
-    about = np.zeros((3, 3))
+    total_inertia = np.zeros((3, 3))
     if total > 0.0:
-        center = sum((kg * at for kg, at, _ in parts), center) / total
-        for kg, at, own in parts:
-            arm = at - center
-            about += own + kg * (arm @ arm * np.eye(3) - np.outer(arm, arm))
-    return total, center, about if known else None, added
+        center = sum((link.mass * link.center for link in links), center) / total
+        for link in links:
+            arm = link.center - center
+            shift = arm @ arm * np.eye(3) - np.outer(arm, arm)
+            total_inertia += link.inertia + link.mass * shift
+    return _Masses(total, center, total_inertia if is_inertia_known else None, added_mass)

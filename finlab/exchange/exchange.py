@@ -1,5 +1,8 @@
-"""One exchange: what is taken where a file of others is silent, and the sentences on what was
-lost."""
+"""The options and the notes of one conversion from or to a file of another program.
+
+Every reader of this package takes an `Exchange`, builds its thrusters by it, so that all readers
+have the same defaults, and leaves a sentence in it for each value that was assumed or dropped.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -14,17 +17,18 @@ from finlab.axes import Vector3
 from finlab.errors import LayoutError
 from finlab.layout import Layout, Thruster
 
-T200_FORCE, T200_POWER = (-39.91, 51.44), PowerLaw(0.997, 1.449)
-"""Least and most force [N] of a Blue Robotics T200 at 16 V (the maker's table), and a fit of its
-power."""
+T200_FORCE = (-39.91, 51.44)
+"""Least and most force of a Blue Robotics T200 at 16 V [N], by the maker's table."""
+T200_POWER = PowerLaw(0.997, 1.449)
+"""A fit of that table's electric power over force: 0.997 F^1.5 ahead, 1.449 |F|^1.5 astern [W]."""
 TO_FRD = np.array([[1.0], [-1.0], [-1.0], [1.0], [-1.0], [-1.0]])
-"""Turns wrenches (6, n) from x forward, y left, z up to x forward, y right, z down, or back."""
+"""Signs (6, 1) that turn wrenches (6, n) from FLU (x forward, y left, z up) to FRD (x forward,
+y right, z down), and back."""
 
 
 @dataclass
 class Exchange:
-    """What a reader takes where the file is silent, and notes of what it took or could not
-    write."""
+    """Defaults for what a file does not say, and notes on what was assumed or not written."""
 
     fins: Sequence[str] = ()
     """Links of a robot description that are fins."""
@@ -45,7 +49,7 @@ class Exchange:
     path: Path | None = None
     """The file; None for one from a browser, which may open no other."""
     notes: list[str] = field(default_factory=list)
-    """Sentences."""
+    """Sentences for the user, in the order in which they arose."""
 
     def note(self, sentence: str) -> None:
         """Adds a sentence once."""
@@ -55,59 +59,105 @@ class Exchange:
     def thruster(
         self,
         name: str,
-        place: Array,
+        position: Array,
         axis: Array,
         force: tuple[float, float] | None,
-        reaction: float = 0.0,
+        torque_per_newton: float = 0.0,
     ) -> Thruster:
-        """Returns a thruster by its place (3,) [m], axis (3,), the file's force [N], None where it
-        says none, and its reaction torque per newton [m]. Raises LayoutError: a value is out of
-        bounds."""
+        """Returns a thruster with the power of a T200, in the frame of the layout.
+
+        Args:
+            name: its name.
+            position: where its force acts, (3,) [m].
+            axis: direction of a positive force, a unit vector (3,).
+            force: least and most force of the file [N]; None where it says none.
+            torque_per_newton: reaction torque about the axis over the force [m].
+
+        Raises:
+            LayoutError: a value is out of bounds.
+        """
         if self.force is None and force is None:
             self.note(
                 "It has no limits of force: those of a T200 at 16 V are taken; correct `force_n`."
             )
         self.note("It has no power: that of a T200 at 16 V is taken; write your own as `model`.")
-        ends = self.force or force or T200_FORCE
         return Thruster(
-            name, vector(place), vector(axis), ends, T200_POWER, torque_per_newton=reaction
+            name,
+            vector(position),
+            vector(axis),
+            self.force or force or T200_FORCE,
+            T200_POWER,
+            torque_per_newton=torque_per_newton,
         )
 
-    def of_column(self, name: str, column: Array, force: tuple[float, float] | None) -> Thruster:
-        """Returns the thruster whose wrench per unit of its command is `column` (6,) [N, N m];
-        `force` has the limits of the command. It sits on the line of its force nearest to the
-        origin. Raises LayoutError: the column holds no force."""
-        size = float(np.linalg.norm(column[:3]))
-        if not 1e-9 < size < 1e9:
+    def thruster_of_column(
+        self, name: str, column: Array, limits: tuple[float, float] | None
+    ) -> Thruster:
+        """Returns the thruster that has a given column of an allocation matrix.
+
+        A column (f, t) fixes the line of the force, and not the place on it. With the axis
+        a = f / |f| and tau = t / |f|, the point of the line nearest to the origin is a x tau, and
+        the reaction torque per newton is the component a . tau along the axis.
+
+        Args:
+            name: its name.
+            column: wrench per unit of its command, (6,) [N, N m].
+            limits: least and most command; None where the file says none.
+
+        Raises:
+            LayoutError: the column holds no force.
+        """
+        force_per_command = float(np.linalg.norm(column[:3]))
+        if not 1e-9 < force_per_command < 1e9:
             raise LayoutError(
                 f"{name!r:.60} has no force; no actuator of finlab gives torque alone"
             )
         self.note(
             "It has no places: thrusters sit where lines of their forces are nearest to the origin."
         )
-        axis = column[:3] / size
-        torque = column[3:] / size
-        ends = None if force is None else (force[0] * size, force[1] * size)
-        return self.thruster(name, np.cross(axis, torque), axis, ends, float(torque @ axis))
+        axis = column[:3] / force_per_command
+        torque = column[3:] / force_per_command
+        force = None
+        if limits is not None:
+            force = (limits[0] * force_per_command, limits[1] * force_per_command)
+        position = np.cross(axis, torque)
+        return self.thruster(name, position, axis, force, float(torque @ axis))
 
-    def thrusters_of(self, layout: Layout, form: str, *lost: str) -> Layout:
-        """Returns a layout's thrusters alone, for a form with no place for others, nor for what is
-        `lost`. Raises LayoutError: there is none."""
-        others = {
-            part.name: part.type for part in layout.actuators if not isinstance(part, Thruster)
+    def thrusters_of(self, layout: Layout, form: str, *not_written: str) -> Layout:
+        """Returns the layout without the actuators that a format cannot hold: all but thrusters.
+
+        Args:
+            layout: the layout to write.
+            form: the format, as the sentences name it.
+            not_written: properties of thrusters that it cannot hold, besides power and rates.
+
+        Raises:
+            LayoutError: there is no thruster.
+        """
+        names = {thruster.name for thruster in thrusters_in(layout)}
+        kinds = {
+            actuator.name: actuator.type
+            for actuator in layout.actuators
+            if actuator.name not in names
         }
-        if len(others) == layout.n:
+        if len(kinds) == layout.n:
             raise LayoutError(
                 f"layout {layout.name} has no thruster, and {form} has a place for these alone"
             )
-        if others:
-            left = ", ".join(f"{name} ({kind})" for name, kind in others.items())
-            self.note(f"{form} has a place for thrusters alone; left out are {left}.")
-        self.note(f"{form} has no place for {', '.join(('power', 'dead bands', 'rates', *lost))}.")
-        return layout.without(others) if others else layout
+        if kinds:
+            left_out = ", ".join(f"{name} ({kind})" for name, kind in kinds.items())
+            self.note(f"{form} has a place for thrusters alone; left out are {left_out}.")
+        properties = ", ".join(("power", "dead bands", "rates", *not_written))
+        self.note(f"{form} has no place for {properties}.")
+        return layout.without(kinds) if kinds else layout
+
+
+def thrusters_in(layout: Layout) -> tuple[Thruster, ...]:
+    """Returns the actuators of a layout that are thrusters, in order."""
+    return tuple(actuator for actuator in layout.actuators if isinstance(actuator, Thruster))
 
 
 def vector(values: Array) -> Vector3:
-    """Returns numbers (3,) as plain ones; rounding errors of 0 become 0."""
+    """Returns an array (3,) as a tuple of floats; rounding errors of 0 become 0."""
     x, y, z = (0.0 if abs(value) < 1e-15 else float(value) for value in values)
     return x, y, z

@@ -1,8 +1,9 @@
 """Expressions in a stranger's robot description: numbers, names, arithmetic, and nothing that runs.
 
-Python's parser takes an expression apart; it is never compiled. All of it is judged before any of
-it is worked out, and what is not listed here is refused: attributes of Python's objects, functions
-of Python, names that lead to either. Values have a bounded size, so `9**9**9` ends at once.
+Python's parser makes a syntax tree of an expression, which is never compiled. All nodes are checked
+before any is evaluated, and what is not listed here is refused: attributes of Python's objects,
+functions of Python, names that lead to either. Values have a bounded size, so `9**9**9` ends at
+once. `xacro_files` puts `evaluate` in place of the evaluation that the package xacro does.
 """
 
 import ast
@@ -15,45 +16,52 @@ from typing import Any
 
 from finlab.errors import LayoutError
 
-MAX_LENGTH, MAX_DEPTH = 2000, 100
-"""Longest expression [characters], and deepest; ordinary ones have fewer than 200, and than 20."""
-MAX_BITS, MAX_TEXT, MAX_ITEMS = 256, 10_000, 1000
-"""Largest whole number [bits], longest text [characters], most values in a list of lists."""
+MAX_LENGTH = 2000
+"""Longest expression [characters]; ordinary ones have fewer than 200."""
+MAX_DEPTH = 100
+"""Deepest syntax tree; ordinary ones are less than 20 deep."""
+MAX_BITS = 256
+"""Largest integer [bits]."""
+MAX_TEXT = 10_000
+"""Longest text [characters], all texts of a list together."""
+MAX_ITEMS = 1000
+"""Most values in a list, those of lists inside it included."""
 MAX_DIGITS = 30
 """Most digits that a number is rounded to, on either side of the point."""
 EXPECTED = "expected numbers, names, arithmetic and functions of numbers: write the value instead"
+"""The end of the sentences on what is refused."""
 
 Lookup = Callable[[str], Any]
 """Returns the value that has a name; a KeyError where nothing has it."""
 
 
-def _rounded(number: float, digits: int | None = None) -> float:
+def _round(number: float, digits: int | None = None) -> float:
     """As `round`, which takes a whole number to as many digits as it is told."""
     if digits is not None and abs(digits) > MAX_DIGITS:
         raise ValueError(f"more than {MAX_DIGITS} digits")
     return round(number, digits)
 
 
-def _counted(*ends: int) -> list[int]:
+def _range(*bounds: int) -> list[int]:
     """As `range`, written out."""
-    numbers = range(*ends)
+    numbers = range(*bounds)
     if len(numbers) > MAX_ITEMS:
         raise ValueError(f"more than {MAX_ITEMS} numbers")
     return list(numbers)
 
 
-def _no_words(*_: object) -> str:
+def _print_nothing(*_: object) -> str:
     """What xacro's functions that print a message give."""
     return ""
 
 
-_OF_MATH = (
+_MATH_NAMES = (
     *("acos", "asin", "atan", "atan2", "cos", "sin", "tan", "degrees", "radians", "hypot", "dist"),
     *("acosh", "asinh", "atanh", "cosh", "sinh", "tanh", "sqrt", "exp", "expm1", "pow"),
     *("log", "log10", "log1p", "log2", "ceil", "floor", "trunc", "fabs", "fmod", "remainder"),
     *("fsum", "copysign", "gcd", "isclose", "isfinite", "isinf", "isnan"),
 )
-_MATH: dict[str, Callable[..., Any]] = {name: getattr(math, name) for name in _OF_MATH}
+_MATH: dict[str, Callable[..., Any]] = {name: getattr(math, name) for name in _MATH_NAMES}
 _PYTHON: dict[str, Callable[..., Any]] = {
     "abs": abs,
     "bool": bool,
@@ -64,8 +72,8 @@ _PYTHON: dict[str, Callable[..., Any]] = {
     "list": list,
     "max": max,
     "min": min,
-    "range": _counted,
-    "round": _rounded,
+    "range": _range,
+    "round": _round,
     "sorted": sorted,
     "str": str,
     "sum": sum,
@@ -77,18 +85,22 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
     **{f"math.{name}": function for name, function in _MATH.items()},
     **_PYTHON,
     **{f"python.{name}": function for name, function in _PYTHON.items()},
-    **dict.fromkeys(_PRINTING, _no_words),
+    **dict.fromkeys(_PRINTING, _print_nothing),
     **dict.fromkeys(("dotify", "xacro.dotify"), dict),
 }
-_ARGUMENT, _FATAL = ("arg", "xacro.arg"), "xacro.fatal"
-"""Functions that return an argument of the description, and the one that ends it with a message."""
-_BY_NAME = ("dict", "python.dict")
+_ARGUMENT_FUNCTIONS = ("arg", "xacro.arg")
+"""Functions that return an argument of the description."""
+_FATAL_FUNCTION = "xacro.fatal"
+"""The function by which a description says that it cannot be used, with a message."""
+_KEYWORD_FUNCTIONS = ("dict", "python.dict")
 """Functions that take arguments by name."""
-_OPENING = (
+_FILE_FUNCTIONS = (
     *("abs_filename", "xacro.abs_filename", "load_yaml", "xacro.load_yaml"),
     *("dirname", "find", "open"),
 )
-_OF_SYSTEM = ("env", "optenv")
+"""Functions of xacro that open files, or name folders; each is refused by its name."""
+_ENVIRONMENT_FUNCTIONS = ("env", "optenv")
+"""Functions of xacro that read the environment; refused."""
 _NUMBERS = {"pi": math.pi, "e": math.e, "tau": math.tau, "inf": math.inf, "nan": math.nan}
 _CONSTANTS: dict[str, Any] = {
     **_NUMBERS,
@@ -110,7 +122,7 @@ _BINARY: dict[type, Callable[[Any, Any], Any]] = {
     ast.Mod: operator.mod,
     ast.Pow: operator.pow,
 }
-_COMPARED: dict[type, Callable[[Any, Any], Any]] = {
+_COMPARISONS: dict[type, Callable[[Any, Any], Any]] = {
     ast.Eq: operator.eq,
     ast.NotEq: operator.ne,
     ast.Lt: operator.lt,
@@ -122,7 +134,7 @@ _COMPARED: dict[type, Callable[[Any, Any], Any]] = {
     ast.In: lambda item, items: item in items,
     ast.NotIn: lambda item, items: item not in items,
 }
-_ALLOWED = (
+_ALLOWED_NODES = (
     ast.Expression,
     ast.Constant,
     ast.Name,
@@ -144,10 +156,10 @@ _ALLOWED = (
     ast.Dict,
     *_UNARY,
     *_BINARY,
-    *_COMPARED,
+    *_COMPARISONS,
 )
 """Nodes of Python's trees; what is not among them is refused."""
-_CALLED: dict[type, str] = {
+_NODE_NAMES: dict[type, str] = {
     ast.Lambda: "a function (lambda)",
     ast.ListComp: "a loop over values",
     ast.SetComp: "a loop over values",
@@ -161,8 +173,8 @@ _CALLED: dict[type, str] = {
     ast.Yield: "yield",
     ast.YieldFrom: "yield",
 }
-"""What is refused, in words."""
-_PLAIN = (int, float, str, bool, type(None), list, tuple, dict)
+"""Nodes that are refused, as the error names them."""
+_PLAIN_TYPES = (int, float, str, bool, type(None), list, tuple, dict)
 """Types of values, exactly: a subclass is a namespace of xacro, or none of its values."""
 
 
@@ -172,19 +184,22 @@ def shown(expression: str) -> str:
     return f"${{{text if len(text) <= 80 else text[:77] + '...'}}}"
 
 
-def evaluated(expression: str, lookup: Lookup, argument: Lookup) -> Any:
+def evaluate(expression: str, lookup: Lookup, argument: Lookup) -> Any:
     """Returns the value of an expression: a number, a text, a truth value, or a list or mapping.
 
     Args:
         expression: what stands between `${` and `}`.
         lookup: returns the value of a name; a mapping is a namespace.
         argument: returns the value of an argument of the description, for `xacro.arg`.
-    Raises LayoutError: the expression holds more than values, names, arithmetic and functions of
-    numbers, names something unknown, is too long, grows too large, or cannot be worked out."""
+
+    Raises:
+        LayoutError: the expression holds more than values, names, arithmetic and functions of
+            numbers, names something unknown, is too long, grows too large, or cannot be evaluated.
+    """
     try:
-        tree = _parsed(expression)
-        _judge(tree)
-        return _Worked(lookup, argument).result(tree.body)
+        tree = _parse(expression)
+        _check_nodes(tree)
+        return _Evaluator(lookup, argument).result(tree.body)
     except _Refused as problem:
         raise LayoutError(f"{shown(expression)} {problem}") from None
     except (ArithmeticError, LookupError, TypeError, ValueError) as problem:
@@ -193,10 +208,11 @@ def evaluated(expression: str, lookup: Lookup, argument: Lookup) -> Any:
 
 
 class _Refused(Exception):
-    """What is wrong with an expression; the words follow it."""
+    """A fault of an expression; its message goes on a sentence that begins with the expression."""
 
 
-def _parsed(expression: str) -> ast.Expression:
+def _parse(expression: str) -> ast.Expression:
+    """The syntax tree of an expression."""
     if len(expression) > MAX_LENGTH:
         length = f"{len(expression):,} characters"
         raise _Refused(f"has {length}, expected at most {MAX_LENGTH:,}; shorten it")
@@ -208,12 +224,12 @@ def _parsed(expression: str) -> ast.Expression:
         raise _Refused(f"is no expression; {EXPECTED}") from None
 
 
-def _judge(tree: ast.Expression) -> None:
+def _check_nodes(tree: ast.Expression) -> None:
     """Refuses a tree that holds what is not listed, also where it would not be reached."""
     nodes = _nodes(tree)
     for node in nodes:
-        if not isinstance(node, _ALLOWED):
-            called = _CALLED.get(type(node), type(node).__name__)
+        if not isinstance(node, _ALLOWED_NODES):
+            called = _NODE_NAMES.get(type(node), type(node).__name__)
             raise _Refused(f"holds {called}; {EXPECTED}")
     for node in nodes:
         if isinstance(node, ast.Name | ast.Attribute):
@@ -222,10 +238,10 @@ def _judge(tree: ast.Expression) -> None:
                 raise _Refused(f"holds the name {name[:60]}, which is Python's own; {EXPECTED}")
     for node in nodes:
         if isinstance(node, ast.Call):
-            _judge_call(node)
+            _check_call(node)
         elif isinstance(node, ast.Constant):
             kind = type(node.value)
-            if kind not in _PLAIN:
+            if kind not in _PLAIN_TYPES:
                 raise _Refused(f"holds a value of type {kind.__name__}; {EXPECTED}")
         elif isinstance(node, ast.Dict) and None in node.keys:
             raise _Refused(f"holds two stars (**); {EXPECTED}")
@@ -248,21 +264,22 @@ def _nodes(tree: ast.Expression) -> list[ast.AST]:
     return nodes
 
 
-def _judge_call(node: ast.Call) -> None:
-    name = _dotted(node.func)
-    if name in _OPENING:
+def _check_call(node: ast.Call) -> None:
+    """Refuses a call of what is not listed, and keyword arguments where a function takes none."""
+    name = _dotted_name(node.func)
+    if name in _FILE_FUNCTIONS:
         raise _Refused(f"calls {name}, which opens files; write the values themselves")
-    if name in _OF_SYSTEM:
+    if name in _ENVIRONMENT_FUNCTIONS:
         raise _Refused(f"calls {name}, which reads the environment; write the value itself")
-    if name not in _FUNCTIONS and name not in (*_ARGUMENT, _FATAL):
+    if name not in _FUNCTIONS and name not in (*_ARGUMENT_FUNCTIONS, _FATAL_FUNCTION):
         called = f"calls {name[:60]}" if name else "calls what is not the name of a function"
         raise _Refused(f"{called}; {EXPECTED}")
-    starred = any(each.arg is None for each in node.keywords)
-    if starred or (node.keywords and name not in _BY_NAME):
+    starred = any(argument.arg is None for argument in node.keywords)
+    if starred or (node.keywords and name not in _KEYWORD_FUNCTIONS):
         raise _Refused(f"calls {name} with arguments by name; {EXPECTED}")
 
 
-def _dotted(node: ast.AST) -> str:
+def _dotted_name(node: ast.AST) -> str:
     """The name that a node is, such as `pi` or `math.pi`; empty where it is none."""
     if isinstance(node, ast.Name):
         return node.id
@@ -271,14 +288,14 @@ def _dotted(node: ast.AST) -> str:
     return ""
 
 
-class _Worked:
-    """Works out a tree that has been judged, node by node."""
+class _Evaluator:
+    """Evaluates a tree whose nodes have been checked, node by node."""
 
     def __init__(self, lookup: Lookup, argument: Lookup) -> None:
-        """Takes what returns the values of names and of arguments."""
+        """Takes the functions that return the values of names and of arguments."""
         self._lookup = lookup
         self._argument = argument
-        self._ways: dict[type, Callable[[Any], Any]] = {
+        self._handlers: dict[type, Callable[[Any], Any]] = {
             ast.Constant: lambda node: node.value,
             ast.Name: self._name,
             ast.Attribute: self._attribute,
@@ -296,7 +313,7 @@ class _Worked:
 
     def result(self, node: ast.expr) -> Any:
         """Returns the value of a node, of a plain type and bounded size."""
-        value = self._ways[type(node)](node)
+        value = self._handlers[type(node)](node)
         _check_size(value)
         return value
 
@@ -309,41 +326,45 @@ class _Worked:
             return _CONSTANTS[node.id]
         if node.id in _FUNCTIONS:
             raise _Refused(f"names the function {node.id} and does not call it; {EXPECTED}")
-        what = f"names {node.id[:60]!r}, which is not defined"
-        raise _Refused(f"{what}; define it by <xacro:property> or <xacro:arg>")
+        problem = f"names {node.id[:60]!r}, which is not defined"
+        raise _Refused(f"{problem}; define it by <xacro:property> or <xacro:arg>")
 
     def _attribute(self, node: ast.Attribute) -> Any:
         """An entry of a mapping or of a namespace, never an attribute of an object of Python's."""
-        dotted = _dotted(node)
-        if dotted in _CONSTANTS:
-            return _CONSTANTS[dotted]
-        bare = isinstance(node.value, ast.Name | ast.Attribute)
-        holder = self._ways[type(node.value)](node.value) if bare else self.result(node.value)
+        name = _dotted_name(node)
+        if name in _CONSTANTS:
+            return _CONSTANTS[name]
+        is_name = isinstance(node.value, ast.Name | ast.Attribute)
+        # A namespace is no plain value, so that `result` would refuse it.
+        evaluate_holder = self._handlers[type(node.value)] if is_name else self.result
+        holder = evaluate_holder(node.value)
         if not isinstance(holder, dict):
-            what = f"asks for {node.attr[:60]!r} of what is no mapping and no namespace"
-            raise _Refused(f"{what}; {EXPECTED}")
+            problem = f"asks for {node.attr[:60]!r} of what is no mapping and no namespace"
+            raise _Refused(f"{problem}; {EXPECTED}")
         if node.attr not in holder:
-            what = f"asks for {node.attr[:60]!r}, which is not in it"
-            raise _Refused(f"{what}; define it or correct the name")
+            problem = f"asks for {node.attr[:60]!r}, which is not in it"
+            raise _Refused(f"{problem}; define it or correct the name")
         return holder[node.attr]
 
     def _subscript(self, node: ast.Subscript) -> Any:
         holder = self.result(node.value)
         if isinstance(node.slice, ast.Slice):
-            ends = (node.slice.lower, node.slice.upper, node.slice.step)
-            return holder[slice(*(None if end is None else self.result(end) for end in ends))]
+            bounds = []
+            for bound in (node.slice.lower, node.slice.upper, node.slice.step):
+                bounds.append(None if bound is None else self.result(bound))
+            return holder[slice(*bounds)]
         return holder[self.result(node.slice)]
 
     def _call(self, node: ast.Call) -> Any:
-        name = _dotted(node.func)
-        values = [self.result(each) for each in node.args]
-        if name in _ARGUMENT:
-            return self._argument(*values)
-        if name == _FATAL:
-            words = " ".join(" ".join(map(str, values)).split())[:200]
+        name = _dotted_name(node.func)
+        arguments = [self.result(argument) for argument in node.args]
+        if name in _ARGUMENT_FUNCTIONS:
+            return self._argument(*arguments)
+        if name == _FATAL_FUNCTION:
+            words = " ".join(" ".join(map(str, arguments)).split())[:200]
             raise _Refused(f"says that the description cannot be used: {words}")
-        named = {str(each.arg): self.result(each.value) for each in node.keywords}
-        return _FUNCTIONS[name](*values, **named)
+        keywords = {str(argument.arg): self.result(argument.value) for argument in node.keywords}
+        return _FUNCTIONS[name](*arguments, **keywords)
 
     def _unary(self, node: ast.UnaryOp) -> Any:
         return _UNARY[type(node.op)](self.result(node.operand))
@@ -354,26 +375,26 @@ class _Worked:
         kind = type(node.op)
         numbers = isinstance(left, int | float) and isinstance(right, int | float)
         if not numbers:
-            _check_joined(kind, left, right)
+            _check_join(kind, left, right)
         elif kind is ast.Pow:
             _check_power(left, right)
         return _BINARY[kind](left, right)
 
     def _boolean(self, node: ast.BoolOp) -> Any:
         """As in Python: the value that decides, and none after it."""
-        ends = isinstance(node.op, ast.Or)
+        decides = isinstance(node.op, ast.Or)
         value = None
-        for each in node.values:
-            value = self.result(each)
-            if bool(value) is ends:
+        for operand in node.values:
+            value = self.result(operand)
+            if bool(value) is decides:
                 break
         return value
 
     def _comparison(self, node: ast.Compare) -> bool:
         left = self.result(node.left)
-        for kind, each in zip(node.ops, node.comparators, strict=True):
-            right = self.result(each)
-            if not _COMPARED[type(kind)](left, right):
+        for op, comparator in zip(node.ops, node.comparators, strict=True):
+            right = self.result(comparator)
+            if not _COMPARISONS[type(op)](left, right):
                 return False
             left = right
         return True
@@ -382,25 +403,25 @@ class _Worked:
         return self.result(node.body if self.result(node.test) else node.orelse)
 
     def _list(self, node: ast.List) -> list[Any]:
-        return [self.result(each) for each in node.elts]
+        return [self.result(item) for item in node.elts]
 
     def _tuple(self, node: ast.Tuple) -> tuple[Any, ...]:
-        return tuple(self.result(each) for each in node.elts)
+        return tuple(self.result(item) for item in node.elts)
 
     def _dict(self, node: ast.Dict) -> dict[Any, Any]:
         keys = [self.result(key) for key in node.keys if key is not None]
         return dict(zip(keys, map(self.result, node.values), strict=True))
 
 
-def _check_joined(kind: type, left: Any, right: Any) -> None:
+def _check_join(kind: type, left: Any, right: Any) -> None:
     """Texts and lists are joined by + and repeated by *; nothing else is done with them."""
     if kind is ast.Add and type(left) is type(right):
         return
     if kind is ast.Mult and isinstance(left, int) != isinstance(right, int):
         items, times = (right, left) if isinstance(left, int) else (left, right)
         if isinstance(items, str | list | tuple):
-            most = MAX_TEXT if isinstance(items, str) else MAX_ITEMS
-            if len(items) * times > most:
+            limit = MAX_TEXT if isinstance(items, str) else MAX_ITEMS
+            if len(items) * times > limit:
                 raise _Refused("makes a text or list that is too long; write a smaller number")
             return
     kinds = f"{type(left).__name__} and {type(right).__name__}"
@@ -409,8 +430,8 @@ def _check_joined(kind: type, left: Any, right: Any) -> None:
 
 def _check_power(base: float, exponent: float) -> None:
     """Refuses what would have too many digits before it is worked out."""
-    whole = isinstance(base, int) and isinstance(exponent, int)
-    if whole and exponent > 0 and int(base).bit_length() * exponent > MAX_BITS:
+    are_integers = isinstance(base, int) and isinstance(exponent, int)
+    if are_integers and exponent > 0 and int(base).bit_length() * exponent > MAX_BITS:
         raise _Refused(f"makes a whole number of over {MAX_BITS} bits; write a smaller one")
     if base < 0 and exponent != int(exponent):
         raise _Refused("takes a fractional power of a negative number; expected a real number")
@@ -418,27 +439,27 @@ def _check_power(base: float, exponent: float) -> None:
 
 def _check_size(value: Any) -> None:
     """Refuses a value that is not plain, or large; what a list holds twice counts twice."""
-    waiting = [value]
+    stack = [value]
     items = 0
-    text = 0
-    while waiting:
-        each = waiting.pop()
-        if type(each) not in _PLAIN:
+    characters = 0
+    while stack:
+        item = stack.pop()
+        if type(item) not in _PLAIN_TYPES:
             raise _Refused(f"gives what is no value (a namespace, or a block); {EXPECTED}")
-        if isinstance(each, int) and each.bit_length() > MAX_BITS:
+        if isinstance(item, int) and item.bit_length() > MAX_BITS:
             raise _Refused(f"makes a whole number of over {MAX_BITS} bits; write a smaller one")
         items += 1
-        text += len(each) if isinstance(each, str) else 0
-        if items > MAX_ITEMS + 1 or text > MAX_TEXT:
+        characters += len(item) if isinstance(item, str) else 0
+        if items > MAX_ITEMS + 1 or characters > MAX_TEXT:
             raise _Refused("makes a text or list that is too long; make it shorter")
-        if isinstance(each, dict):
-            waiting += each.keys()
-            waiting += each.values()
-        elif isinstance(each, list | tuple):
-            waiting += each
+        if isinstance(item, dict):
+            stack += item.keys()
+            stack += item.values()
+        elif isinstance(item, list | tuple):
+            stack += item
 
 
-def typed(text: str) -> Any:
+def parse_typed(text: str) -> Any:
     """Returns the number or truth value that a text stands for in `$(eval ...)`, or the text."""
     plain = text.strip().lower()
     if plain in ("true", "false"):

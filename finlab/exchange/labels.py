@@ -1,5 +1,10 @@
-"""Words of others for axes, frames, places and limits, and all places in plain values that they
-name."""
+"""The vocabulary of other people's files: labels of axes, frames, positions, directions and limits.
+
+A label is compared by its letters and digits in lower case (`plain`), so `max_thrust [N]` and
+`MaxThrust` are one. Constants hold such labels with blanks between. `nodes` walks through plain
+values of YAML, JSON or a table, and `lookup` finds an entry by its label and unit; `records` and
+`plain_robot` read robots by both.
+"""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
@@ -13,19 +18,24 @@ from finlab.errors import LayoutError
 from finlab.files.csv_table import FORCES, LENGTHS, TURNS
 
 Frame = Literal["FLU", "FRD"]
+"""A body frame, named by the directions of x, y and z."""
 FRAMES: dict[Frame, str] = {"FLU": "x forward, y left, z up", "FRD": "x forward, y right, z down"}
-_FRAME_WORDS: dict[Frame, set[str]] = {
+"""Body frames as sentences name them."""
+_FRAME_NAMES: dict[Frame, set[str]] = {
     "FLU": {"flu", "enu", "nwu", "rep103", "rep"},
     "FRD": {"frd", "ned", "sname", "fsd"},
 }
-_SIDES: dict[Frame, set[str]] = {
+"""Names of frames; world frames stand for the body frame of the same handedness and z."""
+_FRAME_SIDES: dict[Frame, set[str]] = {
     "FLU": {"left", "port", "up"},
     "FRD": {"right", "starboard", "down"},
 }
+"""Directions of y and z, asked where no frame is named."""
 FRAME_KEYS = (
     "frame bodyframe convention coordinateframe coordinatesystem referenceframe axesconvention "
+    "frameid"
 )
-FRAME_KEYS += "frameid"
+"""Keys of the frame."""
 _AXIS_WORDS = {
     "Fx": "fx x surge forcex xforce",
     "Fy": "fy y sway forcey yforce",
@@ -36,33 +46,53 @@ _AXIS_WORDS = {
 }
 _AXES: dict[str, Axis] = {word: axis for axis in AXES for word in _AXIS_WORDS[axis].split()}
 NAME = "name thruster joint thrustername jointname motor actuator id label"
+"""Keys of one thruster's name."""
 NAMES = "names thrusters thrusternames joints jointnames motors actuators"
+"""Keys of the list of all thrusters' names."""
 COUNT = "count n num number nthrusters numthrusters numberofthrusters thrustercount"
+"""Keys of the number of thrusters."""
 POSITION = (
     "position positions pos xyz location locations place placement leverarm r coordinates origin"
 )
-DIRECTION = "direction directions dir axis axes forcedirection forcedirections thrustdirection "
-DIRECTION += "thrustdirections thrustaxis thrustvector unitvector vector"
+"""Keys of a thruster's position, or of all positions."""
+DIRECTION = (
+    "direction directions dir axis axes forcedirection forcedirections thrustdirection "
+    "thrustdirections thrustaxis thrustvector unitvector vector"
+)
+"""Keys of a thruster's direction, or of all directions."""
 ANGLES = "rpy euler eulerangles rollpitchyaw"
-UNCLEAR = "orientation orientations attitude rotation"
-ROWS_OF = "axes dof dofs rows rownames axisnames degreesoffreedom controlledaxes"
+"""Keys of roll, pitch and yaw of a thruster, which pushes along its x."""
+AMBIGUOUS = "orientation orientations attitude rotation"
+"""Keys that may hold a direction or angles; a file with one is refused."""
+ROW_LABELS = "axes dof dofs rows rownames axisnames degreesoffreedom controlledaxes"
+"""Keys of the labels of a matrix's rows."""
 CENTER = "centerofmass centreofmass centerofgravity centreofgravity cog com cg"
-PAIR = (
+"""Keys of the centre of gravity."""
+LIMITS = (
     "bounds limits range forcelimits thrustlimits forcebounds thrustbounds thrustrange forcerange"
 )
-LEAST = (
+"""Keys of a pair of least and most."""
+LOWER_LIMIT = (
     "least min lower minimum minforce minthrust forcemin thrustmin lowerlimit lowerbound fmin tmin"
 )
-MOST = (
+"""Keys of the least force or command."""
+UPPER_LIMIT = (
     "most max upper maximum maxforce maxthrust forcemax thrustmax upperlimit upperbound fmax tmax"
 )
-LIMIT_KEYS = f"{PAIR} {LEAST} {MOST} {COUNT} {ROWS_OF}"
-ROW = f"{NAME} {POSITION} {DIRECTION} {ANGLES} {LIMIT_KEYS} x y z "
-ROW += "px py pz posx posy posz dx dy dz ax ay az nx ny nz ux uy uz dirx diry dirz"
-"""Keys of a thruster that are read."""
-LONGEST_LIST, MAX_NODES = 300, 30_000
-"""Most characters of a list of keys, and most values that are looked at."""
+"""Keys of the most force or command."""
+LIMIT_KEYS = f"{LIMITS} {LOWER_LIMIT} {UPPER_LIMIT} {COUNT} {ROW_LABELS}"
+"""Keys that are read of a mapping around the thrusters."""
+THRUSTER_KEYS = (
+    f"{NAME} {POSITION} {DIRECTION} {ANGLES} {LIMIT_KEYS} x y z "
+    "px py pz posx posy posz dx dy dz ax ay az nx ny nz ux uy uz dirx diry dirz"
+)
+"""Keys that are read of the mapping of one thruster."""
+MAX_LIST_LENGTH = 300
+"""Longest list of keys in a sentence [characters]."""
+MAX_NODES = 30_000
+"""Most values of a file that are visited."""
 Path = tuple[str, ...]
+"""The keys that lead to a value; an index is a key such as `[2]`."""
 
 
 def plain(label: object) -> str:
@@ -75,79 +105,115 @@ def axis_of(label: object) -> Axis | None:
     return _AXES.get(plain(label))
 
 
+class Entry(NamedTuple):
+    """An entry of a mapping that was looked up by the words for it."""
+
+    key: str
+    """The key as the file has it; empty where the mapping has no such entry."""
+    value: Any
+    unit: float
+    """What a value of 1 stands for, in SI: 0.001 of `position_mm`; 1 where no unit is named."""
+
+
 def lookup(
     values: Mapping[str, Any], words: str, units: Mapping[str, float] | None = None
-) -> tuple[str, Any, float]:
-    """Returns the first key of a mapping that is one of some words, its value and the size of its
-    unit, which may end the key (`position_mm`) or stand behind it in brackets; an empty key where
-    there is none."""
-    known = words.split()
+) -> Entry:
+    """Returns the first entry of a mapping whose key is one of some words.
+
+    Args:
+        values: the mapping.
+        words: the words, plain and with blanks between; `thruster` may stand before one.
+        units: units that may end the key (`position_mm`) or follow it in brackets, with their
+            sizes in SI; none when None.
+
+    Returns:
+        The entry; with an empty key and the value None where there is none.
+    """
+    accepted = words.split()
     for key, value in values.items():
         label = str(key)[:100]
         size = 1.0
-        unit = re.search(r"[_ (\[]+([a-z]+)[)\]]?$", label, re.IGNORECASE) if units else None
-        if unit and units and unit[1].lower() in units:
-            label = label[: unit.start()]
-            size = units[unit[1].lower()]
+        if units:
+            unit = re.search(r"[_ (\[]+([a-z]+)[)\]]?$", label, re.IGNORECASE)
+            if unit and unit[1].lower() in units:
+                label = label[: unit.start()]
+                size = units[unit[1].lower()]
         word = plain(label)
-        if word in known or word.removeprefix("thruster").removeprefix("s") in known:
-            return str(key), value, size
-    return "", None, 1.0
+        if word in accepted or word.removeprefix("thruster").removeprefix("s") in accepted:
+            return Entry(str(key), value, size)
+    return Entry("", None, 1.0)
+
+
+def is_key_of(key: str, words: str, units: Mapping[str, float] | None = None) -> bool:
+    """Whether a key is one of some words, as `lookup` compares them."""
+    return bool(lookup({key: None}, words, units).key)
 
 
 def unknown_in(rows: Iterable[Mapping[str, Any]]) -> str:
     """Returns the keys of thrusters that are not read, with commas between."""
-    keys = dict.fromkeys(str(key) for row in rows for key in row)
     units = {**LENGTHS, **FORCES, **TURNS}
-    return ", ".join(
-        key for key in keys if not axis_of(key) and not lookup({key: 0}, ROW, units)[0]
-    )[:300]
+    unknown: dict[str, None] = {}  # a set that keeps the order
+    for row in rows:
+        for key in map(str, row):
+            if not axis_of(key) and not is_key_of(key, THRUSTER_KEYS, units):
+                unknown[key] = None
+    return ", ".join(unknown)[:300]
 
 
 def frame_in(text: str) -> Frame | None:
     """Returns the frame that a text names by words such as NED, FLU, `y right`; None where it names
     none, or a left-handed one."""
     words = set(re.findall(r"[a-z]+(?:103)?", text[:2000].lower()))
-    for known in (_FRAME_WORDS, _SIDES):
-        named: list[Frame] = [frame for frame, of_it in known.items() if words & of_it]
-        if named:
-            return named[0] if len(named) == 1 else None
+    for vocabulary in (_FRAME_NAMES, _FRAME_SIDES):
+        frames: list[Frame] = [frame for frame, names in vocabulary.items() if words & names]
+        if frames:
+            return frames[0] if len(frames) == 1 else None
     return None
 
 
-def frame_said(
+def stated_frame(
     scopes: Iterable[Mapping[str, Any]], comments: Iterable[str]
 ) -> tuple[Frame | None, str]:
-    """Returns the frame that mappings, the innermost first, or else comments name, and where it
-    says so. Raises LayoutError: a frame is named by a word that is not known."""
-    for key, value, _ in (lookup(scope, FRAME_KEYS) for scope in scopes):
+    """Returns the frame that a file states, and the words by which it does; None where it does not.
+
+    Args:
+        scopes: the mappings around the thrusters, the innermost first.
+        comments: the file's comments, which count where no mapping states a frame.
+
+    Raises:
+        LayoutError: a frame is named by a word that is not known.
+    """
+    for scope in scopes:
+        key, value, _ = lookup(scope, FRAME_KEYS)
         text = " ".join(map(str, value.values())) if isinstance(value, Mapping) else str(value)
-        if frame := frame_in(text):
+        frame = frame_in(text)
+        if frame:
             return frame, f"{key} {text}"
-        if key and plain(key) != "frameid":
+        if key and plain(key) != "frameid":  # ROS's frame_id names a link more often than a frame
             words = "FLU, ENU or REP-103 (y left, z up), or FRD, NED or SNAME (y right, z down)"
             raise LayoutError(
                 f"is {text!r:.60}, expected {words}; or leave it out, and say --frame", key
             )
     for comment in comments:
-        if re.search(r"\b(?:FLU|FRD|NED|ENU|SNAME|frame)\b", comment) and (
-            frame := frame_in(comment)
-        ):
-            return frame, "its comment"
+        if re.search(r"\b(?:FLU|FRD|NED|ENU|SNAME|frame)\b", comment):
+            frame = frame_in(comment)
+            if frame:
+                return frame, "its comment"
     return None, ""
 
 
 class Node(NamedTuple):
-    """A value in plain values, the keys that lead to it, and the mappings around it with their
-    paths, the innermost first; a mapping itself is the first."""
+    """A value within plain values."""
 
     path: Path
     value: Any
     scopes: tuple[tuple[Path, Mapping[str, Any]], ...]
+    """The mappings around it with their paths, the innermost first; a mapping itself comes
+    first."""
 
     @property
     def key(self) -> str:
-        """Its last key, without places in lists."""
+        """Its last key that is no index."""
         return next((key for key in reversed(self.path) if not key.startswith("[")), "")
 
     @property
@@ -157,44 +223,52 @@ class Node(NamedTuple):
 
 
 def nodes(data: Any) -> Iterator[Node]:
-    """Yields all mappings, lists and values in plain values, outer ones first, but no numbers in
-    lists. Raises LayoutError: there are too many."""
-    waiting: list[Node] = [Node((), data, ())]
+    """Yields all mappings, lists and values of mappings, outer ones first.
+
+    Numbers and texts in lists are no nodes: their list is one.
+
+    Raises:
+        LayoutError: there are more than MAX_NODES.
+    """
+    stack: list[Node] = [Node((), data, ())]
     count = 0
-    while waiting:
-        path, value, scopes = node = waiting.pop()
+    while stack:
+        path, value, scopes = node = stack.pop()
         count += len(value) if isinstance(value, Mapping | list) else 0
         if count > MAX_NODES:
             raise LayoutError(f"has more than {MAX_NODES:,} entries, too many to be read")
-        inner: Iterable[tuple[str, Any]] = ()
+        children: list[tuple[str, Any]] = []
         if isinstance(value, Mapping):
             scopes = ((path, value), *scopes)
-            inner = value.items()
+            children = list(value.items())
             node = Node(path, value, scopes)
         elif isinstance(value, list):
-            inner = (
-                (f"[{i}]", each) for i, each in enumerate(value) if isinstance(each, Mapping | list)
-            )
+            for i, item in enumerate(value):
+                if isinstance(item, Mapping | list):
+                    children.append((f"[{i}]", item))
         yield node
-        waiting += [Node((*path, key), each, scopes) for key, each in [*inner][::-1]]
+        for key, child in reversed(children):
+            stack.append(Node((*path, key), child, scopes))
 
 
 def unread(data: Any, used: set[Path]) -> str:
-    """Returns the keys of values that lie below none that were used, with commas between."""
-    values = (node for node in nodes(data) if not isinstance(node.value, Mapping))
-    named = [node for node in values if not (node.path and node.path[-1].startswith("["))]
-    left = [
-        node.words
-        for node in named
-        if not any(node.path[:i] in used for i in range(len(node.path) + 1))
-    ]
-    return listed(left) if left else ""
+    """Returns the keys of values that lie below no used path, with commas between."""
+    keys = []
+    for node in nodes(data):
+        is_item = bool(node.path) and node.path[-1].startswith("[")
+        if isinstance(node.value, Mapping) or is_item:
+            continue
+        if not any(node.path[:i] in used for i in range(len(node.path) + 1)):
+            keys.append(node.words)
+    return listed(keys) if keys else ""
 
 
 def listed(names: Iterable[str]) -> str:
-    """Returns names as a sentence has them, the first of many."""
+    """Returns names as a sentence has them: with commas between, the first of many."""
     text = ", ".join(names) or "none"
-    return text if len(text) <= LONGEST_LIST else f"{text[:LONGEST_LIST].rpartition(',')[0]}, ..."
+    if len(text) <= MAX_LIST_LENGTH:
+        return text
+    return f"{text[:MAX_LIST_LENGTH].rpartition(',')[0]}, ..."
 
 
 def numbers_in(values: Any) -> Array | None:

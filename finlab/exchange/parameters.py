@@ -1,4 +1,4 @@
-"""Parameters of autopilots by name, and PX4's geometry of rotors among them, CA_*.
+"""Reads parameters of autopilots by name, and reads and writes PX4's geometry of rotors (CA_*).
 
 Scripts of PX4, lists of Mission Planner, MAVProxy and QGroundControl are read. Rotor i of PX4, in x
 forward, y right, z down, gives the force CT a u and the torque CT (p x a - KM a) u for an output u
@@ -7,51 +7,84 @@ of 0 to 1, or -1 to 1 where CA_R_REV says that it reverses (PX4, ActuatorEffecti
 
 import math
 import re
+from collections.abc import Mapping
 
 import numpy as np
 
 from finlab.errors import LayoutError
-from finlab.exchange.exchange import TO_FRD, Exchange
+from finlab.exchange.exchange import TO_FRD, Exchange, thrusters_in
 from finlab.exchange.matrix_table import is_number
-from finlab.layout import Layout, Thruster
+from finlab.layout import Layout
 
-LONGEST = 500
-"""Most characters of a line that are looked at."""
+MAX_LINE_LENGTH = 500
+"""Most characters of a line that are parsed."""
 _NAME = re.compile(r"[A-Z][A-Z0-9]*_\w+\Z")
-_ASKING = {"compare", "greater", "show", "echo", "if", "reset", "touch"}
-"""Words of a script before a name that sets nothing."""
+"""The name of a parameter."""
+_COMMANDS_WITHOUT_VALUE = {"compare", "greater", "show", "echo", "if", "reset", "touch"}
+"""Words of a script before a name that they do not set."""
 MAX_ROTORS = 12
+"""Most rotors of PX4."""
 FRD = TO_FRD[:3, 0]
-USUAL = {"PX": 0.0, "PY": 0.0, "PZ": 0.0, "AX": 0.0, "AY": 0.0, "AZ": -1.0, "CT": 6.5, "KM": 0.05}
-"""Keys of a rotor, and their defaults."""
+"""Signs (3,) that turn vectors from FLU to PX4's frame, and back."""
+ROTOR_DEFAULTS = {
+    "PX": 0.0,
+    "PY": 0.0,
+    "PZ": 0.0,
+    "AX": 0.0,
+    "AY": 0.0,
+    "AZ": -1.0,
+    "CT": 6.5,
+    "KM": 0.05,
+}
+"""Keys of a rotor and PX4's defaults: position [m], axis, CT [N] and KM [m]."""
+MAV_PARAM_TYPE_INT32 = 6
+"""MAVLink's type of a parameter that is an integer of 32 bits."""
+MAV_PARAM_TYPE_REAL32 = 9
+"""MAVLink's type of a parameter that is a float of 32 bits."""
 
 
-def read_parameters(text: str, wanted: str) -> dict[str, float]:
-    """Returns parameters by name, of lines `param set-default NAME VALUE`, `NAME VALUE`,
-    `NAME,VALUE` and `1 1 NAME VALUE TYPE`. What follows # is a comment; the last value counts.
-    Raises LayoutError: a name that begins with one of the words in `wanted` has no number behind
-    it."""
+def read_parameters(text: str, prefixes: str) -> dict[str, float]:
+    """Returns the parameters in a list or script by name; of several values the last one counts.
+
+    Lines are `param set-default NAME VALUE`, `NAME VALUE`, `NAME,VALUE` or `1 1 NAME VALUE TYPE`;
+    what follows # is a comment.
+
+    Args:
+        text: the list or script.
+        prefixes: beginnings of names, with blanks between, whose value must be a number; others are
+            left out where it is none.
+
+    Raises:
+        LayoutError: a parameter with such a name has no number behind it.
+    """
     values: dict[str, float] = {}
-    for number, line in enumerate(text.splitlines(), 1):
-        cells = re.split(r"[\s,=]+", line[:LONGEST].partition("#")[0].strip())
-        place = next((i for i, cell in enumerate(cells) if _NAME.match(cell)), None)
-        if place is None or _ASKING & {*cells[:place]}:
+    for line_number, line in enumerate(text.splitlines(), 1):
+        cells = re.split(r"[\s,=]+", line[:MAX_LINE_LENGTH].partition("#")[0].strip())
+        index = next((i for i, cell in enumerate(cells) if _NAME.match(cell)), None)
+        if index is None or _COMMANDS_WITHOUT_VALUE & {*cells[:index]}:
             continue
-        name = cells[place]
-        value = (cells[place + 1 : place + 2] or [""])[0]
+        name = cells[index]
+        value = cells[index + 1] if index + 1 < len(cells) else ""
         if is_number(value) and abs(float(value)) < 1e9:
             values[name] = float(value)
-        elif name.startswith(tuple(wanted.split())):
+        elif name.startswith(tuple(prefixes.split())):
             raise LayoutError(
-                f"line {number}: {name} is {value!r:.40}, expected a number of ordinary size"
+                f"line {line_number}: {name} is {value!r:.40}, expected a number of ordinary size"
             )
     return values
 
 
 def read_px4(text: str, name: str, exchange: Exchange) -> Layout:
-    """Returns the layout, called `name`, of the rotors in a parameter file or airframe script.
-    Raises LayoutError: it has no rotors, or one without direction or force; a value is no
-    number."""
+    """Returns the layout of the rotors in a parameter file or airframe script of PX4.
+
+    Args:
+        text: the file or script.
+        name: the layout's name.
+        exchange: force of all thrusters where the user gives one; gets the notes.
+
+    Raises:
+        LayoutError: it has no rotors, or one without direction or force; a value is no number.
+    """
     values = read_parameters(text, "CA_")
     count = int(values.get("CA_ROTOR_COUNT", 0))
     if not 0 < count <= MAX_ROTORS:
@@ -63,80 +96,96 @@ def read_px4(text: str, name: str, exchange: Exchange) -> Layout:
         exchange.note(
             "Its surfaces and tilting servos (CA_SV_*) are left out: they hold no forces."
         )
-    for key, usual in USUAL.items():
-        if lacking := [str(i) for i in range(count) if f"CA_ROTOR{i}_{key}" not in values]:
-            which = ", ".join(lacking) if len(lacking) < count else "all"
+    for key, default in ROTOR_DEFAULTS.items():
+        without = [str(i) for i in range(count) if f"CA_ROTOR{i}_{key}" not in values]
+        if without:
+            rotors = ", ".join(without) if len(without) < count else "all"
             exchange.note(
-                f"No CA_ROTORi_{key} of rotors {which}: {usual:g} is taken, the default of PX4."
+                f"No CA_ROTORi_{key} of rotors {rotors}: {default:g} is taken, the default of PX4."
             )
-    rotors = {key: own for key in values if (own := re.match(r"CA_ROTOR(\d{1,3})_(\w+)", key))}
-    if beyond := sorted(
-        key
-        for key, own in rotors.items()
-        if int(own[1]) >= count
-        and not math.isclose(values[key], USUAL.get(own[2], 0.0), rel_tol=1e-6)
-    ):
-        exchange.note(f"CA_ROTOR_COUNT is {count}; not read: {', '.join(beyond[:12])}.")
+    unread = _values_beyond(values, count)
+    if unread:
+        exchange.note(f"CA_ROTOR_COUNT is {count}; not read: {', '.join(unread[:12])}.")
     if exchange.force is None:
         exchange.note(
             "CA_ROTORi_CT is taken for the newtons at full output; correct `force_n` if not."
         )
-    parts = []
+    thrusters = []
     for i in range(count):
-        *vectors, size, km = (
-            values.get(f"CA_ROTOR{i}_{key}", usual) for key, usual in USUAL.items()
-        )
-        place, axis = np.reshape(vectors, (2, 3)) * FRD
+        rotor = {
+            key: values.get(f"CA_ROTOR{i}_{key}", default)
+            for key, default in ROTOR_DEFAULTS.items()
+        }
+        position = np.array([rotor["PX"], rotor["PY"], rotor["PZ"]]) * FRD
+        axis = np.array([rotor["AX"], rotor["AY"], rotor["AZ"]]) * FRD
+        thrust = rotor["CT"]  # [N]; a negative one pushes against the axis
         length = float(np.linalg.norm(axis))
-        if size == 0.0 or length == 0.0:
+        if thrust == 0.0 or length == 0.0:
             raise LayoutError("has no direction or no force", f"CA_ROTOR{i}")
-        force = (-abs(size) if reversing >> i & 1 else 0.0, abs(size))
-        axis *= math.copysign(1.0 / length, size)
-        parts.append(exchange.thruster(f"rotor{i + 1}", place, axis, force, -km))
-    return Layout(name, tuple(parts))
+        is_reversible = reversing >> i & 1
+        force = (-abs(thrust) if is_reversible else 0.0, abs(thrust))
+        axis *= math.copysign(1.0 / length, thrust)
+        thrusters.append(exchange.thruster(f"rotor{i + 1}", position, axis, force, -rotor["KM"]))
+    return Layout(name, tuple(thrusters))
+
+
+def _values_beyond(values: Mapping[str, float], count: int) -> list[str]:
+    """Parameters of rotors beyond CA_ROTOR_COUNT that differ from PX4's defaults, in order."""
+    keys = []
+    for key, value in values.items():
+        match = re.match(r"CA_ROTOR(\d{1,3})_(\w+)", key)
+        if match and int(match[1]) >= count:
+            default = ROTOR_DEFAULTS.get(match[2], 0.0)
+            if not math.isclose(value, default, rel_tol=1e-6):
+                keys.append(key)
+    return sorted(keys)
 
 
 def write_px4(layout: Layout, exchange: Exchange, suffix: str) -> str:
-    """Returns a layout's thrusters as lines of an airframe script, for `.params` as a list of
-    QGroundControl. Raises LayoutError: there is no thruster, or there are too many."""
-    parts = [
-        part
-        for part in exchange.thrusters_of(layout, "PX4").actuators
-        if isinstance(part, Thruster)
-    ]
-    if len(parts) > MAX_ROTORS:
+    """Returns a layout's thrusters as parameters of PX4.
+
+    Args:
+        layout: the layout to write.
+        exchange: gets notes on what PX4 cannot hold.
+        suffix: `.params` for a list of QGroundControl; lines of an airframe script for all others.
+
+    Raises:
+        LayoutError: there is no thruster, or there are too many.
+    """
+    thrusters = thrusters_in(exchange.thrusters_of(layout, "PX4"))
+    if len(thrusters) > MAX_ROTORS:
         raise LayoutError(
-            f"PX4 takes up to {MAX_ROTORS} rotors, layout {layout.name} has {len(parts)}"
+            f"PX4 takes up to {MAX_ROTORS} rotors, layout {layout.name} has {len(thrusters)}"
         )
-    reversing = sum(1 << i for i, part in enumerate(parts) if part.force[0] < 0.0 < part.force[1])
+    reversing = 0  # a bit for each rotor
+    for i, thruster in enumerate(thrusters):
+        if thruster.force[0] < 0.0 < thruster.force[1]:
+            reversing |= 1 << i
     values: dict[str, float] = {
         "CA_AIRFRAME": 7,
-        "CA_ROTOR_COUNT": len(parts),
+        "CA_ROTOR_COUNT": len(thrusters),
         "CA_R_REV": reversing,
     }
-    for i, part in enumerate(parts):
-        least, most = part.force
-        if least < 0.0 < most and -least != most:
+    for i, thruster in enumerate(thrusters):
+        low, high = thruster.force
+        if low < 0.0 < high and -low != high:
+            exchange.note(f"PX4 has one size for both ways: {high:g} N stands for {low:g} N, too.")
+        if high == 0.0:
             exchange.note(
-                f"PX4 has one size for both ways: {most:g} N stands for {least:g} N, too."
+                f"{thruster.name} pushes against its axis alone; its rotor has the axis reversed."
             )
-        if most == 0.0:
-            exchange.note(
-                f"{part.name} pushes against its axis alone; its rotor has the axis reversed."
-            )
-        axis = np.array(part.axis) * FRD * (1.0 if most > 0.0 else -1.0) + 0.0
-        own = [
-            *(np.array(part.position) * FRD + 0.0),
-            *axis,
-            most or -least,
-            -part.torque_per_newton + 0.0,
-        ]
-        values |= {
-            f"CA_ROTOR{i}_{key}": float(value) for key, value in zip(USUAL, own, strict=True)
-        }
-    lines = [f"# motor {i}: {part.name}" for i, part in enumerate(parts, 1)]
+        forward = 1.0 if high > 0.0 else -1.0
+        position = np.array(thruster.position) * FRD + 0.0  # + 0.0 makes -0.0 to 0.0
+        axis = np.array(thruster.axis) * FRD * forward + 0.0
+        thrust = high or -low
+        rotor = [*position, *axis, thrust, -thruster.torque_per_newton + 0.0]
+        for key, value in zip(ROTOR_DEFAULTS, rotor, strict=True):
+            values[f"CA_ROTOR{i}_{key}"] = float(value)
+    lines = [f"# motor {i}: {thruster.name}" for i, thruster in enumerate(thrusters, 1)]
     for key, value in values.items():
-        kind = 6 if isinstance(value, int) else 9  # of MAVLink: 32 bits, whole or not
-        listed = f"1\t1\t{key}\t{value!r}\t{kind}"
-        lines.append(listed if suffix == ".params" else f"param set-default {key} {value!r}")
+        if suffix == ".params":
+            kind = MAV_PARAM_TYPE_INT32 if isinstance(value, int) else MAV_PARAM_TYPE_REAL32
+            lines.append(f"1\t1\t{key}\t{value!r}\t{kind}")
+        else:
+            lines.append(f"param set-default {key} {value!r}")
     return "\n".join(lines) + "\n"

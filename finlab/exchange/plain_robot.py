@@ -1,4 +1,7 @@
-"""Robots of thrusters in plain values, of YAML, JSON or a table, and matrices as text."""
+"""Layouts of thrusters from plain values of YAML, JSON or a table, and allocation matrices as text.
+
+`records` finds the thrusters; here they get positions, axes, limits and the frame of the layout.
+"""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -11,47 +14,69 @@ from finlab.axes import AXES
 from finlab.errors import LayoutError
 from finlab.exchange import labels
 from finlab.exchange.exchange import TO_FRD, Exchange
-from finlab.exchange.labels import FRAMES, Path, frame_said, lookup, nodes, numbers_in, unread
-from finlab.exchange.records import UNIT, Found, Row, found_in, is_unit
+from finlab.exchange.labels import (
+    FRAMES,
+    Path,
+    is_key_of,
+    lookup,
+    nodes,
+    numbers_in,
+    stated_frame,
+    unread,
+)
+from finlab.exchange.records import UNIT_TOLERANCE, Record, ThrusterRecords, find_thrusters, is_unit
 from finlab.files import yaml_text
 from finlab.files.csv_table import FORCES, LENGTHS, TURNS
 from finlab.layout import MAX_ACTUATORS, Layout, Thruster, own_effectiveness
 
-Ends = tuple[float, float]
-Parts = tuple[Thruster, ...]
+LimitPair = tuple[float, float]
+"""Least and most [N], or least and most command."""
 
 
 def read_plain(
     data: Any, name: str, exchange: Exchange, comments: Sequence[str] = (), table: bool = False
 ) -> Layout:
-    """Returns the layout, called `name`, of the thrusters in plain values.
+    """Returns the layout of the thrusters in plain values.
 
-    `comments` of the file may name the frame; a `table` has rows that nothing but their labels
-    names. Raises LayoutError: none are there, or several times, or they may be read in two ways."""
-    held = found_in(data, exchange, table)
-    if len(held.rows) > MAX_ACTUATORS:
-        what = "columns" if held.axes else "thrusters"
-        raise LayoutError(
-            f"expected up to {MAX_ACTUATORS} {what}, got {len(held.rows)}", held.node.words
-        )
-    frd = _frd(held, exchange, comments)
-    used = {held.node.path}
-    parts = (_of_matrix if held.axes else _of_places)(held, data, frd, used, exchange)
-    for k, (path, scope) in enumerate(held.node.scopes):
-        words = f"{labels.FRAME_KEYS} {labels.NAMES} {labels.LIMIT_KEYS if k < 2 else ''}"
-        used |= {(*path, key) for key in scope if lookup({key: 0}, words, FORCES)[0]}
-    if left := labels.unknown_in(held.rows.values()):
-        exchange.note(f"Not read of each thruster: {left}.")
-    if keys := unread(data, used):
-        exchange.note(f"Not read: {keys}.")
-    return Layout(
-        name, parts, axes=tuple(axis for axis in AXES if axis in held.axes or not held.axes)
-    )
+    Args:
+        data: mappings, lists, numbers and texts of a file.
+        name: the layout's name.
+        exchange: defaults for what the file does not say; gets the notes.
+        comments: the file's comments, which may name the frame.
+        table: whether the values come from a table, whose rows nothing but labels names.
+
+    Raises:
+        LayoutError: there are no thrusters, or several sets of them, or they may be read in two
+            ways.
+    """
+    thrusters = find_thrusters(data, exchange, table)
+    n = len(thrusters.records)
+    if n > MAX_ACTUATORS:
+        what = "columns" if thrusters.axes else "thrusters"
+        raise LayoutError(f"expected up to {MAX_ACTUATORS} {what}, got {n}", thrusters.node.words)
+    is_frd = _is_frd(thrusters, exchange, comments)
+    used = {thrusters.node.path}
+    build = _of_columns if thrusters.axes else _of_positions
+    actuators = build(thrusters, data, is_frd, used, exchange)
+    for depth, (path, scope) in enumerate(thrusters.node.scopes):
+        # Limits count where they stand with the thrusters, or right around them.
+        limit_keys = labels.LIMIT_KEYS if depth < 2 else ""
+        words = f"{labels.FRAME_KEYS} {labels.NAMES} {limit_keys}"
+        used |= {(*path, key) for key in scope if is_key_of(key, words, FORCES)}
+    unknown_keys = labels.unknown_in(thrusters.records.values())
+    if unknown_keys:
+        exchange.note(f"Not read of each thruster: {unknown_keys}.")
+    unread_keys = unread(data, used)
+    if unread_keys:
+        exchange.note(f"Not read: {unread_keys}.")
+    axes = tuple(axis for axis in AXES if axis in thrusters.axes or not thrusters.axes)
+    return Layout(name, actuators, axes=axes)
 
 
-def _frd(held: Found, exchange: Exchange, comments: Sequence[str]) -> bool:
-    """Whether the file is in x forward, y right, z down; the note says why."""
-    frame, where = frame_said([scope for _, scope in held.node.scopes], comments)
+def _is_frd(thrusters: ThrusterRecords, exchange: Exchange, comments: Sequence[str]) -> bool:
+    """Whether the file is in x forward, y right, z down; a note says by which words."""
+    scopes = [scope for _, scope in thrusters.node.scopes]
+    frame, where = stated_frame(scopes, comments)
     if exchange.frame and frame and exchange.frame != frame:
         exchange.note(f"It says {where}; --frame {exchange.frame} was taken in its stead.")
     elif exchange.frame is None and frame:
@@ -63,153 +88,188 @@ def _frd(held: Found, exchange: Exchange, comments: Sequence[str]) -> bool:
     return (exchange.frame or frame) == "FRD"
 
 
-def _of_places(
-    held: Found, data: Any, frd: bool, used: set[Path], exchange: Exchange
+def _of_positions(
+    thrusters: ThrusterRecords, data: Any, is_frd: bool, used: set[Path], exchange: Exchange
 ) -> tuple[Thruster, ...]:
+    """Thrusters by position and direction; adds the paths of what it reads to `used`."""
     center = np.zeros(3)
-    for each in nodes(data) if exchange.origin == "gravity" else ():
-        at = numbers_in(each.value) if lookup({each.key: 0}, labels.CENTER)[0] else None
-        if at is not None and at.shape == (3,):
-            center = at
-            used.add(each.path)
-            exchange.note(f"The origin is at {each.words}, {at[0]:g} {at[1]:g} {at[2]:g} m.")
-    exchange.note(f"{held.node.words} was read: places in m, directions, limits in N.")
-    sign = TO_FRD[:3, 0] if frd else np.ones(3)
-    parts = []
-    for (key, row), ends in zip(held.rows.items(), _ends(held, data, used, exchange), strict=True):
-        place_key, place, size = lookup(row, labels.POSITION, LENGTHS)
-        at = _three(place, f"{key}.{place_key}") * size - center
-        axis = _direction(key, row, exchange)
-        parts.append(exchange.thruster(_name(key, row), at * sign, axis * sign, ends))
-    return tuple(parts)
+    if exchange.origin == "gravity":
+        for node in nodes(data):
+            point = numbers_in(node.value) if is_key_of(node.key, labels.CENTER) else None
+            if point is not None and point.shape == (3,):
+                center = point
+                used.add(node.path)
+                x, y, z = point
+                exchange.note(f"The origin is at {node.words}, {x:g} {y:g} {z:g} m.")
+    exchange.note(f"{thrusters.node.words} was read: places in m, directions, limits in N.")
+    sign = TO_FRD[:3, 0] if is_frd else np.ones(3)
+    limits = _limits(thrusters, data, used, exchange)
+    actuators = []
+    for (key, record), force in zip(thrusters.records.items(), limits, strict=True):
+        position_key, value, meters = lookup(record, labels.POSITION, LENGTHS)
+        position = _vector(value, f"{key}.{position_key}") * meters - center
+        axis = _direction(key, record, exchange)
+        name = _thruster_name(key, record)
+        actuators.append(exchange.thruster(name, position * sign, axis * sign, force))
+    return tuple(actuators)
 
 
-def _name(key: str, row: Row) -> str:
-    """A thruster's name: its own, else its key, else its number."""
-    name = str(lookup(row, labels.NAME)[1] or "").strip()
-    key = f"thruster{int(key[1:-1]) + 1}" if key.startswith("[") else key
-    return key if not name or name.isdecimal() else name
+def _thruster_name(key: str, record: Record) -> str:
+    """A thruster's name: that in its record, else its key, else its number from 1."""
+    name = str(lookup(record, labels.NAME).value or "").strip()
+    if name and not name.isdecimal():
+        return name
+    return f"thruster{int(key[1:-1]) + 1}" if key.startswith("[") else key
 
 
-def _direction(key: str, row: Row, exchange: Exchange) -> Array:
-    axis_key, value, _ = lookup(row, labels.DIRECTION)
-    if axis_key:
-        axis = _three(value, f"{key}.{axis_key}")
+def _direction(key: str, record: Record, exchange: Exchange) -> Array:
+    """The direction (3,) of a thruster's force, of length 1, by a vector or by angles."""
+    direction_key, value, _ = lookup(record, labels.DIRECTION)
+    if direction_key:
+        axis = _vector(value, f"{key}.{direction_key}")
     else:
-        axis_key, value, size = lookup(row, labels.ANGLES, TURNS)
-        turn = _three(value, f"{key}.{axis_key}") * size
-        if np.abs(turn).max() > 2 * np.pi:
+        direction_key, value, radians = lookup(record, labels.ANGLES, TURNS)
+        angles = _vector(value, f"{key}.{direction_key}") * radians
+        if np.abs(angles).max() > 2 * np.pi:
             raise LayoutError(
-                "is more than a turn; are these degrees? call it rpy_deg", f"{key}.{axis_key}"
+                "is more than a turn; are these degrees? call it rpy_deg", f"{key}.{direction_key}"
             )
-        exchange.note(f"{axis_key} turns the axis x of a thruster, along which it pushes.")
-        axis = Rotation.from_euler("xyz", turn).apply([1.0, 0.0, 0.0])
+        exchange.note(f"{direction_key} turns the axis x of a thruster, along which it pushes.")
+        axis = Rotation.from_euler("xyz", angles).apply([1.0, 0.0, 0.0])
     length = float(np.linalg.norm(axis))
     if length < 1e-9:
-        raise LayoutError("has no length", f"{key}.{axis_key}")
-    if abs(length - 1.0) > UNIT:
-        exchange.note(f"{key}.{axis_key} has length {length:g}; its direction alone is read.")
+        raise LayoutError("has no length", f"{key}.{direction_key}")
+    if abs(length - 1.0) > UNIT_TOLERANCE:
+        exchange.note(f"{key}.{direction_key} has length {length:g}; its direction alone is read.")
     return axis / length
 
 
-def _three(value: Any, what: str) -> Array:
-    array = numbers_in([value.get(axis) for axis in "xyz"] if isinstance(value, Mapping) else value)
+def _vector(value: Any, key: str) -> Array:
+    """The vector (3,) in a list, a text or a mapping of x, y and z; `key` goes into the error."""
+    components = [value.get(axis) for axis in "xyz"] if isinstance(value, Mapping) else value
+    array = numbers_in(components)
     if array is None or array.shape != (3,):
-        raise LayoutError(f"is {value!r:.60}, expected three numbers", what)
+        raise LayoutError(f"is {value!r:.60}, expected three numbers", key)
     return array
 
 
-def _of_matrix(
-    held: Found, data: Any, frd: bool, used: set[Path], exchange: Exchange
+def _of_columns(
+    thrusters: ThrusterRecords, data: Any, is_frd: bool, used: set[Path], exchange: Exchange
 ) -> tuple[Thruster, ...]:
-    columns = np.zeros((6, len(held.rows)))
-    columns[[AXES.index(axis) for axis in held.axes]] = held.columns
+    """Thrusters by the columns of a matrix; adds the paths of what it reads to `used`."""
+    columns = np.zeros((6, len(thrusters.records)))
+    columns[[AXES.index(axis) for axis in thrusters.axes]] = thrusters.columns
     per_newton = is_unit(columns[:3])
     unit = "N and N m" if per_newton else "N and N m at a command of 1"
-    exchange.note(f"{held.node.words} was read, {held.order}, in {unit}.")
-    if missing := ", ".join(axis for axis in AXES if axis not in held.axes):
+    exchange.note(f"{thrusters.node.words} was read, {thrusters.order}, in {unit}.")
+    missing = ", ".join(axis for axis in AXES if axis not in thrusters.axes)
+    if missing:
         exchange.note(f"It has no row {missing}: 0 is taken there, and not commanded (`axes`).")
-    ends = _ends(held, data, used, exchange)
-    if not any(ends) and not per_newton:
+    limits = _limits(thrusters, data, used, exchange)
+    if not any(limits) and not per_newton:
         exchange.note(
             "It has no limits: commands are taken to go from -1 to 1 (--force LEAST MOST)."
         )
-        ends = [(-1.0, 1.0)] * len(ends)
-    columns = columns * (TO_FRD if frd else 1.0)
-    names = [_name(key, row) for key, row in held.rows.items()]
-    return tuple(exchange.of_column(*each) for each in zip(names, columns.T, ends, strict=True))
+        limits = [(-1.0, 1.0)] * len(limits)
+    columns = columns * (TO_FRD if is_frd else 1.0)
+    actuators = []
+    for (key, record), column, pair in zip(
+        thrusters.records.items(), columns.T, limits, strict=True
+    ):
+        actuators.append(exchange.thruster_of_column(_thruster_name(key, record), column, pair))
+    return tuple(actuators)
 
 
-def _ends(held: Found, data: Any, used: set[Path], exchange: Exchange) -> list[Ends | None]:
-    """Least and most of each thruster: its own, those around, or in any mapping that names it."""
-    keys = [_name(key, row) for key, row in held.rows.items()]
-    ends = [_limits_in(row, 1, exchange)[0] for row in held.rows.values()]
-    for _, scope in held.node.scopes[:2]:
-        shared = _limits_in(scope, len(keys), exchange)
-        ends = [own or other for own, other in zip(ends, shared, strict=True)]
-    if any(ends):
-        return ends
-    known: dict[str, Ends] = {}
-    for each in nodes(data):
-        if isinstance(each.value, Mapping):
-            key, named, _ = lookup(each.value, labels.NAME)
-            named = named if key else each.key
-            if (
-                isinstance(named, str)
-                and named in keys
-                and (pair := _limits_in(each.value, 1, exchange)[0])
-            ):
-                known[named] = pair
-                used.add(each.path)
-    if known and (without := ", ".join(key for key in keys if key not in known)):
+def _limits(
+    thrusters: ThrusterRecords, data: Any, used: set[Path], exchange: Exchange
+) -> list[LimitPair | None]:
+    """The limits of each thruster: those of its record, of the two mappings around all, or of any
+    mapping in the file that has its name; None where there are none."""
+    names = [_thruster_name(key, record) for key, record in thrusters.records.items()]
+    limits = [_limits_in(record, 1, exchange)[0] for record in thrusters.records.values()]
+    for _, scope in thrusters.node.scopes[:2]:
+        shared = _limits_in(scope, len(names), exchange)
+        limits = [pair or default for pair, default in zip(limits, shared, strict=True)]
+    if any(limits):
+        return limits
+    by_name: dict[str, LimitPair] = {}
+    for node in nodes(data):
+        if not isinstance(node.value, Mapping):
+            continue
+        name_key, name, _ = lookup(node.value, labels.NAME)
+        if not name_key:
+            name = node.key
+        if isinstance(name, str) and name in names:
+            pair = _limits_in(node.value, 1, exchange)[0]
+            if pair:
+                by_name[name] = pair
+                used.add(node.path)
+    without = ", ".join(name for name in names if name not in by_name)
+    if by_name and without:
         exchange.note(f"It has no limits of {without}.")
-    return [known.get(key) for key in keys]
+    return [by_name.get(name) for name in names]
 
 
-def _limits_in(values: Mapping[str, Any], n: int, exchange: Exchange) -> list[Ends | None]:
-    """Least and most [N, or of a command] of each of n thrusters in a mapping; None where unsaid.
-    One pair, or one number of each, is for all. A most alone is for both ways."""
-    key, pair, size = lookup(values, labels.PAIR, FORCES)
-    ends = numbers_in(pair)
-    if key and pair is not None:
-        if ends is None or ends.shape not in ((2,), (n, 2), (2, n)):
+def _limits_in(values: Mapping[str, Any], n: int, exchange: Exchange) -> list[LimitPair | None]:
+    """The limits of each of n thrusters in a mapping [N, or of a command]; None where it has none.
+
+    One pair, or one number of each, is for all. A most alone is for both ways.
+    """
+    key, value, newtons = lookup(values, labels.LIMITS, FORCES)
+    if key and value is not None:
+        pairs = numbers_in(value)
+        if pairs is None or pairs.shape not in ((2,), (n, 2), (2, n)):
             raise LayoutError(f"expected least and most, or both of each of {n} thrusters", key)
-        ends = np.broadcast_to(ends if ends.shape in ((n, 2), (2,)) else ends.T, (n, 2)) * size
-        return [(low, high) for low, high in ends.tolist()]
-    low_key, low, low_size = lookup(values, labels.LEAST, FORCES)
-    high_key, high, high_size = lookup(values, labels.MOST, FORCES)
-    if high is None:
+        if pairs.shape not in ((n, 2), (2,)):
+            pairs = pairs.T
+        pairs = np.broadcast_to(pairs, (n, 2)) * newtons
+        return [(low, high) for low, high in pairs.tolist()]
+    low_key, low_value, low_newtons = lookup(values, labels.LOWER_LIMIT, FORCES)
+    high_key, high_value, high_newtons = lookup(values, labels.UPPER_LIMIT, FORCES)
+    if high_value is None:
         return [None] * n
-    most = numbers_in(high)
-    least = numbers_in(low if low is not None else high)
-    if most is None or least is None or not {most.size, least.size} <= {1, n}:
+    high = numbers_in(high_value)
+    low = numbers_in(low_value if low_value is not None else high_value)
+    if high is None or low is None or not {high.size, low.size} <= {1, n}:
         raise LayoutError(
             f"expected a number, or one for each of {n} thrusters", f"{low_key} {high_key}"
         )
-    if low is None:
+    if low_value is None:
         exchange.note(f"{high_key} says nothing of reverse: as much is taken for it.")
-        least = -least
-        low_size = high_size
-    lows = np.broadcast_to(least.ravel() * low_size, n)
-    highs = np.broadcast_to(most.ravel() * high_size, n)
+        low = -low
+        low_newtons = high_newtons
+    lows = np.broadcast_to(low.ravel() * low_newtons, n)
+    highs = np.broadcast_to(high.ravel() * high_newtons, n)
     return [*zip(lows.tolist(), highs.tolist(), strict=True)]
 
 
 def write_matrix(layout: Layout, exchange: Exchange, suffix: str) -> str:
-    """Returns the matrix of a layout's thrusters per newton, as CSV for `.csv`, else as YAML.
-    Raises LayoutError: there is no thruster."""
-    kept = exchange.thrusters_of(layout, "A matrix", "places along the lines of the forces")
-    rows = own_effectiveness(kept)[:, 0].T * (TO_FRD if exchange.frame == "FRD" else 1.0) + 0.0
-    names = list(kept.names)
-    limits = np.stack([kept.lower, kept.upper], axis=1)[..., 0].tolist()
+    """Returns the effectiveness matrix of a layout's thrusters, per newton, as text.
+
+    Args:
+        layout: the layout to write.
+        exchange: the frame of the matrix; gets the notes.
+        suffix: `.csv` for a table; YAML for all others.
+
+    Raises:
+        LayoutError: there is no thruster.
+    """
+    form = "A matrix"
+    thrusters = exchange.thrusters_of(layout, form, "places along the lines of the forces")
+    frame = exchange.frame or "FLU"
+    sign = TO_FRD if frame == "FRD" else 1.0
+    rows = own_effectiveness(thrusters)[:, 0].T * sign + 0.0  # (6, n); + 0.0 makes -0.0 to 0.0
+    names = list(thrusters.names)
     matrix = dict(zip(AXES, rows.tolist(), strict=True))
+    low = thrusters.lower[:, 0].tolist()
+    high = thrusters.upper[:, 0].tolist()
     if suffix != ".csv":
-        head = {"frame": exchange.frame or "FLU", "unit": "N", "names": names, "limits": limits}
-        return yaml_text({**head, "matrix": matrix})
-    table = {
-        "axis": names,
-        **matrix,
-        **dict(zip(("least", "most"), zip(*limits, strict=True), strict=True)),
-    }
-    lines = [",".join(map(str, [key, *row])) for key, row in table.items()]
-    return "\n".join([f"# frame: {exchange.frame or 'FLU'}", *lines]) + "\n"
+        limits = [list(pair) for pair in zip(low, high, strict=True)]
+        return yaml_text(
+            {"frame": frame, "unit": "N", "names": names, "limits": limits, "matrix": matrix}
+        )
+    table = {"axis": names, **matrix, "least": low, "most": high}
+    lines = [f"# frame: {frame}"]
+    for label, cells in table.items():
+        lines.append(",".join(map(str, [label, *cells])))
+    return "\n".join(lines) + "\n"

@@ -1,8 +1,11 @@
-"""Thrusters in plain values, a mapping for each: by place and direction, or by the wrench of its
-command."""
+"""Finds the thrusters in plain values: by position and direction, or by wrench.
+
+Files of others name things as they like, so every mapping and list is looked at as a candidate;
+exactly one of them must be thrusters. `plain_robot` makes a layout of what is found.
+"""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,9 +18,9 @@ from finlab.exchange.exchange import Exchange
 from finlab.exchange.labels import Node, axis_of, lookup, nodes, numbers_in, plain
 from finlab.files.csv_table import LENGTHS, TURNS
 
-UNIT = 0.05
+UNIT_TOLERANCE = 0.05
 """A vector whose length is this close to 1 is a direction, or a force per newton."""
-WORDS = {
+ALLOCATION_WORDS = {
     "tam",
     "tcm",
     "allocation",
@@ -29,209 +32,264 @@ WORDS = {
     "effectiveness",
 }
 """Words of a key that holds an allocation matrix."""
-NEAR = "matrix thruster thrusters thrust force forces b t configuration config control motor motors"
-"""Words that may stand with `matrix` in such a key."""
-OTHER = "mass inertia damping drag added coriolis covariance weight weights gain gains rotation "
-OTHER += "inverse inv pinv pseudo pseudoinverse"
-"""Words of a key that holds another matrix."""
-CLEAR = {"fx", "fy", "fz", "tx", "ty", "tz", "mx", "my", "mz"}
-"""Labels that are those of a wrench under any key."""
-Row = dict[str, Any]
+MATRIX_WORDS = {
+    *("matrix", "thruster", "thrusters", "thrust", "force", "forces", "b", "t"),
+    *("configuration", "config", "control", "motor", "motors"),
+}
+"""A key that holds `matrix` and no other words than these names an allocation matrix, too."""
+OTHER_MATRIX_WORDS = {
+    *("mass", "inertia", "damping", "drag", "added", "coriolis", "covariance", "weight"),
+    *("weights", "gain", "gains", "rotation", "inverse", "inv", "pinv", "pseudo", "pseudoinverse"),
+}
+"""Words of a key, or of one around it, that holds another matrix."""
+WRENCH_LABELS = {"fx", "fy", "fz", "tx", "ty", "tz", "mx", "my", "mz"}
+"""Labels that are those of a wrench under any key; `x` or `roll` are so in a matrix alone."""
+Record = dict[str, Any]
+"""What a file says of one thruster, by its own keys."""
 
 
-class Found(NamedTuple):
-    """Thrusters at one place of the values, each by name, as the file has it.
-
-    Thrusters without places and directions have wrenches (axes, n); `order` is how a note says that
-    their matrix was read."""
+class ThrusterRecords(NamedTuple):
+    """The thrusters of a file, by position and direction or by wrench."""
 
     node: Node
-    rows: dict[str, Row]
+    """Where they stand in the file."""
+    records: dict[str, Record]
+    """Each thruster by its name, or by its index such as `[2]`."""
     axes: tuple[Axis, ...] = ()
+    """Axes of the rows of `columns`; empty for thrusters by position and direction."""
     columns: Array = np.zeros((0, 0))
+    """Wrenches per command (axes, n) [N, N m]."""
     order: str = ""
+    """How a note says that the rows of the matrix were read."""
 
 
-def found_in(data: Any, exchange: Exchange, table: bool) -> Found:
-    """Returns the thrusters in plain values, or in a `table` whose six rows nothing names.
+def find_thrusters(data: Any, exchange: Exchange, is_table: bool) -> ThrusterRecords:
+    """Returns the thrusters in plain values.
 
-    Places and directions go before a matrix, since they tell more. Raises LayoutError: none are
-    there, or several times, or they may be read in two ways."""
-    placed = [each for node in nodes(data) if (each := _placed(node, exchange))]
-    every = placed or [each for node in nodes(data) if (each := _wrenches(node, exchange, table))]
-    if len(every) > 1:
-        what = "thrusters by place and direction" if placed else "a matrix"
-        keys = ", ".join(each.node.words for each in every[:6])
+    Positions and directions go before a matrix, since they say more.
+
+    Args:
+        data: the plain values.
+        exchange: how to read rows that may be read in two ways; gets the notes.
+        is_table: whether they come from a table, where nothing names a matrix of six rows.
+
+    Raises:
+        LayoutError: there are none, or several, or they may be read in two ways.
+    """
+    by_position = _candidates(data, lambda node: _by_position(node, exchange))
+    candidates = by_position or _candidates(data, lambda node: _by_wrench(node, exchange, is_table))
+    if len(candidates) == 1:
+        return candidates[0]
+    if len(candidates) > 1:
+        what = "thrusters by place and direction" if by_position else "a matrix"
+        keys = ", ".join(candidate.node.words for candidate in candidates[:6])
         raise LayoutError(f"holds {what} more than once, at {keys}; leave one in the file")
-    if every:
-        return every[0]
-    shaped = [(each.words, numbers_in(each.value)) for each in nodes(data) if each.path]
-    lists = [
-        f"{words} {array.shape}" for words, array in shaped if array is not None and array.size > 5
-    ]
-    seen = (
-        f"; its lists of numbers, {', '.join(lists[:8])}, have no key that says so" if lists else ""
-    )
+    lists = _number_lists(data)
+    hint = ""
+    if lists:
+        shown = ", ".join(lists[:8])
+        hint = f"; its lists of numbers, {shown}, have no key that says so"
     raise LayoutError(
         "has no matrix, expected six rows of numbers (Fx, Fy, Fz, Tx, Ty, Tz) under a key such as "
         "`tam` or "
-        f"`allocation_matrix`, or a position and a direction of each thruster{seen}"
+        f"`allocation_matrix`, or a position and a direction of each thruster{hint}"
     )
 
 
-def _held(value: Any) -> dict[str, Mapping[str, Any]]:
-    """The mappings right below a value, by their keys or places."""
+def _candidates(data: Any, read: Callable[[Node], ThrusterRecords | None]) -> list[ThrusterRecords]:
+    """What a reader makes of all nodes, without those that hold no thrusters."""
+    results = [read(node) for node in nodes(data)]
+    return [result for result in results if result is not None]
+
+
+def _number_lists(data: Any) -> list[str]:
+    """Lists of at least six numbers with their shapes, for the error."""
+    lists = []
+    for node in nodes(data):
+        array = numbers_in(node.value) if node.path else None
+        if array is not None and array.size > 5:
+            lists.append(f"{node.words} {array.shape}")
+    return lists
+
+
+def _records_below(value: Any) -> dict[str, Mapping[str, Any]]:
+    """The mappings right below a mapping or list, by their keys or indices."""
     if isinstance(value, list):
-        value = {f"[{i}]": each for i, each in enumerate(value)}
-    pairs = value.items() if isinstance(value, Mapping) else ()
-    return {str(key): each for key, each in pairs if isinstance(each, Mapping)}
+        value = {f"[{i}]": item for i, item in enumerate(value)}
+    if not isinstance(value, Mapping):
+        return {}
+    return {str(key): item for key, item in value.items() if isinstance(item, Mapping)}
 
 
-def _placed(node: Node, exchange: Exchange) -> Found | None:
-    """Thrusters by place and direction: mappings below a node, or lists of all in one."""
-    rows = {key: _joined(row) for key, row in _held(node.value).items()}
-    says = {
-        key: (_short(lookup(row, labels.POSITION, LENGTHS)[1]), _points(row))
-        for key, row in rows.items()
+def _by_position(node: Node, exchange: Exchange) -> ThrusterRecords | None:
+    """Thrusters by position and direction: mappings below a node, or lists of all in one."""
+    records = {key: _join_components(record) for key, record in _records_below(node.value).items()}
+    has_position = {
+        key: _may_be_vector(lookup(record, labels.POSITION, LENGTHS).value)
+        for key, record in records.items()
     }
-    if not any(map(all, says.values())):
-        lists = _lists(node, exchange)
-        return Found(node, lists) if lists else None
-    for key, (place, points) in says.items():
-        if place != points:
-            lacks = "direction" if place else "position"
+    has_direction = {key: _has_direction(record) for key, record in records.items()}
+    if not any(has_position[key] and has_direction[key] for key in records):
+        in_lists = _from_lists(node, exchange)
+        return ThrusterRecords(node, in_lists) if in_lists else None
+    for key in records:
+        if has_position[key] != has_direction[key]:
+            lacks = "direction" if has_position[key] else "position"
             raise LayoutError(
                 f"has no {lacks}, and others beside it have one", f"{node.words}.{key}"
             )
-    return Found(node, {key: row for key, row in rows.items() if all(says[key])})
+    thrusters = {key: record for key, record in records.items() if has_position[key]}
+    return ThrusterRecords(node, thrusters)
 
 
-def _joined(row: Mapping[str, Any]) -> Row:
-    """A mapping; `x`, `y`, `z` become one position, `dx`, `dy`, `dz` or the like one direction,
-    unless it has torques or angles: a wrench is for others to read."""
-    joined = {**row}
-    short = {str(key).lower().strip().replace("_", ""): value for key, value in row.items()}
-    if any(axis_of(key) in ("Tx", "Ty", "Tz") for key in short):
+def _join_components(record: Mapping[str, Any]) -> Record:
+    """A record in which `x`, `y`, `z` became one position, and `dx`, `dy`, `dz` or the like one
+    direction, unless it has torques or angles: then its entries are those of a wrench."""
+    joined = {**record}
+    by_label = {str(key).lower().strip().replace("_", ""): value for key, value in record.items()}
+    if any(axis_of(label) in ("Tx", "Ty", "Tz") for label in by_label):
         return joined
-    for what, starts in (
-        ("position", ("", "p", "pos")),
-        ("direction", ("d", "a", "n", "u", "dir", "f")),
-    ):
-        for start in starts:
-            if {f"{start}x", f"{start}y"} <= set(short):
-                joined.setdefault(what, [short.get(f"{start}{axis}", 0.0) for axis in "xyz"])
+    prefixes_of = {"position": ("", "p", "pos"), "direction": ("d", "a", "n", "u", "dir", "f")}
+    for vector, prefixes in prefixes_of.items():
+        for prefix in prefixes:
+            if {f"{prefix}x", f"{prefix}y"} <= set(by_label):
+                components = [by_label.get(f"{prefix}{axis}", 0.0) for axis in "xyz"]
+                joined.setdefault(vector, components)
     return joined
 
 
-def _short(value: Any) -> bool:
-    """Whether a value may be a vector of one thruster."""
-    return isinstance(value, Mapping | str) or (
-        isinstance(value, list)
-        and len(value) < 6
-        and not any(isinstance(each, list) for each in value)
-    )
+def _may_be_vector(value: Any) -> bool:
+    """Whether a value may be a vector of one thruster: a mapping, a text or a short list."""
+    if isinstance(value, Mapping | str):
+        return True
+    if not isinstance(value, list) or len(value) >= 6:
+        return False
+    return not any(isinstance(item, list) for item in value)
 
 
-def _points(row: Row) -> bool:
-    """Whether a mapping says where its thruster points; an error where that may be angles as
-    well."""
-    points = any(
-        _short(lookup(row, words, TURNS)[1]) for words in (labels.DIRECTION, labels.ANGLES)
+def _has_direction(record: Record) -> bool:
+    """Whether a record says where its thruster points; an error where that may be angles, too."""
+    has_direction = any(
+        _may_be_vector(lookup(record, words, TURNS).value)
+        for words in (labels.DIRECTION, labels.ANGLES)
     )
-    key, value, _ = lookup(row, labels.UNCLEAR)
-    if key and not points and _short(value) and lookup(row, labels.POSITION, LENGTHS)[0]:
+    key, value, _ = lookup(record, labels.AMBIGUOUS)
+    has_position = bool(lookup(record, labels.POSITION, LENGTHS).key)
+    if key and not has_direction and _may_be_vector(value) and has_position:
         raise LayoutError(
             "may be a direction, or roll, pitch and yaw; call it `direction`, or `rpy` in radians",
             key,
         )
-    return points
+    return has_direction
 
 
-def _lists(node: Node, exchange: Exchange) -> dict[str, Row]:
-    """The thrusters of a mapping that holds the places of all, and all directions, as lists."""
+def _from_lists(node: Node, exchange: Exchange) -> dict[str, Record]:
+    """The thrusters of a mapping that holds all positions in one list and all directions in
+    another; empty where it does not."""
     value = node.value if isinstance(node.value, Mapping) else {}
-    place_key, places, size = lookup(value, labels.POSITION, LENGTHS)
-    key, directions, _ = lookup(value, labels.DIRECTION)
-    axes = numbers_in(directions)
-    at = numbers_in(places)
-    if axes is None or at is None or axes.size < 6 or axes.size % 3 or axes.ndim > 2:
+    position_key, position_value, meters = lookup(value, labels.POSITION, LENGTHS)
+    direction_key, direction_value, _ = lookup(value, labels.DIRECTION)
+    positions = numbers_in(position_value)
+    axes = numbers_in(direction_value)
+    if axes is None or positions is None:
+        return {}
+    if axes.size < 6 or axes.size % 3 or axes.ndim > 2:
         return {}
     n = axes.size // 3
-    what = f"{node.words}.{key}"
-    names, count = (lookup(value, words)[1] for words in (labels.NAMES, labels.COUNT))
-    if at.size != axes.size:
+    where = f"{node.words}.{direction_key}"
+    if positions.size != axes.size:
         raise LayoutError(
-            f"holds {at.size} numbers, and {key} {axes.size}", f"{node.words}.{place_key}"
+            f"holds {positions.size} numbers, and {direction_key} {axes.size}",
+            f"{node.words}.{position_key}",
         )
+    names = lookup(value, labels.NAMES).value
+    count = lookup(value, labels.COUNT).value
     if axes.ndim == 1 and n != (len(names) if isinstance(names, list) else count):
         raise LayoutError(
             f"holds {axes.size} numbers without a shape; write a list of 3 for each, or count: {n}",
-            what,
+            where,
         )
-    by_row = axes.shape == (n, 3)
+    by_thruster = axes.shape == (n, 3)
     if axes.ndim == 1 or n == 3:
-        fit = [is_unit(axes.reshape(n, 3).T), is_unit(axes.reshape(3, n))]
-        if fit[0] == fit[1] and not exchange.rows:
+        # Both orders have the right shape: directions of length 1 tell which it is.
+        unit_by_thruster = is_unit(axes.reshape(n, 3).T)
+        unit_by_axis = is_unit(axes.reshape(3, n))
+        if unit_by_thruster == unit_by_axis and not exchange.rows:
             raise LayoutError(
                 "may stand thruster by thruster, or all x before all y; say --rows thrusters or "
                 "--rows axes",
-                what,
+                where,
             )
-        by_row = exchange.rows == "thrusters" if exchange.rows else fit[0]
-        exchange.note(
-            f"{what} is read {'thruster by thruster' if by_row else 'all x, all y, all z'}."
+        by_thruster = exchange.rows == "thrusters" if exchange.rows else unit_by_thruster
+        order = "thruster by thruster" if by_thruster else "all x, all y, all z"
+        exchange.note(f"{where} is read {order}.")
+    positions = positions * meters
+    if by_thruster:
+        positions = positions.reshape(n, 3)
+        axes = axes.reshape(n, 3)
+    else:
+        positions = positions.reshape(3, n).T
+        axes = axes.reshape(3, n).T
+    return {
+        name: {"position": position, "direction": axis}
+        for name, position, axis in zip(
+            _names(node, n), positions.tolist(), axes.tolist(), strict=True
         )
-    axes, at = (
-        each.reshape(n, 3) if by_row else each.reshape(3, n).T for each in (axes, at * size)
-    )
-    rows = zip(_names(node, n), at.tolist(), axes.tolist(), strict=True)
-    return {name: {"position": place, "direction": axis} for name, place, axis in rows}
+    }
 
 
 def is_allocation(node: Node) -> bool:
-    """Whether a node's key is that of an allocation matrix."""
-    around = [
-        re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", key[:100]) for key in ("", *node.path[-3:])
+    """Whether a node's key names an allocation matrix, and none of the keys around another."""
+    words_of_keys = [
+        {word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", key[:100])}
+        for key in ("", *node.path[-3:])
     ]
-    words = {word.lower() for word in around[-1]}
-    known = bool(words & WORDS) or ("matrix" in words and words <= {*NEAR.split()})
-    return known and not {word.lower() for each in around for word in each} & {*OTHER.split()}
+    words = words_of_keys[-1]
+    if not words & ALLOCATION_WORDS and not ("matrix" in words and words <= MATRIX_WORDS):
+        return False
+    return not set.union(*words_of_keys) & OTHER_MATRIX_WORDS
 
 
-def _wrenches(node: Node, exchange: Exchange, table: bool) -> Found | None:
+def _by_wrench(node: Node, exchange: Exchange, is_table: bool) -> ThrusterRecords | None:
     """Thrusters by their wrenches: a mapping for each, or a matrix whose key or rows say that it is
     one."""
     value = node.value
-    sure = is_allocation(node)
-    names = list[str]()
-    held = _held(value)
-    if held and len(held) == len(value):
-        return _of_records(node, held)
+    is_named_allocation = is_allocation(node)
+    names: list[str] = []
+    records = _records_below(value)
+    if records and len(records) == len(value):
+        return _of_wrench_records(node, records)
     if isinstance(value, Mapping):
-        rows = {
-            axis: row
-            for key, row in value.items()
-            if (axis := axis_of(key)) and isinstance(row, list)
-        }
-        if len(rows) > 1 and (sure or len({plain(key) for key in value} & CLEAR) > 1):
-            matrix = _array([*rows.values()], node)
-            named = {name: Row() for name in _names(node, matrix.shape[1])}
-            return Found(node, named, tuple(rows), matrix, "by its labels")
-        if sure and isinstance(flat := lookup(value, "data")[1], list):
+        rows: dict[Axis, list[Any]] = {}
+        for key, row in value.items():
+            axis = axis_of(key)
+            if axis and isinstance(row, list):
+                rows[axis] = row
+        n_wrench_labels = len({plain(key) for key in value} & WRENCH_LABELS)
+        if len(rows) > 1 and (is_named_allocation or n_wrench_labels > 1):
+            matrix = _matrix([*rows.values()], node)
+            unnamed = {name: Record() for name in _names(node, matrix.shape[1])}
+            return ThrusterRecords(node, unnamed, tuple(rows), matrix, "by its labels")
+        flat = lookup(value, "data").value
+        if is_named_allocation and isinstance(flat, list):
             value = flat
         elif len(value) > 1 and all(isinstance(row, list) for row in value.values()):
             names = [*map(str, value)]
             value = [*value.values()]
-    if not sure or not isinstance(value, list) or not value:
+    if not is_named_allocation or not isinstance(value, list) or not value:
         return None
-    array = _array(value, node) if isinstance(value[0], list) else numbers_in(value)
-    if array is None:
-        return None
-    array = array if isinstance(value[0], list) else _unfolded(array, node)
-    return _of_array(array, names, node, exchange, table)
+    if isinstance(value[0], list):
+        array = _matrix(value, node)
+    else:
+        numbers = numbers_in(value)
+        if numbers is None:
+            return None
+        array = _reshape(numbers, node)
+    return _of_matrix(array, names, node, exchange, is_table)
 
 
-def _array(rows: Sequence[Any], node: Node) -> Array:
+def _matrix(rows: Sequence[Any], node: Node) -> Array:
+    """Rows as an array of two dimensions; an error where they are none."""
     array = numbers_in(rows)
     if array is None or array.ndim != 2:
         raise LayoutError(
@@ -240,98 +298,133 @@ def _array(rows: Sequence[Any], node: Node) -> Array:
     return array
 
 
-def _of_records(node: Node, rows: Mapping[str, Mapping[str, Any]]) -> Found | None:
-    keyed = [
-        {axis: key for key in row if (axis := axis_of(key)) and np.ndim(row[key]) == 0}
-        for row in rows.values()
-    ]
-    first = keyed[0]
-    if len(first) < 2 or not set(first) & {"Fx", "Fy", "Fz"}:
+def _of_wrench_records(
+    node: Node, records: Mapping[str, Mapping[str, Any]]
+) -> ThrusterRecords | None:
+    """Thrusters with a mapping of each wrench by axes; None where the mappings are no wrenches."""
+    keys_by_axis = [_axis_keys(record) for record in records.values()]
+    axes = tuple(keys_by_axis[0])
+    if len(axes) < 2 or not set(axes) & {"Fx", "Fy", "Fz"}:
         return None
-    keys = {plain(key) for key in first.values()}
-    if {"x", "y"} <= keys and not keys & (CLEAR | {"k", "m", "n"}):
+    keys = keys_by_axis[0].values()
+    words = {plain(key) for key in keys}
+    if {"x", "y"} <= words and not words & (WRENCH_LABELS | {"k", "m", "n"}):
         raise LayoutError(
-            f"has {', '.join(map(str, first.values()))} of each thruster, which may be its "
-            "wrench, or its "
+            f"has {', '.join(map(str, keys))} of each thruster, which may be its wrench, or its "
             "place and angles; call them Fx to Tz, or x, y, z and dx, dy, dz",
             node.words,
         )
-    pairs = zip(rows.values(), keyed, strict=True)
-    columns = numbers_in([[row.get(own.get(axis, "")) for axis in first] for row, own in pairs])
-    if columns is None or any(set(own) != set(first) for own in keyed):
-        raise LayoutError(f"expected numbers {', '.join(first)} of each thruster", node.words)
-    named = {key: {**row} for key, row in rows.items()}
-    return Found(node, named, tuple(first), columns.T, "a row per thruster")
+    rows = []
+    for record, key_of_axis in zip(records.values(), keys_by_axis, strict=True):
+        rows.append([record.get(key_of_axis.get(axis, "")) for axis in axes])
+    wrenches = numbers_in(rows)
+    if wrenches is None or any(set(key_of_axis) != set(axes) for key_of_axis in keys_by_axis):
+        raise LayoutError(f"expected numbers {', '.join(axes)} of each thruster", node.words)
+    copies = {key: {**record} for key, record in records.items()}
+    return ThrusterRecords(node, copies, axes, wrenches.T, "a row per thruster")
+
+
+def _axis_keys(record: Mapping[str, Any]) -> dict[Axis, str]:
+    """The keys of a record that hold one number for an axis, by that axis."""
+    keys: dict[Axis, str] = {}
+    for key, value in record.items():
+        axis = axis_of(key)
+        if axis and np.ndim(value) == 0:
+            keys[axis] = key
+    return keys
 
 
 def _names(node: Node, n: int) -> list[str]:
     """Names of a matrix's thrusters from the nearest mapping around it that has some."""
     for _, scope in node.scopes:
         key, names, _ = lookup(scope, labels.NAMES)
-        if isinstance(names, list) and all(isinstance(each, str | int) for each in names):
+        if isinstance(names, list) and all(isinstance(name, str | int) for name in names):
             if len({*map(str, names)}) != n or len(names) != n:
                 raise LayoutError(f"holds {len(names)} names, expected {n}, each another one", key)
             return [*map(str, names)]
     return [f"thruster{i + 1}" for i in range(n)]
 
 
-def _unfolded(array: Array, node: Node) -> Array:
-    """A matrix in one list, row by row, of as many columns as there are names, or as is said."""
+def _reshape(numbers: Array, node: Node) -> Array:
+    """A matrix from one list of its numbers, row by row; keys around it say how many columns."""
     for _, scope in node.scopes:
-        names, n, rows = (
-            lookup(scope, words)[1]
-            for words in (labels.NAMES, f"cols columns {labels.COUNT}", "rows")
-        )
-        n = len(names) if isinstance(names, list) else n
-        fits = isinstance(n, int) and n > 0 and array.size % n == 0
-        if fits and (rows is None or isinstance(rows, list) or rows == array.size // n):
-            return array.reshape(-1, n)
-    shapes = ", ".join(f"{k} rows of {array.size // k}" for k in range(2, 7) if array.size % k == 0)
+        names = lookup(scope, labels.NAMES).value
+        rows = lookup(scope, "rows").value
+        columns = lookup(scope, f"cols columns {labels.COUNT}").value
+        n = len(names) if isinstance(names, list) else columns
+        fits = isinstance(n, int) and n > 0 and numbers.size % n == 0
+        if fits and (rows is None or isinstance(rows, list) or rows == numbers.size // n):
+            return numbers.reshape(-1, n)
+    shapes = ", ".join(
+        f"{rows} rows of {numbers.size // rows}" for rows in range(2, 7) if numbers.size % rows == 0
+    )
     raise LayoutError(
-        f"is {array.size} numbers in one list, which may be {shapes or 'of any shape'}; write a "
-        "list "
-        "per axis, or the names of the thrusters beside it",
+        f"is {numbers.size} numbers in one list, which may be {shapes or 'of any shape'}; write a "
+        "list per axis, or the names of the thrusters beside it",
         node.words,
     )
 
 
-def _of_array(array: Array, names: list[str], node: Node, exchange: Exchange, table: bool) -> Found:
-    """A matrix whose rows have no labels of their own; keys beside it may name the axes."""
-    said = next(
-        (value for _, scope in node.scopes if (value := lookup(scope, labels.ROWS_OF)[1])), None
-    )
-    axes = (
-        tuple(axis for each in said if (axis := axis_of(each))) if isinstance(said, list) else AXES
-    )
-    if isinstance(said, list) and len({*axes}) < len(said):
-        raise LayoutError(f"names its rows {said!r:.80}, expected such as Fx, Fy, Tz", node.words)
-    by_axes = len(array) == len(axes) and not names
-    across = array.shape[1] == len(axes)
-    if not by_axes and not across:
+def _of_matrix(
+    array: Array, names: list[str], node: Node, exchange: Exchange, is_table: bool
+) -> ThrusterRecords:
+    """Thrusters of a matrix whose rows have no labels of axes; keys around it may name the axes.
+
+    Args:
+        array: the matrix as the file has it.
+        names: labels of its rows that are thrusters; empty where they have none.
+        node: where it stands in the file.
+        exchange: what the rows are where that is unclear.
+        is_table: whether nothing but its shape says what it is.
+    """
+    axes = _axes_of_rows(node)
+    may_be_axes = len(array) == len(axes) and not names
+    may_be_thrusters = array.shape[1] == len(axes)
+    if not may_be_axes and not may_be_thrusters:
         raise LayoutError(
             f"is {len(array)} rows of {array.shape[1]} numbers, expected six rows, or beside them "
             "`axes` with a name for each (Fx, Fy, Tz), or rows with labels",
             node.words,
         )
     if names or exchange.rows or len(axes) < 6:
-        across = across and (not by_axes or exchange.rows == "thrusters")
-    elif across:
-        unit = by_axes and (is_unit(array[:3]) or not table), is_unit(array[:, :3].T)
-        if unit[0] == unit[1] and (table or not by_axes):
+        by_thruster = may_be_thrusters and (not may_be_axes or exchange.rows == "thrusters")
+    elif may_be_thrusters:
+        # A matrix per newton has forces of length 1, in its columns or in its rows.
+        unit_columns = may_be_axes and (is_unit(array[:3]) or not is_table)
+        unit_rows = is_unit(array[:, :3].T)
+        if unit_columns == unit_rows and (is_table or not may_be_axes):
             raise LayoutError(
                 f"is {len(array)} rows of 6 numbers without labels, which may be axes, a row per "
-                "thruster "
-                "(--rows axes, --rows thrusters), or the inverse; label them Fx, Fy, Fz, Tx, Ty, "
-                "Tz",
+                "thruster (--rows axes, --rows thrusters), or the inverse; label them Fx, Fy, Fz, "
+                "Tx, Ty, Tz",
                 node.words,
             )
-        across = unit[1] and not unit[0]
-    matrix, kind = (array.T, "thrusters") if across else (array, "axes")
+        by_thruster = unit_rows and not unit_columns
+    else:
+        by_thruster = False
+    matrix = array.T if by_thruster else array
     names = names or _names(node, matrix.shape[1])
+    kind = "thrusters" if by_thruster else "axes"
     order = f"its rows taken for {kind}, in the order {', '.join(axes)}"
-    return Found(node, {name: {} for name in names}, axes, matrix, order)
+    return ThrusterRecords(node, {name: {} for name in names}, axes, matrix, order)
+
+
+def _axes_of_rows(node: Node) -> tuple[Axis, ...]:
+    """The axes of a matrix's rows by the nearest key that names them; all six where none does."""
+    stated: Any = None
+    for _, scope in node.scopes:
+        value = lookup(scope, labels.ROW_LABELS).value
+        if value:
+            stated = value
+            break
+    if not isinstance(stated, list):
+        return AXES
+    axes = tuple(axis for axis in map(axis_of, stated) if axis)
+    if len({*axes}) < len(stated):
+        raise LayoutError(f"names its rows {stated!r:.80}, expected such as Fx, Fy, Tz", node.words)
+    return axes
 
 
 def is_unit(forces: Array) -> bool:
-    """Whether columns (3, n) have length 1."""
-    return bool((np.abs(np.linalg.norm(forces, axis=0) - 1.0) < UNIT).all())
+    """Whether the columns of an array (3, n) have length 1."""
+    return bool((np.abs(np.linalg.norm(forces, axis=0) - 1.0) < UNIT_TOLERANCE).all())

@@ -1,8 +1,8 @@
-"""Descriptions that the package xacro expands, without a way to code, nor to files elsewhere.
+"""Expands robot descriptions by the package xacro, without running code or opening files elsewhere.
 
 xacro hands `${...}` to Python, and opens what a file names. Each expansion has a copy of xacro's
-module for it alone, in which what evaluates, opens or grows is replaced: `expressions` judges
-expressions and works them out, files are those in the description's folder or below, and elements,
+module for it alone, in which what evaluates, opens or grows is replaced: `expressions` checks
+expressions and evaluates them, files are those in the description's folder or below, and elements,
 characters and time are counted. It needs no limits of the process, and is the same on every system.
 """
 
@@ -18,7 +18,7 @@ from typing import Any
 from xml.dom import Node, minidom
 
 from finlab.errors import LayoutError
-from finlab.exchange.expressions import evaluated, typed
+from finlab.exchange.expressions import evaluate, parse_typed
 from finlab.exchange.xml_models import root_of
 from finlab.files.guarded import is_regular, read_text
 
@@ -28,18 +28,18 @@ MAX_NODES = 60_000
 """Most elements, attributes and texts in files and copies of macros; a large robot has a tenth."""
 MAX_TEXT = 5_000_000
 """Most characters that expressions give, all together."""
-LONGEST = 10_000
+MAX_LENGTH = 10_000
 """Longest text with `$` in it, and longest list of a macro's parameters [characters]."""
 SECONDS = 1.2
 """Most processor time of one expansion [s]."""
-_NEEDED = (
+_REPLACED_NAMES = (
     *("safe_eval", "eval_text", "eval_extension", "parse", "get_include_files", "resolve_macro"),
     *("parse_macro_arg", "re_macro_arg", "is_valid_name", "warning", "print_location", "Table"),
     *("remove_previous_comments", "_global_symbols", "process_doc", "init_stacks", "filestack"),
     "substitution_args_context",
 )
 """Names in xacro's module that are replaced or used; one without them evaluates in another way."""
-_FORBIDDEN = ("eval", "exec", "compile", "open")
+_FORBIDDEN_FUNCTIONS = ("eval", "exec", "compile", "open")
 """Functions of Python that the copy of the module has no more once it is loaded."""
 _PARAMETER = re.compile(
     r"^\s*([^\s:=]+?)\s*:?=\s*(\^\|?)?"
@@ -51,20 +51,23 @@ _OTHER_PACKAGE = "package://"
 """What `$(find NAME)` becomes, before the name; meshes, which have most of them, are not opened."""
 
 
-def expanded(path: Path | None) -> str:
+def expand(path: Path | None) -> str:
     """Returns the text that xacro makes of a file.
 
     Args:
         path: the file; None for one from a browser, which may open no other.
-    Raises LayoutError: xacro is not installed, or refuses the file; the file came without a path;
-    an expression is more than arithmetic; it includes files elsewhere; it grows too large."""
+
+    Raises:
+        LayoutError: xacro is not installed, or refuses the file; the file came without a path; an
+            expression is more than arithmetic; it includes files elsewhere; it grows too large.
+    """
     if path is None:
         raise LayoutError("is a xacro file, not a description; `finlab layout convert` expands it")
     return _Expansion(path.resolve()).text()
 
 
 class _Budget:
-    """What one expansion may still use."""
+    """The nodes, characters and processor time that one expansion has left."""
 
     def __init__(self) -> None:
         self._nodes = MAX_NODES
@@ -75,9 +78,9 @@ class _Budget:
         """Takes elements, attributes and texts; a LayoutError where too many were taken."""
         self._nodes -= count
         if self._nodes < 0:
-            most = f"more than {MAX_NODES:,} elements and attributes"
-            raise LayoutError(f"makes {most} by xacro; make it smaller, or end what calls itself")
-        self.look_at_the_clock()
+            what = f"more than {MAX_NODES:,} elements and attributes"
+            raise LayoutError(f"makes {what} by xacro; make it smaller, or end what calls itself")
+        self.check_time()
 
     def take_text(self, count: int) -> None:
         """Takes characters; a LayoutError where too many were taken."""
@@ -85,7 +88,7 @@ class _Budget:
         if self._text < 0:
             raise LayoutError(f"makes over {MAX_TEXT:,} characters by expressions; make it smaller")
 
-    def look_at_the_clock(self) -> None:
+    def check_time(self) -> None:
         """Raises a LayoutError after the time."""
         if time.thread_time() > self._end:
             raise LayoutError(f"takes over {SECONDS} s to expand by xacro; make it smaller")
@@ -130,11 +133,11 @@ class _Expansion:
         xacro.parse_macro_arg = self._parameter
         xacro.re_macro_arg = _PARAMETER
         xacro.is_valid_name = _is_name
-        xacro.remove_previous_comments = _say_nothing  # its time grows with their square
-        xacro.warning = _say_nothing
-        xacro.print_location = _say_nothing
+        xacro.remove_previous_comments = _print_nothing  # its time grows with their square
+        xacro.warning = _print_nothing
+        xacro.print_location = _print_nothing
         xacro._global_symbols = {}  # its functions and load_yaml; `expressions` has its own
-        for name in _FORBIDDEN:
+        for name in _FORBIDDEN_FUNCTIONS:
             setattr(xacro, name, _forbidden)
         resolve = xacro.Table._resolve_
 
@@ -148,13 +151,13 @@ class _Expansion:
 
     def _value(self, expression: str, symbols: Any, _: Any = None) -> Any:
         """The value of an expression, in place of `safe_eval`."""
-        value = evaluated(expression, symbols.__getitem__, self._argument)
+        value = evaluate(expression, symbols.__getitem__, self._argument)
         self._budget.take_text(len(str(value)))
         return value
 
     def _text_value(self, text: str | None, symbols: Any) -> Any:
         """The value of a text with expressions in it, in place of `eval_text`."""
-        self._budget.look_at_the_clock()
+        self._budget.check_time()
         if text is None or "$" not in text:
             return text or ""
         _check_length(text)
@@ -164,22 +167,22 @@ class _Expansion:
 
     def _substitution(self, text: str) -> str:
         """What `$(...)` stands for, in place of `eval_extension`."""
-        command, _, rest = text[2:-1].strip().partition(" ")
-        rest = rest.strip()
-        what = f"$({' '.join(f'{command} {rest}'.split())[:80]})"
+        command, _, argument = text[2:-1].strip().partition(" ")
+        argument = argument.strip()
+        shown = f"$({' '.join(f'{command} {argument}'.split())[:80]})"
         if command == "arg":
-            value = self._argument(rest)
+            value = self._argument(argument)
         elif command == "eval":
-            value = evaluated(rest, self._typed_argument, self._typed_argument)
-        elif command == "find" and re.fullmatch(r"[\w.-]+", rest):
-            value = f"{_OTHER_PACKAGE}{rest}"
+            value = evaluate(argument, self._typed_argument, self._typed_argument)
+        elif command == "find" and re.fullmatch(r"[\w.-]+", argument):
+            value = f"{_OTHER_PACKAGE}{argument}"
         elif command in ("env", "optenv"):
-            raise LayoutError(f"{what} reads the environment; write the value itself")
+            raise LayoutError(f"{shown} reads the environment; write the value itself")
         elif command in ("dirname", "cwd"):
-            raise LayoutError(f"{what} asks for a folder of this computer; leave it away")
+            raise LayoutError(f"{shown} asks for a folder of this computer; leave it away")
         else:
-            known = "$(arg ...), $(eval ...) or $(find ...)"
-            raise LayoutError(f"{what} is no substitution of xacro; expected {known}")
+            expected = "$(arg ...), $(eval ...) or $(find ...)"
+            raise LayoutError(f"{shown} is no substitution of xacro; expected {expected}")
         self._budget.take_text(len(str(value)))
         return str(value)
 
@@ -187,13 +190,14 @@ class _Expansion:
         """The value of an argument."""
         values = self._xacro.substitution_args_context["arg"]
         if name not in values:
-            what = f"{name!s:.60}"
-            raise LayoutError(f"has no value for argument {what!r}; give its <xacro:arg> a default")
+            shown = f"{name!s:.60}"
+            remedy = "give its <xacro:arg> a default"
+            raise LayoutError(f"has no value for argument {shown!r}; {remedy}")
         return values[name]
 
     def _typed_argument(self, name: Any) -> Any:
         """The value of an argument in `$(eval ...)`; a KeyError where there is none."""
-        return typed(self._xacro.substitution_args_context["arg"][name])
+        return parse_typed(self._xacro.substitution_args_context["arg"][name])
 
     def _document(self, _: Any, file: str) -> Any:
         """The tree of a file, in place of `parse`."""
@@ -205,65 +209,66 @@ class _Expansion:
         text = read_text(file, MAX_BYTES, "a file of xacro", LayoutError)
         # It has no entities and is not too deep; the same text goes to the parser that xacro needs.
         root = root_of(text)
-        elements = sum(3 + len(each.attrib) for each in root.iter())
-        others = text.count("<!") + text.count("<?")
-        self._budget.take_nodes(elements + others)
+        n_nodes = sum(3 + len(element.attrib) for element in root.iter())
+        n_declarations = text.count("<!") + text.count("<?")
+        self._budget.take_nodes(n_nodes + n_declarations)
         return minidom.parseString(text.lstrip())
 
     def _included(self, file: str, symbols: Any) -> Iterator[str]:
         """The path of an included file, in place of `get_include_files`."""
         name = str(self._text_value(file, symbols))
-        here = Path(self._xacro.filestack[-1]).parent
-        asked = " ".join(name.split())[:80]
-        asked = re.sub(f"^{_OTHER_PACKAGE}([^/]*)", r"$(find \1)", asked)
-        said = f"includes {asked!r}"
-        own = "expected one in the description's folder or below, by its path from there"
+        folder = Path(self._xacro.filestack[-1]).parent
+        shown = " ".join(name.split())[:80]
+        shown = re.sub(f"^{_OTHER_PACKAGE}([^/]*)", r"$(find \1)", shown)
+        problem = f"includes {shown!r}"
+        expected = "expected one in the description's folder or below, by its path from there"
         if re.search(r"[*?[\]]", name):
-            raise LayoutError(f"{said}, a pattern; {own}")
+            raise LayoutError(f"{problem}, a pattern; {expected}")
         if name.startswith(_OTHER_PACKAGE):
             path = self._of_package(name)
         else:
-            path = None if Path(name).is_absolute() else here / name
+            path = None if Path(name).is_absolute() else folder / name
         try:
             inside = path is not None and path.resolve().is_relative_to(self._folder)
         except (OSError, RuntimeError, ValueError):  # a circle of links, a NUL byte
             inside = False
         if path is None or not inside:
-            raise LayoutError(f"{said}, a file elsewhere; {own}: copy what it includes there")
+            remedy = "copy what it includes there"
+            raise LayoutError(f"{problem}, a file elsewhere; {expected}: {remedy}")
         yield str(path.resolve())
 
     def _of_package(self, name: str) -> Path | None:
         """The path that `$(find NAME)/...` names where the description lies below such a folder."""
-        package, _, rest = name.removeprefix(_OTHER_PACKAGE).partition("/")
+        package, _, subpath = name.removeprefix(_OTHER_PACKAGE).partition("/")
         for folder in (self._folder, *self._folder.parents):
             if folder.name == package:
-                return folder / rest
+                return folder / subpath
         return None
 
     def _macro(self, name: str, macros: Any, symbols: Any) -> Any:
         """The macro of a name, whose elements are copied next, in place of `resolve_macro`."""
-        found = self._resolve_macro(name, macros, symbols)
-        self._budget.take_nodes(_size(found[2].body))
-        return found
+        macro = self._resolve_macro(name, macros, symbols)
+        self._budget.take_nodes(_size(macro[2].body))
+        return macro
 
     def _parameter(self, text: str) -> Any:
         """The first parameter of a macro's list, in place of `parse_macro_arg`."""
         _check_length(text)
-        self._budget.look_at_the_clock()
+        self._budget.check_time()
         return self._parse_parameter(text)
 
     def _sentence(self, problem: Exception) -> LayoutError:
         """The error for what an expansion has ended with."""
-        own: BaseException | None = problem
-        while own is not None and not isinstance(own, LayoutError | RecursionError):
-            own = getattr(own, "exc", None)
+        cause: BaseException | None = problem
+        while cause is not None and not isinstance(cause, LayoutError | RecursionError):
+            cause = getattr(cause, "exc", None)
         file = Path(str((self._xacro.filestack or [self._path])[-1]))
         where = "" if file == self._path else f"in {file.name}: "
-        if isinstance(own, RecursionError):
-            what = "has an expression, macro or include that is nested too deep"
-            return LayoutError(f"{where}{what}; does it hold itself?")
-        if own is not None:
-            return LayoutError(f"{where}{own}")
+        if isinstance(cause, RecursionError):
+            depth = "has an expression, macro or include that is nested too deep"
+            return LayoutError(f"{where}{depth}; does it hold itself?")
+        if cause is not None:
+            return LayoutError(f"{where}{cause}")
         words = " ".join(str(problem).split())[:300] or type(problem).__name__
         return LayoutError(f"{where}is a xacro file that xacro refuses: {words}")
 
@@ -275,7 +280,7 @@ def _copy_of_xacro() -> ModuleType:
         raise LayoutError("is a xacro file; to expand it, pip install finlab-marine[xacro]")
     module = module_from_spec(spec)
     spec.loader.exec_module(module)
-    if missing := [name for name in _NEEDED if not hasattr(module, name)]:
+    if missing := [name for name in _REPLACED_NAMES if not hasattr(module, name)]:
         problem = f"is a xacro file, and xacro {version('xacro')} has no {missing[0]}"
         raise LayoutError(f"{problem}: pip install xacro==2.1.1")
     return module
@@ -284,19 +289,19 @@ def _copy_of_xacro() -> ModuleType:
 def _size(node: Any) -> int:
     """How many elements, attributes and texts there are in a node."""
     count = 0
-    waiting = [node]
-    while waiting:
-        each = waiting.pop()
-        count += 1 + (each.attributes.length if each.attributes is not None else 0)
-        waiting += each.childNodes
+    stack = [node]
+    while stack:
+        child = stack.pop()
+        count += 1 + (child.attributes.length if child.attributes is not None else 0)
+        stack += child.childNodes
     return count
 
 
 def _check_length(text: str) -> None:
-    if len(text) > LONGEST:
+    if len(text) > MAX_LENGTH:
         start = " ".join(text[:40].split())
-        what = f"has a text of {len(text):,} characters to expand"
-        raise LayoutError(f"{what}, expected at most {LONGEST:,}; shorten it: {start}...")
+        problem = f"has a text of {len(text):,} characters to expand"
+        raise LayoutError(f"{problem}, expected at most {MAX_LENGTH:,}; shorten it: {start}...")
 
 
 def _is_name(name: str) -> bool:
@@ -304,7 +309,7 @@ def _is_name(name: str) -> bool:
     return name.isidentifier() and not keyword.iskeyword(name)
 
 
-def _say_nothing(*_: object, **__: object) -> None:
+def _print_nothing(*_: object, **__: object) -> None:
     """What xacro would print to a terminal."""
 
 

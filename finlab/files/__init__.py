@@ -1,9 +1,8 @@
-"""YAML and JSON text to plain values: mappings, lists, text, true, false, null, and the numbers of
-JSON.
+"""Parses YAML and JSON into plain values: mappings, lists, text, true, false, null and numbers.
 
 The text may come from a stranger. Nothing in it runs code, expands, drops a key, or takes more than
-linear time. Whatever YAML calls a number beyond JSON's (0o17, 1_000, 1:30, .inf), a date or a yes
-is text here.
+linear time. Numbers are those of JSON: whatever else YAML calls a number (0o17, 1_000, 1:30, .inf),
+a date or a yes is text here.
 """
 
 import json
@@ -21,19 +20,35 @@ MAX_DIGITS = 100
 """Most characters of a number."""
 
 _NUMBER = re.compile(r"-?(?:0|[1-9][0-9]*)(\.[0-9]+)?([eE][-+]?[0-9]+)?\Z")
-_WORDS = {"": None, "null": None, "true": True, "false": False}
+"""A number of JSON."""
+_CONSTANTS = {"": None, "null": None, "true": True, "false": False}
+"""Plain scalars of YAML that are no text."""
 _ESCAPED_SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
+"""Half of a surrogate pair as an escape of JSON."""
 
 
 def parse_json(content: str, source: str, error: type[FinlabError] = DataError) -> Any:
-    """Returns the values of a JSON document. Raises FinlabError of the kind `error`: it is no JSON,
-    or holds a key twice or a number that is not finite; the message calls the document `source`."""
-    numbers: Any = dict.fromkeys(("parse_float", "parse_constant", "parse_int"), _number)
+    """Returns the values of a JSON document.
+
+    Args:
+        content: the text of the document.
+        source: its name in the sentence of an error.
+        error: the class of the error.
+
+    Raises:
+        FinlabError: of the class `error`: it is no JSON, holds a key twice, or a number that is not
+            finite.
+    """
     try:
-        values = json.loads(content, object_pairs_hook=_once, **numbers)
-        if _ESCAPED_SURROGATE.search(
-            content
-        ):  # half of a pair is no character, and cannot be written
+        values = json.loads(
+            content,
+            object_pairs_hook=_without_duplicates,
+            parse_float=_number,
+            parse_constant=_number,
+            parse_int=_number,
+        )
+        if _ESCAPED_SURROGATE.search(content):
+            # Half of a pair is no character, and cannot be encoded: UnicodeError is a ValueError.
             json.dumps(values, ensure_ascii=False).encode()
         return values
     except json.JSONDecodeError as problem:
@@ -45,18 +60,26 @@ def parse_json(content: str, source: str, error: type[FinlabError] = DataError) 
 
 
 def parse_yaml(content: str, source: str, error: type[FinlabError] = DataError) -> Any:
-    """Returns the values of one YAML document; aliases and tags are refused. Raises FinlabError of
-    the kind `error`: it is no YAML, or holds what is refused; the message calls the document
-    `source`."""
+    """Returns the values of one YAML document, without aliases and tags.
+
+    Args:
+        content: the text of the document.
+        source: its name in the sentence of an error.
+        error: the class of the error.
+
+    Raises:
+        FinlabError: of the class `error`: it is no YAML, or holds an alias, a tag, a key twice or
+            too much.
+    """
     import yaml  # a robot's computer reads JSON and may lack PyYAML
 
     try:
         return _document(content)
     except yaml.YAMLError as problem:
         mark = getattr(problem, "problem_mark", None)
-        said = getattr(problem, "problem", None) or str(problem).splitlines()[0]
-        place = f"line {mark.line + 1}: " if mark else ""
-        raise error.at(source, f"is not valid YAML: {place}{said}"[:200]) from None
+        message = getattr(problem, "problem", None) or str(problem).splitlines()[0]
+        line = f"line {mark.line + 1}: " if mark else ""
+        raise error.at(source, f"is not valid YAML: {line}{message}"[:200]) from None
     except ValueError as problem:
         raise error.at(source, str(problem)[:200]) from None
 
@@ -84,7 +107,8 @@ def _number(text: str) -> int | float:
     return value
 
 
-def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+def _without_duplicates(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """A mapping of the pairs of a JSON object; refused where a key stands twice."""
     values: dict[str, Any] = {}
     for key, value in pairs:
         if key in values:
@@ -94,7 +118,7 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _document(content: str) -> Any:
-    """The value of the document; what it is made of is looked through before anything is built."""
+    """The value of the document; all its events are checked before any value is built."""
     import yaml
 
     # libyaml's parser is ten times as fast, but PyYAML may have been built without it.
@@ -129,10 +153,9 @@ def _document(content: str) -> Any:
 
 
 def _value(node: Any) -> Any:
-    """The value of a YAML node: plain scalars are numbers and words of JSON or text, a key stands
-    once."""
+    """The value of a YAML node; refused where a mapping has a key twice."""
     if node.id == "sequence":
-        return [_value(each) for each in node.value]
+        return [_value(item) for item in node.value]
     if node.id == "mapping":
         values: dict[str, Any] = {}
         for key, value in node.value:
@@ -143,9 +166,9 @@ def _value(node: Any) -> Any:
                 raise ValueError(f"line {line}: key {key.value!r:.60} is given twice")
             values[key.value] = _value(value)
         return values
-    if node.style or not (node.value in _WORDS or _NUMBER.match(node.value)):
+    if node.style or not (node.value in _CONSTANTS or _NUMBER.match(node.value)):
         return node.value
     try:
-        return _WORDS[node.value] if node.value in _WORDS else _number(node.value)
+        return _CONSTANTS[node.value] if node.value in _CONSTANTS else _number(node.value)
     except ValueError as problem:
         raise ValueError(f"line {node.start_mark.line + 1}: {problem}") from None

@@ -1,5 +1,7 @@
-"""Files opened in one way: a regular file, within a size, and one sentence where it is not; zip
-archives and NPZ files, unpacked in memory: what is declared is checked, what is read is counted.
+"""Reads files of strangers: regular files up to a size, zip archives and NPZ files.
+
+Archives are unpacked in memory: declared sizes are checked, and what is read is counted. Whatever
+is wrong with a file becomes one sentence.
 """
 
 import io
@@ -21,70 +23,103 @@ from finlab.errors import DataError, FinlabError
 from finlab.files import parse_json
 
 Name = str | os.PathLike[str]
-PART = 1 << 20
+"""The path of a file."""
+CHUNK_BYTES = 1 << 20
 """Bytes that are read at once."""
 
 
 def read_file(
     path: Name,
-    most: int,
-    what: str,
+    max_bytes: int,
+    expected: str,
     error: type[FinlabError] = DataError,
     *,
     head: int | None = None,
 ) -> bytes:
-    """Returns the content of a regular file of up to `most` bytes, or of these its first `head`.
+    """Returns the content of a regular file.
 
-    A pipe, a socket and a device are refused without waiting for them. Raises FinlabError of the
-    kind `error`: the file is missing, not regular, too large or not readable; the sentence says
-    `what` is expected, such as "a layout file"."""
+    A pipe, a socket and a device are refused without waiting for them.
+
+    Args:
+        path: the file.
+        max_bytes: its largest size [bytes].
+        expected: what a sentence says was expected, such as "a layout file".
+        error: the class of the error.
+        head: how many bytes are read of its beginning; all when None.
+
+    Raises:
+        FinlabError: of the class `error`: the file is missing, not regular, too large or not
+            readable.
+    """
     try:
         with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as file:
-            about = os.fstat(file.fileno())
-            if stat.S_ISDIR(about.st_mode):
-                raise error.at(str(path), f"is a folder, expected {what}")
-            if not stat.S_ISREG(about.st_mode):
-                raise error.at(str(path), f"is not a regular file, expected {what}")
-            content = (
-                _read(file, most if head is None else head - 1) if about.st_size <= most else None
-            )
+            status = os.fstat(file.fileno())
+            if stat.S_ISDIR(status.st_mode):
+                raise error.at(str(path), f"is a folder, expected {expected}")
+            if not stat.S_ISREG(status.st_mode):
+                raise error.at(str(path), f"is not a regular file, expected {expected}")
+            content = None
+            if status.st_size <= max_bytes:
+                content = _read(file, max_bytes if head is None else head - 1)
     except FileNotFoundError:
-        raise error.at(str(path), f"no such file, expected {what}") from None
+        raise error.at(str(path), f"no such file, expected {expected}") from None
     except IsADirectoryError:
-        raise error.at(str(path), f"is a folder, expected {what}") from None
+        raise error.at(str(path), f"is a folder, expected {expected}") from None
     except (OSError, ValueError) as problem:  # ValueError: a NUL byte in the name
         reason = getattr(problem, "strerror", None) or problem
         raise error.at(str(path)[:300], f"cannot be read: {reason}") from None
-    if content is None or len(content) > most:
-        raise error.at(str(path), f"is larger than {most:,} bytes, too large for {what}")
+    if content is None or len(content) > max_bytes:
+        raise error.at(str(path), f"is larger than {max_bytes:,} bytes, too large for {expected}")
     return content
 
 
-def _read(file: BinaryIO, most: int) -> bytes:
-    """The content, or its first `most` + 1 bytes: a file may grow while it is read, and some report
-    no size at all. A single `read` of that many would take the memory of the largest file for a
-    small one."""
+def _read(file: BinaryIO, max_bytes: int) -> bytes:
+    """The content, or its first `max_bytes` + 1 bytes: a file may grow while it is read, and some
+    report no size at all. A single `read` of that many would take the memory of the largest file
+    for a small one."""
     content = BytesIO()
-    while part := file.read(min(PART, most + 1 - content.tell())):
-        content.write(part)
+    while chunk := file.read(min(CHUNK_BYTES, max_bytes + 1 - content.tell())):
+        content.write(chunk)
     return content.getvalue()
 
 
-def read_text(path: Name, most: int, what: str, error: type[FinlabError] = DataError) -> str:
-    """Returns the text of a regular file; arguments and errors as in `read_file`, and it must be
-    text."""
-    return decoded(read_file(path, most, what, error), str(path), what, error)
+def read_text(
+    path: Name, max_bytes: int, expected: str, error: type[FinlabError] = DataError
+) -> str:
+    """Returns the text of a regular file.
+
+    Args:
+        path: the file.
+        max_bytes: its largest size [bytes].
+        expected: what a sentence says was expected.
+        error: the class of the error.
+
+    Raises:
+        FinlabError: as `read_file`, or it is no text in UTF-8.
+    """
+    return decoded(read_file(path, max_bytes, expected, error), str(path), expected, error)
 
 
-def decoded(content: bytes, source: str, what: str, error: type[FinlabError] = DataError) -> str:
-    """Returns UTF-8 text, without a byte order mark. Raises FinlabError of the kind `error`: the
-    bytes are no UTF-8 text; the message calls them `source`."""
+def decoded(
+    content: bytes, source: str, expected: str, error: type[FinlabError] = DataError
+) -> str:
+    """Returns UTF-8 text, without a byte order mark.
+
+    Args:
+        content: the text's bytes.
+        source: their name in the sentence of an error.
+        expected: what a sentence says was expected.
+        error: the class of the error.
+
+    Raises:
+        FinlabError: of the class `error`: the bytes are no UTF-8 text.
+    """
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise error.at(source, f"is not UTF-8 text, expected {what}") from None
+        raise error.at(source, f"is not UTF-8 text, expected {expected}") from None
     if "\0" in text:
-        raise error.at(source, f"is a binary file, expected {what}")
+        raise error.at(source, f"is a binary file, expected {expected}")
     return text
 
 
@@ -96,52 +131,62 @@ def is_regular(path: Name) -> bool:
         return False
 
 
-_DAMAGED = (
+_DAMAGE_ERRORS = (
     *(zipfile.BadZipFile, zlib.error, struct.error, tokenize.TokenError, ArithmeticError, EOFError),
     *(LookupError, MemoryError, OSError, RuntimeError, TypeError, ValueError),
 )
-"""What reading a damaged or locked archive ends with."""
-_PACKED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
-_ENTRY = b"PK\x01\x02"
-"""What an entry of an archive's list of files begins with."""
-MOST_FILES = 500
+"""Exceptions that reading a damaged or locked archive ends with."""
+_COMPRESSIONS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+"""Compressions that are unpacked."""
+_ENTRY_SIGNATURE = b"PK\x01\x02"
+"""The first bytes of an entry in an archive's list of files."""
+MAX_FILES = 500
 """Most files in an archive."""
 
 
 def unpacked(
     content: bytes,
     source: str,
-    largest: Callable[[str], int | None],
-    most: int,
+    max_size_of: Callable[[str], int | None],
+    max_bytes: int,
     error: type[FinlabError] = DataError,
 ) -> dict[str, bytes]:
-    """Returns files in a zip archive by name.
+    """Returns the files in a zip archive by name.
 
-    `largest` says the largest size [bytes] of the file of a name, None for one that is passed over,
-    and may raise; `most` is that of all of them together. Raises FinlabError of the kind `error`,
-    whose sentence calls the archive `source`: it is damaged, holds a name twice, or a file is too
-    large."""
+    Args:
+        content: the archive.
+        source: its name in the sentence of an error.
+        max_size_of: returns the largest size of the file of a name [bytes], or None for one that is
+            passed over; it may raise.
+        max_bytes: the largest size of all files together [bytes].
+        error: the class of the error.
+
+    Raises:
+        FinlabError: of the class `error`: the archive is damaged, holds a name twice, or a file is
+            too large.
+    """
     files: dict[str, bytes] = {}
-    if content.count(_ENTRY) > MOST_FILES:  # before a list of them is made
-        raise error.at(source, f"holds more than {MOST_FILES} files; pack it again")
+    if content.count(_ENTRY_SIGNATURE) > MAX_FILES:  # before a list of them is made
+        raise error.at(source, f"holds more than {MAX_FILES} files; pack it again")
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             entries = {entry.filename: entry for entry in archive.infolist() if not entry.is_dir()}
             if len(set(archive.namelist())) < len(archive.namelist()):
                 raise error.at(source, "holds a file twice; pack it again")
             for name, entry in entries.items():
-                if (own := largest(name)) is None:
+                max_size = max_size_of(name)
+                if max_size is None:
                     continue
-                room = min(own, most)
-                if entry.compress_type not in _PACKED:
+                room = min(max_size, max_bytes)
+                if entry.compress_type not in _COMPRESSIONS:
                     raise ValueError(f"{name!r:.60} is compressed in another way than deflate")
                 if entry.file_size <= room:
                     with archive.open(entry) as stream:
                         files[name] = stream.read(room + 1)
                 if entry.file_size > room or len(files[name]) > room:
                     raise error.at(source, f"{name[-60:]} in it is larger than {room:,} bytes")
-                most -= len(files[name])
-    except _DAMAGED as problem:
+                max_bytes -= len(files[name])
+    except _DAMAGE_ERRORS as problem:
         reason = str(problem).splitlines()[0][:80] if str(problem) else type(problem).__name__
         raise error.at(source, f"cannot be read as a zip archive ({reason})") from None
     return files
@@ -160,24 +205,34 @@ def packed(files: Mapping[str, bytes]) -> bytes:
 
 
 def read_arrays(
-    path: Name, names: Iterable[str] | None, most: int, what: str
+    path: Name, names: Iterable[str] | None, max_bytes: int, expected: str
 ) -> dict[str, AnyArray]:
-    """Returns arrays of an NPZ file by name, those of some names or, for None, all.
+    """Returns arrays of an NPZ file by name.
 
-    `most` is the largest size of the file, and of all arrays that are wanted together [bytes].
-    Raises DataError: the file cannot be read, is damaged or too large, or lacks an array; the
-    sentence says `what` is expected, such as "a swim log"."""
+    Args:
+        path: the file.
+        names: names of the arrays that are read, and must be there; all that are there when None.
+        max_bytes: the largest size of the file, and of all these arrays together [bytes].
+        expected: what a sentence says was expected, such as "a swim log".
 
-    def largest(member: str) -> int | None:
+    Raises:
+        DataError: the file cannot be read, is damaged or too large, or lacks an array.
+    """
+    wanted_names = set(names or ())
+
+    def max_size_of(member: str) -> int | None:
         name = member.removesuffix(".npy")
-        return most if name != member and (names is None or name in wanted) else None
+        is_array = name != member
+        is_wanted = names is None or name in wanted_names
+        return max_bytes if is_array and is_wanted else None
 
-    wanted = set(names or ())
-    parts = unpacked(read_file(path, most, what), f"{path}: expected {what}", largest, most)
-    named = {name.removesuffix(".npy"): content for name, content in parts.items()}
-    if missing := sorted(wanted - set(named)):
-        raise DataError(f"{path}: expected {what}, but it holds no {missing[0]}")
-    return {name: _array(content, name, str(path)) for name, content in named.items()}
+    contents = unpacked(
+        read_file(path, max_bytes, expected), f"{path}: expected {expected}", max_size_of, max_bytes
+    )
+    by_name = {name.removesuffix(".npy"): content for name, content in contents.items()}
+    if missing := sorted(wanted_names - set(by_name)):
+        raise DataError(f"{path}: expected {expected}, but it holds no {missing[0]}")
+    return {name: _array(content, name, str(path)) for name, content in by_name.items()}
 
 
 def json_of(array: AnyArray, source: str) -> Any:
@@ -208,6 +263,6 @@ def _array(content: bytes, name: str, source: str) -> AnyArray:
         if array.dtype.kind not in "biufcU":
             raise ValueError
         return array
-    except _DAMAGED:
+    except _DAMAGE_ERRORS:
         plain = f"{name!r:.60} in it is damaged, or no array of numbers or text"
         raise DataError(f"{source}: {plain}") from None

@@ -1,9 +1,8 @@
-"""Plain values checked against types, with one sentence for whatever does not fit, and the place of
-it.
+"""Checks plain values against types, with one sentence for what does not fit and where it stands.
 
-The annotations of a frozen dataclass say what its fields may be. One declaration serves three:
+The annotations of a frozen dataclass say what its fields may be. One declaration serves three uses:
 construction in code is checked by it, files are read by it, and the published JSON Schemas are made
-of it.
+of it. msgspec does the checking; its messages are put into our sentences here.
 """
 
 import re
@@ -11,7 +10,17 @@ from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import MISSING, fields
 from functools import cache
-from typing import Annotated, Any, ClassVar, Self, TypeVar, cast, get_args, get_type_hints
+from typing import (
+    Annotated,
+    Any,
+    ClassVar,
+    NamedTuple,
+    Self,
+    TypeVar,
+    cast,
+    get_args,
+    get_type_hints,
+)
 
 import msgspec
 from msgspec import Meta, inspect
@@ -21,11 +30,22 @@ from finlab.errors import FinlabError, LayoutError
 Checkable = TypeVar("Checkable")
 """A type that plain values are checked against."""
 
-_PLACE = re.compile(r"(?s)(.*) - at `(?:key` in `)?\$(.*)`")
+_MESSAGE_AND_PATH = re.compile(r"(?s)(.*) - at `(?:key` in `)?\$(.*)`")
+"""A message of msgspec and the path that it names, such as `$.actuators[2].name`."""
 _STEP = re.compile(r"\.([^.\[\]]+)|\[(\d+)\]|\[(\.\.\.)\]")
-_TYPES = {"float": "a number", "int": "a whole number", "str": "text", "bool": "true or false"}
-_TYPES |= {"array": "a list", "object": "keys and values", "null": "null"}
+"""One step of such a path: a key, an index, or any index."""
+_TYPES = {
+    "float": "a number",
+    "int": "a whole number",
+    "str": "text",
+    "bool": "true or false",
+    "array": "a list",
+    "object": "keys and values",
+    "null": "null",
+}
+"""Types as msgspec names them, and as a sentence does."""
 _BOUNDS = {">=": "at least", "<=": "at most", ">": "more than", "<": "less than"}
+"""Comparisons as msgspec writes them, and as a sentence does."""
 
 
 def shown(value: Any) -> str:
@@ -41,134 +61,172 @@ def checked(
     source: str = "",
     key: str = "",
 ) -> Checkable:
-    """Returns plain values, such as those of a file, in a type: a `msgspec.Struct`, or any that
-    msgspec knows.
+    """Returns plain values, such as those of a file, as a value of a type.
 
-    Arrays count as lists. Raises FinlabError of the kind `error`: the sentence says where, by the
-    `source` of all, unless its reader adds that, and the `key` of these in it, what was expected,
-    and what was got."""
+    Args:
+        values: the plain values; arrays count as lists.
+        kind: a `msgspec.Struct`, or any type that msgspec knows.
+        error: the class of the error.
+        source: the name of the file in the sentence; empty where its reader adds it.
+        key: the path of these values in the file.
+
+    Raises:
+        FinlabError: of the class `error`: a value does not fit. The sentence says where, what was
+            expected, and what was got.
+    """
     try:
         values = msgspec.to_builtins(values, enc_hook=_plain)
         return msgspec.convert(values, kind)
     except msgspec.ValidationError as problem:
-        said = str(problem)
-        place = ""
+        message = str(problem)
     except (RecursionError, TypeError, ValueError, OverflowError):
-        said = "Expected `object`"
-        place = ""
-    if parts := _PLACE.fullmatch(said):
-        said = parts[1]
-        place = parts[2]
-    sentence, inner = _sentence(said, place, values, kind)
-    place = ".".join(part for part in (place.lstrip("."), inner) if part)
-    if key and place:
-        place = key + ("" if place.startswith("[") else ".") + place
-    raise error.at(source, sentence, place or key)
+        message = "Expected `object`"
+    path = ""
+    match = _MESSAGE_AND_PATH.fullmatch(message)
+    if match:
+        message, path = match.groups()
+    fault = _fault(message, path, values, kind)
+    path = ".".join(step for step in (path.lstrip("."), fault.key) if step)
+    if key and path:
+        path = key + ("" if path.startswith("[") else ".") + path
+    raise error.at(source, fault.sentence, path or key)
 
 
 def _plain(value: Any) -> Any:
-    """An array as a list, anything else that no file holds as text."""
+    """An array as a list; any other value that no file holds as text."""
     return value.tolist() if hasattr(value, "tolist") else repr(value)
 
 
-def _sentence(said: str, place: str, values: Any, kind: Any) -> tuple[str, str]:
-    """What is wrong, and the key below `place` that it is about, if any."""
-    value, known = _at(place, values, inspect.type_info(kind))
-    if parts := re.fullmatch(r"Object missing required field `(.*)`", said):
-        return "required key is missing", parts[1]
-    if parts := re.fullmatch(r"(?s)Object contains unknown field `(.*)`", said):
-        name = parts[1] if parts[1].isprintable() and len(parts[1]) <= 40 else shown(parts[1])
-        return f"unknown key, expected one of {', '.join(_keys(known))}", name
-    if parts := re.fullmatch(r"Expected `(\w+)` of length (>=|<=)? ?(\d+)(?:, got \d+)?", said):
-        unit = "characters" if parts[1] == "str" else "values"
-        few = getattr(known, "min_length", None)
-        many = getattr(known, "max_length", None)
-        if few is None or many is None:
-            few = many = int(parts[3])
-        number = f"{few} to {many}" if few < many else f"{many}"
-        return f"expected {_TYPES[parts[1]]} of {number} {unit}, got {len(value)}", ""
-    if said.startswith("Expected `str` matching regex"):
-        return f"expected text on one line, without spaces around it, got {shown(value)}", ""
-    least = getattr(known, "ge", None)
-    most = getattr(known, "le", None)
-    if re.fullmatch(r"Expected `\w+` [<>]=? \S+|Number out of range", said) and None not in (
-        least,
-        most,
-    ):
-        return f"must lie within {least:g} .. {most:g}, got {shown(value)}", ""
-    if parts := re.fullmatch(r"Expected `\w+` ([<>]=?) (\S+)", said):
-        return (
-            f"expected a number of {_BOUNDS[parts[1]]} {float(parts[2]):g}, got {shown(value)}",
-            "",
-        )
-    if parts := re.fullmatch(r"Expected `([\w| ]+)`(, got .*)?", said):
-        wanted = " or ".join(
-            _TYPES.get(name, name) for name in parts[1].split(" | ") if name != "null"
-        )
-        return f"expected {wanted}, got {shown(value)}", ""
-    if choices := _choices(known):
-        return (
-            f"expected {'one of ' * (len(choices) > 1)}{', '.join(choices)}, got {shown(value)}",
-            "",
-        )
-    return f"{said[:1].lower()}{said[1:]}, got {shown(value)}", ""
+class _Fault(NamedTuple):
+    """A fault of a value."""
+
+    sentence: str
+    key: str = ""
+    """The key below the path of the value that it is about; empty for the value itself."""
 
 
-def _at(place: str, value: Any, known: Any) -> tuple[Any, Any]:
-    """The value at a place, and what msgspec knows of its type; None where that is not known."""
-    for name, index, _ in _STEP.findall(place):
-        known = _step_into(_one(known, value), name, index)
+def _fault(message: str, path: str, values: Any, kind: Any) -> _Fault:
+    """A message of msgspec as one of our sentences.
+
+    Args:
+        message: the message, without the path.
+        path: the path in the values that it is about.
+        values: the plain values.
+        kind: the type that they do not fit.
+    """
+    value, type_info = _value_at(path, values, inspect.type_info(kind))
+    match = re.fullmatch(r"Object missing required field `(.*)`", message)
+    if match:
+        return _Fault("required key is missing", match[1])
+    match = re.fullmatch(r"(?s)Object contains unknown field `(.*)`", message)
+    if match:
+        key = match[1]
+        is_short = key.isprintable() and len(key) <= 40
+        keys = ", ".join(_keys(type_info))
+        return _Fault(f"unknown key, expected one of {keys}", key if is_short else shown(key))
+    match = re.fullmatch(r"Expected `(\w+)` of length (>=|<=)? ?(\d+)(?:, got \d+)?", message)
+    if match:
+        return _Fault(_length_sentence(match[1], int(match[3]), value, type_info))
+    return _Fault(f"{_expectation(message, type_info)}, got {shown(value)}")
+
+
+def _length_sentence(type_name: str, length: int, value: Any, type_info: Any) -> str:
+    """The sentence for a text or list of another length; `length` is the bound that was passed."""
+    unit = "characters" if type_name == "str" else "values"
+    shortest = getattr(type_info, "min_length", None)
+    longest = getattr(type_info, "max_length", None)
+    if shortest is None or longest is None:
+        shortest = length
+        longest = length
+    number = f"{shortest} to {longest}" if shortest < longest else f"{longest}"
+    return f"expected {_TYPES[type_name]} of {number} {unit}, got {len(value)}"
+
+
+def _expectation(message: str, type_info: Any) -> str:
+    """What was expected of a number, a text or a choice, as a clause."""
+    if message.startswith("Expected `str` matching regex"):
+        return "expected text on one line, without spaces around it"
+    low = getattr(type_info, "ge", None)
+    high = getattr(type_info, "le", None)
+    is_out_of_bounds = re.fullmatch(r"Expected `\w+` [<>]=? \S+|Number out of range", message)
+    if is_out_of_bounds and low is not None and high is not None:
+        return f"must lie within {low:g} .. {high:g}"
+    match = re.fullmatch(r"Expected `\w+` ([<>]=?) (\S+)", message)
+    if match:
+        comparison, bound = match.groups()
+        return f"expected a number of {_BOUNDS[comparison]} {float(bound):g}"
+    match = re.fullmatch(r"Expected `([\w| ]+)`(, got .*)?", message)
+    if match:
+        names = [_TYPES.get(name, name) for name in match[1].split(" | ") if name != "null"]
+        return f"expected {' or '.join(names)}"
+    choices = _choices(type_info)
+    if choices:
+        one_of = "one of " if len(choices) > 1 else ""
+        return f"expected {one_of}{', '.join(choices)}"
+    return f"{message[:1].lower()}{message[1:]}"
+
+
+def _value_at(path: str, value: Any, type_info: Any) -> tuple[Any, Any]:
+    """The value at a path, and its type as msgspec describes it; None for what is not there."""
+    for name, index, _ in _STEP.findall(path):
+        type_info = _type_below(_resolve(type_info, value), name, index)
         if name:
             value = value.get(name) if isinstance(value, Mapping) else None
         else:
-            fits = isinstance(value, Sequence) and index and int(index) < len(value)
-            value = value[int(index)] if fits else None
-    return value, _one(known, value)
+            is_item = isinstance(value, Sequence) and index and int(index) < len(value)
+            value = value[int(index)] if is_item else None
+    return value, _resolve(type_info, value)
 
 
-def _step_into(known: Any, name: str, index: str) -> Any:
-    if isinstance(known, inspect.StructType):
-        return next((field.type for field in known.fields if field.encode_name == name), None)
-    if isinstance(known, inspect.UnionType) and name == getattr(known.types[0], "tag_field", None):
-        return known
-    if isinstance(known, inspect.TupleType) and index:
-        return known.item_types[int(index)]
-    return getattr(known, "value_type", None) or getattr(known, "item_type", None)
+def _type_below(type_info: Any, name: str, index: str) -> Any:
+    """The type of the value under a key, or at an index where the key is empty."""
+    if isinstance(type_info, inspect.StructType):
+        for field in type_info.fields:
+            if field.encode_name == name:
+                return field.type
+        return None
+    is_union = isinstance(type_info, inspect.UnionType)
+    if is_union and name == getattr(type_info.types[0], "tag_field", None):
+        return type_info  # the tag of one of several structures
+    if isinstance(type_info, inspect.TupleType) and index:
+        return type_info.item_types[int(index)]
+    return getattr(type_info, "value_type", None) or getattr(type_info, "item_type", None)
 
 
-def _one(known: Any, value: Any) -> Any:
-    """A type without what describes it, without null, and of several structures the one that is
-    meant."""
-    if isinstance(known, inspect.Metadata):
-        return _one(known.type, value)
-    if isinstance(known, inspect.UnionType):
-        kinds = [
-            _one(kind, value) for kind in known.types if not isinstance(kind, inspect.NoneType)
-        ]
-        tag = (
-            value.get(getattr(kinds[0], "tag_field", None)) if isinstance(value, Mapping) else None
-        )
-        meant = [kind for kind in kinds if tag is not None and getattr(kind, "tag", None) == tag]
-        return (
-            meant[0] if meant else kinds[0] if len(kinds) == 1 else inspect.UnionType(tuple(kinds))
-        )
-    return known
+def _resolve(type_info: Any, value: Any) -> Any:
+    """A type without its metadata and without null; of several structures the one whose tag the
+    value has."""
+    if isinstance(type_info, inspect.Metadata):
+        return _resolve(type_info.type, value)
+    if not isinstance(type_info, inspect.UnionType):
+        return type_info
+    members = [
+        _resolve(member, value)
+        for member in type_info.types
+        if not isinstance(member, inspect.NoneType)
+    ]
+    if isinstance(value, Mapping):
+        tag = value.get(getattr(members[0], "tag_field", None))
+        for member in members:
+            if tag is not None and getattr(member, "tag", None) == tag:
+                return member
+    return members[0] if len(members) == 1 else inspect.UnionType(tuple(members))
 
 
-def _keys(known: Any) -> list[str]:
-    return (
-        [field.encode_name for field in known.fields]
-        if isinstance(known, inspect.StructType)
-        else []
-    )
+def _keys(type_info: Any) -> list[str]:
+    """The keys of a structure; none of another type."""
+    if not isinstance(type_info, inspect.StructType):
+        return []
+    return [field.encode_name for field in type_info.fields]
 
 
-def _choices(known: Any) -> list[str]:
-    """The values that a type leaves to choose from, or the kinds of structure."""
-    if isinstance(known, inspect.LiteralType):
-        return [str(value) for value in known.values]
-    kinds: Any = known.types if isinstance(known, inspect.UnionType) else ()
-    return [str(kind.tag) for kind in kinds]
+def _choices(type_info: Any) -> list[str]:
+    """The values that a type leaves to choose from, or the tags of its structures."""
+    if isinstance(type_info, inspect.LiteralType):
+        return [str(value) for value in type_info.values]
+    if isinstance(type_info, inspect.UnionType):
+        return [str(member.tag) for member in cast(Any, type_info.types)]
+    return []
 
 
 Name = Annotated[str, Meta(min_length=1, max_length=64, pattern=r"^\S(.*\S)?$")]
@@ -176,9 +234,13 @@ Name = Annotated[str, Meta(min_length=1, max_length=64, pattern=r"^\S(.*\S)?$")]
 
 
 class Checked:
-    """Base of frozen dataclasses that are checked on construction, by their annotations. Raises
-    LayoutError: a value is none of its type, or out of bounds; the message names the argument. A
-    reader of files puts the key in its place: see `file_key`."""
+    """Base of frozen dataclasses that are checked on construction, by their annotations.
+
+    A reader of files puts the key in the place of the argument: see `file_key`.
+
+    Raises:
+        LayoutError: a value is none of its type, or out of bounds; the message names the argument.
+    """
 
     __dataclass_fields__: ClassVar[dict[str, Any]]
     KEYS: ClassVar[Mapping[str, str]] = {}
@@ -186,11 +248,11 @@ class Checked:
     DEGREES: ClassVar[Mapping[str, tuple[str, Any]]] = {}
     """Fields in radians -> their keys and types in a file, in degrees."""
     WRITTEN: ClassVar[Collection[str]] = ()
-    """Fields that a file is given even where they are as usual."""
+    """Fields that are written to a file even where they have their defaults."""
     UNSAID: ClassVar[Collection[str]] = ()
     """Fields that no file has."""
     type: ClassVar[str] = ""
-    """What a file calls it under the key `type`, where it may hold one of several."""
+    """Its value under the key `type` of a file, where one of several classes may stand there."""
 
     def __post_init__(self) -> None:
         names, kind = _plain_fields(cast(Any, type(self)))
@@ -204,14 +266,14 @@ class Checked:
 
     @classmethod
     def file_key(cls, argument: str) -> str:
-        """Returns what a file calls an argument, or a place in one: `force_n[1]` for `force[1]`."""
+        """Returns the key of an argument in a file, or of an item: `force_n[1]` for `force[1]`."""
         keys = {**cls.KEYS, **{name: key for name, (key, _) in cls.DEGREES.items()}}
         name = argument.partition(".")[0].partition("[")[0]
         return keys.get(name, name) + argument[len(name) :]
 
 
 class Part(ABC):
-    """What a part of a file stands for whose keys are not the fields of its class."""
+    """Base of classes that a part of a file stands for whose keys are not their fields."""
 
     @classmethod
     @abstractmethod
@@ -222,16 +284,20 @@ class Part(ABC):
     @classmethod
     @abstractmethod
     def from_file(cls, tag: str, values: dict[str, Any], may_open: bool) -> Self:
-        """Returns what a part stands for. Raises LayoutError: something does not fit.
+        """Returns the value that a part stands for.
 
         Args:
             tag: which of several forms it has.
-            values: what the part says, by field of the form; paths are absolute.
+            values: the part's values by field of the form; paths are absolute.
             may_open: whether files that the part names may be opened.
+
+        Raises:
+            LayoutError: a value does not fit.
         """
 
 
 _LINES = {ord("\n"): " ", ord("\t"): " "}
+"""Characters that a description may hold although they are not printable."""
 
 
 @cache
@@ -244,12 +310,10 @@ def _plain_fields(cls: Any) -> tuple[list[str], Any]:
 
 def _holds_checked(kind: Any) -> bool:
     """Whether a type is, or contains, one that is checked on its own."""
-    parts = get_args(kind)
-    return (
-        any(map(_holds_checked, parts))
-        if parts
-        else isinstance(kind, type) and issubclass(kind, Checked)
-    )
+    members = get_args(kind)
+    if members:
+        return any(map(_holds_checked, members))
+    return isinstance(kind, type) and issubclass(kind, Checked)
 
 
 def form(
@@ -267,10 +331,10 @@ def form(
     Args:
         cls: the dataclass; what has a default there may be left out of the file, or be null.
         keys: fields -> keys in the file; `cls.KEYS` when None.
-        called: what the part is called in a schema; the dataclass's name when empty.
+        called: the name of the part in a schema; the dataclass's name when empty.
         required: fields that the file must have although they have a default.
         optional: those of `kinds` that the file may leave out, beside the fields that have a
-        default.
+            default.
         tag: a key and its value, by which the part is known among others in the same place; the key
             `type` where the class has a `type` when None.
         kinds: types of fields that are different in the file, and of those that are there alone;
@@ -278,25 +342,30 @@ def form(
     """
     annotated = get_type_hints(cls, include_extras=True)
     hints = {**{field.name: annotated[field.name] for field in fields(cls)}, **kinds}
-    usual = {field.name for field in fields(cls) if field.default is not MISSING}
-    free = (usual - set(required)) | set(optional)
-    parts = [
-        (name, kind | None, None) if name in free else (name, kind)
+    with_default = {field.name for field in fields(cls) if field.default is not MISSING}
+    may_be_left_out = (with_default - set(required)) | set(optional)
+    # Required fields come first, as in a dataclass.
+    struct_fields: list[Any] = [
+        (name, kind)
         for name, kind in hints.items()
-        if kind is not None
+        if kind is not None and name not in may_be_left_out
     ]
-    parts.sort(key=len)
+    struct_fields += [
+        (name, kind | None, None)
+        for name, kind in hints.items()
+        if kind is not None and name in may_be_left_out
+    ]
     rename = cls.KEYS if keys is None and issubclass(cls, Checked) else dict(keys or {})
-    about: dict[str, Any] = {"__doc__": _summary(cls), "stands_for": cls}
+    namespace: dict[str, Any] = {"__doc__": _summary(cls), "stands_for": cls}
     if tag is None and issubclass(cls, Checked) and cls.type:
         tag = ("type", cls.type)
     key, value = tag or (None, None)
     return msgspec.defstruct(
         called or cls.__name__,
-        parts,
+        struct_fields,
         rename=rename,
         forbid_unknown_fields=True,
-        namespace=about,
+        namespace=namespace,
         tag_field=key,
         tag=value,
     )
@@ -311,7 +380,6 @@ def _summary(cls: type) -> str:
 
 
 def given(part: Any) -> dict[str, Any]:
-    """Returns the fields of a part of a file that are there."""
-    return {
-        name: value for name in part.__struct_fields__ if (value := getattr(part, name)) is not None
-    }
+    """Returns the fields of a part of a file that the file has, by name."""
+    values = {name: getattr(part, name) for name in part.__struct_fields__}
+    return {name: value for name, value in values.items() if value is not None}

@@ -1,4 +1,8 @@
-"""A process that reads a file of a stranger, within limits of processor time and memory."""
+"""Reads a file of a stranger in a process of its own, within limits of processor time and memory.
+
+A parser that loops or allocates without bound then ends that process, and not the app or the
+command line; the caller gets one sentence.
+"""
 
 import math
 import multiprocessing
@@ -15,47 +19,63 @@ from typing import Any, NamedTuple, TypeVar
 
 from finlab.errors import FinlabError
 
-CPU_S, CPU_S_PER_BYTE = 1.8, 0.6e-6
-"""Processor time of a small file [s], and of each byte of a large one: a mesh takes 0.35 s per
-megabyte."""
-ROOM, ROOM_PER_BYTE = 150_000_000, 50
-"""Memory that reading a small file may take [bytes], and each byte of a large one: a GLB mesh takes
-46. The process has about 110 MB before."""
-PATIENCE = 20.0
-"""Times the processor time after which the process is ended although it has not used it."""
+CPU_S = 1.8
+"""Processor time that reading a small file may take [s]."""
+CPU_S_PER_BYTE = 0.6e-6
+"""Processor time for each byte of a large file [s]; a mesh takes 0.35e-6."""
+MEMORY_BYTES = 150_000_000
+"""Memory that reading a small file may take, beyond the 110 MB of the process before [bytes]."""
+MEMORY_PER_BYTE = 50
+"""Memory for each byte of a large file [bytes]; a GLB mesh takes 46."""
+WALL_OVER_CPU = 20.0
+"""Wall time over the limit of processor time after which the process is ended although it has not
+used its processor time: it waits for something that never comes."""
 
 Result = TypeVar("Result")
 
 
 class _Limits(NamedTuple):
+    """What reading one file may take."""
+
     seconds: float
-    room: int
+    """Processor time [s]."""
+    memory: int
+    """Memory beyond that of the process before [bytes]."""
 
 
 def in_worker(read: Callable[..., Result], *arguments: Any) -> Result:
-    """Returns what `read(*arguments)` gives, which runs in a process of its own.
+    """Returns the result of `read(*arguments)`, which runs in a process of its own.
 
-    What it changes in its arguments stays there. A program of one thread is copied; any other one
-    has a process that is copied, so that its main module must be guarded by `if __name__ ==
-    "__main__"`. `read` is a function of a module, for the files that the arguments are (bytes) or
-    name (paths); with their size the limits grow. Raises FinlabError: so did `read`; or it took too
-    much time or memory, or failed."""
+    What it changes in its arguments stays in that process. A program of one thread is forked; any
+    other one has a fork server, so that its main module must be guarded by `if __name__ ==
+    "__main__"`.
+
+    Args:
+        read: a function of a module.
+        arguments: its arguments. Limits grow with the size of the files among them, as bytes or by
+            their paths.
+
+    Raises:
+        FinlabError: `read` raised it, took too much time or memory, or failed.
+    """
     size = sum(map(_size, arguments))
-    limits = _Limits(max(CPU_S, CPU_S_PER_BYTE * size), max(ROOM, ROOM_PER_BYTE * size))
+    limits = _Limits(max(CPU_S, CPU_S_PER_BYTE * size), max(MEMORY_BYTES, MEMORY_PER_BYTE * size))
     context: Any = _context()
-    here, there = context.Pipe(duplex=False)
-    process = context.Process(target=_child, args=(there, limits, read, arguments), daemon=True)
-    with here:
+    receiver, sender = context.Pipe(duplex=False)
+    process = context.Process(
+        target=_run_child, args=(sender, limits, read, arguments), daemon=True
+    )
+    with receiver:
         try:
             process.start()
-            there.close()
-            if not here.poll(PATIENCE * limits.seconds):
-                raise _ended(-signal.SIGKILL, limits)
-            answer, error = here.recv()
+            sender.close()
+            if not receiver.poll(WALL_OVER_CPU * limits.seconds):
+                raise _error_of_exit(-signal.SIGKILL, limits)
+            answer, error = receiver.recv()
         except EOFError:
             process.join()
             answer = None
-            error = _ended(process.exitcode, limits)
+            error = _error_of_exit(process.exitcode, limits)
         except OSError as problem:
             raise FinlabError(
                 f"no process can be started to read the file: {problem.strerror}"
@@ -71,7 +91,7 @@ def in_worker(read: Callable[..., Result], *arguments: Any) -> Result:
 
 
 def end_with_parent() -> None:
-    """Let this process end as soon as the one that started it has, however that ended."""
+    """Lets this process end as soon as the one that started it has, however that ended."""
     parent = multiprocessing.parent_process()
 
     def wait() -> None:
@@ -83,8 +103,7 @@ def end_with_parent() -> None:
 
 
 def prepare(modules: Sequence[str]) -> None:
-    """Let the process that is copied be ready, with modules imported, before the first file
-    comes."""
+    """Starts the fork server, with modules imported, before the first file comes."""
     multiprocessing.set_forkserver_preload(list(modules))
     with suppress(OSError, ValueError):
         from multiprocessing.forkserver import ensure_running
@@ -93,16 +112,19 @@ def prepare(modules: Sequence[str]) -> None:
 
 
 def _context() -> Any:
-    alone = threading.active_count() == 1 and sys.platform == "linux"
-    methods = multiprocessing.get_all_start_methods()
-    return multiprocessing.get_context(
-        "fork" if alone else "forkserver" if "forkserver" in methods else None
-    )
+    """How a process is started: by fork where no thread of ours could hold a lock."""
+    if threading.active_count() == 1 and sys.platform == "linux":
+        return multiprocessing.get_context("fork")
+    has_fork_server = "forkserver" in multiprocessing.get_all_start_methods()
+    return multiprocessing.get_context("forkserver" if has_fork_server else None)
 
 
 def _size(argument: Any) -> int:
-    if isinstance(argument, (bytes, list, tuple)):
-        return len(argument) if isinstance(argument, bytes) else sum(map(_size, argument))
+    """Size of the files in an argument [bytes]: bytes, a path of a file or folder, or a list."""
+    if isinstance(argument, bytes):
+        return len(argument)
+    if isinstance(argument, (list, tuple)):
+        return sum(map(_size, argument))
     with suppress(OSError, TypeError, ValueError):
         if os.path.isdir(argument):
             return sum(map(os.path.getsize, Path(argument).iterdir()))
@@ -110,17 +132,19 @@ def _size(argument: Any) -> int:
     return 0
 
 
-def _child(
+def _run_child(
     connection: Connection, limits: _Limits, read: Callable[..., Any], arguments: Any
 ) -> None:
-    # Memory may not even suffice to say so; whoever interrupts, interrupts both.
+    """The body of the process: sends the result, or the error, and ends."""
+    # Memory may not suffice to send an error; whoever interrupts, interrupts both processes.
     with suppress(BaseException):
-        _limit(limits)
+        _set_limits(limits)
         connection.send(_answer(read, arguments))
     os._exit(1)
 
 
 def _answer(read: Callable[..., Any], arguments: Any) -> tuple[Any, FinlabError | None]:
+    """The result of reading, or the error in its place."""
     try:
         return read(*arguments), None
     except FinlabError as problem:
@@ -128,9 +152,9 @@ def _answer(read: Callable[..., Any], arguments: Any) -> tuple[Any, FinlabError 
     except MemoryError:
         raise
     except Exception as problem:  # a fault of ours; a stranger's file has no power by it
-        at = traceback.extract_tb(problem.__traceback__)[-1]
+        frame = traceback.extract_tb(problem.__traceback__)[-1]
         text = (
-            f"{type(problem).__name__} in {Path(at.filename).name}, line {at.lineno}: "
+            f"{type(problem).__name__} in {Path(frame.filename).name}, line {frame.lineno}: "
             f"{problem!s:.100}"
         )
         return None, FinlabError(
@@ -138,7 +162,8 @@ def _answer(read: Callable[..., Any], arguments: Any) -> tuple[Any, FinlabError 
         )
 
 
-def _limit(limits: _Limits) -> None:
+def _set_limits(limits: _Limits) -> None:
+    """Sets the limits of this process, where the system has them."""
     with suppress(ImportError, OSError, ValueError):  # not every system has all
         import resource
 
@@ -149,15 +174,16 @@ def _limit(limits: _Limits) -> None:
         signal.signal(signal.SIGPROF, signal.SIG_DFL)
         signal.setitimer(signal.ITIMER_PROF, limits.seconds)  # the other one counts whole seconds
         pages = int(Path("/proc/self/statm").read_text().split()[0])
-        resource.setrlimit(resource.RLIMIT_AS, (pages * resource.getpagesize() + limits.room,) * 2)
+        resource.setrlimit(
+            resource.RLIMIT_AS, (pages * resource.getpagesize() + limits.memory,) * 2
+        )
 
 
-def _ended(code: int | None, limits: _Limits) -> FinlabError:
-    """Why the process has ended without a word."""
-    late = code in (-signal.SIGPROF, -signal.SIGXCPU, -signal.SIGKILL)
-    why = (
-        f"time, more than {limits.seconds:.1f} s"
-        if late
-        else f"memory, over {limits.room / 1e6:.0f} MB"
-    )
-    return FinlabError(f"reading the file takes too much {why}; make it smaller or simpler")
+def _error_of_exit(code: int | None, limits: _Limits) -> FinlabError:
+    """The error for a process that has ended without an answer, by its exit code."""
+    is_timeout = code in (-signal.SIGPROF, -signal.SIGXCPU, -signal.SIGKILL)
+    if is_timeout:
+        excess = f"time, more than {limits.seconds:.1f} s"
+    else:
+        excess = f"memory, over {limits.memory / 1e6:.0f} MB"
+    return FinlabError(f"reading the file takes too much {excess}; make it smaller or simpler")

@@ -1,4 +1,8 @@
-"""Columns of measurements, of CSV files and workbooks: names, units, and numbers in SI."""
+"""Reads columns of measurements from CSV files and workbooks: names, units, and numbers in SI.
+
+Fits of fins, thrusters and robots read their files by `read_columns`; a header names a quantity by
+one of several words, and its unit.
+"""
 
 import csv
 import io
@@ -18,31 +22,57 @@ from finlab.files.csv_table import UNITS, CsvTable, read_table
 from finlab.files.guarded import read_file, unpacked
 from finlab.layout import Layout
 
-MOST_PACKED, MOST_UNPACKED = 10_000_000, 20_000_000
-"""Largest workbook, and what is in it without its pictures [bytes]."""
-MOST_ROWS, MOST_COLUMNS, MOST_SHEETS = 20_000, 60, 50
-"""Of a sheet, and of a workbook."""
-TITLES = 30
-"""Rows that may stand above a header."""
-DAMAGED = (ParseError, ArithmeticError, AttributeError, LookupError, OSError, TypeError, ValueError)
-"""What openpyxl ends with on files that are no workbooks."""
+MAX_WORKBOOK_BYTES = 10_000_000
+"""Largest workbook [bytes]."""
+MAX_UNPACKED_BYTES = 20_000_000
+"""Largest content of a workbook, without its pictures [bytes]."""
+MAX_ROWS = 20_000
+"""Most rows of a sheet."""
+MAX_COLUMNS = 60
+"""Most columns of a sheet that are read."""
+MAX_SHEETS = 50
+"""Most sheets of a workbook."""
+MAX_TITLE_ROWS = 30
+"""Most rows above a header."""
+DAMAGE_ERRORS = (
+    ParseError,
+    ArithmeticError,
+    AttributeError,
+    LookupError,
+    OSError,
+    TypeError,
+    ValueError,
+)
+"""Exceptions that openpyxl ends with on files that are no workbooks."""
 
 IsHeader = Callable[[Sequence[str]], bool]
+"""Whether the cells of a row are a header."""
 MAX_BYTES = 200_000_000
 """Largest file that is read [bytes]; a swim of an hour at 50 Hz has half of it."""
-LONGEST, MOST_BLANKS = 120, 10_000
-"""Characters of a header that count, without and with its blanks."""
-ALIKE = 0.01
+MAX_HEADER_LENGTH = 120
+"""Characters of a header that count, blanks merged."""
+MAX_RAW_HEADER_LENGTH = 10_000
+"""Characters of a header that are looked at, with all its blanks."""
+AGREEMENT = 0.01
 """Share of the largest value by which two columns of one quantity may differ."""
 
 
-def sheets(path: Path, is_header: IsHeader) -> tuple[dict[str, CsvTable], tuple[str, ...]]:
-    """Returns the sheets of a workbook that hold a table, by name, and the names of those that do
-    not.
+def read_sheets(path: Path, is_header: IsHeader) -> tuple[dict[str, CsvTable], tuple[str, ...]]:
+    """Returns the tables of a workbook.
 
-    A table begins at a row that `is_header`; of formulas the values count that were saved with
-    them. Raises DataError: the workbook cannot be read, is too large, or openpyxl is missing."""
-    content = read_file(path, MOST_PACKED, "a workbook (.xlsx)")
+    Of formulas the values count that were saved with them.
+
+    Args:
+        path: the workbook (.xlsx).
+        is_header: whether a table begins at a row.
+
+    Returns:
+        The tables by the names of their sheets, and the names of the sheets without one.
+
+    Raises:
+        DataError: the workbook cannot be read, is too large, or openpyxl is missing.
+    """
+    content = read_file(path, MAX_WORKBOOK_BYTES, "a workbook (.xlsx)")
     try:
         import openpyxl
     except ImportError:
@@ -50,33 +80,34 @@ def sheets(path: Path, is_header: IsHeader) -> tuple[dict[str, CsvTable], tuple[
             f"{path}: workbooks are read by openpyxl, which is not installed: "
             "pip install 'finlab-marine[bench]', or save the sheet as CSV"
         ) from None
-    most = MOST_UNPACKED
-    unpacked(
-        content, str(path), lambda name: most if name.endswith((".xml", ".rels")) else None, most
-    )
+
+    def max_size_of(name: str) -> int | None:
+        return MAX_UNPACKED_BYTES if name.endswith((".xml", ".rels")) else None
+
+    unpacked(content, str(path), max_size_of, MAX_UNPACKED_BYTES)
     tables: dict[str, CsvTable | None] = {}
     try:
         book = openpyxl.load_workbook(io.BytesIO(content), read_only=True, data_only=True)
-        if len(book.worksheets) > MOST_SHEETS:
+        if len(book.worksheets) > MAX_SHEETS:
             raise DataError(
-                f"{path}: has {len(book.worksheets)} sheets, expected at most {MOST_SHEETS}"
+                f"{path}: has {len(book.worksheets)} sheets, expected at most {MAX_SHEETS}"
             )
         for sheet in book.worksheets:
             tables[sheet.title] = _table(sheet, f"{path}, sheet {sheet.title}", is_header)
-    except DAMAGED as problem:
+    except DAMAGE_ERRORS as problem:
         raise DataError(f"{path}: cannot be read as a workbook (.xlsx): {problem!r:.80}") from None
-    other = tuple(title for title, table in tables.items() if table is None)
-    return {title: table for title, table in tables.items() if table is not None}, other
+    without_table = tuple(title for title, table in tables.items() if table is None)
+    return {title: table for title, table in tables.items() if table is not None}, without_table
 
 
 def _table(sheet: Any, source: str, is_header: IsHeader) -> CsvTable | None:
     """The table of a sheet from its header on; None where there is none."""
     sheet.reset_dimensions()
-    cells = sheet.iter_rows(max_col=MOST_COLUMNS, values_only=True)
-    rows = [_words(row) for row in islice(cells, MOST_ROWS + 1)]
-    if len(rows) > MOST_ROWS:
-        raise DataError(f"{source}: has more than {MOST_ROWS} rows; delete those that hold nothing")
-    above = next((k for k, row in enumerate(rows[:TITLES]) if is_header(row)), None)
+    cells = sheet.iter_rows(max_col=MAX_COLUMNS, values_only=True)
+    rows = [_words(row) for row in islice(cells, MAX_ROWS + 1)]
+    if len(rows) > MAX_ROWS:
+        raise DataError(f"{source}: has more than {MAX_ROWS} rows; delete those that hold nothing")
+    above = next((k for k, row in enumerate(rows[:MAX_TITLE_ROWS]) if is_header(row)), None)
     if above is None:
         return None
     width = len(rows[above])
@@ -98,43 +129,60 @@ def _words(row: Sequence[object]) -> list[str]:
 
 @dataclass(frozen=True)
 class Columns:
-    """Columns that a fit reads, in SI, (n,) each, and headers by name; the names of those whose
-    header names no unit; and where each of n rows stands, file and line."""
+    """Columns that a fit reads."""
 
     values: dict[str, Array]
+    """Values in SI by the name of the quantity, (n,) each."""
     headers: dict[str, str]
-    bare: tuple[str, ...]
-    places: tuple[str, ...]
+    """The header cell of each."""
+    without_unit: tuple[str, ...]
+    """Names of those whose header names no unit."""
+    sources: tuple[str, ...]
+    """File and line of each of the n rows."""
 
 
 class Header(NamedTuple):
-    """What a header cell stands for, and its unit in SI and as it stands there, in lower case."""
+    """The meaning of a header cell."""
 
     name: str
+    """The quantity; empty for what no fit reads."""
     scale: float
+    """What a value of 1 stands for, in SI."""
     unit: str
+    """The unit as it stands there, in lower case; empty where there is none."""
 
 
 def named_column(
     header: str, names: Mapping[str, str], units: Mapping[str, float] = UNITS
 ) -> Header:
-    """Returns what a header cell stands for: `A [deg]`, `amplitude_deg`, `Force (Kg f)`, `Fx`; ""
-    for what no fit reads. With units of its own a name counts as it stands, else in lower case. A
-    `stroke` is the angle from end to end, twice the amplitude. Raises DataError: the unit is not
-    known."""
-    behind = "deg|rad|hz|rpm|us|nm|mN|kgf|lbf|N|W|mW|V|A"
-    short = " ".join(header[:MOST_BLANKS].split())[:LONGEST]
-    parts = re.fullmatch(rf"(.+?) ?(?:[\[(](.*)[\])]|_({behind}))?", short, flags=re.IGNORECASE)
-    word = parts[1] if parts else ""
-    name = names.get(word.lower().replace(" ", "_") if units is UNITS else word, "")
-    if parts is None or not name:
+    """Returns the meaning of a header cell such as `A [deg]`, `amplitude_deg` or `Force (Kg f)`.
+
+    A `stroke` is the angle from end to end, twice the amplitude.
+
+    Args:
+        header: the cell.
+        names: quantities by the words for them; in lower case, unless `units` are given.
+        units: units in SI by name.
+
+    Raises:
+        DataError: the unit is not known.
+    """
+    suffixes = "deg|rad|hz|rpm|us|nm|mN|kgf|lbf|N|W|mW|V|A"
+    short = " ".join(header[:MAX_RAW_HEADER_LENGTH].split())[:MAX_HEADER_LENGTH]
+    match = re.fullmatch(rf"(.+?) ?(?:[\[(](.*)[\])]|_({suffixes}))?", short, flags=re.IGNORECASE)
+    if match is None:
         return Header("", 1.0, "")
-    unit = re.sub(r"[\s.*·]", "", (parts[2] or parts[3] or "")).lower()
+    word = match[1]
+    name = names.get(word.lower().replace(" ", "_") if units is UNITS else word, "")
+    if not name:
+        return Header("", 1.0, "")
+    unit = re.sub(r"[\s.*·]", "", (match[2] or match[3] or "")).lower()
     if unit and unit not in units:
         raise DataError(
             f"column {short}: unit {unit!r:.20} is not known, expected {', '.join(units)}"
         )
-    return Header(name, (0.5 if word.lower() == "stroke" else 1.0) * units.get(unit, 1.0), unit)
+    amplitude_share = 0.5 if word.lower() == "stroke" else 1.0
+    return Header(name, amplitude_share * units.get(unit, 1.0), unit)
 
 
 def read_columns(
@@ -148,20 +196,29 @@ def read_columns(
     """Returns the columns of a CSV file, or of a table, that have a name.
 
     Of several columns for one quantity that agree, such as a force in kgf and in N, the first is
-    taken. Names are what words in the header stand for, as `named_column` takes them, with its
-    units; a file without those `needed` is refused, of `a|b` one is enough, with what the error
-    says is `expected`. With `gaps` cells of a file may be empty, which makes them NaN. Raises
-    DataError: the file cannot be read, or lacks a column."""
-    what = "a CSV file of measurements"
-    table = file if isinstance(file, CsvTable) else read_table(file, MAX_BYTES, what, gaps)
+    taken.
+
+    Args:
+        file: the file, or a table of a workbook.
+        names: quantities by the words for them, as `named_column` takes them.
+        needed: quantities without which the file is refused; of `a|b` one is enough.
+        expected: what the sentence of an error says was expected.
+        units: units in SI by name.
+        gaps: whether cells of a file may be empty, which makes them NaN.
+
+    Raises:
+        DataError: the file cannot be read, or lacks a column.
+    """
+    description = "a CSV file of measurements"
+    table = file if isinstance(file, CsvTable) else read_table(file, MAX_BYTES, description, gaps)
     path = table.source
     try:
-        named = [named_column(cell, names, units) for cell in table.header]
+        headers = [named_column(cell, names, units) for cell in table.header]
     except DataError as error:
         raise DataError(f"{path}: {error}") from None
-    used = [i for i, column in enumerate(named) if column.name]
+    used = [i for i, column in enumerate(headers) if column.name]
     for name in needed:
-        if not set(name.split("|")) & {named[i].name for i in used}:
+        if not set(name.split("|")) & {headers[i].name for i in used}:
             missing = name.replace("|", " or ")
             header = ", ".join(table.header)
             raise DataError(
@@ -169,43 +226,53 @@ def read_columns(
             )
     numbers, lines = table.numbers(used)
     values: dict[str, Array] = {}
-    first: dict[str, int] = {}
+    column_of: dict[str, int] = {}
     for i, column in zip(used, numbers.T, strict=True):
-        own = column * named[i].scale
-        name = named[i].name
+        scaled = column * headers[i].scale
+        name = headers[i].name
         if name not in values:
-            values[name] = own
-            first[name] = i
-        elif not np.allclose(
-            own, values[name], rtol=0.0, atol=ALIKE * np.abs(own).max(), equal_nan=True
-        ):
-            pair = f"{table.header[first[name]]:.40} and {table.header[i]:.40}"
+            values[name] = scaled
+            column_of[name] = i
+            continue
+        tolerance = AGREEMENT * np.abs(scaled).max()
+        if not np.allclose(scaled, values[name], rtol=0.0, atol=tolerance, equal_nan=True):
+            pair = f"{table.header[column_of[name]]:.40} and {table.header[i]:.40}"
             raise DataError(f"{path}: two columns stand for {name}, {pair}, and differ; keep one")
-    headers = {name: table.header[i] for name, i in first.items()}
-    bare = tuple(name for name, i in first.items() if not named[i].unit)
-    return Columns(values, headers, bare, tuple(f"{Path(path).name} line {line}" for line in lines))
+    header_of = {name: table.header[i] for name, i in column_of.items()}
+    without_unit = tuple(name for name, i in column_of.items() if not headers[i].unit)
+    sources = tuple(f"{Path(path).name} line {line}" for line in lines)
+    return Columns(values, header_of, without_unit, sources)
 
 
 def command_columns(layout: Layout) -> list[list[str]]:
     """Returns for each actuator the columns of its command, `NAME.number`, such as `bow.force`."""
     columns = []
-    for part in layout.actuators:
-        columns.append([f"{part.name}.{number.name}" for number in part.KIND.numbers])
+    for actuator in layout.actuators:
+        columns.append([f"{actuator.name}.{number.name}" for number in actuator.KIND.numbers])
     return columns
 
 
 def commands_in(values: Mapping[str, Array], layout: Layout) -> Array:
-    """Returns the commands (N, n, 3) of N rows of such columns, in the units of the actuators'
-    numbers: NaN where an actuator has none, 0 for a number that it does not have."""
+    """Returns the commands in columns that `command_columns` names.
+
+    Args:
+        values: columns by name, (N,) each.
+        layout: the robot.
+
+    Returns:
+        Commands (N, n, 3) in the units of the actuators' numbers: NaN where an actuator has none, 0
+        for a number that its kind does not have.
+    """
     columns = command_columns(layout)
     command = np.zeros((len(values[columns[0][0]]), layout.n, 3))
-    for i, own in enumerate(columns):
-        command[:, i, : len(own)] = np.stack([values[name] for name in own], axis=-1)
-        command[np.isnan(command[:, i, : len(own)]).all(axis=1), i] = np.nan
+    for i, names in enumerate(columns):
+        numbers = np.stack([values[name] for name in names], axis=-1)
+        command[:, i, : len(names)] = numbers
+        command[np.isnan(numbers).all(axis=1), i] = np.nan
     return command
 
 
-def together(tables: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
+def concatenate(tables: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
     """Returns the columns (n,) that all tables have, one table's rows after the other's, by
     name."""
     shared = [name for name in tables[0] if all(name in table for table in tables)]

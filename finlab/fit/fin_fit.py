@@ -1,4 +1,8 @@
-"""A fin from measurements: smooth forces and power with their uncertainty, and the file of them."""
+"""Fits a fin to measurements: smooth forces and power with their uncertainty, and the file of them.
+
+Each component of the force is a Gaussian process over the command (`gaussian_process`); the file is
+a force table that a layout names.
+"""
 
 import os
 from collections.abc import Callable
@@ -19,22 +23,27 @@ from finlab.fit.gaussian_process import Component
 from finlab.fit.measurements import MIN_SAMPLES, Measurements
 from finlab.whole_file import write_whole
 
-MOST_SAMPLES = 1500
+MAX_SAMPLES = 1500
 """Samples beyond this number are thinned: the time grows with their cube."""
 OUTLIER = 5.0
-"""Error, over the usual one, beyond which a sample is left out."""
+"""Error over its standard deviation beyond which a sample is an outlier."""
 BAND = 1.96
-"""Standard deviations of a band that holds 95 % of a normal distribution."""
-GOOD_ERROR, GOOD_BAND = 0.05, 0.85
-"""Mean uncertainty of a force over the largest one up to which a fit is trusted, and least share of
-samples left out that must lie within their band."""
-ROUND = (0.01, 0.05)
+"""Half width of a band that holds 95 % of a normal distribution [standard deviations]."""
+GOOD_ERROR = 0.05
+"""Largest mean uncertainty of a force, over the largest force, of a fit that is trusted."""
+GOOD_COVERAGE = 0.85
+"""Least share of samples within their 95 % band of a fit that is trusted."""
+GRID_STEPS = (0.01, 0.05)
 """Steps of amplitude [rad] and frequency [Hz] to whose next multiple a table goes."""
-COVERED = 0.75 * TURN
-"""Zero directions from which a table goes all round; fewer make a table of their arc."""
+FULL_CIRCLE = 0.75 * TURN
+"""Range of zero directions from which on a table goes all round [rad]; less makes a table of their
+arc."""
 GRID = (13, 13, 18)
 """Amplitudes, frequencies and zero directions of the table, from rest to the largest that was
 measured."""
+SCALE_QUANTILE = 0.98
+"""Quantile of the forces' sizes by which they are scaled while outliers are looked for: the largest
+may be one."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +53,7 @@ class FinFit:
 
     measurements: Measurements
     outliers: tuple[str, ...]
-    """Where the samples stand that were left out."""
+    """File and line of the samples that were left out."""
     components: tuple[Component, ...]
     """Force along the thrust's mean direction, across it, and along the shaft, over `largest`."""
     power: Component | None
@@ -60,22 +69,35 @@ class FinFit:
     """What was filled in or left out, a sentence each."""
 
     def predict(self, command: Array) -> tuple[Array, Array]:
-        """Returns forces [N] in the fin frame and their standard deviations (..., 3) at commands
-        (..., 3)."""
+        """Returns forces and their standard deviations.
+
+        Args:
+            command: commands (..., 3): half amplitude [rad], frequency [Hz], zero direction [rad].
+
+        Returns:
+            Forces (..., 3) and their standard deviations (..., 3) [N] in the fin's frame: along the
+            shaft, the horizontal thrust axis, and up.
+        """
         inputs = self.measurements.scaled(command)
-        predicted = np.array([component.predict(inputs) for component in self.components])
-        thrust, unsure = self.largest * predicted.transpose(1, 0, 2).reshape(
-            2, 3, *command.shape[:-1]
-        )
+        shape = command.shape[:-1]
+        means = []
+        deviations = []
+        for component in self.components:
+            mean, deviation = component.predict(inputs)
+            means.append(self.largest * mean.reshape(shape))
+            deviations.append(self.largest * deviation.reshape(shape))
+        along, across, shaft = means
+        sigma_along, sigma_across, sigma_shaft = deviations
+        # The components turn with the zero direction: rotate them by it and by the deflection.
         angle = command[..., 2] + self.deflection
         cos = np.cos(angle)
         sin = np.sin(angle)
-        along, across, sideways = thrust
-        by_along, by_across, by_sideways = unsure
-        force = [sideways, along * cos - across * sin, along * sin + across * cos]
-        y = np.hypot(by_along * cos, by_across * sin)
-        z = np.hypot(by_along * sin, by_across * cos)
-        return np.stack(force, axis=-1), np.stack([by_sideways, y, z], axis=-1)
+        y = along * cos - across * sin
+        z = along * sin + across * cos
+        sigma_y = np.hypot(sigma_along * cos, sigma_across * sin)
+        sigma_z = np.hypot(sigma_along * sin, sigma_across * cos)
+        force = np.stack([shaft, y, z], axis=-1)
+        return force, np.stack([sigma_shaft, sigma_y, sigma_z], axis=-1)
 
     def predict_power(self, command: Array) -> Array | None:
         """Returns the power [W], (...), at commands (..., 3); None where none was measured."""
@@ -107,152 +129,196 @@ class FinFit:
 
     @cached_property
     def doubts(self) -> tuple[str, ...]:
-        """Why the fit should not be trusted, a clause each; nothing where it may be."""
-        usual = float(np.sqrt(np.mean(self.uncertainty(self.grid()) ** 2)))
-        lost = len(self.outliers)
+        """Reasons not to trust the fit, a clause each; empty where it may be trusted."""
+        uncertainty = float(np.sqrt(np.mean(self.uncertainty(self.grid()) ** 2)))
+        n_outliers = len(self.outliers)
         n = len(self.measurements)
-        clauses = {
-            f"forces are uncertain by {usual:.0%} of the largest one": usual > GOOD_ERROR,
-            f"only {self.coverage():.0%} of the samples lie in their 95 % band": self.coverage()
-            < GOOD_BAND,
-            f"{lost} of {lost + n} samples contradict the others": lost > 0.1 * (lost + n),
-            f"{n} samples are few, 300 are a good number": n < 3 * MIN_SAMPLES,
-        }
-        return tuple(clause for clause, holds in clauses.items() if holds)
+        n_all = n_outliers + n
+        clauses = []
+        if uncertainty > GOOD_ERROR:
+            clauses.append(f"forces are uncertain by {uncertainty:.0%} of the largest one")
+        if self.coverage() < GOOD_COVERAGE:
+            clauses.append(f"only {self.coverage():.0%} of the samples lie in their 95 % band")
+        if n_outliers > 0.1 * n_all:
+            clauses.append(f"{n_outliers} of {n_all} samples contradict the others")
+        if n < 3 * MIN_SAMPLES:
+            clauses.append(f"{n} samples are few, 300 are a good number")
+        return tuple(clauses)
 
     def grid(self, shape: tuple[int, int, int] = (7, 7, 12)) -> Array:
-        """Returns commands on a grid (*shape, 3) over what was measured, from rest on, to round
-        numbers; zero directions go all round, or over the arc where samples are."""
-        ends = np.ceil(np.divide(self.measurements.reach, ROUND) - 1e-9) * ROUND
-        ends = np.minimum(ends, (MAX_AMPLITUDE, MAX_FREQUENCY))
-        axes = [np.linspace(0.0, most, count) for most, count in zip(ends, shape, strict=False)]
+        """Returns commands on a grid (*shape, 3) over what was measured.
+
+        Amplitudes and frequencies go from rest to the next multiple of `GRID_STEPS`; zero
+        directions go all round, or over the arc where samples are.
+
+        Args:
+            shape: how many amplitudes, frequencies and zero directions.
+        """
+        n_amplitudes, n_frequencies, n_directions = shape
+        limits = np.ceil(np.divide(self.measurements.reach, GRID_STEPS) - 1e-9) * GRID_STEPS
+        amplitude_max, frequency_max = np.minimum(limits, (MAX_AMPLITUDE, MAX_FREQUENCY))
+        amplitudes = np.linspace(0.0, amplitude_max, n_amplitudes)
+        frequencies = np.linspace(0.0, frequency_max, n_frequencies)
         phi = self.measurements.command[:, 2]
-        if not self.measurements.turned or np.ptp(phi) >= COVERED:
-            axes.append(np.linspace(-0.5 * TURN, 0.5 * TURN, shape[2], endpoint=False))
+        if not self.measurements.has_directions or np.ptp(phi) >= FULL_CIRCLE:
+            directions = np.linspace(-0.5 * TURN, 0.5 * TURN, n_directions, endpoint=False)
         else:
-            axes.append(np.linspace(phi.min(), phi.max(), shape[2]))
+            directions = np.linspace(phi.min(), phi.max(), n_directions)
+        axes = (amplitudes, frequencies, directions)
         return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
 
 
 def fit_fin(
     measurements: Measurements, seed: int = 0, progress: Callable[[str], None] = lambda words: None
 ) -> FinFit:
-    """Returns the fin that explains samples, leaving out those that contradict all others.
+    """Returns the fin that explains the samples, without outliers.
 
-    The linear algebra runs on one thread: on matrices of this size several wait for each other. The
-    seed draws the samples that are kept where there are more than `MOST_SAMPLES`; `progress` is
-    called before each step, and what it raises ends the fit. Raises DataError: fewer than
-    `MIN_SAMPLES` are of a fin that beats."""
+    The linear algebra runs on one thread: on matrices of this size several wait for each other.
+
+    Args:
+        measurements: the samples.
+        seed: draws the samples that are used where there are more than `MAX_SAMPLES`.
+        progress: called with a clause before each step; an exception of its own ends the fit.
+
+    Raises:
+        DataError: fewer than `MIN_SAMPLES` are of a fin that beats.
+    """
     notes = list(measurements.notes)
-    rest = measurements.command[:, 0] * measurements.command[:, 1] == 0.0
-    if rest.any():
-        notes.append(f"{rest.sum()} samples at rest tell nothing and are left out")
-        measurements = measurements.without(rest)
+    at_rest = measurements.command[:, 0] * measurements.command[:, 1] == 0.0
+    if at_rest.any():
+        notes.append(f"{at_rest.sum()} samples at rest tell nothing and are left out")
+        measurements = measurements.without(at_rest)
     n = len(measurements)
     if n < MIN_SAMPLES:
         raise DataError(
             f"{n} samples of a fin that beats, expected at least {MIN_SAMPLES}; 300 are a good "
             "number"
         )
-    if n > MOST_SAMPLES:
-        notes.append(f"{MOST_SAMPLES} of {n} samples, drawn at random, are used")
-        measurements = measurements.without(
-            np.random.default_rng(seed).permutation(n) >= MOST_SAMPLES
-        )
+    if n > MAX_SAMPLES:
+        notes.append(f"{MAX_SAMPLES} of {n} samples, drawn at random, are used")
+        order = np.random.default_rng(seed).permutation(n)
+        measurements = measurements.without(order >= MAX_SAMPLES)
     with threadpool_limits(limits=1, user_api="blas"):
-        bad = _outliers(measurements, progress)
-        if not measurements.force[
-            ~bad
-        ].any():  # a fin that hardly ever pushes: what it gives is no outlier
-            bad[:] = False
-        outliers = tuple(place for place, out in zip(measurements.places, bad, strict=True) if out)
+        is_outlier = _find_outliers(measurements, progress)
+        if not measurements.force[~is_outlier].any():
+            is_outlier[:] = False  # a fin that hardly ever pushes: its few forces are no outliers
+        outliers = tuple(np.array(measurements.sources)[is_outlier].tolist())
         if outliers:
             shown = ", ".join(outliers[:5]) + (" ..." if len(outliers) > 5 else "")
             notes.append(
-                f"{len(outliers)} of {len(bad)} samples contradict the others and are left out: "
-                f"{shown}"
+                f"{len(outliers)} of {len(is_outlier)} samples contradict the others and are left "
+                f"out: {shown}"
             )
-            measurements = measurements.without(bad)
-        return _fitted(measurements, outliers, tuple(notes), progress)
+            measurements = measurements.without(is_outlier)
+        return _fit_components(measurements, outliers, tuple(notes), progress)
 
 
-def _outliers(measurements: Measurements, tell: Callable[[str], None]) -> NDArray[np.bool_]:
-    """Which samples (n,) lie far off a fit to the others, in which such samples count for little: a
-    wrong unit, a bump of the rig, a cell that slipped."""
-    turned, _ = measurements.thrust()
+def _find_outliers(
+    measurements: Measurements, progress: Callable[[str], None]
+) -> NDArray[np.bool_]:
+    """Marks samples (n,) that lie far off a fit to the others, in which such samples count for
+    little: a wrong unit, a bump of the rig, a cell that slipped."""
+    thrust, _ = measurements.thrust()
     sizes = np.linalg.norm(measurements.force, axis=-1)
-    values = turned / (float(np.quantile(sizes, 0.98)) or float(sizes.max()))
+    scale = float(np.quantile(sizes, SCALE_QUANTILE)) or float(sizes.max())
+    values = thrust / scale
     inputs = measurements.scaled(measurements.command)
-    tell("looking for samples that contradict the others")
-    along = Component(inputs, values[:, 0], wild=True)
-    tell("looking for such samples across the thrust")
-    across = Component(inputs, values[:, 1], size=along.mean, wild=True)
-    return np.asarray((along.strange > OUTLIER) | (across.strange > OUTLIER))
+    progress("looking for samples that contradict the others")
+    along = Component(inputs, values[:, 0], is_heavy_tailed=True)
+    progress("looking for such samples across the thrust")
+    across = Component(inputs, values[:, 1], size=along.mean, is_heavy_tailed=True)
+    return np.asarray((along.standardized_error > OUTLIER) | (across.standardized_error > OUTLIER))
 
 
-def _fitted(
+def _fit_components(
     measurements: Measurements,
     outliers: tuple[str, ...],
     notes: tuple[str, ...],
-    tell: Callable[[str], None],
+    progress: Callable[[str], None],
 ) -> FinFit:
-    turned, deflection = measurements.thrust()
+    """The fit to samples without outliers: a Gaussian process for each component, and for power."""
+    thrust, deflection = measurements.thrust()
     largest = float(np.linalg.norm(measurements.force, axis=-1).max())
     inputs = measurements.scaled(measurements.command)
-    parts: list[Component] = []
-    for values, what in zip(
-        turned.T, ("thrust", "force across the thrust", "force along the shaft"), strict=True
-    ):
-        tell(f"fitting the {what}")
-        parts.append(Component(inputs, values / largest, parts[0].mean if parts else None))
+    progress("fitting the thrust")
+    along = Component(inputs, thrust[:, 0] / largest)
+    progress("fitting the force across the thrust")
+    across = Component(inputs, thrust[:, 1] / largest, along.mean)
+    progress("fitting the force along the shaft")
+    shaft = Component(inputs, thrust[:, 2] / largest, along.mean)
     power = None
     largest_power = 1.0
     if measurements.power is not None:
-        tell("fitting power")
+        progress("fitting power")
         largest_power = float(measurements.power.max())
         power = Component(inputs, np.sqrt(np.maximum(measurements.power, 0.0) / largest_power))
     return FinFit(
-        measurements, outliers, tuple(parts), power, deflection, largest, largest_power, notes
+        measurements=measurements,
+        outliers=outliers,
+        components=(along, across, shaft),
+        power=power,
+        deflection=deflection,
+        largest=largest,
+        largest_power=largest_power,
+        notes=notes,
     )
 
 
 def fin_csv(fit: FinFit) -> str:
-    """Returns the file's text: lines that begin with # and say what the fit is worth, a header, a
-    grid."""
+    """Returns the text of a force table: comments on how good the fit is, a header, and a grid."""
     command = fit.grid(GRID).reshape(-1, 3)
     force, deviation = fit.predict(command)
     power = fit.predict_power(command)
-    table = np.hstack([command, force, *([] if power is None else [power[:, None]]), deviation])
-    header = [*COLUMNS, *([] if power is None else [POWER_COLUMN]), *DEVIATIONS]
-    return table_text(summary(fit), header, table, 6)
+    header = [*COLUMNS]
+    columns = [command, force]
+    if power is not None:
+        header.append(POWER_COLUMN)
+        columns.append(power[:, None])
+    header += DEVIATIONS
+    columns.append(deviation)
+    return table_text(summary(fit), header, np.hstack(columns), 6)
 
 
 def write_fin(fit: FinFit, path: str | os.PathLike[str]) -> None:
     """Writes a fitted fin to a CSV file that a layout names: `model: {type: table, path: FILE}`.
-    Raises DataError: the file cannot be written, or is not called .csv."""
+
+    Args:
+        fit: the fin.
+        path: the file.
+
+    Raises:
+        DataError: the file cannot be written, or its name does not end in .csv.
+    """
     check_table_path(path)
     write_whole(path, fin_csv(fit), DataError)
 
 
 def check_table_path(path: str | os.PathLike[str]) -> None:
-    """Raises DataError for a name that no layout takes for a table, before a fit, which takes
-    seconds."""
+    """Refuses a name that no layout takes for a table, before a fit, which takes seconds.
+
+    Raises:
+        DataError: the name does not end in .csv.
+    """
     if Path(path).suffix.lower() != ".csv":
         raise DataError(f"{path}: a table is a CSV file, expected a name that ends in .csv")
 
 
 def summary(fit: FinFit) -> tuple[str, ...]:
-    """Returns what the fit is worth, a line each; the first says why it should not be trusted, if
+    """Returns how good the fit is, a line each; the first says why it should not be trusted, if
     so."""
     amplitude, frequency = fit.measurements.reach
-    return (
-        *((f"{DOUBT}: {'; '.join(fit.doubts)}",) if fit.doubts else ()),
+    lines = []
+    if fit.doubts:
+        lines.append(f"{DOUBT}: {'; '.join(fit.doubts)}")
+    lines.append(
         f"fitted to {len(fit.measurements)} samples, amplitudes up to {amplitude:.3g} rad, "
-        "frequencies up to "
-        f"{frequency:.3g} Hz, forces up to {fit.largest:.3g} N",
-        f"cross-validated error {fit.error():.1%} of the largest force, noise of a sample "
-        f"{fit.noise():.1%}; "
-        f"{fit.coverage():.0%} of the samples lie in the 95 % band of the fit to the others",
-        f"thrust leans {float(np.degrees(fit.deflection)):+.1f} deg off the zero direction",
-        *fit.notes,
+        f"frequencies up to {frequency:.3g} Hz, forces up to {fit.largest:.3g} N"
     )
+    lines.append(
+        f"cross-validated error {fit.error():.1%} of the largest force, noise of a sample "
+        f"{fit.noise():.1%}; {fit.coverage():.0%} of the samples lie in the 95 % band of the fit "
+        "to the others"
+    )
+    deflection_deg = float(np.degrees(fit.deflection))
+    lines.append(f"thrust leans {deflection_deg:+.1f} deg off the zero direction")
+    return (*lines, *fit.notes)

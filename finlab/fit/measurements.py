@@ -1,4 +1,7 @@
-"""Samples of one fin on a load cell, cycle means, read from CSV files."""
+"""Reads measurements of one fin on a load cell: cycle means of forces by command, from CSV files.
+
+`fin_fit` fits a fin to them.
+"""
 
 import os
 from collections.abc import Sequence
@@ -12,38 +15,39 @@ from finlab.actuators.fin.fin_model import MAX_AMPLITUDE, MAX_FREQUENCY
 from finlab.arrays import Array
 from finlab.axes import FILE_TURN_TOLERANCE, TURN
 from finlab.errors import DataError
-from finlab.fit.columns import Columns, read_columns, together
+from finlab.fit.columns import Columns, concatenate, read_columns
 
-NEEDED = ("A", "f", "Fy", "Fz")
+NEEDED_COLUMNS = ("A", "f", "Fy", "Fz")
 """Columns without which no fin can be fitted."""
 NAMES = {
     "a": "A", "amplitude": "A", "stroke": "A", "f": "f", "frequency": "f",
     "phi": "phi", "zero_direction": "phi", "direction": "phi",
     "fx": "Fx", "fy": "Fy", "fz": "Fz", "p": "P", "power": "P",
 }  # fmt: skip
+"""Quantities by the words for them, in lower case."""
 MIN_SAMPLES = 20
-SAME = 1e-3
-"""Amplitudes [rad] or frequencies [Hz] all closer than this are one and the same."""
-SAME_DIRECTION = 0.05
+"""Fewest samples of a fit."""
+MIN_RANGE = 1e-3
+"""Amplitudes [rad] or frequencies [Hz] whose range is less than this count as one value."""
+MIN_DIRECTION_RANGE = 0.05
 """The same of zero directions [rad]."""
 
 
 @dataclass(frozen=True)
 class Measurements:
-    """Samples of one fin in its own frame (x' shaft, y' horizontal thrust axis, z' up), cycle
-    means."""
+    """Cycle means of one fin in its own frame (x' shaft, y' horizontal thrust axis, z' up)."""
 
     command: Array
     """Half amplitude [rad], frequency [Hz], zero direction [rad], (n, 3)."""
     force: Array
     """Mean force [N], (n, 3)."""
     power: Array | None
-    """Mean mechanical power [W], (n,), where the file tells it."""
-    places: tuple[str, ...]
-    """Where each sample stands, file and line."""
+    """Mean mechanical power [W], (n,); None where a file has none."""
+    sources: tuple[str, ...]
+    """File and line of each sample."""
     notes: tuple[str, ...]
     """What was filled in or left out, a sentence each."""
-    turned: bool = True
+    has_directions: bool = True
     """Whether several zero directions were measured; if not, the fin counts as the same all
     round."""
 
@@ -56,11 +60,11 @@ class Measurements:
         return float(self.command[:, 0].max()), float(self.command[:, 1].max())
 
     def scaled(self, command: Array) -> Array:
-        """Returns commands (..., 3) as inputs (m, 3) of a fit: over the reach, and all in one
-        direction where only one was measured."""
+        """Returns commands (..., 3) as inputs (m, 3) of a fit: amplitude and frequency over the
+        largest ones, and one zero direction for all where only one was measured."""
         inputs = command.reshape(-1, 3).copy()
         inputs[:, :2] /= self.reach
-        if not self.turned:
+        if not self.has_directions:
             inputs[:, 2] = 0.0
         return inputs
 
@@ -74,76 +78,81 @@ class Measurements:
         planar *= np.exp(-1j * deflection)
         return np.stack([planar.real, planar.imag, force[:, 0]], axis=-1), deflection
 
-    def without(self, places: NDArray[np.bool_]) -> "Measurements":
-        """The samples but those (n,) that are marked."""
-        keep = ~places
+    def without(self, excluded: NDArray[np.bool_]) -> "Measurements":
+        """Returns the samples without those that are marked, (n,)."""
+        keep = ~excluded
         power = None if self.power is None else self.power[keep]
-        named = tuple(np.array(self.places)[keep].tolist())
+        sources = tuple(np.array(self.sources)[keep].tolist())
         return replace(
-            self, command=self.command[keep], force=self.force[keep], power=power, places=named
+            self, command=self.command[keep], force=self.force[keep], power=power, sources=sources
         )
 
 
 def read_measurements(paths: Sequence[str | os.PathLike[str]]) -> Measurements:
     """Returns the samples of all files together.
 
-    Each file has a header; columns come in any order, units may stand behind names (`A [deg]`),
-    else they are SI. They are cycle means: A (or stroke), f, Fy, Fz and perhaps phi, Fx, P. Raises
-    DataError: a file is missing, too large, lacks a column or holds what no fin can do; or there
-    are too few samples, or only one amplitude or frequency."""
-    read = [
-        read_columns(Path(path), NAMES, NEEDED, "A, f, phi, Fx, Fy, Fz in any order")
+    Each file has a header; columns come in any order, units may follow names (`A [deg]`), else they
+    are SI. They are cycle means: A (or stroke), f, Fy, Fz and perhaps phi, Fx, P.
+
+    Args:
+        paths: the CSV files.
+
+    Raises:
+        DataError: a file is missing, too large, lacks a column or holds what no fin can do; or
+            there are too few samples, or only one amplitude or frequency.
+    """
+    if not paths:
+        raise DataError("expected at least one CSV file of measurements, got none")
+    files = [
+        read_columns(Path(path), NAMES, NEEDED_COLUMNS, "A, f, phi, Fx, Fy, Fz in any order")
         for path in paths
     ]
-    if not read:
-        raise DataError("expected at least one CSV file of measurements, got none")
-    for file, path in zip(read, paths, strict=True):
+    for file, path in zip(files, paths, strict=True):
         _check_units(file.values, str(path))
-    return _checked(read, ", ".join(str(path) for path in paths))
+    return _checked(files, ", ".join(str(path) for path in paths))
 
 
 def _check_units(values: dict[str, Array], source: str) -> None:
     """Refuses amplitudes [rad] and frequencies [Hz] that no fin has, as in a file in other
     units."""
-    for name, what, most, unit, hint in (
-        (
-            "A",
-            "half amplitudes",
-            MAX_AMPLITUDE,
-            "rad",
-            "`A [deg]`, and call whole strokes `stroke`",
-        ),
-        ("f", "frequencies", MAX_FREQUENCY, "Hz", "`f [rpm]`"),
-    ):
-        low = float(values[name].min())
-        high = float(values[name].max())
-        if high > most + 1e-9 or low < 0.0:
-            raise DataError(
-                f"{source}: {what} from {low:.4g} to {high:.4g} {unit}, expected 0 to {most:.4g}; "
-                "name "
-                f"another unit in the header, {hint}"
-            )
+    hint = "`A [deg]`, and call whole strokes `stroke`"
+    _check_range(values["A"], MAX_AMPLITUDE, f"{source}: half amplitudes", "rad", hint)
+    _check_range(values["f"], MAX_FREQUENCY, f"{source}: frequencies", "Hz", "`f [rpm]`")
 
 
-def _checked(read: list[Columns], source: str) -> Measurements:
-    """The samples of all files, with what is wrong with all together said in a sentence."""
-    places = tuple(place for file in read for place in file.places)
-    notes = list[str]()
-    if (n := len(places)) < MIN_SAMPLES:
+def _check_range(values: Array, limit: float, what: str, unit: str, hint: str) -> None:
+    """Refuses values that do not lie between 0 and a limit."""
+    low = float(values.min())
+    high = float(values.max())
+    if high > limit + 1e-9 or low < 0.0:
+        raise DataError(
+            f"{what} from {low:.4g} to {high:.4g} {unit}, expected 0 to {limit:.4g}; name another "
+            f"unit in the header, {hint}"
+        )
+
+
+def _checked(files: list[Columns], source: str) -> Measurements:
+    """The samples of all files; an error where no fin can be fitted to them."""
+    sources: list[str] = []
+    for file in files:
+        sources += file.sources
+    notes: list[str] = []
+    n = len(sources)
+    if n < MIN_SAMPLES:
         raise DataError(
             f"{source}: {n} samples, expected at least {MIN_SAMPLES}; 300 are a good number"
         )
-    columns = together([file.values for file in read])
+    columns = concatenate([file.values for file in files])
     for name, unit in (("A", "rad"), ("f", "Hz")):
-        if np.ptp(columns[name]) < SAME:
+        if np.ptp(columns[name]) < MIN_RANGE:
             raise DataError(
                 f"{source}: column {name} has the one value {columns[name][0]:.4g} {unit}, "
                 "expected several; "
                 "a fin's force cannot be determined from one amplitude or one frequency"
             )
-    phi, turned = _directions(columns, source, notes)
+    phi, has_directions = _directions(columns, source, notes)
     if "Fx" not in columns:
-        columns["Fx"] = np.zeros(len(places))
+        columns["Fx"] = np.zeros(n)
         notes.append("there is no column Fx: no force along the shaft is assumed")
     command = np.stack([columns["A"], columns["f"], phi], axis=-1)
     force = np.stack([columns[name] for name in ("Fx", "Fy", "Fz")], axis=-1)
@@ -157,9 +166,11 @@ def _checked(read: list[Columns], source: str) -> Measurements:
                 f"{source}: column {name} is {value} throughout; is the sensor connected?"
             )
     if power is not None and power.min() < -0.02 * np.abs(power).max():
-        least = f"{power.min():.4g} W, expected the mean power that drives the fin"
-        raise DataError(f"{source}: column P has {least}")
-    return Measurements(command, force, power, places, tuple(notes), turned)
+        raise DataError(
+            f"{source}: column P has {power.min():.4g} W, expected the mean power that drives the "
+            "fin"
+        )
+    return Measurements(command, force, power, tuple(sources), tuple(notes), has_directions)
 
 
 def _directions(columns: dict[str, Array], source: str, notes: list[str]) -> tuple[Array, bool]:
@@ -168,10 +179,11 @@ def _directions(columns: dict[str, Array], source: str, notes: list[str]) -> tup
     if phi is not None and np.ptp(phi) > TURN + FILE_TURN_TOLERANCE:
         span = f"{np.ptp(phi):.4g} rad; name their unit in the header, `phi [deg]`"
         raise DataError(f"{source}: the zero directions span {span}")
-    if phi is not None and np.ptp(phi) >= SAME_DIRECTION:
+    if phi is not None and np.ptp(phi) >= MIN_DIRECTION_RANGE:
         return phi, True
-    said = "there is no column phi" if phi is None else f"phi is {phi[0]:.3f} rad throughout"
+    reason = "there is no column phi" if phi is None else f"phi is {phi[0]:.3f} rad throughout"
     notes.append(
-        f"{said}: the other directions are filled by symmetry, as a fin that is the same all round"
+        f"{reason}: the other directions are filled by symmetry, as a fin that is the same all "
+        "round"
     )
     return np.zeros(len(columns["A"])) if phi is None else phi, False

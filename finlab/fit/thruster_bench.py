@@ -1,7 +1,7 @@
-"""Benches of one thruster in still water, from CSV files and workbooks: force and power over its
-command.
+"""Reads benches of one thruster in still water: force and power over its command.
 
-At several voltages it is known which rows are of one voltage, and what lies between two of them.
+Files are CSV files and workbooks. Where a bench was measured at several voltages, its rows are
+split by voltage, and interpolated between two of them. `thruster_fit` fits a thruster to a bench.
 """
 
 import os
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from finlab.arrays import Array
 from finlab.errors import DataError
-from finlab.fit.columns import Columns, named_column, read_columns, sheets, together
+from finlab.fit.columns import Columns, concatenate, named_column, read_columns, read_sheets
 
 _WORDS = {
     "PWM": "pwm pulse pulse_width pulsewidth pwm_signal pwm_value pwm_input pwm_width signal "
@@ -29,107 +29,146 @@ _WORDS = {
     "current": "current amps supply_current input_current battery_current",
     "torque": "torque motor_torque",
 }
-NAMES = {word: name for name, words in _WORDS.items() for word in words.split()}
+"""Quantities, and the words for them with blanks between, in lower case."""
+NAMES: dict[str, str] = {}
+"""Quantities by the words for them."""
+for _name, _words_of_name in _WORDS.items():
+    NAMES |= dict.fromkeys(_words_of_name.split(), _name)
 COMMANDS = {"PWM": "us", "input": "", "rpm": "rpm"}
 """Columns of commands with their units; the first that a file has is taken."""
-EXPECTED = (
+EXPECTED_COLUMNS = (
     "a command (PWM, input or rpm), force, and power or voltage and current; units in brackets, "
     "`force [kgf]`; `finlab fit fin` takes A, f, Fy, Fz of fins"
 )
-NEEDED = ("|".join(COMMANDS), "force", "power|voltage", "power|current")
-TAKEN = {"PWM": "us", "force": "N", "power": "W", "voltage": "V", "current": "A", "torque": "N m"}
+"""What a sentence says was expected."""
+NEEDED_COLUMNS = ("|".join(COMMANDS), "force", "power|voltage", "power|current")
+"""Columns without which no thruster can be fitted; of `a|b` one is enough."""
+DEFAULT_UNITS = {
+    "PWM": "us",
+    "force": "N",
+    "power": "W",
+    "voltage": "V",
+    "current": "A",
+    "torque": "N m",
+}
 """Units of columns that name none."""
-UNSIGNED, PUSHES = 0.03, 0.1
-"""Shares of the largest force: up to which a thruster rests, and from which on one pushes on either
-side of the neutral command."""
+UNSIGNED = 0.03
+"""Share of the largest force that forces of one sign do not exceed where all are sizes alone, or
+where a thruster pushes one way; also that of a thruster at rest."""
+PUSHING = 0.1
+"""Share of the largest force from which on a thruster pushes on a side of the neutral command."""
 MIN_COMMANDS = 5
 """Fewest different commands."""
 NEGATIVE = 0.02
 """Share of the largest power by which a power may lie below 0, as noise."""
 Rows = Mapping[str, Array]
 """Columns of a bench by name (n,), with `command`, `force` and `power`."""
-NEAR = 0.05
+SAME_VOLTAGE = 0.05
 """Share by which voltages of one supply may differ."""
-WITHIN = 0.3
+OVERLAP = 0.3
 """Share of the commands at a voltage within those at a higher one, from which on the two are two
 tables."""
 
 
 def by_voltage(rows: Rows, command: Array) -> list[Rows]:
-    """Returns the rows of one table, apart where it was measured at several voltages, commands
-    (n,).
+    """Splits the rows of one table by the voltage of the supply.
 
     A supply that sags under load is one: there commands of a lower voltage lie beyond those of a
     higher one.
+
+    Args:
+        rows: the rows (n,), with a column `voltage` [V].
+        command: their commands (n,).
+
+    Returns:
+        The rows of each supply.
     """
     volts = np.abs(rows["voltage"])
-    parts = _levels(volts)
-    tables = [parts[-1]]
-    for part in parts[-2::-1]:
-        higher = command[tables[-1]]
-        if np.mean((command[part] >= higher.min()) & (command[part] <= higher.max())) > WITHIN:
-            tables.append(part)
+    groups = _groups_of_voltage(volts)
+    supplies = [groups[-1]]  # indices of rows, from the highest voltage on
+    for group in groups[-2::-1]:
+        higher = command[supplies[-1]]
+        is_within = (command[group] >= higher.min()) & (command[group] <= higher.max())
+        if np.mean(is_within) > OVERLAP:
+            supplies.append(group)
         else:
-            tables[-1] = np.concatenate([part, tables[-1]])
-    return [{name: values[np.sort(table)] for name, values in rows.items()} for table in tables]
+            supplies[-1] = np.concatenate([group, supplies[-1]])
+    tables: list[Rows] = []
+    for supply in supplies:
+        indices = np.sort(supply)
+        tables.append({name: values[indices] for name, values in rows.items()})
+    return tables
 
 
 def at_voltage(
     tables: Sequence[Rows], voltage: float | None, source: str
 ) -> tuple[Rows, tuple[str, ...]]:
-    """Returns the rows of one voltage [V], None where there is only one, and notes on what was
-    done.
+    """Returns the rows at one voltage, and notes on how they were taken.
 
-    Each table is of one voltage, by its middle in column `voltage`; without that column of any.
-    Raises DataError: there are several and none is named, or that one does not lie among them;
-    `source` has the names of the files."""
-    known = np.array(
-        [np.median(np.abs(rows["voltage"])) if "voltage" in rows else np.nan for rows in tables]
-    )
-    groups = _levels(known)
-    if np.isnan(known).any() and (voltage is not None or len(groups) > 1):
+    Args:
+        tables: tables of one voltage each, by the median of their column `voltage`.
+        voltage: the voltage [V]; None where all tables are of one.
+        source: names of the files, for the sentences.
+
+    Raises:
+        DataError: there are several voltages and none is named, or the one that is does not lie
+            among them.
+    """
+    medians = []
+    for rows in tables:
+        medians.append(np.median(np.abs(rows["voltage"])) if "voltage" in rows else np.nan)
+    voltages = np.array(medians)
+    groups = _groups_of_voltage(voltages)
+    if np.isnan(voltages).any() and (voltage is not None or len(groups) > 1):
         raise DataError(f"{source}: does not tell at which voltage all rows were measured")
-    levels = np.array([np.median(known[own]) for own in groups])
-    named = f"measured at {', '.join(f'{level:.4g}' for level in levels)} V"
+    levels = np.array([np.median(voltages[group]) for group in groups])
+    measured = f"measured at {', '.join(f'{level:.4g}' for level in levels)} V"
     if voltage is None and len(groups) > 1:
-        raise DataError(f"{source}: {named}; say which counts, --voltage {levels[-1]:.4g}")
-    within = [together([tables[k] for k in own]) for own in groups]
+        raise DataError(f"{source}: {measured}; say which counts, --voltage {levels[-1]:.4g}")
+    rows_of_level = [concatenate([tables[k] for k in group]) for group in groups]
     if voltage is None:
-        return within[0], ()
-    near = int(np.argmin(np.abs(levels - voltage)))
-    if abs(voltage - levels[near]) <= 0.5 * NEAR * levels[near]:
-        return within[near], (f"{named}: the rows at {levels[near]:.4g} V are taken",) * (
-            len(groups) > 1
+        return rows_of_level[0], ()
+    nearest = int(np.argmin(np.abs(levels - voltage)))
+    if abs(voltage - levels[nearest]) <= 0.5 * SAME_VOLTAGE * levels[nearest]:
+        if len(groups) == 1:
+            return rows_of_level[nearest], ()
+        return rows_of_level[nearest], (
+            f"{measured}: the rows at {levels[nearest]:.4g} V are taken",
         )
     if not levels[0] < voltage < levels[-1]:
-        raise DataError(f"{source}: {named}, which tells nothing of {voltage:g} V")
+        raise DataError(f"{source}: {measured}, which tells nothing of {voltage:g} V")
     upper = int(np.searchsorted(levels, voltage))
     low, high = levels[upper - 1 : upper + 1].tolist()
-    rows = _between(within[upper - 1], within[upper], (voltage - low) / (high - low))
+    rows = _interpolate(
+        rows_of_level[upper - 1], rows_of_level[upper], (voltage - low) / (high - low)
+    )
     return rows, (f"interpolated between the rows at {low:.4g} V and at {high:.4g} V",)
 
 
-def _levels(volts: Array) -> list[NDArray[np.intp]]:
-    """Places of voltages (n,) that are one, the lowest first."""
+def _groups_of_voltage(volts: Array) -> list[NDArray[np.intp]]:
+    """Indices of voltages (n,) that are one within SAME_VOLTAGE, the lowest first."""
     order = np.argsort(volts, kind="stable")
-    steps = np.diff(volts[order]) > NEAR * volts[order][1:]
+    steps = np.diff(volts[order]) > SAME_VOLTAGE * volts[order][1:]
     return np.split(order, np.flatnonzero(steps) + 1)
 
 
-def _between(low: Rows, high: Rows, share: float) -> Rows:
-    """The table at a share of the way from one to the other, over commands that both reach."""
-    ends = [(rows["command"].min(), rows["command"].max()) for rows in (low, high)]
-    first = max(own[0] for own in ends)
-    last = min(own[1] for own in ends)
-    places = np.unique(np.concatenate([low["command"], high["command"]]))
-    places = places[(places >= first) & (places <= last)]
+def _interpolate(low: Rows, high: Rows, share: float) -> Rows:
+    """The table at a share of the difference between two, over the commands that both have."""
+    first = max(low["command"].min(), high["command"].min())
+    last = min(low["command"].max(), high["command"].max())
+    commands = np.unique(np.concatenate([low["command"], high["command"]]))
+    commands = commands[(commands >= first) & (commands <= last)]
 
     def means(rows: Rows, name: str) -> Array:
-        at, where, count = np.unique(rows["command"], return_inverse=True, return_counts=True)
-        return np.asarray(np.interp(places, at, np.bincount(where, rows[name]) / count))
+        """The means of a column at each command, interpolated."""
+        unique, index, count = np.unique(rows["command"], return_inverse=True, return_counts=True)
+        return np.asarray(np.interp(commands, unique, np.bincount(index, rows[name]) / count))
 
-    names = [name for name in low if name in high]
-    return {name: (1.0 - share) * means(low, name) + share * means(high, name) for name in names}
+    table = {}
+    for name in low:
+        if name in high:
+            table[name] = (1.0 - share) * means(low, name) + share * means(high, name)
+    return table
 
 
 @dataclass(frozen=True)
@@ -154,51 +193,67 @@ class BenchData:
 def read_bench(paths: Sequence[str | os.PathLike[str]], voltage: float | None = None) -> BenchData:
     """Returns the rows of all files together.
 
-    Paths are those of CSV files, and of workbooks (.xlsx) with a table in a sheet. Of several
-    voltages the one named counts [V]; between two of them forces are interpolated. Raises
-    DataError: a file is missing, lacks a column or holds what no thruster does, or there are
-    several voltages and none is named."""
-    read = [_tables(Path(path)) for path in paths]
-    files = [table for tables, _ in read for table in tables]
+    Args:
+        paths: CSV files, and workbooks (.xlsx) with a table in each sheet.
+        voltage: the voltage that counts where there are several [V]; between two of them forces
+            are interpolated.
+
+    Raises:
+        DataError: a file is missing, lacks a column or holds what no thruster does, or there are
+            several voltages and none is named.
+    """
+    tables: list[Columns] = []
+    notes: list[str] = []
+    for path in paths:
+        file_tables, file_notes = _read_tables(Path(path))
+        tables += file_tables
+        notes += file_notes
     source = ", ".join(str(path) for path in paths)
-    kind, *others = [name for name in COMMANDS if all(name in file.values for file in files)] or [
-        ""
-    ]
-    if not kind:
-        raise DataError(f"{source}: no command stands in all files, expected {EXPECTED}")
-    notes = [note for _, said in read for note in said]
-    if others:
-        notes.append(f"commands are those of column {kind}; {' and '.join(others)} is left aside")
-    if bare := {name: file.headers[name] for file in files for name in file.bare if name in TAKEN}:
-        units = ", ".join(TAKEN[name] for name in bare)
-        notes.append(f"no unit stands at {', '.join(bare.values())}: taken for {units}")
-    tables = [rows for file in files for rows in _rows(file, kind, notes)]
-    values, said = at_voltage(tables, voltage, source)
-    return _checked(values, kind, source, (*dict.fromkeys(notes), *said))
+    commands = [name for name in COMMANDS if all(name in table.values for table in tables)]
+    if not commands:
+        raise DataError(f"{source}: no command stands in all files, expected {EXPECTED_COLUMNS}")
+    kind, *unused = commands
+    if unused:
+        notes.append(f"commands are those of column {kind}; {' and '.join(unused)} is left aside")
+    header_of: dict[str, str] = {}  # of quantities without a unit
+    for table in tables:
+        for name in table.without_unit:
+            if name in DEFAULT_UNITS:
+                header_of[name] = table.headers[name]
+    if header_of:
+        units = ", ".join(DEFAULT_UNITS[name] for name in header_of)
+        notes.append(f"no unit stands at {', '.join(header_of.values())}: taken for {units}")
+    rows: list[Rows] = []
+    for table in tables:
+        rows += _rows_by_voltage(table, kind, notes)
+    values, voltage_notes = at_voltage(rows, voltage, source)
+    return _checked(values, kind, source, (*dict.fromkeys(notes), *voltage_notes))
 
 
-def _tables(path: Path) -> tuple[list[Columns], tuple[str, ...]]:
-    """The tables of a file, and notes on what was passed over."""
+def _read_tables(path: Path) -> tuple[list[Columns], tuple[str, ...]]:
+    """The tables of a file, and notes on sheets without one."""
     if path.suffix.lower() not in (".xlsx", ".xlsm"):
-        return [_renamed(read_columns(path, NAMES, NEEDED, EXPECTED))], ()
-    held, other = sheets(path, _is_header)
-    if not held:
+        return [_with_pulse_column(read_columns(path, NAMES, NEEDED_COLUMNS, EXPECTED_COLUMNS))], ()
+    tables_by_sheet, empty_sheets = read_sheets(path, _is_header)
+    if not tables_by_sheet:
         raise DataError(
-            f"{path}: no sheet holds a table ({', '.join(other):.200}), expected {EXPECTED}"
+            f"{path}: no sheet holds a table ({', '.join(empty_sheets):.200}), expected "
+            f"{EXPECTED_COLUMNS}"
         )
     tables = []
-    for title, table in held.items():
-        columns = _renamed(read_columns(table, NAMES, NEEDED, EXPECTED))
+    for title, table in tables_by_sheet.items():
+        columns = _with_pulse_column(read_columns(table, NAMES, NEEDED_COLUMNS, EXPECTED_COLUMNS))
         volts = re.search(r"(\d+(?:[.,]\d+)?) ?v(?:olts?)?\b", title, flags=re.IGNORECASE)
         if volts and "voltage" not in columns.values:
             columns.values["voltage"] = np.full(
-                len(columns.places), float(volts[1].replace(",", "."))
+                len(columns.sources), float(volts[1].replace(",", "."))
             )
         tables.append(columns)
-    return tables, (f"no table in sheet {', '.join(other):.200}",) if other else ()
+    return tables, (f"no table in sheet {', '.join(empty_sheets):.200}",) if empty_sheets else ()
 
 
 def _is_header(cells: Sequence[str]) -> bool:
+    """Whether the cells of a row name a command and a force."""
     try:
         names = {named_column(cell, NAMES).name for cell in cells}
     except DataError:  # a header whose unit is not known, which is said when it is read
@@ -206,7 +261,8 @@ def _is_header(cells: Sequence[str]) -> bool:
     return "force" in names and bool(names & set(COMMANDS))
 
 
-def _renamed(columns: Columns) -> Columns:
+def _with_pulse_column(columns: Columns) -> Columns:
+    """The same columns; an `input` in microseconds is a pulse, PWM."""
     header = columns.headers.get("input", "")
     if "PWM" not in columns.values and re.match("[uµμm]", named_column(header, NAMES).unit):
         columns.values["PWM"] = columns.values.pop("input")
@@ -214,8 +270,8 @@ def _renamed(columns: Columns) -> Columns:
     return columns
 
 
-def _rows(file: Columns, kind: str, notes: list[str]) -> list[Rows]:
-    """Rows of one table with signed forces, apart by voltage."""
+def _rows_by_voltage(file: Columns, kind: str, notes: list[str]) -> list[Rows]:
+    """Rows of one table with signed forces, split by voltage; adds sentences to the notes."""
     values = file.values
     command = values[kind]
     force = values["force"]
@@ -226,18 +282,18 @@ def _rows(file: Columns, kind: str, notes: list[str]) -> list[Rows]:
         notes.append("column rpm has no sign: rows with negative forces got one")
     power = values["power"] if "power" in values else np.abs(values["voltage"] * values["current"])
     if power.min() < -NEGATIVE * np.abs(power).max():
-        place = file.places[int(np.argmin(power))]
-        least = f"{power.min():.4g} W, expected what the thruster takes, 0 or more"
-        raise DataError(f"{place}: the power is {least}")
+        source = file.sources[int(np.argmin(power))]
+        shown = f"{power.min():.4g} W, expected what the thruster takes, 0 or more"
+        raise DataError(f"{source}: the power is {shown}")
     rows = {"command": command, "force": force, "power": power}
     rows |= {name: values[name] for name in values if name in ("voltage", "torque")}
-    apart = by_voltage(rows, command) if "voltage" in rows else [rows]
-    return [_signed(each, COMMANDS[kind], notes) for each in apart]
+    by_level = by_voltage(rows, command) if "voltage" in rows else [rows]
+    return [_with_signs(level, COMMANDS[kind], notes) for level in by_level]
 
 
-def _signed(rows: Rows, unit: str, notes: list[str]) -> Rows:
-    """Rows whose forces have signs: where they are sizes alone, those below the neutral command
-    push back."""
+def _with_signs(rows: Rows, unit: str, notes: list[str]) -> Rows:
+    """Rows whose forces have signs: where all are of one sign, and the thruster pushes on both
+    sides of its neutral command, those below it count as negative."""
     command = rows["command"]
     force = rows["force"]
     size = np.abs(force)
@@ -245,7 +301,7 @@ def _signed(rows: Rows, unit: str, notes: list[str]) -> Rows:
         return rows
     neutral = float(np.median(command[size <= max(UNSIGNED * size.max(), size.min())]))
     sides = command < neutral, command > neutral
-    if not all(size[own].max(initial=0.0) > PUSHES * size.max() for own in sides):
+    if not all(size[side].max(initial=0.0) > PUSHING * size.max() for side in sides):
         return rows
     which = "sizes alone" if force.max() > -force.min() else "negative alone"
     notes.append(
@@ -256,6 +312,7 @@ def _signed(rows: Rows, unit: str, notes: list[str]) -> Rows:
 
 
 def _checked(values: Rows, kind: str, source: str, notes: tuple[str, ...]) -> BenchData:
+    """The bench of rows; an error where no thruster can be fitted to them."""
     command = values["command"]
     force = values["force"]
     power = values["power"]

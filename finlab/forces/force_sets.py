@@ -28,7 +28,7 @@ from finlab.actuators.kinds import groups_of, laws_of
 from finlab.actuators.response import Plane, Response
 from finlab.arrays import Array
 from finlab.axes import TURN
-from finlab.core.calls import planes, reach
+from finlab.core.ray_reach import block_of_planes, ray_reach
 from finlab.layout import Layout
 from finlab.layout.effectiveness import own_effectiveness
 from finlab.physics.plant import plant_of
@@ -123,7 +123,7 @@ class ForceSets(NamedTuple):
             self.effectiveness / unit[:, None, None, None]
         )
         ends[..., :m] = origin / unit[:, None], ray
-        size, normal, force = reach(self.block, own, ends[0], ends[1], close)
+        size, normal, force = ray_reach(self.block, own, ends[0], ends[1], close)
         return size * unit, normal[:, :m], np.where(self.radius[..., None] > 0.0, force, 0.0)
 
     def farthest(self, normal: Array) -> tuple[Array, Array]:
@@ -188,7 +188,7 @@ def force_sets(
 
 def assembled(shapes: Sequence[Sequence[Shape]], effectiveness: Array) -> ForceSets:
     """Returns R robots with shapes (R, n) and wrenches (R, n, 3, 6) of 1 N along their own axes."""
-    numbers = [planes(len(shapes[0]))]
+    numbers = [block_of_planes(len(shapes[0]))]
     fields = []
     end = len(numbers[0])
     for shape in (shape for robot in shapes for shape in robot):

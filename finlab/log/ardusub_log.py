@@ -1,5 +1,6 @@
-"""Logs of ArduSub (DataFlash), indexed by pymavlink and read as columns: demands, pulses,
-parameters.
+"""Reads logs of ArduSub (DataFlash): demands, pulses and parameters.
+
+pymavlink indexes the messages, and numpy reads them as columns.
 
 Demands of roll, pitch, yaw and throttle are those of RATE, forward and lateral those of the pilot
 (RCIN, channels RCMAP_*), which no other message holds. An output of 1500 us is rest, 400 us more or
@@ -7,94 +8,153 @@ less full (ArduSub, `AP_Motors6DOF`).
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.exchange.motor_factors import read_parameters_of_ardusub
-from finlab.log.recorded import CUT, Event, Recorded, Series, silent
+from finlab.log.recorded import TRUNCATED, Event, LogRecord, Series, silenced
 
 MAGIC = b"\xa3\x95"
+"""The first bytes of each message, and so of a file."""
+HEAD_BYTES = 3
+"""Bytes before the values of a message: MAGIC and its kind."""
 REST_US = 1500.0
+"""Pulse of a motor at rest [us]."""
 FULL_US = 400.0
-FIRST_MOTOR, MOTORS, CHANNELS = 33, 8, 14
-"""Function of the output of motor 1, most motors, and channels of one message of outputs."""
-WORTH = re.compile(r"fail|leak|lost|error|crash|bad |low", re.IGNORECASE)
-"""Words by which a message is told."""
-VEHICLE = re.compile(r"(Ardu(?!Sub)|Blimp|AntennaTracker)\w*(?= V\d)")
-"""How a message begins by which another vehicle of ArduPilot names itself."""
-WANTED = ("PARM", "RATE", "CTUN", "RCOU", "RCIN", "ESC", "MSG", "ERR")
-STICKS = {"FORWARD": 5, "LATERAL": 6}
-"""Demand of the pilot -> its usual channel."""
+"""Pulse of a motor at full thrust, above or below the one at rest [us]."""
+FIRST_MOTOR = 33
+"""SERVOn_FUNCTION of the output of motor 1; the next motors have the next numbers."""
+MOTORS = 8
+"""Most motors."""
+CHANNELS = 14
+"""Channels of one message of outputs."""
+REPORTED = re.compile(r"fail|leak|lost|error|crash|bad |low", re.IGNORECASE)
+"""Words of messages that become events."""
+OTHER_VEHICLE = re.compile(r"(Ardu(?!Sub)|Blimp|AntennaTracker)\w*(?= V\d)")
+"""The beginning of a message by which another vehicle of ArduPilot names itself."""
+MESSAGES = ("PARM", "RATE", "CTUN", "RCOU", "RCIN", "ESC", "MSG", "ERR")
+STICK_CHANNELS = {"FORWARD": 5, "LATERAL": 6}
+"""Demands of the pilot, and their default channels."""
 Columns = dict[str, Any]
+"""Columns of one kind of message by name, and the times [s] under `time`."""
 
 
-def read_dataflash(path: Path) -> Recorded:
-    """Reads a log of ArduSub. Raises DataError: it lacks demands; any error: it is damaged."""
-    tables, complete = _tables(path)
-    messages = [*_rows(tables, "MSG", "time", "Message")]
-    if other := next((match for _, words in messages if (match := VEHICLE.match(words))), None):
-        raise DataError(
-            f"{path}: is a log of {other[0]}, expected one of ArduSub, whose demands are known"
-        )
-    if (rate := tables.get("RATE")) is None:
-        has = ", ".join(sorted(tables)) or "nothing"
-        lacks = f"holds no RATE, expected the demands of ArduSub; it has {has}"
-        raise DataError(f"{path}: {lacks}; set LOG_BITMASK so that it logs attitude rates")
-    parameters = {name: float(value) for name, value in _rows(tables, "PARM", "Name", "Value")}
-    time = rate["time"]
-    throttle = rate.get("AOut")
-    sticks = tables.get("RCIN", {})
-    if throttle is None and (control := tables.get("CTUN")):
-        throttle = _held(control, "ThO", time)[:, 0]
-    heave = (
-        np.zeros(len(time)) if throttle is None else 2.0 * np.asarray(throttle, np.float64) - 1.0
-    )
-    channels = {name: int(parameters.get(f"RCMAP_{name}", usual)) for name, usual in STICKS.items()}
-    forward, lateral = (_stick(sticks, parameters, channel, time) for channel in channels.values())
-    setpoints = [forward, -lateral, heave, rate["ROut"], -rate["POut"], -rate["YOut"]]
-    record = Recorded("ardusub", Series.of(time, np.stack(setpoints, axis=1)))
-    if not complete:
-        record.notes.append(CUT)
-    lacking = [name for name, channel in channels.items() if f"C{channel}" not in sticks]
-    for name in lacking:
-        how = f"log RCIN, channel {channels[name]} (LOG_BITMASK)"
-        record.asks.append(f"It holds no {name.lower()} demand: that axis is not judged; {how}.")
-    if len(lacking) < len(channels):
-        how = "modes that steer them log none"
-        record.notes.append(f"Demands forward and lateral are the pilot's (RCIN); {how}.")
-    _outputs(record, tables, parameters)
+def read_dataflash(path: Path) -> LogRecord:
+    """Reads a log of ArduSub.
+
+    Args:
+        path: the file.
+
+    Raises:
+        DataError: it lacks demands, or is of another vehicle.
+        Exception: of any class, where the file is damaged.
+    """
+    tables, is_complete = _read_tables(path)
+    messages = [*_message_rows(tables, "MSG", "time", "Message")]
+    rates = _checked_rates(path, tables, [words for _, words in messages])
+    parameters = {
+        name: float(value) for name, value in _message_rows(tables, "PARM", "Name", "Value")
+    }
+    record = LogRecord("ardusub", _demands(tables, rates, parameters))
+    if not is_complete:
+        record.notes.append(TRUNCATED)
+    _note_sticks(record, tables, parameters)
+    _read_outputs(record, tables, parameters)
     frame = {
         name: value for name, value in parameters.items() if name.startswith(("FRAME_", "MOT_"))
     }
     if record.describe(read_parameters_of_ardusub, frame, path.stem):
         guesses = "guesses are taken; name the robot by --robot LAYOUT"
         record.lacking.append(f"A frame of ArduSub has no arms and no newtons: {guesses}.")
-    record.events += [Event(at, words) for at, words in messages if WORTH.search(words)]
-    record.events += [
-        Event(at, f"error {code} of ArduPilot's subsystem {of}")
-        for at, of, code in _rows(tables, "ERR", "time", "Subsys", "ECode")
-    ]
+    for time, words in messages:
+        if REPORTED.search(words):
+            record.events.append(Event(time, words))
+    for time, subsystem, code in _message_rows(tables, "ERR", "time", "Subsys", "ECode"):
+        words = f"error {code} of ArduPilot's subsystem {subsystem}"
+        record.events.append(Event(time, words))
     return record
 
 
-def _rows(tables: dict[str, Columns], name: str, *columns: str) -> Iterator[tuple[Any, ...]]:
+def _checked_rates(path: Path, tables: dict[str, Columns], messages: list[str]) -> Columns:
+    """The columns of RATE; an error where the log is of another vehicle, or has none."""
+    for words in messages:
+        vehicle = OTHER_VEHICLE.match(words)
+        if vehicle:
+            raise DataError(
+                f"{path}: is a log of {vehicle[0]}, expected one of ArduSub, whose demands are "
+                "known"
+            )
+    if "RATE" not in tables:
+        present = ", ".join(sorted(tables)) or "nothing"
+        lacks = f"holds no RATE, expected the demands of ArduSub; it has {present}"
+        raise DataError(f"{path}: {lacks}; set LOG_BITMASK so that it logs attitude rates")
+    return tables["RATE"]
+
+
+def _stick_channels(parameters: dict[str, float]) -> dict[str, int]:
+    """The channel of each demand of the pilot."""
+    return {
+        name: int(parameters.get(f"RCMAP_{name}", default))
+        for name, default in STICK_CHANNELS.items()
+    }
+
+
+def _demands(tables: dict[str, Columns], rates: Columns, parameters: dict[str, float]) -> Series:
+    """Demands (N, 6), FLU, -1 to 1, at the times of RATE; ArduSub's roll is FLU's, its pitch and
+    yaw have the other sign, and its throttle goes from 0 to 1."""
+    time = rates["time"]
+    throttle = rates.get("AOut")
+    if throttle is None and "CTUN" in tables:
+        throttle = _values_at(tables["CTUN"], "ThO", time)[:, 0]
+    heave = np.zeros(len(time))
+    if throttle is not None:
+        heave = 2.0 * np.asarray(throttle, np.float64) - 1.0
+    channels = _stick_channels(parameters)
+    sticks = tables.get("RCIN", {})
+    forward = _stick(sticks, parameters, channels["FORWARD"], time)
+    lateral = _stick(sticks, parameters, channels["LATERAL"], time)
+    setpoints = [forward, -lateral, heave, rates["ROut"], -rates["POut"], -rates["YOut"]]
+    return Series.of(time, np.stack(setpoints, axis=1))
+
+
+def _note_sticks(
+    record: LogRecord, tables: dict[str, Columns], parameters: dict[str, float]
+) -> None:
+    """Adds sentences on the demands of the pilot, and on those that the log lacks."""
+    channels = _stick_channels(parameters)
+    sticks = tables.get("RCIN", {})
+    missing = [name for name, channel in channels.items() if f"C{channel}" not in sticks]
+    for name in missing:
+        remedy = f"log RCIN, channel {channels[name]} (LOG_BITMASK)"
+        record.asks.append(f"It holds no {name.lower()} demand: that axis is not judged; {remedy}.")
+    if len(missing) < len(channels):
+        reason = "modes that steer them log none"
+        record.notes.append(f"Demands forward and lateral are the pilot's (RCIN); {reason}.")
+
+
+def _message_rows(
+    tables: dict[str, Columns], name: str, *columns: str
+) -> Iterator[tuple[Any, ...]]:
     """Rows of messages, which may be none; bytes as text."""
     table = tables.get(name) or dict.fromkeys(columns, np.empty(0))
     for row in zip(*(table[column].tolist() for column in columns), strict=True):
         yield tuple(v.decode("utf-8", "replace") if isinstance(v, bytes) else v for v in row)
 
 
-def _tables(path: Path) -> tuple[dict[str, Columns], bool]:
-    """Columns of the wanted messages by their names, and whether the last message is whole.
-    pymavlink says where they lie, numpy reads them all at once."""
+def _read_tables(path: Path) -> tuple[dict[str, Columns], bool]:
+    """Columns of the MESSAGES by name, and whether the last message of the file is whole.
+
+    pymavlink finds where messages lie; numpy reads all of one kind at once.
+    """
     from pymavlink import DFReader
 
-    class Index(silent(DFReader).DFReader_binary):  # type: ignore[misc]  # it ships no types
+    class Index(silenced(DFReader).DFReader_binary):  # type: ignore[misc]  # it ships no types
         init_arrays_fast = DFReader.DFReader_binary.init_arrays  # the fast one prints past Python
 
         def init_clock(self) -> None:
@@ -103,73 +163,93 @@ def _tables(path: Path) -> tuple[dict[str, Columns], bool]:
     tables = {}
     with Index(str(path)) as log:
         content = np.frombuffer(bytes(log.data_map), np.uint8)
-        ends = [
-            log.offsets[kind][-1] + form.len
-            for kind, form in log.formats.items()
-            if log.offsets[kind]
-        ]
-        for name in WANTED:
-            if (form := log.formats.get(log.name_to_id.get(name))) is None:
+        message_ends = []
+        for kind, message in log.formats.items():
+            if log.offsets[kind]:
+                message_ends.append(log.offsets[kind][-1] + message.len)
+        for name in MESSAGES:
+            message = log.formats.get(log.name_to_id.get(name))
+            if message is None:
                 continue
-            codes = [DFReader.FORMAT_TO_STRUCT[letter] for letter in form.format]
-            kinds = [f"S{code[:-1]}" if code.endswith("s") else f"<{code}" for code, _, _ in codes]
-            kind = np.dtype([*zip(form.columns, kinds, strict=True)])
-            starts = np.asarray(log.offsets[form.type], np.intp) + 3
-            starts = starts[starts + kind.itemsize <= len(content)]
-            rows = content[starts[:, None] + np.arange(kind.itemsize)].view(kind)[:, 0]
-            if len(rows):
-                units = zip(form.columns, codes, strict=True)
-                tables[name] = {
-                    column: rows[column] * unit if unit else rows[column]
-                    for column, (_, unit, _) in units
-                }
-                tables[name]["time"] = tables[name]["TimeUS"] * 1e-6
-    return tables, max(ends, default=0) <= len(content)
+            codes = [DFReader.FORMAT_TO_STRUCT[letter] for letter in message.format]
+            table = _read_columns(content, message.columns, codes, log.offsets[message.type])
+            if table:
+                table["time"] = table["TimeUS"] * 1e-6
+                tables[name] = table
+    return tables, max(message_ends, default=0) <= len(content)
+
+
+def _read_columns(
+    content: NDArray[np.uint8], names: Sequence[str], codes: Sequence[Any], offsets: Sequence[int]
+) -> Columns:
+    """Columns of one kind of message; empty where no whole message is in the file.
+
+    Args:
+        content: the bytes of the file.
+        names: names of the columns.
+        codes: of each its code of `struct`, its unit or None, and its type.
+        offsets: where the messages begin.
+    """
+    dtypes = [f"S{code[:-1]}" if code.endswith("s") else f"<{code}" for code, _, _ in codes]
+    row_type = np.dtype([*zip(names, dtypes, strict=True)])
+    starts = np.asarray(offsets, np.intp) + HEAD_BYTES
+    starts = starts[starts + row_type.itemsize <= len(content)]
+    rows = content[starts[:, None] + np.arange(row_type.itemsize)].view(row_type)[:, 0]
+    if not len(rows):
+        return {}
+    columns = {}
+    for name, (_, unit, _) in zip(names, codes, strict=True):
+        columns[name] = rows[name] * unit if unit else rows[name]
+    return columns
 
 
 def _stick(sticks: Columns, parameters: dict[str, float], channel: int, time: Array) -> Array:
-    """What a stick of the pilot asked for at times (N,), -1 to 1; NaN where its channel is not
+    """The demand of a stick of the pilot at times (N,), -1 to 1; NaN where its channel is not
     logged."""
-    if (pulses := sticks.get(f"C{channel}")) is None:
+    pulses = sticks.get(f"C{channel}")
+    if pulses is None:
         return np.full(len(time), np.nan)
-    least, rest, most = (
-        parameters.get(f"RC{channel}_{key}", value)
-        for key, value in (("MIN", 1100), ("TRIM", 1500), ("MAX", 1900))
-    )
-    ends = np.maximum.accumulate([least, rest, most])
-    share = np.interp(np.where(pulses > 0, pulses, rest), ends, [-1.0, 0.0, 1.0])
+    minimum = parameters.get(f"RC{channel}_MIN", 1100)
+    trim = parameters.get(f"RC{channel}_TRIM", 1500)
+    maximum = parameters.get(f"RC{channel}_MAX", 1900)
+    pulse_points = np.maximum.accumulate([minimum, trim, maximum])
+    share = np.interp(np.where(pulses > 0, pulses, trim), pulse_points, [-1.0, 0.0, 1.0])
     sign = -1.0 if parameters.get(f"RC{channel}_REVERSED", 0) else 1.0
     return np.nan_to_num(Series.of(sticks["time"], sign * share[:, None]).at(time)[:, 0])
 
 
-def _outputs(record: Recorded, tables: dict[str, Columns], parameters: dict[str, float]) -> None:
-    """Shares of full output of the motors, as their frame says which way they push, and what ESCs
-    say."""
-    if (pulses := tables.get("RCOU")) is None:
+def _read_outputs(
+    record: LogRecord, tables: dict[str, Columns], parameters: dict[str, float]
+) -> None:
+    """Adds the motors' shares of full output, signed as their frame has them, and their speeds by
+    ESCs."""
+    pulses = tables.get("RCOU")
+    if pulses is None:
         return
     functions = {int(parameters.get(f"SERVO{i}_FUNCTION", 0)): i for i in range(CHANNELS, 0, -1)}
-    if not any(FIRST_MOTOR <= each < FIRST_MOTOR + MOTORS for each in functions):
+    if not any(FIRST_MOTOR <= function < FIRST_MOTOR + MOTORS for function in functions):
         functions = {FIRST_MOTOR + i: i + 1 for i in range(MOTORS)}
-        how = "channel n is motor n"
-        record.notes.append(f"It says of no output that it is a motor's (SERVOn_FUNCTION): {how}.")
+        rule = "channel n is motor n"
+        record.notes.append(f"It says of no output that it is a motor's (SERVOn_FUNCTION): {rule}.")
     time = pulses["time"]
     escs = tables.get("ESC", {})
     shares = []
     speeds = []
     for motor in range(MOTORS):
         channel = functions.get(FIRST_MOTOR + motor, 0)
-        if (pulse := pulses.get(f"C{channel}")) is None:
+        pulse = pulses.get(f"C{channel}")
+        if pulse is None:
             break
         sign = parameters.get(f"MOT_{motor + 1}_DIRECTION", 1.0)
         shares.append(np.where(pulse > 0, sign * (pulse - REST_US) / FULL_US, np.nan))
         rows = escs.get("Instance", np.empty(0)) == channel - 1
         speed = np.full((len(time), 1), np.nan)
-        speeds.append(_held(escs, "RPM", time, rows) if rows.any() else speed)
+        speeds.append(_values_at(escs, "RPM", time, rows) if rows.any() else speed)
     if shares:
         record.outputs = Series.of(time, np.stack(shares, axis=1))
         record.turns = Series.of(time, np.hstack(speeds))
 
 
-def _held(table: Columns, column: str, time: Array, rows: Any = slice(None)) -> Array:
-    """What a column held at times (N,), as (N, 1)."""
+def _values_at(table: Columns, column: str, time: Array, rows: Any = slice(None)) -> Array:
+    """The last values of a column at times (N,), as (N, 1)."""
     return Series.of(table["time"][rows], table[column][rows][:, None]).at(time)

@@ -15,13 +15,13 @@ from finlab.layout.save import layout_to_dict
 from finlab.log.replay import Replay
 from finlab.research.evaluation.document import three
 
-HELD = 0.02
+HELD_SHARE = 0.02
 """Share of what was missing along an axis that a replay which holds it may miss."""
 
 
 @dataclass(frozen=True)
 class Spell:
-    """A time over which axes were lost."""
+    """A stretch of time over which axes were lost."""
 
     start: float
     """On the log's clock [s]."""
@@ -40,7 +40,7 @@ class Spell:
 
 @dataclass(frozen=True, eq=False)
 class Timeline:
-    """The log in pieces, as means over each."""
+    """Means over K pieces of the log."""
 
     time: Array
     """Begin of each piece (K,) [s]."""
@@ -56,8 +56,10 @@ class Timeline:
 
 @dataclass(frozen=True, eq=False)
 class Judgement:
-    """What a robot could not, and what would have held it; an impulse is the integral over time of
-    a size."""
+    """The wrenches that a robot lacked, and the method that would have delivered them.
+
+    An impulse is the integral over time of a size.
+    """
 
     source: str
     """Name of the file."""
@@ -110,14 +112,21 @@ class Judgement:
         if self.axis is None:
             return None
         i = AXES.index(self.axis)
-        able = [each for each in self.replays if each.lost == self.without]
-        held = [each for each in able if each.missing[i] <= HELD * self.missing[i]]
-        price = {each: (round(sum(each.missing / self.scale), 3), each.watts) for each in held}
-        return min(held, key=lambda each: (each.robot != "as it is", *price[each]), default=None)
+        holding = [
+            replay
+            for replay in self.replays
+            if replay.lost == self.without and replay.missing[i] <= HELD_SHARE * self.missing[i]
+        ]
+
+        def rank(replay: Replay) -> tuple[bool, float, float]:
+            missing = round(sum(replay.missing / self.scale), 3)
+            return replay.robot != "as it is", missing, replay.watts
+
+        return min(holding, key=rank, default=None)
 
     @property
     def sentence(self) -> str:
-        """The answer."""
+        """The judgement in one sentence."""
         if self.axis is None:
             return (
                 f"No axis was lost in {three(self.seconds)} s: no actuator at a limit cut a demand."
@@ -135,23 +144,28 @@ class Judgement:
         )
 
     def _remedy(self, i: int) -> str:
-        best = self.held_by or min(
-            self.replays, key=lambda r: (r.lost != self.without, r.missing[i])
-        )
-        where = "" if best.lost is None else f" without {best.lost}"
-        if self.held_by is None:
-            where = where or (", on the improved layout," if best.robot == "improved" else "")
+        """A clause on the replay that would have held axis i, and what it costs on other axes; or
+        on the one that comes nearest."""
+        best = self.held_by
+        if best is None:
+            best = min(self.replays, key=lambda r: (r.lost != self.without, r.missing[i]))
+            where = ", on the improved layout," if best.robot == "improved" else ""
+            if best.lost is not None:
+                where = f" without {best.lost}"
             misses = f"comes nearest and misses {amount(best.missing, i)}"
             return f"no policy would have held it; {best.name}{where} {misses}"
-        where = where or " on the improved layout, and nothing on this one" * (
-            best.robot == "improved"
-        )
-        more = np.subtract(best.missing, self.missing)
-        least = HELD * self.missing[i] * self.scale / self.scale[i]
-        price = [f"{amount(more, int(k))} of {MOTIONS[k]}" for k in np.flatnonzero(more > least)]
-        return f"{best.name} would have held it{where}" + (
-            f", for {' and '.join(price)}" if price else ""
-        )
+        where = ""
+        if best.lost is not None:
+            where = f" without {best.lost}"
+        elif best.robot == "improved":
+            where = " on the improved layout, and nothing on this one"
+        excess = np.subtract(best.missing, self.missing)
+        threshold = HELD_SHARE * self.missing[i] * self.scale / self.scale[i]
+        costs = []
+        for k in np.flatnonzero(excess > threshold).tolist():
+            costs.append(f"{amount(excess, k)} of {MOTIONS[k]}")
+        clause = f", for {' and '.join(costs)}" if costs else ""
+        return f"{best.name} would have held it{where}{clause}"
 
     def to_dict(self) -> dict[str, Any]:
         """Returns all of it as numbers, strings, lists and None, for JSON."""
@@ -162,5 +176,5 @@ class Judgement:
 
 
 def amount(impulse: Sequence[float] | Array, axis: int) -> str:
-    """What an impulse (6,) has along an axis, in words."""
+    """Returns the component of an impulse (6,) along an axis, with its unit."""
     return f"{three(impulse[axis])} {UNITS[axis]} s"

@@ -1,5 +1,5 @@
-"""Judges a log: what its robot could not, what it gave instead, and which policy would have held
-it."""
+"""Judges a log: when axes were lost, at which limits, and which method or policy would have held
+them."""
 
 from collections.abc import Sequence
 
@@ -14,38 +14,47 @@ from finlab.arrays import Array
 from finlab.axes import AXES, Axis, axes_in
 from finlab.errors import FinlabError
 from finlab.layout import Layout
-from finlab.log.answers import answers_to
+from finlab.log.demand_answers import answers_to
 from finlab.log.judgement import Judgement, Spell, Timeline
-from finlab.log.read import Log, robot_rest
+from finlab.log.read import Log, rest_command
 from finlab.log.recorded import Event
 from finlab.log.replay import demands_of, replay, six
 from finlab.physics.objective import judged_power, yardstick
 from finlab.physics.plant import plant_of
 
-CHUNK = 8192
-LOST = 0.01
+CHUNK_ROWS = 8192
+"""Samples whose wrenches are computed at once: bounds the memory."""
+LOST_SHARE = 0.01
 """Share of the yardstick from which on a missing wrench counts as an axis lost."""
-OFF = 0.05
-"""Share of what was asked for that may be missing with no actuator at a limit before it is said."""
-DEAD = 0.1
-"""Least share of the square of what was away that a dead thruster explains, and most that none
-does."""
+UNEXPLAINED_SHARE = 0.05
+"""Share of the demand that may be missing with no actuator at a limit before a note says it."""
+DEAD_SHARE = 0.1
+"""Least share of the squared deviation that a dead thruster explains, and most that remains
+unexplained."""
 MERGED_S = 0.5
-"""Losses that are no further apart are one spell."""
-MOST_SPELLS, BINS = 200, 1000
-"""Most spells that are told, and pieces of a timeline."""
-HARDEST, ROUNDS = 8, 8
-"""Demands that an improved layout is to meet, and rounds of the search for it."""
-USUAL = Policy("priority").order
+"""Longest break within one spell [s]."""
+MAX_SPELLS = 200
+"""Most spells of a judgement: those that lost most."""
+TIMELINE_PIECES = 1000
+"""Most pieces of a timeline."""
+MISSION_DEMANDS = 8
+"""Demands that an improved layout is to meet: the hardest ones."""
+SEARCH_ROUNDS = 8
+"""Rounds of the search for it."""
+DEFAULT_ORDER = Policy("priority").order
+"""Order of the axes of policy `priority` where none is given."""
 Flags = NDArray[np.bool_]
+"""Truth values, by samples and actuators."""
 
 
 def judge(log: Log, *, priority: Sequence[Sequence[Axis]] = (), improve: bool = True) -> Judgement:
-    """Returns what the log's robot could not, and replays its demands by other methods and
-    policies, with each actuator lost, and on an improved layout.
+    """Returns the judgement of a log: which axes its robot lost, and what would have held them.
+
+    The demands are replayed by other methods and policies, with each actuator lost, and on an
+    improved layout.
 
     Args:
-        log: of `read_log`.
+        log: the log, of `read_log`.
         priority: groups of axes for policy `priority`, most important first; the axis that lost
             most comes first when empty.
         improve: whether to search for a better layout.
@@ -61,7 +70,9 @@ def judge(log: Log, *, priority: Sequence[Sequence[Axis]] = (), improve: bool = 
     notes = [*log.notes]
     asked = span @ np.abs(account.demand)
     axis = AXES[int(np.argmax(impulse / scale))] if account.lost.any() else None
-    if ((span @ np.abs(account.away) - impulse) / scale).max() > OFF * (asked / scale).max():
+    if ((span @ np.abs(account.deviation) - impulse) / scale).max() > UNEXPLAINED_SHARE * (
+        asked / scale
+    ).max():
         notes.append(
             "With no actuator at a limit the outputs gave another wrench than was asked for: "
             "forces of the "
@@ -73,7 +84,7 @@ def judge(log: Log, *, priority: Sequence[Sequence[Axis]] = (), improve: bool = 
     if improved is not None:
         replays += replay(improved, log.demand, span, policies, improved=True)
     spells = account.spells()
-    worst = sorted(spells, key=lambda spell: -float((spell.missing / scale).sum()))[:MOST_SPELLS]
+    worst = sorted(spells, key=lambda spell: -float((spell.missing / scale).sum()))[:MAX_SPELLS]
     return Judgement(
         source=log.source,
         robot=log.robot,
@@ -91,54 +102,58 @@ def judge(log: Log, *, priority: Sequence[Sequence[Axis]] = (), improve: bool = 
         replays=tuple(replays),
         improved=improved,
         timeline=account.timeline(),
-        events=tuple((event.time, _words(log, event)) for event in log.events),
+        events=tuple((event.time, _event_words(log, event)) for event in log.events),
         notes=tuple(notes),
         asks=log.asks,
     )
 
 
 class Account:
-    """What was asked for in a log of N samples, given and missing; n actuators."""
+    """Demanded, delivered and missing wrenches of a log of N samples; n actuators."""
 
     def __init__(self, log: Log) -> None:
+        """Takes the log, and computes all fields."""
         self.log = log
         self.scale = yardstick(log.robot)
         self.demand = np.nan_to_num(log.demand)
         """(N, 6) [N, N m]."""
         self.watts: float | None = None
         """Mean power of the outputs [W]; None without outputs."""
-        self.full = self.ended = np.zeros((len(log), log.robot.n), bool)
+        self.is_full = self.is_at_arc_end = np.zeros((len(log), log.robot.n), bool)
         """Which actuators were at full thrust, and which at the end of their arc (N, n)."""
         self.delivered = self._delivered()
         """Wrench of the outputs (N, 6)."""
-        self.away = np.where(np.isfinite(log.demand), self.demand - self.delivered, 0.0)
+        self.deviation = np.where(np.isfinite(log.demand), self.demand - self.delivered, 0.0)
         """Demand less that (N, 6)."""
-        self.at = self.full | self.ended
+        self.is_limited = self.is_full | self.is_at_arc_end
         self.dead = self._dead()
         """Actuators (n,) at rest all along, to whom most of what was away is due."""
         command = np.zeros((1, log.robot.n, 3)) if log.command is None else log.command
         self.gone = np.isnan(command).any(axis=-1) & ~self.dead
         """Which others were stopped, or stood still (N, n)."""
-        self.missing = np.where((self._bound() | self.dead.any())[:, None], self.away, 0.0)
+        self.missing = np.where((self._bound() | self.dead.any())[:, None], self.deviation, 0.0)
         """The same where a limit is why (N, 6)."""
-        self.lost = np.abs(self.missing) > LOST * self.scale
+        self.lost = np.abs(self.missing) > LOST_SHARE * self.scale
         """Which axes were lost (N, 6)."""
         self.impulse = log.span @ np.abs(self.missing)
         """(6,) [N s, N m s]."""
 
     def _delivered(self) -> Array:
+        """Wrenches (N, 6) of the outputs by the laws; without outputs by what the autopilot logged
+        as unallocated, or else by what its method gives. Sets flags and power on the way."""
         log = self.log
-        if (command := log.command) is None:
+        command = log.command
+        if command is None:
             if log.unmet is not None:
                 return self.demand - log.unmet
             method = "dual" if log.form == "ros" else log.form
             command = answers_to(Allocator(log.robot, method), log.demand).command
-        self.full, self.ended = at_limits(log.robot, command)
+        self.is_full, self.is_at_arc_end = at_limits(log.robot, command)
         plant = plant_of(log.robot)
         delivered = np.empty((len(log), 6))
         energy = 0.0
-        for k in range(0, len(log), CHUNK):
-            rows = slice(k, k + CHUNK)
+        for k in range(0, len(log), CHUNK_ROWS):
+            rows = slice(k, k + CHUNK_ROWS)
             delivered[rows] = plant.wrench(command[rows])
             energy += float(log.span[rows] @ judged_power(plant, command[rows]))
         if log.command is not None:
@@ -150,55 +165,66 @@ class Account:
         thruster which does not reverse or was stopped, or, in a log without outputs, where the
         autopilot says so."""
         log = self.log
-        bound = self.at.any(axis=1)
+        bound = self.is_limited.any(axis=1)
         if log.command is not None:
             one_way = (log.robot.lower[:, 0] == 0.0) | (log.robot.upper[:, 0] == 0.0)
-            rests = (log.command[..., 0] == 0.0) & one_way
-            bound |= (rests | np.isnan(log.command).any(axis=-1)).any(axis=1)
+            is_resting = (log.command[..., 0] == 0.0) & one_way
+            bound |= (is_resting | np.isnan(log.command).any(axis=-1)).any(axis=1)
         elif log.unmet is not None:
             bound |= log.unmet.any(axis=1)
         return np.asarray(bound)
 
     def _dead(self) -> Flags:
-        """Actuators (n,) of one number, such as thrusters, that were at rest in all of the log, and
-        whose forces are most of what was away while no actuator was at a limit."""
+        """Dead actuators (n,): of one number, such as thrusters, at rest in all of the log, and
+        with forces that explain most of the deviation while no actuator was at a limit.
+
+        The forces are the least-squares solution of D = F C for the deviations D (M, 6) and the
+        columns C (n, 6) of the actuators at rest, both over the wrench scale.
+        """
         log = self.log
         robot = self.log.robot
         none = np.zeros(robot.n, bool)
         if log.command is None:
             return none
-        rest = (np.nan_to_num(log.command) == robot_rest(robot)).all(axis=(0, 2))
-        rest &= (robot.lower[:, 1:] == robot.upper[:, 1:]).all(axis=1)
-        off = (self.away / self.scale)[~self.at.any(axis=1)]
-        if not rest.any() or np.abs(off).max(initial=0.0) < LOST:
+        is_resting = (np.nan_to_num(log.command) == rest_command(robot)).all(axis=(0, 2))
+        is_resting &= (robot.lower[:, 1:] == robot.upper[:, 1:]).all(axis=1)
+        deviation = (self.deviation / self.scale)[~self.is_limited.any(axis=1)]
+        if not is_resting.any() or np.abs(deviation).max(initial=0.0) < LOST_SHARE:
             return none
-        counts = rest[:, None] & np.isfinite(log.demand).any(axis=0)
-        columns = np.where(counts, plant_of(robot).effectiveness[:, 0] / self.scale, 0.0)
-        force = off @ np.linalg.pinv(columns)
-        size = np.square(off).sum()
+        counted = is_resting[:, None] & np.isfinite(log.demand).any(axis=0)
+        columns = np.where(counted, plant_of(robot).effectiveness[:, 0] / self.scale, 0.0)
+        force = deviation @ np.linalg.pinv(columns)
+        size = np.square(deviation).sum()
         share = np.square(force).sum(axis=0) * np.square(columns).sum(axis=1) / size
-        explained = np.square(off - force @ columns).sum() < DEAD * size
-        return np.asarray(rest & (share > DEAD) & explained)
+        explained = np.square(deviation - force @ columns).sum() < DEAD_SHARE * size
+        return np.asarray(is_resting & (share > DEAD_SHARE) & explained)
 
     def names(self, flags: Flags) -> tuple[str, ...]:
         """Names of the actuators with a flag (n,)."""
-        return tuple(name for name, one in zip(self.log.robot.names, flags, strict=True) if one)
+        return tuple(name for name, flag in zip(self.log.robot.names, flags, strict=True) if flag)
 
     def spells(self) -> list[Spell]:
-        """Times between which axes were lost, without longer breaks."""
-        time = self.log.time
-        span = self.log.span
-        places = np.flatnonzero(self.lost.any(axis=1))
-        apart = time[places[1:]] - (time + span)[places[:-1]] > MERGED_S
-        parts = np.split(places, np.flatnonzero(apart) + 1) if len(places) else []
-        return [self._spell(slice(int(part[0]), int(part[-1]) + 1)) for part in parts]
+        """Stretches of time over which axes were lost; breaks up to MERGED_S belong to them."""
+        start = self.log.time
+        end = start + self.log.span
+        samples = np.flatnonzero(self.lost.any(axis=1))
+        if not len(samples):
+            return []
+        is_break = start[samples[1:]] - end[samples[:-1]] > MERGED_S
+        stretches = np.split(samples, np.flatnonzero(is_break) + 1)
+        return [self._spell(slice(int(rows[0]), int(rows[-1]) + 1)) for rows in stretches]
 
     def _spell(self, rows: slice) -> Spell:
+        """The spell of a range of samples."""
         log = self.log
         lost = self.lost[rows]
         span = log.span[rows]
-        some = np.asarray(lost.any(axis=1))
-        flags = (np.any(each[rows][some], axis=0) for each in (self.full, self.ended))
+        is_losing = np.asarray(lost.any(axis=1))
+        was_full = np.any(self.is_full[rows][is_losing], axis=0)
+        was_at_arc_end = np.any(self.is_at_arc_end[rows][is_losing], axis=0)
+        limits = [f"{name} at rest all along" for name in self.names(self.dead)]
+        limits += [f"{name} stopped" for name in self.names(np.any(self.gone[rows], axis=0))]
+        limits += limit_words(log.robot, was_full, was_at_arc_end)
         return Spell(
             start=float(log.time[rows.start]),
             end=float(log.time[rows.stop - 1] + span[-1]),
@@ -206,59 +232,64 @@ class Account:
             missing=six(span @ np.abs(self.missing[rows]), self.scale),
             asked=six(span @ self.demand[rows] / span.sum(), self.scale),
             gave=six(span @ self.delivered[rows] / span.sum(), self.scale),
-            limits=(
-                *(f"{name} at rest all along" for name in self.names(self.dead)),
-                *(f"{name} stopped" for name in self.names(np.any(self.gone[rows], axis=0))),
-                *limit_words(log.robot, *flags),
-            ),
+            limits=tuple(limits),
         )
 
     def timeline(self) -> Timeline:
         """Means over pieces of the log."""
         span = self.log.span
         n = len(self.log)
-        starts = np.unique(np.linspace(0, n, BINS, endpoint=False).astype(np.intp))
-        columns = (self.demand, self.delivered, self.missing, self.at)
-        sums = [np.add.reduceat(span[:, None] * each, starts) for each in columns]
+        starts = np.unique(np.linspace(0, n, TIMELINE_PIECES, endpoint=False).astype(np.intp))
+        piece_span = np.add.reduceat(span, starts)[:, None]
+
+        def means(values: Array | Flags) -> Array:
+            return np.asarray(np.add.reduceat(span[:, None] * values, starts) / piece_span)
+
         return Timeline(
-            self.log.time[starts], *(each / np.add.reduceat(span, starts)[:, None] for each in sums)
+            time=self.log.time[starts],
+            demand=means(self.demand),
+            given=means(self.delivered),
+            missing=means(self.missing),
+            limits=means(self.is_limited),
         )
 
 
 def _priority(groups: Sequence[Sequence[Axis]], axis: Axis | None) -> Policy:
-    """Policy `priority`: the groups named, or the axis that lost most and then the usual ones."""
+    """Policy `priority` with given groups, or with the axis that lost most before the default
+    ones."""
     if groups:
         check_order(groups, "priority")
         return Policy("priority", order=tuple(tuple(group) for group in groups))
-    rest = (tuple(each for each in group if each != axis) for group in USUAL)
-    return Policy(
-        "priority", order=(*(((axis,),) if axis else ()), *(group for group in rest if group))
-    )
+    order: list[tuple[Axis, ...]] = [] if axis is None else [(axis,)]
+    for group in DEFAULT_ORDER:
+        remaining = tuple(name for name in group if name != axis)
+        if remaining:
+            order.append(remaining)
+    return Policy("priority", order=tuple(order))
 
 
 def _improved(log: Log, scale: Array, notes: list[str]) -> Layout | None:
     """The layout that a search proposes for the demands that miss most, or else are largest."""
-    demands = demands_of(log.demand, log.span, scale, 10 * HARDEST)
+    demands = demands_of(log.demand, log.span, scale, 10 * MISSION_DEMANDS)
     answer = answers_to(Allocator(log.robot), demands.wrench)
     size = np.linalg.norm(np.nan_to_num(demands.wrench) / scale, axis=1)
     order = np.lexsort((-size * demands.span, -np.round(answer.err_norm, 3) * demands.span))
-    mission = np.nan_to_num(demands.wrench[order[:HARDEST]])
+    mission = np.nan_to_num(demands.wrench[order[:MISSION_DEMANDS]])
     try:
-        found = optimize_layout(
-            log.robot, log.robot.names, goal="mission_power", mission=mission, rounds=ROUNDS
+        search = optimize_layout(
+            log.robot, log.robot.names, goal="mission_power", mission=mission, rounds=SEARCH_ROUNDS
         )
     except FinlabError as error:
         notes.append(f"No better layout was searched for: {error}.")
         return None
-    if not found.improved:
+    if not search.improved:
         notes.append("The search found no layout that meets the hardest demands better.")
-    return found.layout if found.improved else None
+    return search.layout if search.improved else None
 
 
-def _words(log: Log, event: Event) -> str:
-    place = event.actuator
-    return (
-        event.words
-        if place is None or place >= log.robot.n
-        else f"{log.robot.names[place]} {event.words}"
-    )
+def _event_words(log: Log, event: Event) -> str:
+    """An event in words, after the name of its actuator."""
+    index = event.actuator
+    if index is None or index >= log.robot.n:
+        return event.words
+    return f"{log.robot.names[index]} {event.words}"

@@ -1,5 +1,4 @@
-"""Logs of PX4 (ULog), read by pyulog: setpoints of thrust and torque, outputs of motors, what was
-left.
+"""Reads logs of PX4 (ULog) by pyulog: setpoints, outputs of motors, and unallocated wrenches.
 
 Setpoints are without unit, in x forward, y right, z down; outputs are shares of CA_ROTORi_CT (PX4,
 messages `vehicle_thrust_setpoint`, `vehicle_torque_setpoint`, `actuator_motors`,
@@ -15,102 +14,135 @@ from numpy.typing import NDArray
 
 from finlab.errors import DataError
 from finlab.exchange.parameters import read_px4
-from finlab.log.recorded import CUT, FLU, Event, Recorded, Series, changes, silent
+from finlab.log.recorded import FLU, TRUNCATED, Event, LogRecord, Series, changes, silenced
 
 MAGIC = b"ULog\x01\x125"
-MOTORS, FIRST_MOTOR, PULSES = 12, 101, 16
-"""Most motors, the number of the first as the function of an output, and most outputs that are
-pulses."""
+"""The first bytes of a file."""
+MAX_MOTORS = 12
+"""Most motors."""
+FIRST_MOTOR = 101
+"""PWM_MAIN_FUNCi of the output of the first motor; the next ones have the next numbers."""
+MAX_PULSES = 16
+"""Most outputs that are pulses."""
 WARNING = ord("4")
-"""Level of a message; more serious ones are below."""
-TOY = 6.5
+"""Level of a warning; more serious messages have lower levels."""
+DEFAULT_CT = 6.5
 """PX4's default of CA_ROTORi_CT, which is no force of any thruster in water."""
+PULSE_MIN_US = 1000.0
+"""PX4's default of PWM_MAIN_MINi [us]."""
+PULSE_MAX_US = 2000.0
+"""PX4's default of PWM_MAIN_MAXi [us]."""
 
 
-def _each(name: str, count: int) -> tuple[str, ...]:
+def _indexed(name: str, count: int) -> tuple[str, ...]:
+    """Names of the columns of an array, whose index is the # in a name."""
     return tuple(name.replace("#", f"[{i}]") for i in range(count))
 
 
 TOPICS = {
-    "vehicle_thrust_setpoint": _each("xyz#", 3),
-    "vehicle_torque_setpoint": _each("xyz#", 3),
-    "actuator_motors": _each("control#", MOTORS),
-    "actuator_outputs": _each("output#", PULSES),
+    "vehicle_thrust_setpoint": _indexed("xyz#", 3),
+    "vehicle_torque_setpoint": _indexed("xyz#", 3),
+    "actuator_motors": _indexed("control#", MAX_MOTORS),
+    "actuator_outputs": _indexed("output#", MAX_PULSES),
     "control_allocator_status": (
-        *_each("unallocated_thrust#", 3),
-        *_each("unallocated_torque#", 3),
+        *_indexed("unallocated_thrust#", 3),
+        *_indexed("unallocated_torque#", 3),
     ),
     "failure_detector_status": ("motor_failure_mask",),
-    "esc_status": ("esc_online_flags", "esc_count", *_each("esc#.esc_rpm", 8)),
+    "esc_status": ("esc_online_flags", "esc_count", *_indexed("esc#.esc_rpm", 8)),
 }
-"""Topic -> the columns that are read."""
+"""Columns that are read, by topic."""
 
 
-def read_ulog(path: Path) -> Recorded:
-    """Reads a log of PX4. Raises DataError: it lacks setpoints; any error: it is damaged."""
+def read_ulog(path: Path) -> LogRecord:
+    """Reads a log of PX4.
+
+    Args:
+        path: the file.
+
+    Raises:
+        DataError: it lacks setpoints.
+        Exception: of any class, where the file is damaged.
+    """
     from pyulog import core
 
     with _File(open(path, "rb", 0)) as file:
-        log = silent(core).ULog(file, [*TOPICS])
-    begin = log.start_timestamp
-    topics = {each.name: _series(each, begin) for each in reversed(log.data_list)}
-    thrust, torque = map(topics.get, list(TOPICS)[:2])
-    if thrust is None or torque is None:
-        raise DataError(
-            f"{path}: holds no {[name for name in TOPICS if name not in topics][0]}, expected the "
-            "setpoints "
-            "that PX4 1.14 and newer log; log them with SDLOG_PROFILE, or take a newer PX4"
-        )
-    parameters = {
-        **log.initial_parameters,
-        **{name: value for _, name, value in log.changed_parameters},
-    }
-    both = np.hstack([thrust.at(torque.time), torque.values]) * FLU
-    record = Recorded("px4", Series(torque.time, both, torque.back), topics.get("actuator_motors"))
-    if record.outputs is None and "actuator_outputs" in topics:
-        record.outputs = _by_pulses(topics["actuator_outputs"], parameters)
-    if unmet := topics.get("control_allocator_status"):
-        record.unmet = Series(unmet.time, unmet.values * FLU)
+        log = silenced(core).ULog(file, [*TOPICS])
+    start = log.start_timestamp
+    topics = {entry.name: _series(entry, start) for entry in reversed(log.data_list)}
+    parameters = dict(log.initial_parameters)
+    for _, name, value in log.changed_parameters:
+        parameters[name] = value
+    outputs = topics.get("actuator_motors")
+    if outputs is None and "actuator_outputs" in topics:
+        outputs = _by_pulses(topics["actuator_outputs"], parameters)
+    record = LogRecord("px4", _setpoints(path, topics), outputs)
+    unallocated = topics.get("control_allocator_status")
+    if unallocated:
+        record.unmet = Series(unallocated.time, unallocated.values * FLU)
     if log.file_corruption:
         record.notes.append("The file is damaged; what could be read was read.")
     elif file.cut:
-        record.notes.append(CUT)
-    if lost := sum(drop.duration for drop in log.dropouts):
-        record.notes.append(f"PX4 says that {lost / 1000:.1f} s are missing from the log.")
-    record.events += [
-        Event((each.timestamp - begin) * 1e-6, each.message)
-        for each in log.logged_messages
-        if each.log_level <= WARNING
-    ]
-    if mask := topics.get("failure_detector_status"):
-        record.events += changes(
-            mask.time, _bits(mask), "failed, says PX4", "works again, says PX4"
-        )
-    if escs := topics.get("esc_status"):
-        known = np.arange(MOTORS) < escs.values[:, 1:2]
-        record.events += changes(
-            escs.time, known & ~_bits(escs), "has an ESC offline", "is online again"
-        )
-        record.turns = Series(escs.time, escs.values[:, 2:])
-    robot = record.describe(
-        read_px4, {k: v for k, v in parameters.items() if k.startswith("CA_")}, path.stem
-    )
-    if robot and {abs(float(parameters.get(f"CA_ROTOR{i}_CT", TOY))) for i in range(robot.n)} == {
-        TOY
-    }:
-        record.lacking.append(
-            f"CA_ROTORi_CT is PX4's default, {TOY} for all, which are no newtons of a thruster; "
-            "name the "
-            "robot by --robot LAYOUT."
-        )
+        record.notes.append(TRUNCATED)
+    lost_ms = sum(dropout.duration for dropout in log.dropouts)
+    if lost_ms:
+        record.notes.append(f"PX4 says that {lost_ms / 1000:.1f} s are missing from the log.")
+    for entry in log.logged_messages:
+        if entry.log_level <= WARNING:
+            record.events.append(Event((entry.timestamp - start) * 1e-6, entry.message))
+    _read_health(record, topics)
+    _describe_robot(record, parameters, path.stem)
     return record
 
 
+def _setpoints(path: Path, topics: dict[str, Series]) -> Series:
+    """Setpoints of thrust and torque (N, 6), FLU, at the times of those of torque."""
+    thrust = topics.get("vehicle_thrust_setpoint")
+    torque = topics.get("vehicle_torque_setpoint")
+    if thrust is None or torque is None:
+        missing = next(name for name in TOPICS if name not in topics)
+        raise DataError(
+            f"{path}: holds no {missing}, expected the setpoints that PX4 1.14 and newer log; log "
+            "them with SDLOG_PROFILE, or take a newer PX4"
+        )
+    setpoints = np.hstack([thrust.at(torque.time), torque.values]) * FLU
+    return Series(torque.time, setpoints, torque.max_jump_back)
+
+
+def _read_health(record: LogRecord, topics: dict[str, Series]) -> None:
+    """Adds failures of motors and of ESCs as events, and the speeds that ESCs report."""
+    failures = topics.get("failure_detector_status")
+    if failures:
+        record.events += changes(
+            failures.time, _bits(failures), "failed, says PX4", "works again, says PX4"
+        )
+    escs = topics.get("esc_status")
+    if escs:
+        is_present = np.arange(MAX_MOTORS) < escs.values[:, 1:2]
+        is_offline = is_present & ~_bits(escs)
+        record.events += changes(escs.time, is_offline, "has an ESC offline", "is online again")
+        record.turns = Series(escs.time, escs.values[:, 2:])
+
+
+def _describe_robot(record: LogRecord, parameters: dict[str, Any], name: str) -> None:
+    """Adds the robot by its parameters CA_*, and a sentence where they hold no newtons."""
+    geometry = {key: value for key, value in parameters.items() if key.startswith("CA_")}
+    robot = record.describe(read_px4, geometry, name)
+    if robot is None:
+        return
+    sizes = {abs(float(parameters.get(f"CA_ROTOR{i}_CT", DEFAULT_CT))) for i in range(robot.n)}
+    if sizes == {DEFAULT_CT}:
+        record.lacking.append(
+            f"CA_ROTORi_CT is PX4's default, {DEFAULT_CT} for all, which are no newtons of a "
+            "thruster; name the robot by --robot LAYOUT."
+        )
+
+
 class _File(io.BufferedReader):
-    """A file that knows whether it ended amid what was read; a message begins with a head of 3
-    bytes."""
+    """A file that notices whether it ended in the middle of a message, whose head has 3 bytes."""
 
     cut = False
+    """Whether it did."""
 
     def read(self, size: int | None = -1) -> bytes:
         data = super().read(size)
@@ -131,9 +163,9 @@ def _series(topic: Any, begin: int) -> Series:
 
 def _bits(series: Series) -> NDArray[np.bool_]:
     """Flags (N, 12) in the first column."""
-    return (np.nan_to_num(series.values[:, :1]).astype(np.int64) >> np.arange(MOTORS) & 1).astype(
-        bool
-    )
+    return (
+        np.nan_to_num(series.values[:, :1]).astype(np.int64) >> np.arange(MAX_MOTORS) & 1
+    ).astype(bool)
 
 
 def _by_pulses(outputs: Series, parameters: dict[str, Any]) -> Series | None:
@@ -143,16 +175,17 @@ def _by_pulses(outputs: Series, parameters: dict[str, Any]) -> Series | None:
     reversing = int(parameters.get("CA_R_REV", 0))
     for i, pulse in enumerate(outputs.values.T, 1):
         motor = int(parameters.get(f"PWM_MAIN_FUNC{i}", 0)) - FIRST_MOTOR
-        least, most = (float(parameters.get(f"PWM_MAIN_{end}{i}", usual)) for end, usual in _ENDS)
-        if 0 <= motor < MOTORS and most > least:
-            share = (pulse - least) / (most - least)
-            share = 2.0 * share - 1.0 if reversing >> motor & 1 else share
-            motors[motor] = np.where(pulse < least, np.nan, np.clip(share, -1.0, 1.0))
+        low = float(parameters.get(f"PWM_MAIN_MIN{i}", PULSE_MIN_US))
+        high = float(parameters.get(f"PWM_MAIN_MAX{i}", PULSE_MAX_US))
+        if 0 <= motor < MAX_MOTORS and high > low:
+            share = (pulse - low) / (high - low)
+            if reversing >> motor & 1:
+                share = 2.0 * share - 1.0
+            motors[motor] = np.where(pulse < low, np.nan, np.clip(share, -1.0, 1.0))
     if not motors or {*motors} != {*range(len(motors))}:
         return None
     return Series(
-        outputs.time, np.stack([motors[motor] for motor in sorted(motors)], axis=1), outputs.back
+        outputs.time,
+        np.stack([motors[motor] for motor in sorted(motors)], axis=1),
+        outputs.max_jump_back,
     )
-
-
-_ENDS = (("MIN", 1000.0), ("MAX", 2000.0))

@@ -1,5 +1,8 @@
-"""Reads a log and poses it for one robot: demands in newtons, outputs as commands of its
-actuators."""
+"""Reads a log for one robot: demands in newtons, and outputs as commands of its actuators.
+
+The readers of the autopilots and of ROS make a `LogRecord` in units of their own; here it gets the
+units of the robot. `judging` judges the result.
+"""
 
 import os
 from collections.abc import Iterator
@@ -20,47 +23,49 @@ from finlab.files.guarded import read_file
 from finlab.layout import Layout, load_layout
 from finlab.log import ardusub_log, px4_log, ros_bag
 from finlab.log.ardusub_log import FULL_US, REST_US
-from finlab.log.recorded import Event, Form, Recorded, Series
+from finlab.log.recorded import Event, Form, LogRecord, Series
 from finlab.physics.objective import yardstick
 
-MOST_BYTES = 1_000_000_000
+MAX_BYTES = 1_000_000_000
 """Largest log."""
-MOST_FORCE = 1e9
+MAX_DEMAND = 1e9
 """Largest demand that is no fault of the file [N, N m]."""
-MOST_SAMPLES = 1_000_000
+MAX_SAMPLES = 1_000_000
 """Most samples of demands: five hours at 50 Hz."""
 GAP_S = 1.0
 """Longest time that a sample holds; what lies beyond it was not logged."""
 
-STILL_S, PUSHES = 1.0, 0.2
-"""How long [s] a thruster is told to push, by this share of its most at least, before it is dead
-for not turning."""
+MIN_STILL_S = 1.0
+"""Time that a thruster is commanded to push without turning after which it counts as stopped
+[s]."""
+PUSHING_SHARE = 0.2
+"""Share of its largest force from which on a command counts as one to push."""
 
 
 @dataclass(frozen=True, eq=False)
 class Log(PlainData):
-    """What a robot was asked for and told, as plain data; wrenches in x forward, y left, z up."""
+    """Demands and commands of a robot over time, as plain data; wrenches are FLU."""
 
     source: str
     """Name of the file."""
     form: Form
-    """Whose log it is: `px4`, `ardusub`, `ros`."""
+    """The program that wrote the log."""
     robot: Layout
-    """By whose laws it is judged."""
+    """The robot by whose laws it is judged."""
     time: Array
     """Of each sample on the log's clock (N,) [s], rising."""
     span: Array
     """How long each held (N,) [s]."""
     demand: Array
-    """Wrench that was asked for (N, 6) [N, N m]; NaN along an axis that does not count."""
+    """Demanded wrenches (N, 6) [N, N m]; NaN along an axis that does not count."""
     command: Array | None
-    """What the actuators were told (N, n, 3), as their laws take it, NaN for one that was stopped;
+    """Commands of the actuators (N, n, 3), as their laws take them; NaN for one that was stopped.
     None where the log holds no outputs."""
     unmet: Array | None
-    """What the autopilot says that it left of each demand (N, 6) [N, N m]; None where it says
-    nothing, or the log holds outputs."""
+    """The part of each demand that the autopilot logged as unallocated (N, 6) [N, N m]; None where
+    it logged none, or the log holds outputs."""
     events: tuple[Event, ...]
-    """What the log says of the robot's health, by time."""
+    """Events of the robot's health, by time."""
     notes: tuple[str, ...]
     """Sentences on how it was read."""
     asks: tuple[str, ...]
@@ -95,64 +100,87 @@ def read_log(
             or the package that reads it is not installed.
         LayoutError: the robot cannot be read, or does not fit the log's motors.
     """
-    place = Path(path)
+    file = Path(path)
     try:
-        record = _recorded(place, demand, outputs)
+        record = _read_record(file, demand, outputs)
     except ModuleNotFoundError as error:
-        raise DataError(f"{place}: {error.name} is not installed; run: {install('logs')}") from None
+        raise DataError(f"{file}: {error.name} is not installed; run: {install('logs')}") from None
     except FinlabError:
         raise
     except Exception as problem:  # of many kinds, by a file that is damaged
         why = f"{type(problem).__name__}: {problem!s:.80}"
-        damaged = f"cannot be read as a log ({why}); it is damaged or of an unknown version"
-        raise DataError(f"{place}: {damaged}") from None
-    known = load_layout(robot) if isinstance(robot, str) else robot or record.layout
-    if known is None:
-        raise DataError(f"{place}: {record.lacking[0]}")
-    if known is record.layout:
+        problem_words = f"cannot be read as a log ({why}); it is damaged or of an unknown version"
+        raise DataError(f"{file}: {problem_words}") from None
+    layout = load_layout(robot) if isinstance(robot, str) else robot or record.layout
+    if layout is None:
+        raise DataError(f"{file}: {record.lacking[0]}")
+    if layout is record.layout:
         record.notes, record.asks = record.notes + record.taken, record.lacking + record.asks
-    return _posed(place.name, record, known, scale)
+    return _log_of_record(file.name, record, layout, scale)
 
 
-def _recorded(place: Path, demand: str | None, outputs: str | None) -> Recorded:
-    folder = place.is_dir()
-    head = b"" if folder else read_file(place, MOST_BYTES, "a log", head=64)
+def _read_record(path: Path, demand: str | None, outputs: str | None) -> LogRecord:
+    """The record of a log, by the reader for its first bytes or its suffix."""
+    is_folder = path.is_dir()
+    head = b"" if is_folder else read_file(path, MAX_BYTES, "a log", head=64)
     if head.startswith(px4_log.MAGIC):
-        return px4_log.read_ulog(place)
+        return px4_log.read_ulog(path)
     if head.startswith(ardusub_log.MAGIC):
-        return ardusub_log.read_dataflash(place)
-    if folder and sum(each.stat().st_size for each in place.iterdir()) > MOST_BYTES:
-        raise DataError(f"{place}: is larger than {MOST_BYTES:,} bytes; cut it")
-    if folder or place.suffix.lower() in ros_bag.ENDS:
-        return ros_bag.read_bag(place, demand, outputs)
-    raise DataError(f"{place}: expected a log of PX4 (.ulg), of ArduSub (.bin), or a bag of ROS 2")
+        return ardusub_log.read_dataflash(path)
+    if is_folder and sum(entry.stat().st_size for entry in path.iterdir()) > MAX_BYTES:
+        raise DataError(f"{path}: is larger than {MAX_BYTES:,} bytes; cut it")
+    if is_folder or path.suffix.lower() in ros_bag.SUFFIXES:
+        return ros_bag.read_bag(path, demand, outputs)
+    raise DataError(f"{path}: expected a log of PX4 (.ulg), of ArduSub (.bin), or a bag of ROS 2")
 
 
-def _sides(own: Layout | None, robot: Layout) -> Array:
-    """1 for each actuator (n,) that pushes as the log's motor in its place does, if the log says
-    that, and -1 for one mounted the other way round. Raises LayoutError: they do not fit."""
-    if own is None or own is robot:
+def _motor_signs(log_robot: Layout | None, robot: Layout) -> Array:
+    """The sign (n,) that turns the output of each motor of the log into that of an actuator.
+
+    It is 1, or -1 for an actuator that is mounted the other way round than the motor.
+
+    Args:
+        log_robot: the robot by the log's parameters; None where they hold none.
+        robot: the robot by whose laws the log is judged.
+
+    Raises:
+        LayoutError: the two do not have the same motors in the same order.
+    """
+    if log_robot is None or log_robot is robot:
         return np.ones(robot.n)
-    if own.n != robot.n:
+    if log_robot.n != robot.n:
         raise LayoutError(
             f"layout {robot.name!r:.60} has {robot.counted}, and the log's parameters have "
-            f"{own.n} motors"
+            f"{log_robot.n} motors"
         )
-    axes = [[getattr(part, "axis", (0.0,) * 3) for part in each.actuators] for each in (own, robot)]
-    along = np.einsum("nk,nk->n", *map(np.array, axes))
-    if (apart := np.abs(along) < 0.5).any():
+    cosine = np.einsum("nk,nk->n", _axes_of(log_robot), _axes_of(robot))
+    is_other = np.abs(cosine) < 0.5  # more than 60 degrees off, either way round
+    if is_other.any():
         raise LayoutError(
-            f"{robot.names[apart.argmax()]!r:.60} of layout {robot.name!r:.60} pushes another way "
-            "than the "
-            "log's motor in its place; list the actuators in the order of the motors"
+            f"{robot.names[is_other.argmax()]!r:.60} of layout {robot.name!r:.60} pushes another "
+            "way than the log's motor in its place; list the actuators in the order of the motors"
         )
-    return np.asarray(np.sign(along))
+    return np.asarray(np.sign(cosine))
+
+
+def _axes_of(robot: Layout) -> Array:
+    """Directions (n, 3) of the actuators' forces; 0 for one that has no axis."""
+    return np.array([getattr(actuator, "axis", (0.0, 0.0, 0.0)) for actuator in robot.actuators])
 
 
 def _unit(form: Form, robot: Layout, scale: ArrayLike | None) -> Array:
-    """What a setpoint of 1 asks for on each axis (6,) [N, N m], x forward, y left, z up; NaN along
-    an axis that the robot does not drive. Raises LayoutError: it has other actuators than an
-    autopilot drives."""
+    """The wrench (6,) that a setpoint of 1 stands for [N, N m], FLU; NaN along an axis that the
+    robot does not drive.
+
+    Args:
+        form: the program that wrote the log.
+        robot: the robot; by its forces where `scale` is None.
+        scale: the user's (6,); of ROS the factor of its wrenches.
+
+    Raises:
+        DataError: `scale` is not six numbers above 0.
+        LayoutError: the robot has other actuators than an autopilot drives.
+    """
     if scale is not None:
         unit = np.asarray(scale, np.float64)
         if unit.shape == (6,) and np.isfinite(unit).all() and (unit > 0.0).all():
@@ -166,27 +194,32 @@ def _unit(form: Form, robot: Layout, scale: ArrayLike | None) -> Array:
     return np.abs(kind(robot, kind.settings_class(), yardstick(robot)).setpoint_unit)
 
 
-def _posed(source: str, record: Recorded, robot: Layout, scale: ArrayLike | None) -> Log:
-    """The log in the robot's newtons, at the times of its outputs, or else of what says what was
-    left."""
-    sides = _sides(record.layout, robot)
+def _log_of_record(source: str, record: LogRecord, robot: Layout, scale: ArrayLike | None) -> Log:
+    """The log in the robot's newtons, at the times of its outputs, else of the unallocated
+    wrenches, else of the demands.
+
+    Args:
+        source: the name of the file.
+        record: the record in units of its own.
+        robot: the robot by whose laws it is judged.
+        scale: as in `read_log`.
+    """
+    signs = _motor_signs(record.layout, robot)
     unit = _unit(record.form, robot, scale)
-    basis = record.outputs or record.unmet or record.demand
-    time = basis.time
+    series = record.outputs or record.unmet or record.demand
+    time = series.time
     notes = [*record.notes]
     asks = [*record.asks]
     demand = record.demand.at(time) * np.where(robot.commanded, unit, np.nan)
-    kept = np.isfinite(demand).any(axis=1) & ~(np.abs(demand) > MOST_FORCE).any(axis=1)
-    command = unmet = None
+    is_kept = np.isfinite(demand).any(axis=1) & ~(np.abs(demand) > MAX_DEMAND).any(axis=1)
+    command = None
+    unmet = None
     if record.outputs is not None:
-        command = commands_of(record, record.outputs.values, robot, sides)
-        for i, k in _dead(command, record.turns, time, robot):
-            words = "stood still from here on although it was told to push"
-            record.events.append(Event(float(time[k]), words, i))
-            command[k:, i] = np.nan
-        idle = (np.nan_to_num(command) == robot_rest(robot)).all(axis=(1, 2))
-        kept &= ~idle
-        if idle.any():
+        command = commands_of(record, record.outputs.values, robot, signs)
+        record.events += _stop_thrusters(command, record.turns, time, robot)
+        is_idle = (np.nan_to_num(command) == rest_command(robot)).all(axis=(1, 2))
+        is_kept &= ~is_idle
+        if is_idle.any():
             notes.append("Times at which no output moved, such as before arming, are left out.")
     else:
         asks.append(
@@ -195,22 +228,19 @@ def _posed(source: str, record: Recorded, robot: Layout, scale: ArrayLike | None
         )
         if record.unmet is not None:
             unmet = np.nan_to_num(record.unmet.values * unit, posinf=0.0, neginf=0.0)
-    if kept.sum() < 2:
+    if is_kept.sum() < 2:
         raise DataError(
             f"{source}: holds no demands while outputs moved; there is nothing to judge"
         )
-    if len(time) > MOST_SAMPLES:
+    if len(time) > MAX_SAMPLES:
         raise DataError(
-            f"{source}: holds {len(time):,} samples, expected up to {MOST_SAMPLES:,}; cut it"
+            f"{source}: holds {len(time):,} samples, expected up to {MAX_SAMPLES:,}; cut it"
         )
     step = np.diff(time, append=time[-1] + np.median(np.diff(time)))
-    if (beyond := float(np.maximum(step - GAP_S, 0.0)[kept].sum())) > 0.0:
-        notes.append(f"Gaps between samples, {beyond:.0f} s beyond {GAP_S:g} s each, are left out.")
-    if back := max(basis.back, record.demand.back):
-        notes.append(
-            f"Its clock jumps back, by up to {back:.3g} s; samples were sorted by their times."
-        )
-    if undriven := [axis for axis, one in zip(AXES, unit, strict=True) if np.isnan(one)]:
+    jump_s = max(series.max_jump_back, record.demand.max_jump_back)
+    notes += _notes_on_time(step[is_kept], jump_s)
+    undriven = [axis for axis, size in zip(AXES, unit, strict=True) if np.isnan(size)]
+    if undriven:
         notes.append(
             f"No thruster drives {', '.join(undriven)}; what was asked there is not judged."
         )
@@ -218,58 +248,105 @@ def _posed(source: str, record: Recorded, robot: Layout, scale: ArrayLike | None
         source=source,
         form=record.form,
         robot=robot,
-        time=time[kept],
-        span=np.minimum(step, GAP_S)[kept],
-        demand=demand[kept],
-        command=None if command is None else command[kept],
-        unmet=None if unmet is None else unmet[kept],
+        time=time[is_kept],
+        span=np.minimum(step, GAP_S)[is_kept],
+        demand=demand[is_kept],
+        command=None if command is None else command[is_kept],
+        unmet=None if unmet is None else unmet[is_kept],
         events=tuple(sorted(record.events, key=lambda event: event.time)),
         notes=tuple(dict.fromkeys(notes)),
         asks=tuple(asks),
     )
 
 
-def _dead(
+def _notes_on_time(step: Array, jump_s: float) -> list[str]:
+    """Sentences on gaps between samples and on a clock that jumps back.
+
+    Args:
+        step: times from each sample to the next (N,) [s].
+        jump_s: largest step of the clock backwards [s].
+    """
+    notes = []
+    gap_s = float(np.maximum(step - GAP_S, 0.0).sum())
+    if gap_s > 0.0:
+        notes.append(f"Gaps between samples, {gap_s:.0f} s beyond {GAP_S:g} s each, are left out.")
+    if jump_s:
+        notes.append(
+            f"Its clock jumps back, by up to {jump_s:.3g} s; samples were sorted by their times."
+        )
+    return notes
+
+
+def _stop_thrusters(
+    command: Array, turns: Series | None, time: Array, robot: Layout
+) -> list[Event]:
+    """Sets commands (N, n, 3) of thrusters that stopped turning to NaN from then on; returns the
+    events."""
+    events = []
+    for i, k in _stopped_thrusters(command, turns, time, robot):
+        words = "stood still from here on although it was told to push"
+        events.append(Event(float(time[k]), words, i))
+        command[k:, i] = np.nan
+    return events
+
+
+def _stopped_thrusters(
     command: Array, turns: Series | None, time: Array, robot: Layout
 ) -> Iterator[tuple[int, int]]:
-    """Thrusters that turned once, but no more although told so (N, n, 3), and the sample where that
-    began."""
+    """Yields thrusters that stopped turning although commanded to push, each with the sample at
+    which that began.
+
+    Args:
+        command: commands (N, n, 3).
+        turns: how fast motors turned; None where no ESC says it.
+        time: times of the commands (N,) [s].
+        robot: the robot.
+    """
     speed = np.empty((len(time), 0)) if turns is None else turns.at(time)
-    held = np.minimum(np.diff(time, append=time[-1:]), GAP_S)
-    most = np.maximum(robot.upper, -robot.lower)[:, 0]
-    for i, turned in enumerate(speed.T[: robot.n] != 0.0):
-        pushes = np.abs(command[:, i, 0]) > PUSHES * most[i]
-        pushes[: len(turned) - turned[::-1].argmax()] = False
-        if np.nan_to_num(speed[:, i]).any() and held[pushes].sum() > STILL_S:
-            yield i, int(pushes.argmax())
+    spans = np.minimum(np.diff(time, append=time[-1:]), GAP_S)
+    force_max = np.maximum(robot.upper, -robot.lower)[:, 0]
+    for i, is_turning in enumerate(speed.T[: robot.n] != 0.0):
+        is_pushing = np.abs(command[:, i, 0]) > PUSHING_SHARE * force_max[i]
+        is_pushing[: len(is_turning) - is_turning[::-1].argmax()] = False
+        if np.nan_to_num(speed[:, i]).any() and spans[is_pushing].sum() > MIN_STILL_S:
+            yield i, int(is_pushing.argmax())
 
 
-def robot_rest(robot: Layout) -> Array:
+def rest_command(robot: Layout) -> Array:
     """Commands (n, 3) of actuators at rest."""
     return np.asarray(np.clip(0.0, robot.lower, robot.upper))
 
 
-def commands_of(record: Recorded, outputs: Array, robot: Layout, sides: Array) -> Array:
-    """Commands (M, n, 3) of the outputs (M, k) in a log. Raises LayoutError: they are of another
-    robot."""
+def commands_of(record: LogRecord, outputs: Array, robot: Layout, signs: Array) -> Array:
+    """Returns the commands (M, n, 3) of the outputs in a log.
+
+    Args:
+        record: the record of the log.
+        outputs: its outputs (M, k).
+        robot: the robot.
+        signs: of `_motor_signs`, (n,).
+
+    Raises:
+        LayoutError: the outputs are those of another robot.
+    """
     n = robot.n
     k = outputs.shape[1]
     if not record.of_shares and k == 3 * n:
         return np.asarray(outputs.reshape(-1, n, 3))
     if k < n or (k != n and record.form == "ros"):
-        thrice = "" if record.of_shares else f" or {3 * n}"
+        or_commands = "" if record.of_shares else f" or {3 * n}"
         raise LayoutError(
             f"layout {robot.name!r:.60} has {robot.counted}, and the log {k} outputs, not "
-            f"{n}{thrice}"
+            f"{n}{or_commands}"
         )
     robot.only("a log with one output for each actuator", "thruster")
-    values = outputs[:, :n] * sides
+    values = outputs[:, :n] * signs
     command = np.zeros((len(values), n, 3))
     low = robot.lower[:, 0]
     high = robot.upper[:, 0]
     force = np.where(values < 0.0, -values * low, values * high) if record.of_shares else values
-    for i, part in enumerate(robot.actuators):
-        model = getattr(part, "model", None)
+    for i, actuator in enumerate(robot.actuators):
+        model = getattr(actuator, "model", None)
         if record.form == "ardusub" and isinstance(model, PowerTable) and model.unit == "us":
             force[:, i] = np.interp(REST_US + FULL_US * values[:, i], *model.columns[:2])
     command[..., 0] = np.clip(force, low, high)

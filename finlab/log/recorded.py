@@ -1,4 +1,7 @@
-"""What a reader finds in a log, before the robot's newtons are known."""
+"""The record of a log in units of its own, as the readers of PX4, ArduSub and ROS make it.
+
+`read` gives it the units of a robot.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -13,22 +16,23 @@ from finlab.exchange import Exchange
 from finlab.layout import Layout
 
 Form = Literal["px4", "ardusub", "ros"]
+"""The program that wrote a log."""
 FLU = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
 """Turns a wrench of x forward, y right, z down into x forward, y left, z up."""
 
-CUT = "It ends in the middle of a message: it was cut there, or the power went."
-"""What is said of a log without its end."""
+TRUNCATED = "It ends in the middle of a message: it was cut there, or the power went."
+"""The note on a log without its end."""
 
 
 @dataclass(frozen=True)
 class Event:
-    """Something that the log says of the robot's health."""
+    """An event of the robot's health."""
 
     time: float
     """On the log's clock [s]."""
     words: str
     actuator: int | None = None
-    """Place of the actuator that it is about, from 0."""
+    """Index of the actuator that it is about; None for the robot."""
 
 
 @dataclass(frozen=True)
@@ -39,26 +43,30 @@ class Series:
     """Rising, on the log's clock (N,) [s]."""
     values: Array
     """(N, K)."""
-    back: float = 0.0
-    """How far the clock jumped back, at most, before the samples were sorted [s]."""
+    max_jump_back: float = 0.0
+    """Largest step of the clock backwards, before the samples were sorted [s]."""
 
     @classmethod
     def of(cls, time: Array, values: Array) -> "Series":
         """Sorts samples by time (N,) [s]; of those at one time the last stays."""
         order = np.argsort(time, kind="stable")
-        kept = order[np.append(np.diff(time[order]) > 0.0, True)] if len(order) else order
-        back = -float(np.diff(time).min(initial=0.0))
-        return cls(np.asarray(time[kept], np.float64), np.asarray(values[kept], np.float64), back)
+        chosen = order[np.append(np.diff(time[order]) > 0.0, True)] if len(order) else order
+        max_jump_back = -float(np.diff(time).min(initial=0.0))
+        return cls(
+            np.asarray(time[chosen], np.float64),
+            np.asarray(values[chosen], np.float64),
+            max_jump_back,
+        )
 
     def at(self, time: Array) -> Array:
         """Values (M, K) that hold at times (M,) [s]; NaN before the first."""
-        place = np.searchsorted(self.time, time, side="right") - 1
-        return np.where(place[:, None] >= 0, self.values[np.maximum(place, 0)], np.nan)
+        index = np.searchsorted(self.time, time, side="right") - 1
+        return np.where(index[:, None] >= 0, self.values[np.maximum(index, 0)], np.nan)
 
 
 @dataclass
-class Recorded:
-    """What a log holds, in its own units."""
+class LogRecord:
+    """The content of a log in units of its own."""
 
     form: Form
     demand: Series
@@ -69,9 +77,9 @@ class Recorded:
     of_shares: bool = True
     """Whether outputs are shares."""
     unmet: Series | None = None
-    """What the autopilot says that it left of a demand (M, 6), in its unit."""
+    """The part of a demand that the autopilot logged as unallocated (M, 6), in its unit."""
     turns: Series | None = None
-    """How fast motors turned (M, n), by their ESCs, in any unit; NaN where none says it."""
+    """Speeds of the motors (M, n) by their ESCs, in any unit; NaN where none says it."""
     layout: Layout | None = None
     """The robot by the log's own parameters."""
     events: list[Event] = field(default_factory=list)
@@ -80,15 +88,21 @@ class Recorded:
     asks: list[str] = field(default_factory=list)
     """Sentences on what it lacks, each with the option that gives it."""
     taken: list[str] = field(default_factory=list)
-    """Notes of what was taken for the robot, where its layout is the log's."""
+    """Notes on what was assumed of the robot; they count where the layout is the log's."""
     lacking: list[str] = field(default_factory=list)
-    """What the log lacks of the robot, as `asks` are."""
+    """Sentences on what the log lacks of the robot; they count likewise."""
 
     def describe(
         self, read: Callable[[str, str, Exchange], Layout], parameters: dict[str, Any], name: str
     ) -> Layout | None:
-        """The robot that a reader of the autopilot's parameters finds in them; None where it finds
-        none."""
+        """Finds the robot in the autopilot's parameters, and returns its layout; None where there
+        is none.
+
+        Args:
+            read: the reader of the parameters: takes their text, a name and an exchange.
+            parameters: the parameters by name.
+            name: the name of the layout.
+        """
         exchange = Exchange()
         lines = "\n".join(f"{key} {value}" for key, value in parameters.items())
         try:
@@ -102,16 +116,26 @@ class Recorded:
         return self.layout
 
 
-def changes(time: Array, bits: NDArray[np.bool_], words: str, again: str) -> list[Event]:
-    """Events where flags (N, n) of n actuators change; the second words where one falls."""
-    before = np.vstack([np.zeros_like(bits[:1]), bits[:-1]])
-    return [
-        Event(float(time[row]), words if bits[row, i] else again, int(i))
-        for row, i in zip(*np.nonzero(bits != before), strict=True)
-    ]
+def changes(
+    time: Array, bits: NDArray[np.bool_], rising_words: str, falling_words: str
+) -> list[Event]:
+    """Returns an event for each change of a flag.
+
+    Args:
+        time: times of the samples (N,) [s].
+        bits: flags (N, n) of n actuators.
+        rising_words: words of an event where a flag rises; the first sample counts as a change.
+        falling_words: words where it falls.
+    """
+    previous = np.vstack([np.zeros_like(bits[:1]), bits[:-1]])
+    events = []
+    for row, i in np.argwhere(bits != previous).tolist():
+        words = rising_words if bits[row, i] else falling_words
+        events.append(Event(float(time[row]), words, i))
+    return events
 
 
-def silent(module: Any) -> Any:
-    """A library's module, which from now on prints nothing of what is wrong with a file."""
+def silenced(module: Any) -> Any:
+    """Returns a library's module, which from now on prints nothing about faults of a file."""
     vars(module)["print"] = lambda *_, **__: None
     return module

@@ -1,4 +1,4 @@
-"""The demands of a log, asked again: other methods, policies and robots."""
+"""Replays the demands of a log by other methods, policies and robots."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -11,22 +11,23 @@ from finlab.allocation.methods import MethodName, method_class
 from finlab.allocation.policy import CLOSEST, Policy
 from finlab.arrays import Array
 from finlab.layout import Layout
-from finlab.log.answers import answers_to
+from finlab.log.demand_answers import answers_to
 from finlab.physics.objective import REACHED, yardstick
 
-MOST, MOST_LOST = 2000, 400
-"""Most demands that a replay asks, and one with an actuator lost."""
-FINEST = 0.001
-"""Share of the yardstick that demands taken together spread over; doubled until these are few
-enough."""
-
-HASH = np.random.default_rng(0).integers(-(2**63), 2**63, 6, endpoint=False) | 1
-"""Factors that make one number of six, modulo 2^64."""
+MAX_DEMANDS = 2000
+"""Most demands of a replay; of more, similar ones are merged."""
+MAX_DEMANDS_LOST = 400
+"""The same of a replay with an actuator lost, of which there is one for each actuator."""
+FINEST_SPREAD = 0.001
+"""Width of the finest cells in which demands are merged, as a share of the wrench scale; doubled
+until few enough are left."""
+HASH_FACTORS = np.random.default_rng(0).integers(-(2**63), 2**63, 6, endpoint=False) | 1
+"""Odd factors that hash six integers to one, modulo 2^64."""
 
 
 @dataclass(frozen=True)
 class Replay:
-    """The same demands asked of a method; impulses are integrals over time of sizes."""
+    """The result of the demands by one method; an impulse is the integral over time of a size."""
 
     robot: str
     """`as it is`, or `improved`."""
@@ -46,32 +47,45 @@ class Replay:
 
 
 class Demands(NamedTuple):
-    """Demands of a log, alike ones together."""
+    """Demands of a log; similar ones are merged."""
 
     wrench: Array
     """(K, 6) [N, N m], means over time; NaN along axes that do not count."""
     span: Array
-    """How long each held, all in all (K,) [s]."""
+    """Total time that each held (K,) [s]."""
     spread: float
-    """Share of the yardstick that those which were taken together spread over; 0 where they are
-    equal."""
+    """Width of the cells in which demands were merged, as a share of the wrench scale; 0 where only
+    equal ones were."""
 
 
-def demands_of(wrench: Array, span: Array, scale: Array, most: int) -> Demands:
-    """Takes demands (N, 6) that held for times (N,) together until at most `most` are left: equal
-    ones, then those in one cell of a grid, ever wider, each as its mean over time."""
+def demands_of(wrench: Array, span: Array, scale: Array, limit: int) -> Demands:
+    """Merges demands until few enough are left: equal ones, then those in one cell of a grid, ever
+    wider, each as its mean over time.
+
+    Args:
+        wrench: demands (N, 6) [N, N m]; NaN along free axes.
+        span: how long each held (N,) [s].
+        scale: wrench scale (6,) [N, N m].
+        limit: how many may be left.
+    """
     spread = 0.0
-    place = np.nan_to_num(wrench / scale, nan=1e9)
+    scaled = np.nan_to_num(wrench / scale, nan=1e9)
     while True:
-        cell = place.view(np.int64) if spread == 0.0 else np.round(place / spread).astype(np.int64)
-        _, first, group = np.unique(cell @ HASH, return_index=True, return_inverse=True)
-        if len(first) <= most:
+        cell = (
+            scaled.view(np.int64) if spread == 0.0 else np.round(scaled / spread).astype(np.int64)
+        )
+        _, first_rows, group = np.unique(
+            cell @ HASH_FACTORS, return_index=True, return_inverse=True
+        )
+        if len(first_rows) <= limit:
             break
-        spread = max(2.0 * spread, FINEST)
-    held: Array = np.asarray(np.bincount(group, span, len(first)), np.float64)
-    sums = [np.bincount(group, span * column, len(first)) for column in np.nan_to_num(wrench).T]
-    mean = np.stack(sums, axis=1) / np.maximum(held, 1e-12)[:, None]
-    return Demands(np.where(np.isnan(wrench[first]), np.nan, mean), held, spread)
+        spread = max(2.0 * spread, FINEST_SPREAD)
+    spans: Array = np.asarray(np.bincount(group, span, len(first_rows)), np.float64)
+    sums = [
+        np.bincount(group, span * column, len(first_rows)) for column in np.nan_to_num(wrench).T
+    ]
+    mean = np.stack(sums, axis=1) / np.maximum(spans, 1e-12)[:, None]
+    return Demands(np.where(np.isnan(wrench[first_rows]), np.nan, mean), spans, spread)
 
 
 def policy_words(policy: Policy) -> str:
@@ -84,22 +98,32 @@ def policy_words(policy: Policy) -> str:
 def replay(
     robot: Layout, wrench: Array, span: Array, policies: list[Policy], *, improved: bool = False
 ) -> Iterator[Replay]:
-    """Replays demands (N, 6), each held for (N,) [s], by `dual` with each policy and by both
-    autopilots' methods where they take the robot; of a robot that is not `improved` with each
-    actuator lost, too."""
+    """Replays demands by `dual` with each policy, and by the autopilots' methods where they take
+    the robot.
+
+    Args:
+        robot: the robot.
+        wrench: demands (N, 6) [N, N m]; NaN along free axes.
+        span: how long each held (N,) [s].
+        policies: policies of `dual`.
+        improved: whether the robot is the improved one; the other one is replayed with each
+            actuator lost, too.
+    """
     scale = yardstick(robot)
-    intact = demands_of(wrench, span, scale, MOST)
-    rough = demands_of(intact.wrench, intact.span, scale, MOST_LOST)
+    intact = demands_of(wrench, span, scale, MAX_DEMANDS)
+    merged = demands_of(intact.wrench, intact.span, scale, MAX_DEMANDS_LOST)
     autopilots: tuple[MethodName, ...] = ("px4", "ardusub")
     questions: list[tuple[MethodName, Policy]] = [("dual", policy) for policy in policies]
     questions += [(name, CLOSEST) for name in autopilots if method_class(name).fits(robot)]
-    made = {name: Allocator(robot, name) for name in dict.fromkeys(name for name, _ in questions)}
-    gone = [] if improved or robot.n == 1 else robot.names
-    for lost in (None, *gone):
-        demands = intact if lost is None else rough
+    allocators = {
+        name: Allocator(robot, name) for name in dict.fromkeys(name for name, _ in questions)
+    }
+    lost_names = [] if improved or robot.n == 1 else robot.names
+    for lost in (None, *lost_names):
+        demands = intact if lost is None else merged
         for name, policy in questions:
-            gone_now = () if lost is None else (lost,)
-            answer = answers_to(made[name], demands.wrench, gone_now, policy=policy)
+            lost_now = () if lost is None else (lost,)
+            answer = answers_to(allocators[name], demands.wrench, lost_now, policy=policy)
             missing = demands.span @ np.abs(answer.unallocated)
             yield Replay(
                 robot="improved" if improved else "as it is",
@@ -114,6 +138,6 @@ def replay(
 
 
 def six(values: Array, scale: Array) -> tuple[float, ...]:
-    """Plain numbers of axes (6,); those below a millionth of a yardstick are rounding errors, and
-    0."""
+    """Returns values of axes (6,) as floats; those below a millionth of the wrench scale are
+    rounding errors, and become 0."""
     return tuple(map(float, np.where(np.abs(values) < 1e-6 * scale, 0.0, values)))

@@ -15,7 +15,7 @@ from finlab.actuators.rudder import Rudder, RudderGroup, RudderLaw
 from finlab.actuators.thrust_model import PowerLaw, PowerTable
 from finlab.actuators.thruster import Thruster, ThrusterGroup, ThrusterLaw
 from finlab.allocation.dual.compiled import Compiled
-from finlab.allocation.dual.robot import DualRobot
+from finlab.allocation.dual.robot import CommandLimits, DualRobot
 from finlab.arrays import Array
 from finlab.layout.effectiveness import own_effectiveness
 from finlab.layout.layout import Layout
@@ -65,13 +65,14 @@ def prepared(group: Group, wrench: Array, low: Array, high: Array) -> DualRobot:
     """A robot of the actuators of a group alone, with commands (m, 3) between limits."""
     free = np.zeros(low.shape, bool)
     free[:, 0] = [form.kind == "pod" for form in group.forms]
-    limits = low, high, np.full(low.shape, np.inf), free & (high - low >= 2.0 * np.pi - 1e-9)
+    turns = free & (high - low >= 2.0 * np.pi - 1e-9)
+    limits = CommandLimits(low, high, np.full(low.shape, np.inf), turns)
     return DualRobot(group.responses, group.forms, limits, wrench, np.ones(6))
 
 
 def answer(robot: DualRobot, price: Array) -> tuple[Array, float]:
     """Forces (m, 2) at multipliers (6,) of the wrench, and what they are worth less their power."""
-    inner = robot.basis.T @ (robot.scale * price)
+    inner = robot.basis.T @ (robot.axis_scale * price)
     force, value = robot.core.dual_value(np.zeros(6), np.pad(inner, (0, 6 - len(inner))))
     return force, -value
 

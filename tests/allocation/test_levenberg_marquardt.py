@@ -6,7 +6,9 @@ import warnings
 import numpy as np
 import pytest
 
+from finlab import Azimuth, PowerLaw
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
+from finlab.allocation.rates import Rates
 from finlab.layout import Fin, FinModelSpec, Layout, Limits
 from finlab.physics import plant_of
 from finlab.research.random_layouts import random_layout
@@ -145,6 +147,43 @@ def test_a_direction_may_cross_the_seam(search: AnyRobot) -> None:
     refined = refine(problem, target, start, 15)
     assert refined.error[0] < 1e-6
     assert refined.command[0, 0, 2] == pytest.approx(-math.pi + 0.1, abs=1e-3)
+
+
+POD = Azimuth(
+    name="pod",
+    position=(0.0, 0.0, 0.0),
+    turn_axis=(0.0, 0.0, 1.0),
+    zero=(1.0, 0.0, 0.0),
+    force=(0.0, 40.0),
+    model=PowerLaw(1.0),
+)
+
+
+@pytest.mark.parametrize(
+    ("start", "answer"),
+    [(math.pi - 0.1, -math.pi + 0.1), (math.pi, -math.pi + 0.3), (-math.pi, math.pi - 0.3)],
+)
+def test_a_pod_that_turns_all_round_has_no_limit_at_the_seam(start: float, answer: float) -> None:
+    problem = CommandProblem.of(plant_of(Layout("one", (POD,))), np.full(6, 40.0))
+    target = problem.wrench(np.array([[[answer, 20.0, 0.0]]]))
+    refined = refine(problem, target, np.array([[[start, 20.0, 0.0]]]), 15)
+    assert refined.error[0] < 1e-9
+    assert refined.command[0, 0] == pytest.approx([answer, 20.0, 0.0], abs=1e-6)
+
+
+def test_a_pod_follows_its_angle_across_the_seam_in_a_tick() -> None:
+    plant = plant_of(Layout("one", (POD,)))
+    box = Rates(plant, np.array([[0.2, np.inf, np.inf]])).box(
+        np.array([[math.pi - 0.1, 20.0, 0.0]])
+    )
+    problem = CommandProblem.of(plant, np.full(6, 40.0)).in_tick(box)
+    target = problem.wrench(np.array([[[-math.pi + 0.05, 20.0, 0.0]]]))
+    refined = refine(problem, target, np.array([[[-math.pi + 0.02, 20.0, 0.0]]]), 15)
+    assert refined.error[0] < 1e-9
+    assert refined.command[0, 0, 0] == pytest.approx(math.pi + 0.05, abs=1e-6)
+    beyond = problem.wrench(np.array([[[-math.pi + 0.5, 20.0, 0.0]]]))
+    held = refine(problem, beyond, refined.command, 15)
+    assert held.command[0, 0, 0] == pytest.approx(math.pi + 0.1, abs=1e-9)  # the end of the rate
 
 
 ARCS = (

@@ -15,7 +15,7 @@ import pytest
 import finlab
 from finlab.allocation import METHODS, Allocator
 from finlab.allocation.allocation import CHUNK
-from finlab.allocation.allocator import MOST_PREPARED
+from finlab.allocation.allocator import MAX_STATES
 from finlab.allocation.method import Method
 from finlab.errors import AllocationError
 from finlab.layout import Damage, Fin, FinModelSpec, Layout, load_layout
@@ -93,9 +93,9 @@ def test_damaged_robots_are_prepared_when_first_asked_about(
         allocator.allocate(SURGE, lost=["front_left"])
         allocator.allocate(SURGE, damage=Damage(weak={"back_left": 0.5}))
     assert len(made) == 1  # a loss prepares nothing
-    for k in range(MOST_PREPARED + 3):
+    for k in range(MAX_STATES + 3):
         allocator.allocate(SURGE, damage=Damage(weak={"back_left": 0.5 + 0.01 * k}))
-    assert len(allocator._prepared) == MOST_PREPARED
+    assert len(allocator._states) == MAX_STATES
 
 
 def test_errors_are_shares_of_what_the_robot_can_push() -> None:

@@ -15,28 +15,35 @@ from finlab.layout import Damage, Fin, Layout, Limits
 ROBOT = Layout("robot", tuple(Fin(name, (0.1 * i, 0.0, 0.0), 0.0) for i, name in enumerate("abc")))
 
 
-def test_commands_of_all_fins_are_handed_through() -> None:
+def state_of(damage: Damage) -> question.RobotState:
+    return Allocator(ROBOT)._state(damage)
+
+
+def test_commands_of_an_undamaged_robot_are_not_copied() -> None:
     command = np.ones((2, 3, 3))
-    assert question.usable(ROBOT, Damage()).among_all(command) is command
-    assert question.usable(ROBOT, Damage([])).among_all(command) is command
+    assert state_of(Damage()).among_all(command) is command
+    assert state_of(Damage([])).among_all(command) is command
 
 
-def test_commands_of_the_working_fins_are_put_in_their_places() -> None:
-    fins = question.usable(ROBOT, Damage(["b"]))
-    assert fins.damage.lost == ("b",) and fins.healthy.names == ("a", "c") and fins.layout is ROBOT
-    assert fins.alive.tolist() == [True, False, True]
+def test_commands_of_the_working_fins_are_put_in_their_rows() -> None:
+    state = state_of(Damage(["b"]))
+    assert state.damage.lost == ("b",)
+    assert state.healthy.names == ("a", "c")
+    assert state.layout is ROBOT
+    assert state.works.tolist() == [True, False, True]
     command = np.arange(12.0).reshape(2, 2, 3)
-    full = fins.among_all(command)
+    full = state.among_all(command)
     np.testing.assert_array_equal(full[:, [0, 2]], command)
     assert full.shape == (2, 3, 3) and np.isnan(full[:, 1]).all()
-    assert fins.among_all(command[0]).shape == (3, 3)
+    assert state.among_all(command[0]).shape == (3, 3)
 
 
 def test_damage_changes_the_limits_of_all_and_of_the_working_fins() -> None:
-    fins = question.usable(ROBOT, Damage(["a"], running={"c": (0.2, 1.0, 0.5)}))
-    kept = Limits((0.2, 0.2), (1.0, 1.0), (0.5, 0.5))
-    assert fins.layout.fins[2].limits == fins.healthy.fins[1].limits == kept
-    assert fins.layout.fins[1] == ROBOT.fins[1]
+    state = state_of(Damage(["a"], running={"c": (0.2, 1.0, 0.5)}))
+    held = Limits((0.2, 0.2), (1.0, 1.0), (0.5, 0.5))
+    assert state.layout.fins[2].limits == held
+    assert state.healthy.fins[1].limits == held
+    assert state.layout.fins[1] == ROBOT.fins[1]
 
 
 @pytest.mark.parametrize(

@@ -41,10 +41,12 @@ def test_a_twin_follows_and_the_rest_stays(shipped: Layouts) -> None:
 def test_free_actuators_can_keep_the_symmetry_there_is(shipped: Layouts, name: str) -> None:
     layout = shipped(name)
     moves = Moves(
-        layout, layout.names, {part.name: Bounds.around(part) for part in layout.actuators}
+        layout,
+        layout.names,
+        {actuator.name: Bounds.around(actuator) for actuator in layout.actuators},
     )
-    drawn = np.random.default_rng(0).uniform(moves.lower, moves.upper, (5, len(moves.lower)))
-    for vector, free in zip(moves.mirrored(drawn), drawn, strict=True):
+    vectors = np.random.default_rng(0).uniform(moves.lower, moves.upper, (5, len(moves.lower)))
+    for vector, free in zip(moves.mirrored(vectors), vectors, strict=True):
         assert (vector >= moves.lower).all() and (vector <= moves.upper).all()
         assert (
             mirror_pairs(moves.moved(vector))

@@ -27,9 +27,9 @@ def test_along_it_the_wrench_stays_and_watts_are_no_less(kind: str) -> None:
         count = len(space.basis)
         flat = space.basis.reshape(count, space.basis[0].size if count else 0)
         np.testing.assert_allclose(flat @ flat.T, np.eye(count), atol=1e-9)
-        for k, ends in enumerate(space.ranges(np.zeros(count), count)):
-            assert ends[0] <= 0.0 <= ends[1]
-            shift = np.outer(ends * rng.uniform(0.5, 0.99), np.eye(count)[k])
+        for k, range_ends in enumerate(space.ranges(np.zeros(count), count)):
+            assert range_ends[0] <= 0.0 <= range_ends[1]
+            shift = np.outer(range_ends * rng.uniform(0.5, 0.99), np.eye(count)[k])
             for command in space.commands(shift):
                 other = answer.with_command(command)
                 off.append(np.linalg.norm((other.wrench - answer.wrench) / answer.scale))
@@ -56,10 +56,10 @@ def test_it_has_as_many_directions_as_forces_beyond_the_rank() -> None:
         left = layout_effectiveness(layout.without(lost) if lost else layout)[layout.commanded]
         space = NullSpace(answer)
         assert len(space.basis) == left.shape[1] - np.linalg.matrix_rank(left), name
-        assert not any(set(lost) & set(space.takers(k)) for k in range(len(space.basis)))
+        assert not any(set(lost) & set(space.participants(k)) for k in range(len(space.basis)))
         moved = space.commands(np.ones((1, len(space.basis))) * 0.1)[0]
         assert [bool(np.isnan(row).all()) for row in moved] == [
-            part in lost for part in layout.names
+            actuator in lost for actuator in layout.names
         ]
 
 
@@ -67,15 +67,15 @@ def test_beyond_a_range_an_actuator_has_no_command() -> None:
     layout = load_layout("bluerov2_heavy")
     answer = Allocator(layout).allocate([20.0, 0, 0, 0, 0, 0])
     space = NullSpace(answer)
-    ends = space.ranges(np.zeros(2), 2)
-    least, most = np.array([part.force for part in layout.actuators]).T  # type: ignore[attr-defined]
+    range_ends = space.ranges(np.zeros(2), 2)
+    least, most = np.array([actuator.force for actuator in layout.actuators]).T  # type: ignore[attr-defined]
     for k in range(2):
-        for end in ends[k]:
-            force = answer.command[:, 0] + end * space.basis[k, :, 0]
+        for range_end in range_ends[k]:
+            force = answer.command[:, 0] + range_end * space.basis[k, :, 0]
             room = np.minimum(force - least, most - force)
             assert abs(room.min()) < 0.005 * most.max(), "one of them is at its limit there"
-    further = space.ranges(np.array([0.5 * ends[0, 1], 0.0]), 2)
-    np.testing.assert_allclose(further[0], ends[0], atol=0.1)
+    further = space.ranges(np.array([0.5 * range_ends[0, 1], 0.0]), 2)
+    np.testing.assert_allclose(further[0], range_ends[0], atol=0.1)
 
 
 def test_the_mean_of_two_commands_of_fins_misses_and_of_thrusters_does_not() -> None:

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from finlab.analysis import (
-    AXES,
     GOALS,
     Bounds,
     Progress,
@@ -16,8 +15,6 @@ from finlab.analysis import (
     mirror_pairs,
     optimize_layout,
 )
-from finlab.analysis.moves import Moves
-from finlab.analysis.slopes import Directions, Hill, Power
 from finlab.arrays import Array
 from finlab.axes import AXES as WRENCH
 from finlab.errors import FinlabError, LayoutError
@@ -31,52 +28,54 @@ Layouts = Callable[[str], Layout]
 def test_it_improves_within_bounds_and_keeps_the_mirror(shipped: Layouts, goal: str) -> None:
     layout = shipped("A")
     bounds = {"back_left": Bounds.around(layout.fins[2], (0.04, 0.04, 0.0), 0.6)}
-    found = optimize_layout(layout, ["back_left"], bounds, goal, rounds=2, seed=1)
-    assert found.improved
-    assert found.value_after > found.value_before
-    assert found.moved == ("back_left", "back_right")
-    assert mirror_pairs(found.layout) == mirror_pairs(layout)
-    assert found.layout.fins[:2] == layout.fins[:2]
-    moved = found.layout.fins[2]
+    improvement = optimize_layout(layout, ["back_left"], bounds, goal, rounds=2, seed=1)
+    assert improvement.improved
+    assert improvement.value_after > improvement.value_before
+    assert improvement.moved == ("back_left", "back_right")
+    assert mirror_pairs(improvement.layout) == mirror_pairs(layout)
+    assert improvement.layout.fins[:2] == layout.fins[:2]
+    moved = improvement.layout.fins[2]
     assert np.abs(np.subtract(moved.position, layout.fins[2].position)).max() <= 0.04 + 1e-12
     assert moved.position[2] == layout.fins[2].position[2]
     assert abs(moved.mounting_angle - layout.fins[2].mounting_angle) <= 0.6 + 1e-12
     if goal == "weakest_direction":
-        assert found.card_after.authority.weakest == pytest.approx(found.value_after, abs=1e-3)
-        assert found.card_after.authority.weakest > found.card_before.authority.weakest
+        assert improvement.card_after.authority.weakest == pytest.approx(
+            improvement.value_after, abs=1e-3
+        )
+        assert improvement.card_after.authority.weakest > improvement.card_before.authority.weakest
 
 
 def test_no_yaw_learns_to_yaw(shipped: Layouts) -> None:
     layout = replace(shipped("no_yaw"), axes=WRENCH)
-    found = optimize_layout(layout, ["front"], rounds=2)
-    assert found.value_before == 0.0
-    assert authority(found.layout).rank == 6 and found.layout.axes == WRENCH
+    improvement = optimize_layout(layout, ["front"], rounds=2)
+    assert improvement.value_before == 0.0
+    assert authority(improvement.layout).rank == 6 and improvement.layout.axes == WRENCH
 
 
 def test_it_stops_when_told(shipped: Layouts) -> None:
-    seen: list[Progress] = []
-    found = optimize_layout(
+    reports: list[Progress] = []
+    improvement = optimize_layout(
         shipped("A"),
         ["front_right"],
         rounds=50,
-        progress=seen.append,
-        cancelled=lambda: len(seen) >= 1,
+        progress=reports.append,
+        cancelled=lambda: len(reports) >= 1,
     )
-    assert found.cancelled
-    assert len(seen) == 1
+    assert improvement.cancelled
+    assert len(reports) == 1
 
 
 def test_it_stops_within_a_round(shipped: Layouts) -> None:
     layout = shipped("A")
-    seen = list[int]()
+    reports = list[int]()
 
     def rule(position: Array, frames: Array) -> Array:
-        seen.append(len(position))
+        reports.append(len(position))
         return np.zeros(len(position))
 
-    found = optimize_layout(layout, layout.names, rule=rule, cancelled=lambda: bool(seen))
-    assert seen == [1, 1, 1], "where it begins, and the layouts before and after"
-    assert found.cancelled and found.value_after >= found.value_before
+    improvement = optimize_layout(layout, layout.names, rule=rule, cancelled=lambda: bool(reports))
+    assert reports == [1, 1, 1], "where it begins, and the layouts before and after"
+    assert improvement.cancelled and improvement.value_after >= improvement.value_before
 
 
 def test_nothing_better_leaves_the_layout_as_it_was(shipped: Layouts) -> None:
@@ -86,23 +85,25 @@ def test_nothing_better_leaves_the_layout_as_it_was(shipped: Layouts) -> None:
     inwards = Bounds(
         x=(x, x), y=(y, y + 0.05), z=(z, z), mounting_angle=(angle, angle)
     )  # shorter levers only
-    found = optimize_layout(
+    improvement = optimize_layout(
         layout, layout.names[:1], {layout.names[0]: inwards}, rounds=1, mirror=()
     )
-    assert found.value_after == found.value_before
-    assert not found.improved
-    assert found.layout is layout
+    assert improvement.value_after == improvement.value_before
+    assert not improvement.improved
+    assert improvement.layout is layout
 
 
 def test_fins_keep_their_distance(shipped: Layouts, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("finlab.analysis.climb.CLEARANCE", 0.2)
     layout = shipped("A")
     box = Bounds((-0.26, 0.26), (0.14, 0.16), (0.0, 0.0), (1.0, 1.1))
-    found = optimize_layout(
+    improvement = optimize_layout(
         layout, ["front_left"], {"front_left": box}, "mission_power", (), rounds=1
     )
-    places = found.layout.position
-    assert np.linalg.norm(places[1] - np.delete(places, 1, axis=0), axis=1).min() >= 0.2 - 1e-9
+    positions = improvement.layout.position
+    assert (
+        np.linalg.norm(positions[1] - np.delete(positions, 1, axis=0), axis=1).min() >= 0.2 - 1e-9
+    )
 
 
 @pytest.mark.parametrize(
@@ -142,19 +143,19 @@ SHIPPED = {
 def test_any_actuator_moves_within_bounds_and_keeps_the_mirror(shipped: Layouts, name: str) -> None:
     layout = shipped(name)
     names, settings = SHIPPED[name]
-    parts = [layout.actuators[layout.index(part)] for part in names]
-    bounds = {part.name: Bounds.around(part, 0.04, 0.3) for part in parts}
-    found = optimize_layout(layout, names, bounds, rounds=4, seed=1, **settings)
-    assert found.improved
-    assert found.value_after > found.value_before
-    assert set(mirror_pairs(layout)) <= set(mirror_pairs(found.layout))
-    for before, after in zip(layout.actuators, found.layout.actuators, strict=True):
-        if before.name not in found.moved:
+    actuators = [layout.actuators[layout.index(actuator)] for actuator in names]
+    bounds = {actuator.name: Bounds.around(actuator, 0.04, 0.3) for actuator in actuators}
+    improvement = optimize_layout(layout, names, bounds, rounds=4, seed=1, **settings)
+    assert improvement.improved
+    assert improvement.value_after > improvement.value_before
+    assert set(mirror_pairs(layout)) <= set(mirror_pairs(improvement.layout))
+    for before, after in zip(layout.actuators, improvement.layout.actuators, strict=True):
+        if before.name not in improvement.moved:
             assert after == before
         assert np.abs(np.subtract(after.position, before.position)).max() <= 0.04 + 1e-12
         # The main axis turns by at most both angles together.
         assert np.dot(before.frame[0], after.frame[0]) >= np.cos(0.6) - 1e-9
-    assert found.card_after.authority.rank >= found.card_before.authority.rank
+    assert improvement.card_after.authority.rank >= improvement.card_before.authority.rank
 
 
 def test_a_torpedo_at_rest_has_nothing_to_raise(shipped: Layouts) -> None:
@@ -166,56 +167,22 @@ def test_the_mission_of_a_torpedo_counts_at_its_speed(shipped: Layouts) -> None:
     layout = replace(shipped("torpedo"), axes=("Fx", "Tx", "Ty", "Tz"))
     flow = [1.5, 0, 0, 0, 0, 0]
     rolled = [[5.0, 0.0, 0.0, 0.5, 0.0, 0.0]]
-    left = layout.actuators[layout.index("elevator_left")]
-    bounds = {left.name: Bounds.around(left, (0.0, 0.05, 0.0), 0.0)}
-    found = optimize_layout(
-        layout, [left.name], bounds, "mission_power", mission=rolled, flow=flow, rounds=1
+    damaged = layout.actuators[layout.index("elevator_left")]
+    bounds = {damaged.name: Bounds.around(damaged, (0.0, 0.05, 0.0), 0.0)}
+    improvement = optimize_layout(
+        layout, [damaged.name], bounds, "mission_power", mission=rolled, flow=flow, rounds=1
     )
-    assert found.improved
-    after = least_power(found.layout, rolled, flow=flow)
-    assert -found.value_after == pytest.approx(after[0])
+    assert improvement.improved
+    after = least_power(improvement.layout, rolled, flow=flow)
+    assert -improvement.value_after == pytest.approx(after[0])
     assert after[0] < least_power(layout, rolled, flow=flow)[0]
 
 
 def test_what_a_robot_pushes_alone_is_not_given_for_the_weakest_direction(shipped: Layouts) -> None:
-    left = shipped("bluerov2").without(["front_right"])
-    found = optimize_layout(left, left.names, rounds=6)
-    assert found.improved and found.axes == ("surge", "sway", "heave", "roll", "yaw")
-    assert set(found.axes) <= set(found.card_after.authority.alone)
-
-
-def slopes_are_differences(hill: Hill, moves: Moves, rel: float) -> None:
-    """Along a random change, slopes agree with differences of the goal."""
-    random = np.random.default_rng(3)
-    width = moves.upper - moves.lower
-    vector = random.uniform(moves.lower, moves.upper)
-    way = random.standard_normal(len(width))
-    way *= width / np.linalg.norm(way)
-    look = hill.look(vector)
-    for _ in range(8):
-        look = hill.look(vector, look)
-    values, slopes = hill.slopes(look)
-    ends = [hill.look(vector + sign * 1e-4 * way, look).value for sign in (1.0, -1.0)]
-    slope = float(slopes[values.argmin()] @ (way / width))
-    assert slope == pytest.approx((ends[0] - ends[1]) / 2e-4, rel=rel, abs=1e-3 * abs(look.value))
-
-
-@pytest.mark.parametrize(
-    "name", ["bluerov2_heavy", "A", "turtle_hybrid", "catamaran", "fish", "hexa"]
-)
-def test_slopes_are_those_of_the_goals(shipped: Layouts, name: str) -> None:
-    layout = shipped(name)
-    moves = Moves(
-        layout, layout.names, {part.name: Bounds.around(part) for part in layout.actuators}
-    )
-    axes = [axis for axis, counts in zip(AXES, layout.commanded, strict=True) if counts]
-    near = [[0.05, 0.0, 0.0, 0.0, 0.0, 0.0]]
-    far = [[900.0, 0.0, 0.0, 0.0, 0.0, 1.0]]
-    slopes_are_differences(Directions(moves, axes, False), moves, 0.02)
-    slopes_are_differences(Power(moves, near, None), moves, 0.02)
-    slopes_are_differences(
-        Power(moves, far, None), moves, 0.1
-    )  # the nearest point by other weights
+    damaged = shipped("bluerov2").without(["front_right"])
+    improvement = optimize_layout(damaged, damaged.names, rounds=6)
+    assert improvement.improved and improvement.axes == ("surge", "sway", "heave", "roll", "yaw")
+    assert set(improvement.axes) <= set(improvement.card_after.authority.alone)
 
 
 @pytest.mark.parametrize(("goal", "least"), [("weakest_direction", 112.0), ("mission_power", -1.2)])
@@ -224,21 +191,25 @@ def test_eight_thrusters_find_their_places(shipped: Layouts, goal: str, least: f
     grid."""
     layout = shipped("bluerov2_heavy")
     grid = (0.001, np.radians(1.0))
-    bounds = {part.name: Bounds.around(part, 0.05, np.pi / 2) for part in layout.actuators}
-    seen: list[Progress] = []
-    found = optimize_layout(
-        layout, layout.names, bounds, goal, (), rounds=8, grid=grid, progress=seen.append
+    bounds = {
+        actuator.name: Bounds.around(actuator, 0.05, np.pi / 2) for actuator in layout.actuators
+    }
+    reports: list[Progress] = []
+    improvement = optimize_layout(
+        layout, layout.names, bounds, goal, (), rounds=8, grid=grid, progress=reports.append
     )
-    assert found.value_after >= least
-    assert [one.round for one in seen] == list(range(1, len(seen) + 1))
-    assert all(later.best >= one.best for one, later in zip(seen, seen[1:], strict=False))
-    assert seen[-1].layout.names == layout.names and seen[-1].layout != layout
+    assert improvement.value_after >= least
+    assert [one.round for one in reports] == list(range(1, len(reports) + 1))
+    assert all(later.best >= one.best for one, later in zip(reports, reports[1:], strict=False))
+    assert reports[-1].layout.names == layout.names and reports[-1].layout != layout
     again = optimize_layout(layout, layout.names, bounds, goal, (), rounds=8, grid=grid)
-    assert again.layout == found.layout
-    places = found.layout.position
-    assert np.abs(places / grid[0] - np.round(places / grid[0])).max() < 1e-6
+    assert again.layout == improvement.layout
+    positions = improvement.layout.position
+    assert np.abs(positions / grid[0] - np.round(positions / grid[0])).max() < 1e-6
     first, second = np.triu_indices(layout.n, k=1)
-    gaps, before = (np.linalg.norm(p[first] - p[second], axis=1) for p in (places, layout.position))
+    gaps, before = (
+        np.linalg.norm(p[first] - p[second], axis=1) for p in (positions, layout.position)
+    )
     assert (gaps >= np.minimum(before, 0.1) - 1e-8).all()
 
 
@@ -249,9 +220,9 @@ def test_a_wall_without_slope_is_kept(shipped: Layouts) -> None:
     def wall(position: Array, frames: Array) -> Array:
         return 0.02 * (np.abs(position[..., 1]) > inner).sum(-1)
 
-    found, free = (
+    improvement, free = (
         optimize_layout(layout, layout.names, rounds=3, rule=rule) for rule in (wall, None)
     )
-    assert np.abs(found.layout.position[:, 1]).max() <= inner
+    assert np.abs(improvement.layout.position[:, 1]).max() <= inner
     assert np.abs(free.layout.position[:, 1]).max() > inner
-    assert found.value_after > 1.1 * found.value_before
+    assert improvement.value_after > 1.1 * improvement.value_before

@@ -6,26 +6,29 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from finlab.allocation import Allocator, Policy
+from finlab.allocation import Policy
+from finlab.allocation.dual.compiled import Compiled
 from finlab.arrays import Array
-from finlab.core.calls import CODES, Core, Now
+from finlab.core.calls import CODES, Conditions, Core
 from finlab.core.fields import actuators_of, head_of, struct, tables_begin
 from finlab.core.library import library
 from finlab.errors import CommandError, DataError
+from finlab.layout import Layout
 from tests.mixed_robots import KINDS, bluerov2_heavy, load, random_plant, random_robot, within
 
-BLOCK, NUMBER = 1, 3
-"""Codes of the core: no block, a number out of range."""
+BLOCK = 1
+"""FL_BAD_BLOCK: no block of a robot."""
+NUMBER = 3
+"""FL_BAD_NUMBER: a number out of range."""
 
 
-def core_of(allocator: Allocator) -> Core:
-    made: Core = allocator._whole.method.compiled.robot.core  # type: ignore[attr-defined]
-    return made
+def core_of_layout(layout: Layout) -> Core:
+    return Compiled.of(layout).robot.core
 
 
 @pytest.fixture(scope="module")
 def heavy() -> Core:
-    return core_of(Allocator(load(bluerov2_heavy())))
+    return core_of_layout(load(bluerov2_heavy()))
 
 
 def test_both_languages_agree_on_what_a_block_is(heavy: Core) -> None:
@@ -71,7 +74,7 @@ def test_a_damaged_block_is_refused(heavy: Core, field: str, value: float, code:
 @pytest.mark.parametrize("kind", ["azimuths", "fins uneven", "rudders"])
 def test_no_number_of_a_block_may_be_none(kind: str) -> None:
     """Every field of the head and of every actuator, and every number of a table."""
-    block = core_of(Allocator(load(random_robot(kind, 1, 3))))._block
+    block = core_of_layout(load(random_robot(kind, 1, 3)))._block
     assert checked(block) == 0
     tables = np.random.default_rng(0).integers(
         tables_begin(int(head_of(block)["n"])), len(block), 50
@@ -93,26 +96,29 @@ def test_what_is_no_number_is_refused(heavy: Core) -> None:
     prices = np.zeros(6)
     for bad in (np.nan, np.inf):
         with pytest.raises(CommandError, match="argument"):
-            heavy.one(np.where(np.arange(6) == 2, bad, wrench), None)
+            heavy.answer_one(np.where(np.arange(6) == 2, bad, wrench), None)
         # Prices are where to begin: those of no use are left out.
-        assert heavy.one(wrench, None, np.where(np.arange(6) == 2, bad, prices)).is_attainable[0]
+        assert heavy.answer_one(
+            wrench, None, np.where(np.arange(6) == 2, bad, prices)
+        ).is_attainable[0]
     with pytest.raises(CommandError, match="argument"):
-        heavy.one(wrench, None, now=Now(previous=np.full((8, 3), np.inf)))
-    assert heavy.one(wrench, None, now=Now(previous=np.full((8, 3), np.nan))).is_attainable[
-        0
-    ]  # nothing is known
+        heavy.answer_one(
+            wrench, None, conditions=Conditions(command_previous=np.full((8, 3), np.inf))
+        )
+    nothing_known = Conditions(command_previous=np.full((8, 3), np.nan))
+    assert heavy.answer_one(wrench, None, conditions=nothing_known).is_attainable[0]
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_one_and_many_are_the_same(kind: str) -> None:
-    core = core_of(Allocator(load(random_robot(kind, 1, 3))))
+    core = core_of_layout(load(random_robot(kind, 1, 3)))
     plant = random_plant(kind, 1, 3)
     targets = np.array([within(plant, np.random.default_rng([3, k])) for k in range(6)])
     targets[::2] *= 3.0
     policy = Policy("direction")
-    many = core.many(targets, policy)
+    many = core.answer_many(targets, policy)
     for row, target in enumerate(targets):
-        single = core.one(target, policy)
+        single = core.answer_one(target, policy)
         np.testing.assert_array_equal(many.command[row], single.command[0])
         np.testing.assert_array_equal(many.wrench_served[row], single.wrench_served[0])
         assert many.is_attainable[row] == single.is_attainable[0]
@@ -122,6 +128,6 @@ def test_threads_share_one_robot(heavy: Core) -> None:
     targets = np.random.default_rng(0).normal(0.0, 20.0, (2000, 6))
     with ThreadPoolExecutor(4) as pool:
         shared = list(
-            pool.map(lambda target: heavy.one(target, Policy()).wrench_served[0], targets)
+            pool.map(lambda target: heavy.answer_one(target, Policy()).wrench_served[0], targets)
         )
-    np.testing.assert_array_equal(shared, heavy.many(targets, Policy()).wrench_served)
+    np.testing.assert_array_equal(shared, heavy.answer_many(targets, Policy()).wrench_served)

@@ -6,7 +6,7 @@ import pytest
 
 from finlab.allocation import Policy
 from finlab.arrays import Array
-from finlab.core.calls import _served
+from finlab.core.calls import _policy_record
 from tests.core.parts import ROBOTS, Robot, at, functions, robot_of
 
 NUMBERS = range(2)
@@ -78,9 +78,9 @@ def steps_of(name: str) -> tuple[int, int, int]:
             int(robot.answer(wrench)["newton_steps"]) for wrench in wrenches(robot, number, 1.0, 8)
         )
         for policy in ("closest", "direction", "priority"):
-            served = _served(Policy(policy))
+            record = _policy_record(Policy(policy))
             for wrench in wrenches(robot, number, 3.0, 4):
-                beyond += int(robot.answer(wrench, policy=served.address)["newton_steps"])
+                beyond += int(robot.answer(wrench, policy=record.ctypes.data)["newton_steps"])
         previous = None
         for wrench in wrenches(robot, number, 1.0, 8):
             asked = {} if previous is None else {"previous": previous, "calm": 2.0}

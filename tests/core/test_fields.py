@@ -18,6 +18,7 @@ from pathlib import Path
 from finlab import Allocator, load_layout
 from finlab.core.fields import struct
 from finlab.deploy.c_sources import c_sources, write_c
+from finlab.physics import plant_of
 
 folder = Path(sys.argv[1])
 commands = {}
@@ -25,7 +26,7 @@ for name in ("A", "bluerov2_heavy", "catamaran"):
     layout = load_layout(Path(sys.argv[2]) / f"{name}.yaml")
     allocator = Allocator(layout)
     middle = layout.lower + 0.4 * (layout.upper - layout.lower)
-    wrench = allocator._whole.plant.wrench(middle)
+    wrench = plant_of(layout).wrench(middle)
     first = allocator.allocate(wrench)
     tick = allocator.allocate(3.0 * wrench, previous=first, policy="direction")
     commands[name] = np.stack([first.command, tick.command])

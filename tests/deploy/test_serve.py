@@ -389,7 +389,7 @@ def test_requests_that_nobody_takes_need_no_memory(requests: int) -> None:
 def test_a_signal_ends_waiting_and_sending(
     streams: StandardStreams, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("finlab.deploy.transport.PATIENCE", 0.05)
+    monkeypatch.setattr("finlab.deploy.transport.SEND_TIMEOUT_S", 0.05)
     source, requests = os.pipe()
     _, sink = os.pipe()
     os.write(requests, LINE)

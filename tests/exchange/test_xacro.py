@@ -14,7 +14,7 @@ import pytest
 from finlab.cli import main
 from finlab.errors import LayoutError
 from finlab.exchange import Exchange, read_any, read_robot
-from finlab.exchange.expressions import evaluated
+from finlab.exchange.expressions import evaluate
 from finlab.exchange.xacro_files import SECONDS
 from finlab.layout import Layout, load_layout
 from tests.terminal import refused
@@ -434,4 +434,4 @@ def test_another_xacro_is_not_trusted(folder: Path, monkeypatch: pytest.MonkeyPa
 )
 def test_what_expressions_give(expression: str, value: object) -> None:
     names = {"x": 5, "box": {"depth": {"water": 3}}}
-    assert evaluated(expression, names.__getitem__, names.__getitem__) == value
+    assert evaluate(expression, names.__getitem__, names.__getitem__) == value

@@ -31,9 +31,9 @@ def fit() -> FinFit:
     force = measured(LAW, command)
     largest = np.linalg.norm(force, axis=-1).max()
     force[OUTLIERS, 1] += 1.2 * largest
-    found = samples(command, force)
+    result = samples(command, force)
     power = LAW.power(command) * (1.0 + 0.03 * np.random.default_rng(3).standard_normal(300))
-    return fit_fin(type(found)(command, force, power, found.places, ()))
+    return fit_fin(type(result)(command, force, power, result.sources, ()))
 
 
 def error_of(fit: FinFit, test: Array = TEST) -> Array:
@@ -76,8 +76,8 @@ def test_neighbours_of_wild_samples_are_taken_back_under_mixed_noise() -> None:
     force += 0.02 * largest * rng.standard_normal(force.shape)
     wild = rng.choice(150, 4, replace=False)
     force[wild, 2] += 0.6 * largest
-    found = fit_fin(samples(command, force))
-    assert set(found.outliers) == {f"line {k + 2}" for k in wild}
+    result = fit_fin(samples(command, force))
+    assert set(result.outliers) == {f"line {k + 2}" for k in wild}
 
 
 def test_a_good_fit_is_trusted(fit: FinFit) -> None:
@@ -87,10 +87,10 @@ def test_a_good_fit_is_trusted(fit: FinFit) -> None:
 
 def test_few_samples_are_doubted_first_of_all(tmp_path: Path) -> None:
     command = commands(24, seed=5)
-    few = fit_fin(samples(command, measured(LAW, command, 0.3)))
-    assert "24 samples are few, 300 are a good number" in few.doubts
-    assert summary(few)[0].startswith(DOUBT)
-    write_fin(few, tmp_path / "few.csv")
+    sparse = fit_fin(samples(command, measured(LAW, command, 0.3)))
+    assert "24 samples are few, 300 are a good number" in sparse.doubts
+    assert summary(sparse)[0].startswith(DOUBT)
+    write_fin(sparse, tmp_path / "few.csv")
     assert (tmp_path / "few.csv").read_text().startswith(f"# {DOUBT}: ")
     notes = Allocator(robot_with(tmp_path / "few.csv")).allocate([0.3, 0, 0, 0, 0, 0]).notes
     assert any(f"is {DOUBT}" in note for note in notes)
@@ -118,22 +118,24 @@ def test_one_zero_direction_speaks_for_all() -> None:
     law = soft(d=0.1)
     command = commands(120)
     command[:, 2] = 0.3
-    told = samples(command, measured(law, command, 0.02))
-    found = fit_fin(type(told)(command, told.force, None, told.places, (), turned=False))
+    single = samples(command, measured(law, command, 0.02))
+    result = fit_fin(
+        type(single)(command, single.force, None, single.sources, (), has_directions=False)
+    )
     truth = law.force(TEST)
     error = (
-        np.linalg.norm(found.predict(TEST)[0] - truth, axis=-1)
+        np.linalg.norm(result.predict(TEST)[0] - truth, axis=-1)
         / np.linalg.norm(truth, axis=-1).max()
     )
     assert np.sqrt(np.mean(error**2)) < 0.02
 
 
 def test_many_samples_are_thinned_and_it_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("finlab.fit.fin_fit.MOST_SAMPLES", 100)
+    monkeypatch.setattr("finlab.fit.fin_fit.MAX_SAMPLES", 100)
     command = commands(130)
-    found = fit_fin(samples(command, measured(LAW, command)))
-    assert len(found.measurements) + len(found.outliers) == 100
-    assert "100 of 130 samples, drawn at random" in " ".join(found.notes)
+    result = fit_fin(samples(command, measured(LAW, command)))
+    assert len(result.measurements) + len(result.outliers) == 100
+    assert "100 of 130 samples, drawn at random" in " ".join(result.notes)
 
 
 def eight_directions(
@@ -151,11 +153,11 @@ def eight_directions(
 
 
 def test_a_fit_takes_seconds_on_one_thread_and_says_what_it_does() -> None:
-    told: list[str] = []
+    single: list[str] = []
     threads: set[int] = set()
 
     def progress(words: str) -> None:
-        told.append(words)
+        single.append(words)
         threads.update(
             pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"
         )
@@ -164,7 +166,7 @@ def test_a_fit_takes_seconds_on_one_thread_and_says_what_it_does() -> None:
     fit_fin(samples(*eight_directions()), progress=progress)
     assert time.thread_time() - began < 6.0
     assert threads == {1}
-    assert "fitting the thrust" in told and len(told) >= 5
+    assert "fitting the thrust" in single and len(single) >= 5
 
 
 @pytest.mark.parametrize(("along_shaft", "noise"), [(0.0, 0.03), (0.15, 0.0), (0.0, 0.0)])
@@ -172,16 +174,16 @@ def test_axes_without_force_or_noise_raise_no_warning(along_shaft: float, noise:
     command, force = eight_directions(120, along_shaft, noise)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        found = fit_fin(samples(command, force))
-        assert np.isfinite(found.predict(TEST)).all()
-    assert np.sqrt(np.mean(error_of(found)[TEST[:, 0] > 0.1] ** 2)) < 0.2
+        result = fit_fin(samples(command, force))
+        assert np.isfinite(result.predict(TEST)).all()
+    assert np.sqrt(np.mean(error_of(result)[TEST[:, 0] > 0.1] ** 2)) < 0.2
 
 
 def test_few_forces_among_many_zeros_are_no_outliers() -> None:
     command = commands(60)
     force = np.where((np.arange(60) < 3)[:, None], LAW.force(command), 0.0)
-    found = fit_fin(samples(command, force))
-    assert found.outliers == () and found.largest > 0.0
+    result = fit_fin(samples(command, force))
+    assert result.outliers == () and result.largest > 0.0
 
 
 def test_a_fin_that_hardly_ever_beats_is_refused() -> None:

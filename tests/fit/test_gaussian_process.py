@@ -8,7 +8,7 @@ from scipy.optimize import approx_fprime
 from finlab.fit.gaussian_process import GaussianProcess, ThrustKernel
 from tests.fit.cell import commands
 
-KERNEL = ThrustKernel(even=0.7, uneven=0.2, amplitude=0.5, frequency=0.8, turn=1.3)
+KERNEL = ThrustKernel(isotropic=0.7, directional=0.2, amplitude=0.5, frequency=0.8, turn=1.3)
 FEW = commands(12) / [0.6, 2.1, 1.0]
 INPUTS = commands(30) / [0.6, 2.1, 1.0]
 RNG = np.random.default_rng(0)
@@ -41,7 +41,7 @@ def test_a_value_left_out_is_predicted_by_a_process_without_it() -> None:
 def test_repeated_commands_without_noise_are_bearable() -> None:
     twice = np.repeat(INPUTS, 40, axis=0)
     values = np.repeat(VALUES, 40)
-    strong = KERNEL._replace(even=1e4)
+    strong = KERNEL._replace(isotropic=1e4)
     mean, deviation = GaussianProcess(strong, twice, values, np.zeros(1200)).predict(INPUTS)
     assert np.isfinite(mean).all() and np.isfinite(deviation).all()
 
@@ -62,7 +62,7 @@ def test_nothing_is_unknown_at_rest() -> None:
     assert not KERNEL.covariance(rest, FEW).any()
 
 
-def test_only_the_uneven_part_fades_with_the_turn() -> None:
+def test_only_the_directional_part_fades_with_the_turn() -> None:
     one = np.array([[0.5, 0.5, 0.0]])
     other = np.array([[0.5, 0.5, np.pi]])
     share = np.exp(-2.0 / KERNEL.turn**2)

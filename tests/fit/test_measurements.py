@@ -25,10 +25,14 @@ def read(tmp_path: Path, columns: Columns) -> Measurements:
 
 
 def test_a_plain_file_is_read_as_it_stands(tmp_path: Path, columns: Columns) -> None:
-    found = read(tmp_path, columns)
-    np.testing.assert_allclose(found.command[:, 2], columns["phi"], rtol=1e-7)
-    np.testing.assert_allclose(found.force[:, 1], columns["Fy"], rtol=1e-7)
-    assert found.places[3] == "cell.csv line 5" and found.notes == () and found.turned
+    measurements = read(tmp_path, columns)
+    np.testing.assert_allclose(measurements.command[:, 2], columns["phi"], rtol=1e-7)
+    np.testing.assert_allclose(measurements.force[:, 1], columns["Fy"], rtol=1e-7)
+    assert (
+        measurements.sources[3] == "cell.csv line 5"
+        and measurements.notes == ()
+        and measurements.has_directions
+    )
 
 
 def renamed(columns: Columns, name: str, header: str, factor: float) -> Columns:
@@ -50,18 +54,22 @@ def test_units_stand_in_the_header(
     tmp_path: Path, columns: Columns, name: str, header: str, factor: float
 ) -> None:
     plain = read(tmp_path, columns)
-    found = read(tmp_path, renamed(columns, name, header, factor))
-    np.testing.assert_allclose(found.command, plain.command, rtol=1e-6)
-    np.testing.assert_allclose(found.force, plain.force, rtol=1e-6, atol=1e-12)
+    measurements = read(tmp_path, renamed(columns, name, header, factor))
+    np.testing.assert_allclose(measurements.command, plain.command, rtol=1e-6)
+    np.testing.assert_allclose(measurements.force, plain.force, rtol=1e-6, atol=1e-12)
 
 
 def test_one_zero_direction_is_filled_by_symmetry_and_said(
     tmp_path: Path, columns: Columns
 ) -> None:
     without = {k: v for k, v in columns.items() if k not in ("phi", "Fx")}
-    found = read(tmp_path, without)
-    assert not found.turned and "symmetry" in found.notes[0] and "along the shaft" in found.notes[1]
-    assert not read(tmp_path, columns | {"phi": 0.0 * columns["phi"] + 0.3}).turned
+    measurements = read(tmp_path, without)
+    assert (
+        not measurements.has_directions
+        and "symmetry" in measurements.notes[0]
+        and "along the shaft" in measurements.notes[1]
+    )
+    assert not read(tmp_path, columns | {"phi": 0.0 * columns["phi"] + 0.3}).has_directions
 
 
 def emptied(columns: Columns, tmp_path: Path) -> Path:

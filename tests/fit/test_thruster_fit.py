@@ -44,7 +44,7 @@ def bench(n: int, noise: float, seed: int = 0, repeats: int = 1) -> BenchData:
 def test_the_t200_is_as_published() -> None:
     fit = fit_thruster(read_bench([T200]))
     assert fit.force == pytest.approx((-39.9, 51.4), abs=0.05)
-    assert fit.still == (1472.0, 1528.0)
+    assert fit.idle_commands == (1472.0, 1528.0)
     assert 0.3 < fit.dead_band < 0.41
     assert len(fit.table.rows) == 201 and fit.table.unit == "us"
     assert 0.002 < thrust_table_error(fit.table)[0] < 0.02

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from finlab.core.calls import planes
+from finlab.core.ray_reach import block_of_planes
 from finlab.forces.force_sets import MAX_CUT, ForceSets, Shape, assembled, convex_parts, force_sets
 from finlab.layout import Fin, FinModelSpec, Layout, Limits
 from finlab.physics import Plant
@@ -16,7 +16,9 @@ HALVES = [0.4, np.pi / 2, 1.9, 2.9, np.pi]
 def sectors(effectiveness: Array, radius: Array, middle: Array, half: float) -> ForceSets:
     """Robots of fins with arcs of one width."""
     none = np.zeros_like(middle)
-    return ForceSets(effectiveness, radius, middle, none + half, none, planes(middle.shape[1]))
+    return ForceSets(
+        effectiveness, radius, middle, none + half, none, block_of_planes(middle.shape[1])
+    )
 
 
 def fins(half: float, rows: int = 200) -> ForceSets:

@@ -55,7 +55,7 @@ def _robot(layout: Layout) -> tuple[dict[str, Any], bytes]:
         "hull": hull.size_m,
         "center": hull.center_m,
         "size": float(max(np.abs(layout.position).max(), max(hull.size_m) / 2)),
-        "strongest": float(robot.most.max()),
+        "strongest": float(robot.row_force_max.max()),
         "actuators": [
             {
                 "name": name,

@@ -11,11 +11,11 @@ from typing import Any
 from finlab.actuators.fin.fin_model import MAX_AMPLITUDE, MAX_FREQUENCY
 from finlab.allocation.methods import METHODS, method_class
 from finlab.allocation.policy import AXES, KINDS
-from finlab.allocation.settings import MdnSettings
 from finlab.errors import FinlabError
 from finlab.layout import Actuator, Fin, Layout
 from finlab.layout.damage import WHOLE, Damage
 from finlab.physics import plant_of
+from finlab.research.mdn.method import MdnSettings
 from finlab.research.paper.pipeline import PaperSettings
 
 AXIS_WORDS = ("surge", "sway", "heave", "roll", "pitch", "yaw")

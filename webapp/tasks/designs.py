@@ -8,7 +8,8 @@ from pathlib import PurePath
 import viser
 
 from finlab.allocation.allocation import Allocation
-from finlab.deploy.bundle import graph_text, make_bundle
+from finlab.deploy.bundle import make_bundle
+from finlab.deploy.robot_graph import graph_text
 from finlab.errors import FinlabError
 from finlab.exchange import is_robot_table
 from finlab.exchange.convert import TABLES

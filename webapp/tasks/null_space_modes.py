@@ -56,7 +56,7 @@ def null_space_modes(answer: Allocation, shifts: tuple[float, ...]) -> Modes:
 
 def _takers(space: NullSpace, direction: int) -> list[tuple[str, float]]:
     """Names of the actuators that push along a direction, and their shares, the largest first."""
-    return sorted(space.takers(direction).items(), key=lambda taker: -taker[1])
+    return sorted(space.participants(direction).items(), key=lambda taker: -taker[1])
 
 
 def _numbers_words(answer: Allocation, space: NullSpace, direction: int) -> str:

@@ -239,7 +239,7 @@ class Solver:
             layout=replace(without_jets.layout, interaction=state.layout.interaction),
             flow=None if state.flow is None else np.array(state.flow),
             wrench_expected=None,
-            later=None,
+            answered=None,
         )
         with_jets = self.solve(state)
         for answer in (with_jets, without_jets):
@@ -271,7 +271,7 @@ class Solver:
             own = Candidates(answer.command[None], answer.wrench[None], error, *costs, (OWN,))
             badge = "optimum" if is_proved(answer) else state.method
         ways = self.allocator(replace(state, method="mdn")).refinement(answer)
-        return modes_of(answer, own.beside(ways[-1].exact(ALTERNATIVE_ERROR)), badge, ways)
+        return modes_of(answer, own.followed_by(ways[-1].exact(ALTERNATIVE_ERROR)), badge, ways)
 
     def solve(self, state: State) -> Allocation:
         """The answer to a state. FinlabError: the method cannot be loaded or cannot answer."""

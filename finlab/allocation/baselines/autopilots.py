@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from finlab.allocation.baselines.held import held_of
+from finlab.allocation.baselines.fixed_actuators import fixed_actuators_of
 from finlab.allocation.method import LeastErrorMethod
 from finlab.allocation.policy import AXES as WRENCH_AXES
 from finlab.allocation.settings import Settings, choice
@@ -31,6 +31,7 @@ from finlab.exchange.motor_factors import AXES, FRAMES
 from finlab.exchange.motor_factors import SIGNS as SUB_SIGNS
 
 ROLL, PITCH, YAW, SURGE, SWAY, HEAVE = range(6)
+"""Columns of PX4's mix."""
 ROWS = np.array([3, 4, 5, 0, 1, 2])
 """Axis of the wrench for each row of PX4's matrix."""
 SIGNS = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
@@ -40,7 +41,7 @@ ROUNDS_OFF = float(np.sqrt(6.0 * np.finfo(np.float32).eps))
 precision."""
 NEGLIGIBLE = 1e-3
 """Entries of the normalised mix below this are set to 0, and do not count as used."""
-LEAST = 0.2
+LEAST_ENTRY = 0.2
 """Entries of a column from which on a thruster takes part in desaturation."""
 YAW_MARGIN = 0.15
 """Share of a thruster's range by which yaw may exceed it."""
@@ -57,8 +58,7 @@ class Px4Settings(Settings):
         "airmode 0",
         ("none", "airmode 0", "axes"),
         "what gives way at limits: nothing (plain pseudo-inverse), what PX4 does with MC_AIRMODE "
-        "0, or each "
-        "axis in turn, least important first, as in older versions",
+        "0, or each axis in turn, least important first, as in older versions",
     )
 
 
@@ -71,15 +71,15 @@ class Px4(LeastErrorMethod):
     settings: Px4Settings
 
     def prepare(self) -> None:
+        """Makes the mix of PX4's pseudo-inverse."""
         lower = self.plant.lower[:, 0]
         upper = self.plant.upper[:, 0]
-        held, self._kept = held_of(self.plant)
-        self._most = np.where(held, 1.0, np.maximum(upper, -lower))
-        self._low = lower / self._most
-        self._high = upper / self._most
-        effectiveness = (
-            SIGNS[:, None] * (self.plant.effectiveness[:, 0].T * self._most * ~held)[ROWS]
-        )
+        is_fixed, self._wrench_of_fixed = fixed_actuators_of(self.plant)
+        self._largest = np.where(is_fixed, 1.0, np.maximum(upper, -lower))
+        self._low = lower / self._largest
+        self._high = upper / self._largest
+        columns = self.plant.effectiveness[:, 0].T * self._largest * ~is_fixed
+        effectiveness = SIGNS[:, None] * columns[ROWS]
         self.mix, self.setpoint_scale = normalised(np.linalg.pinv(effectiveness, rcond=ROUNDS_OFF))
         self.setpoint_unit: Array = np.empty(6)
         """What a setpoint of 1 asks for along each axis of a wrench (6,) [N, N m]; NaN where
@@ -87,21 +87,25 @@ class Px4(LeastErrorMethod):
         self.setpoint_unit[ROWS] = np.where(self.mix.any(axis=0), 1.0 / self.setpoint_scale, np.nan)
 
     def _solve(self, targets: Array, *, seed: int, previous: Array | None) -> Solution:
-        wanted = targets - self._kept
-        part = (self.setpoint_scale * SIGNS * wanted[:, ROWS])[:, None, :] * self.mix
-        u = part.sum(axis=-1)
-        form = self.settings.desaturation
-        if form == "axes":
+        """Mixes, desaturates and clips."""
+        from_others = targets - self._wrench_of_fixed
+        setpoint = self.setpoint_scale * SIGNS * from_others[:, ROWS]
+        output_by_axis = setpoint[:, None, :] * self.mix
+        u = output_by_axis.sum(axis=-1)
+        desaturation = self.settings.desaturation
+        if desaturation == "axes":
             for axis in (SWAY, SURGE, YAW, HEAVE, PITCH, ROLL):
                 u = self._desaturated(u, axis)
-        elif form != "none":
-            u = u - part[..., YAW]
+        elif desaturation != "none":
+            yaw = output_by_axis[..., YAW]
+            u = u - yaw
             u = self._desaturated(u, HEAVE, reduce_only=True)
-            u = self._desaturated(self._desaturated(u, ROLL), PITCH)
-            u = self._desaturated(u + part[..., YAW], YAW, margin=YAW_MARGIN)
+            u = self._desaturated(u, ROLL)
+            u = self._desaturated(u, PITCH)
+            u = self._desaturated(u + yaw, YAW, margin=YAW_MARGIN)
             u = self._desaturated(u, HEAVE, reduce_only=True)
         command = np.zeros((*u.shape, 3))
-        command[..., 0] = np.clip(u, self._low, self._high) * self._most
+        command[..., 0] = np.clip(u, self._low, self._high) * self._largest
         return Solution(self.plant.feasible(command))
 
     def _desaturated(
@@ -112,24 +116,35 @@ class Px4(LeastErrorMethod):
         axis."""
         column = self.mix[:, axis]
         high = self._high + margin * (self._high - self._low)
-        first = _gain(u, column, self._low, high)
-        moved = u + first[:, None] * column
-        moved = moved + 0.5 * _gain(moved, column, self._low, high)[:, None] * column
-        return np.where((first < 0.0)[:, None], u, moved) if reduce_only else moved
+        first_gain = _gain(u, column, self._low, high)
+        moved = u + first_gain[:, None] * column
+        second_gain = _gain(moved, column, self._low, high)
+        moved = moved + 0.5 * second_gain[:, None] * column
+        if not reduce_only:
+            return moved
+        return np.where((first_gain < 0.0)[:, None], u, moved)
 
 
 def normalised(mix: Array) -> tuple[Array, Array]:
-    """A mix (n, 6), columns divided as PX4 does since 1.14 (each of thrust by the mean of its own
-    entries), and the divisors (6,), by which it multiplies setpoints."""
-    used = np.abs(mix) > NEGLIGIBLE
-    tilt = [
-        np.sqrt((mix[:, k] ** 2).sum() / max(used[:, k].sum() / 2.0, 1e-9)) for k in (ROLL, PITCH)
-    ]
+    """Normalizes a mix as PX4 does since 1.14: columns of thrust by the means of their entries.
+
+    Args:
+        mix: outputs of n thrusters per unit of each axis (n, 6).
+
+    Returns:
+        The mix (n, 6) with divided columns, and the divisors (6,), by which PX4 multiplies
+        setpoints.
+    """
+    is_used = np.abs(mix) > NEGLIGIBLE
+    tilt = []
+    for column in (ROLL, PITCH):
+        half_count = max(is_used[:, column].sum() / 2.0, 1e-9)
+        tilt.append(np.sqrt((mix[:, column] ** 2).sum() / half_count))
     sizes = np.abs(mix[:, SURGE:])
-    thrust = sizes.sum(axis=0) / np.maximum((sizes > np.finfo(np.float32).eps).sum(axis=0), 1)
-    thrust = np.where(
-        thrust > 0.0, thrust, thrust[-1]
-    )  # of an axis that nothing drives: that of heave
+    is_driving = sizes > np.finfo(np.float32).eps
+    thrust = sizes.sum(axis=0) / np.maximum(is_driving.sum(axis=0), 1)
+    # Of an axis that nothing drives: that of heave.
+    thrust = np.where(thrust > 0.0, thrust, thrust[-1])
     scale = np.array([max(tilt)] * 2 + [mix[:, YAW].max(), *thrust])
     scale = np.where(scale > 1e-9, scale, 1.0)
     result = mix / scale
@@ -140,9 +155,10 @@ def normalised(mix: Array) -> tuple[Array, Array]:
 def _gain(u: Array, column: Array, low: Array, high: Array) -> Array:
     """How far (N,) outputs (N, n) move along a column (n,) until their excesses on both sides are
     alike."""
-    used = np.abs(column) >= LEAST
-    over = (np.clip(u, low, high) - u)[:, used] / column[used]
-    return np.asarray(over.min(axis=1, initial=0.0) + over.max(axis=1, initial=0.0))
+    takes_part = np.abs(column) >= LEAST_ENTRY
+    excess = np.clip(u, low, high) - u
+    gain = excess[:, takes_part] / column[takes_part]
+    return np.asarray(gain.min(axis=1, initial=0.0) + gain.max(axis=1, initial=0.0))
 
 
 COLUMNS = np.array([WRENCH_AXES.index(axis) for axis in AXES])
@@ -154,6 +170,10 @@ ARDUSUB_ORDER: tuple[tuple[Axis, ...], ...] = (("Tx", "Ty", "Fz"), ("Tz", "Fx", 
 SMALL = 0.15
 """Share of the strongest thruster on an axis below which geometry suggests no factor, and of the
 strongest force or torque below which a frame of ArduSub does not serve an axis."""
+NOT_SERVED = 1e-9
+"""Wrench per unit of output up to which an axis is not served by the factors."""
+NO_PART = 1e-12
+"""Force [N] below which a thruster has no part in a group."""
 ALIKE = 0.3
 """By how much each factor of a frame may differ from what geometry suggests."""
 
@@ -165,39 +185,41 @@ class ArduSub(LeastErrorMethod):
     takes = "thrusters"
 
     def prepare(self) -> None:
+        """Finds the factors of the frame that the thrusters make."""
         effectiveness = self.plant.effectiveness[:, 0, COLUMNS] * SUB_SIGNS
-        held, self._kept = held_of(self.plant)
+        is_fixed, self._wrench_of_fixed = fixed_actuators_of(self.plant)
         self.factors = np.zeros(effectiveness.shape)
         """Factors (n, 6); 0 of those that hang at a force."""
-        full = 1.0
-        if not held.all():
-            self.factors[~held] = frame_factors(effectiveness[~held])
-            full = 0.5 * (self.plant.upper - self.plant.lower)[~held, 0].mean()
-        actual = (effectiveness * self.factors).sum(axis=0)
+        full_output = 1.0
+        if not is_fixed.all():
+            self.factors[~is_fixed] = frame_factors(effectiveness[~is_fixed])
+            full_output = 0.5 * (self.plant.upper - self.plant.lower)[~is_fixed, 0].mean()
+        per_output = (effectiveness * self.factors).sum(axis=0)
+        is_served = per_output > NOT_SERVED
         self.setpoint_unit: Array = np.empty(6)
         """What a setpoint of 1 asks for along each axis of a wrench (6,) [N, N m]; NaN where
         nothing answers; full output counts as the mean of both ways of all thrusters."""
-        self.setpoint_unit[COLUMNS] = np.where(actual > 1e-9, full * actual, np.nan)
+        self.setpoint_unit[COLUMNS] = np.where(is_served, full_output * per_output, np.nan)
         # Newton per unit of the wrench; an axis that the factors do not serve is left out.
-        self._per = np.divide(
-            self.factors, actual, out=np.zeros_like(self.factors), where=actual > 1e-9
+        self._force_per_wrench = np.divide(
+            self.factors, per_output, out=np.zeros_like(self.factors), where=is_served
         )
 
     def _solve(self, targets: Array, *, seed: int, previous: Array | None) -> Solution:
+        """Multiplies, scales by groups and clips."""
         lower = self.plant.lower[:, 0]
         upper = self.plant.upper[:, 0]
         force = np.zeros((len(targets), self.plant.n))
+        from_others = SUB_SIGNS * (targets - self._wrench_of_fixed)[:, COLUMNS]
         for group in GROUPS:
             columns = list(group)
-            wanted = SUB_SIGNS * (targets - self._kept)[:, COLUMNS]
-            part = wanted[:, columns] @ self._per[:, columns].T
-            room = np.where(part < 0.0, lower, upper)
+            part = from_others[:, columns] @ self._force_per_wrench[:, columns].T
+            limit = np.where(part < 0.0, lower, upper)
             share = np.divide(
-                room, part, out=np.full_like(part, np.inf), where=np.abs(part) > 1e-12
+                limit, part, out=np.full_like(part, np.inf), where=np.abs(part) > NO_PART
             )
-            share[share <= 0.0] = (
-                np.inf
-            )  # a thruster that cannot reverse is clipped, and holds nobody back
+            # A thruster that cannot reverse is clipped, and scales nobody down.
+            share[share <= 0.0] = np.inf
             force += part * np.minimum(share.min(axis=1, keepdims=True), 1.0)
         command = np.zeros((*force.shape, 3))
         command[..., 0] = force
@@ -205,25 +227,37 @@ class ArduSub(LeastErrorMethod):
 
 
 def frame_factors(effectiveness: Array) -> Array:
-    """Factors (n, 6) for thrusters with these wrenches (n, 6) per newton, in ArduSub's columns and
-    signs. A frame is known by its thrusters in any order, some mounted the other way round, some
-    lost."""
+    """Returns the factors of the frame of ArduSub that some thrusters make; of any other robot
+    those that its geometry suggests.
+
+    A frame is recognized with its thrusters in any order, some mounted the other way round, some
+    lost: by the assignment of thrusters to its own that is nearest.
+
+    Args:
+        effectiveness: wrenches (n, 6) per newton, in ArduSub's columns and signs.
+
+    Returns:
+        Factors (n, 6).
+    """
     strongest = np.abs(effectiveness).max(axis=0)
     suggested: Array = effectiveness / np.maximum(strongest, 1e-9)
     suggested[np.abs(suggested) < SMALL] = 0.0
-    forces, torques = (np.isin(COLUMNS, part) for part in ([0, 1, 2], [3, 4, 5]))
-    most = np.where(forces, strongest[forces].max(), strongest[torques].max())
-    served = np.where(strongest >= SMALL * most, suggested, 0.0)
+    is_force = COLUMNS < 3
+    strongest_of_kind = np.where(is_force, strongest[is_force].max(), strongest[~is_force].max())
+    served = np.where(strongest >= SMALL * strongest_of_kind, suggested, 0.0)
     for frame in sorted(FRAMES.values(), key=len):
         if len(frame) < len(suggested):
             continue
-        known = frame / np.maximum(np.abs(frame).max(axis=0), 1e-9)
-        apart = np.abs(served - np.array([known, -known])[:, :, None])  # (2, frame, own, 6)
-        distance = apart.max(axis=-1)
-        row, own = linear_sum_assignment(distance.min(axis=0))
-        if distance.min(axis=0)[row, own].max() <= ALIKE:
-            sign = np.where(distance[0, row, own] <= distance[1, row, own], 1.0, -1.0)
-            result: Array = np.empty_like(served)
-            result[own] = sign[:, None] * frame[row]
-            return result
+        shares = frame / np.maximum(np.abs(frame).max(axis=0), 1e-9)
+        both_ways = np.array([shares, -shares])[:, :, None]
+        difference = np.abs(served - both_ways)  # (2, of the frame, of the robot, 6)
+        distance = difference.max(axis=-1)
+        nearer_way = distance.min(axis=0)
+        of_frame, of_robot = linear_sum_assignment(nearer_way)
+        if nearer_way[of_frame, of_robot].max() <= ALIKE:
+            is_forward = distance[0, of_frame, of_robot] <= distance[1, of_frame, of_robot]
+            sign = np.where(is_forward, 1.0, -1.0)
+            factors: Array = np.empty_like(served)
+            factors[of_robot] = sign[:, None] * frame[of_frame]
+            return factors
     return suggested

@@ -8,12 +8,13 @@ is wider than half a turn but no full circle, and no fin is uneven. Dead bands a
 from dataclasses import dataclass
 from functools import cached_property
 from time import thread_time
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from finlab.actuators.response import Group, Line, Plane, power_of
 from finlab.allocation.baselines.pseudo_inverse import (
+    NO_FORCE,
     SOLVED,
     ModelBased,
     PseudoInverse,
@@ -41,180 +42,274 @@ NARROW = 1e-6
 
 
 class ForceProgram:
-    """Power over the forces of one robot in the module `casadi`, the wrench as a constraint,
-    normalized by `sigma` (6,), the target as its parameter. `inverse` gives starts and commands."""
+    """Power over the forces of one robot in CasADi, the wrench as a constraint, the target as its
+    parameter."""
 
     def __init__(
         self, casadi: Any, inverse: PseudoInverse, sigma: Array, options: dict[str, Any]
     ) -> None:
+        """Makes the program and its solver.
+
+        Args:
+            casadi: the module, which is an extra.
+            inverse: gives starts, and commands of forces.
+            sigma: what wrenches (6,) are divided by [N, N m].
+            options: of IPOPT.
+        """
         self._inverse = inverse
         n = inverse.plant.n
-        self._most = np.maximum(inverse.largest, 1e-9)
+        self._largest = np.maximum(inverse.largest, NO_FORCE)
         share = casadi.MX.sym("share", 2 * n)
         target = casadi.MX.sym("target", 6)
-        per = np.repeat(self._most, 2)
-        wrench = casadi.DM(inverse.effectiveness * per) @ share + casadi.DM(inverse.beside)
-        self._parts: list[_Line | _Plane | _Held] = []
-        for response, (i, group, place) in zip(inverse.responses, inverse.places, strict=True):
-            own = share[2 * i : 2 * i + 2]
-            most = float(self._most[i])
-            if inverse.held[i]:
-                self._parts.append(_Held())
+        wrench_per_share = inverse.effectiveness * np.repeat(self._largest, 2)
+        wrench = casadi.DM(wrench_per_share) @ share + casadi.DM(inverse.wrench_offset)
+        self._actuators: list[_LineProgram | _PlaneProgram | _FixedProgram] = []
+        for response, index in zip(inverse.responses, inverse.group_indices, strict=True):
+            i = index.actuator
+            share_of_actuator = share[2 * i : 2 * i + 2]
+            if inverse.is_fixed[i]:
+                self._actuators.append(_FixedProgram())
             elif isinstance(response, Plane):
-                self._parts.append(_Plane(casadi, response, own))
+                self._actuators.append(_PlaneProgram(casadi, response, share_of_actuator))
             else:
-                line = _Line(casadi, response, own, most, inverse.groups[group][1], place)
-                self._parts.append(line)
-                wrench += line.beside
-        self.convex = all(part.convex for part in self._parts)
+                _, group = inverse.groups[index.group]
+                largest = float(self._largest[i])
+                line = _LineProgram(
+                    casadi, response, share_of_actuator, largest, group, index.in_group
+                )
+                self._actuators.append(line)
+                wrench += line.wrench_offset
+        self.convex = all(actuator.convex for actuator in self._actuators)
         """Whether one start is enough, as far as actuators can rest."""
-        cost: Any = sum(part.cost for part in self._parts)
-        limits = [limit for part in self._parts for limit in part.limits]
+
+        constraints: list[_Constraint] = []
+        for actuator in self._actuators:
+            constraints += actuator.constraints
+        # The wrench counts along the directions in which the actuators push at all.
         residual = (wrench - target) / casadi.DM(sigma)
-        pushed = casadi.DM(pushed_axes(inverse.effectiveness * per / sigma[:, None])) @ residual
-        limits += [(axis, 0.0, 0.0) for axis in casadi.vertsplit(pushed)]
-        objective = cost / max(sum(part.full_cost for part in self._parts), 1e-300)
-        conditions = casadi.vertcat(*(value for value, _, _ in limits))
-        program = {"x": share, "p": target, "f": objective, "g": conditions}
+        axes = pushed_axes(wrench_per_share / sigma[:, None])
+        for along_axis in casadi.vertsplit(casadi.DM(axes) @ residual):
+            constraints.append(_Constraint(along_axis, 0.0, 0.0))
+
+        power: Any = sum(actuator.power for actuator in self._actuators)
+        full_power = sum(actuator.full_power for actuator in self._actuators)
+        program = {
+            "x": share,
+            "p": target,
+            "f": power / max(full_power, 1e-300),
+            "g": casadi.vertcat(*(constraint.value for constraint in constraints)),
+        }
         self._solver = casadi.nlpsol("forces", "ipopt", program, options)
-        between = np.array([(low, high) for _, low, high in limits]).reshape(-1, 2).T
-        ends = np.array([part.ends for part in self._parts]).reshape(-1, 2).T
-        self._bounds = dict(zip(("lbg", "ubg", "lbx", "ubx"), (*between, *ends), strict=True))
+        ends = np.array([actuator.ends for actuator in self._actuators]).reshape(-1, 2)
+        self._bounds = {
+            "lbg": np.array([constraint.low for constraint in constraints]),
+            "ubg": np.array([constraint.high for constraint in constraints]),
+            "lbx": ends[:, 0],
+            "ubx": ends[:, 1],
+        }
 
     def command(self, target: Array, start: Array) -> Array:
-        """The command (n, 3) for a target (6,) where IPOPT ends from forces (n, 2) [N]."""
-        most = self._most[:, None]
-        answer = self._solver(x0=(start / most).ravel(), p=target, **self._bounds)
-        force = np.array(answer["x"], np.float64).reshape(start.shape) * most
-        return np.asarray(
-            self._inverse.decoded((force if np.isfinite(force).all() else start)[None])[0]
-        )
+        """Solves for one target from one start.
+
+        Args:
+            target: desired wrench (6,) [N, N m].
+            start: forces (n, 2) [N].
+
+        Returns:
+            The command (n, 3) of the forces where IPOPT ends; of the start where these are not
+            finite.
+        """
+        largest = self._largest[:, None]
+        answer = self._solver(x0=(start / largest).ravel(), p=target, **self._bounds)
+        force = np.array(answer["x"], np.float64).reshape(start.shape) * largest
+        if not np.isfinite(force).all():
+            force = start
+        return np.asarray(self._inverse.command_of(force[None])[0])
 
     def starts(self, target: Array, n_random: int, seed: int) -> Array:
-        """Forces (S, n, 2) [N]: the pseudo-inverse's, and where arcs are wide, random ones."""
+        """Returns forces (S, n, 2) [N] at which IPOPT begins: the pseudo-inverse's, and where one
+        start is not enough, random ones.
+
+        Args:
+            target: desired wrench (6,) [N, N m].
+            n_random: how many of these.
+            seed: of the random ones.
+        """
         first = self._inverse.force(target[None])
         if self.convex:
             return first
         rng = np.random.default_rng(seed)
-        drawn = np.array([[part.random(rng) for part in self._parts] for _ in range(n_random)])
-        return np.concatenate([first, drawn.reshape(-1, *first.shape[1:]) * self._most[:, None]])
+        random_starts = np.array(
+            [[actuator.random(rng) for actuator in self._actuators] for _ in range(n_random)]
+        )
+        return np.concatenate(
+            [first, random_starts.reshape(-1, *first.shape[1:]) * self._largest[:, None]]
+        )
 
 
-class _Held:
-    """One actuator that has one command alone: what it gives is beside the forces, its variables
+class _Constraint(NamedTuple):
+    """A value that must lie between two numbers."""
+
+    value: Any
+    """In CasADi."""
+    low: float
+    """Least value."""
+    high: float
+    """Largest value."""
+
+
+class _FixedProgram:
+    """One actuator that has one command alone: what it gives is in the wrench offset, its variables
     are 0."""
 
-    limits = ()
+    constraints: tuple[_Constraint, ...] = ()
+    """See `_PlaneProgram`."""
     convex = True
-    cost = full_cost = 0.0
-    """See `_Line`."""
+    """See `_LineProgram`, as are all that follow."""
+    power = 0.0
+    full_power = 0.0
     ends = ((0.0, 0.0), (0.0, 0.0))
-    """See `_Line`."""
 
     def random(self, rng: np.random.Generator) -> Array:
-        """Shares (2,) within the limits."""
+        """Returns shares (2,) within the limits."""
         return np.zeros(2)
 
 
-class _Line:
+class _LineProgram:
     """One actuator of one direction in CasADi; `share` (2,) is its force over the largest one, and
     0."""
 
-    limits = ()
+    constraints: tuple[_Constraint, ...] = ()
+    """See `_PlaneProgram`."""
 
     def __init__(
-        self, casadi: Any, line: Line, share: Any, most: float, group: Group, place: int
+        self, casadi: Any, line: Line, share: Any, largest: float, group: Group, in_group: int
     ) -> None:
+        """Makes the power and the wrench offset.
+
+        Args:
+            casadi: the module.
+            line: what the actuator offers.
+            share: its variables (2,).
+            largest: its largest force [N].
+            group: of its kind, which knows what comes beside forces.
+            in_group: its index there.
+        """
         reverse = 0.0 if line.reverse is None else line.reverse.largest
-        low = max(line.low, -reverse) / most
-        high = min(line.high, line.table.largest) / most
+        low = max(line.low, -reverse) / largest
+        high = min(line.high, line.table.largest) / largest
         self.ends = [(low, high), (0.0, 0.0)]
         """Least and largest value of both variables."""
-        grid = np.unique(np.concatenate([-LEVELS * reverse, LEVELS * line.table.largest])) / most
+        both_ways = np.concatenate([-LEVELS * reverse, LEVELS * line.table.largest])
+        grid = np.unique(both_ways) / largest
         if grid[0] == grid[-1]:
             grid = np.linspace(-1.0, 1.0, 5)
-        cost = power_of(line, most * grid)
-        self.cost, self.full_cost = _spline(casadi, grid, cost)(share[0]), float(cost.max())
-        """Power [W] in CasADi, and at full load."""
+        power = power_of(line, largest * grid)
+        self.power = _spline(casadi, grid, power)(share[0])
+        """Power [W] in CasADi."""
+        self.full_power = float(power.max())
+        """Power [W] at full load."""
         force = np.zeros((len(grid), len(group.responses), 2))
-        at_rest = group.beside_of(force)
-        force[:, place, 0] = most * grid
-        extra = group.beside_of(force) - at_rest
-        self.beside: Any = _spline(casadi, grid, extra.ravel())(share[0]) if extra.any() else 0.0
-        """Wrench (6,) in CasADi that comes on top."""
-        self.convex = not extra.any()
+        offset_at_rest = group.beside_of(force)
+        force[:, in_group, 0] = largest * grid
+        offset = group.beside_of(force) - offset_at_rest
+        self.wrench_offset: Any = 0.0
+        """Wrench (6,) in CasADi that comes on top, such as the drag of a foil."""
+        if offset.any():
+            self.wrench_offset = _spline(casadi, grid, offset.ravel())(share[0])
+        self.convex = not offset.any()
         """Whether the wrench is linear in the force."""
 
     def random(self, rng: np.random.Generator) -> Array:
-        """Shares (2,) within the limits."""
+        """Returns shares (2,) within the limits."""
         return np.array([rng.uniform(*self.ends[0]), 0.0])
 
 
-class _Plane:
+class _PlaneProgram:
     """One actuator of two directions in CasADi; `share` (2,) is its force over the largest one."""
 
     def __init__(self, casadi: Any, plane: Plane, share: Any) -> None:
-        middle = plane.middle
-        half = plane.half
+        """Makes the power and the constraints.
+
+        Args:
+            casadi: the module.
+            plane: what the actuator offers.
+            share: its variables (2,).
+        """
+        center = plane.middle
+        half_angle = plane.half
         table = plane.table
-        self._middle = middle
-        self._half = half
+        self._center = center
+        self._half_angle = half_angle
         self.ends = [(-np.inf, np.inf)] * 2
-        """See `_Line`."""
-        self.convex = plane.gauge is None and (half <= 0.5 * np.pi or half >= np.pi)
+        """See `_LineProgram`."""
+        is_convex_sector = half_angle <= 0.5 * np.pi or half_angle >= np.pi
+        self.convex = plane.gauge is None and is_convex_sector
         """Whether the set of forces has no gap, and no bulge."""
+
+        # Along the centre of the sector and across it, over the largest force there.
         strongest = 1.0 if plane.gauge is None else float(plane.gauge.max())
-        ahead = strongest * (np.cos(middle) * share[0] + np.sin(middle) * share[1])
-        aside = strongest * (np.cos(middle) * share[1] - np.sin(middle) * share[0])
-        size = casadi.sqrt(ahead * ahead + aside * aside + SMOOTH**2)
+        along = strongest * (np.cos(center) * share[0] + np.sin(center) * share[1])
+        across = strongest * (np.cos(center) * share[1] - np.sin(center) * share[0])
+        size = casadi.sqrt(along * along + across * across + SMOOTH**2)
         low = float(table.force[0]) / table.largest
-        high = 1.0
+        radius = 1.0
         if plane.gauge is not None:
-            end = max(half, NARROW)
-            turn = casadi.atan2(aside, ahead + SMOOTH)  # at rest it has a slope, too
-            turn = casadi.fmin(casadi.fmax(turn, -end), end)
+            end = max(half_angle, NARROW)
+            direction = casadi.atan2(across, along + SMOOTH)  # at rest it has a slope, too
+            direction = casadi.fmin(casadi.fmax(direction, -end), end)
             count = len(plane.gauge)
-            along = end * DIRECTIONS
-            known = np.append(plane.gauge, plane.gauge[0])
-            gauge = np.interp((middle + along) % TURN, TURN / count * np.arange(count + 1), known)
-            high = _spline(casadi, along, gauge)(turn)
+            directions = end * DIRECTIONS
+            circle = TURN / count * np.arange(count + 1)
+            closed_gauge = np.append(plane.gauge, plane.gauge[0])
+            gauge = np.interp((center + directions) % TURN, circle, closed_gauge)
+            radius = _spline(casadi, directions, gauge)(direction)
         force = table.largest * (low + (1.0 - low) * LEVELS)
-        watts = power_of(plane, force)
-        cost = _spline(casadi, LEVELS, watts)
-        self.cost, self.full_cost = (
-            cost((size / high - low) / max(1.0 - low, 1e-9)),
-            float(watts[-1]),
-        )
-        """See `_Line`."""
-        self.limits: list[tuple[Any, float, float]] = [(size - high, -np.inf, 0.0)]
-        """Values in CasADi, and between which two numbers they must lie."""
+        power = power_of(plane, force)
+        level = (size / radius - low) / max(1.0 - low, 1e-9)
+        self.power = _spline(casadi, LEVELS, power)(level)
+        """See `_LineProgram`."""
+        self.full_power = float(power[-1])
+        """See `_LineProgram`."""
+        self.constraints: list[_Constraint] = [_Constraint(size - radius, -np.inf, 0.0)]
+        """What keeps the force in its set: its size, and the sector."""
         if low > REST:
-            self.limits.append((size - low * high, 0.0, np.inf))
-        if half < NARROW:
-            self.limits += [(aside, 0.0, 0.0), (ahead, 0.0, np.inf)]
-        elif half <= 0.5 * np.pi:
-            sides = (ahead * np.sin(half) + sign * aside * np.cos(half) for sign in (-1.0, 1.0))
-            self.limits += [(side, 0.0, np.inf) for side in sides]
-        elif half < np.pi:
-            self.limits.append((ahead - size * np.cos(half), 0.0, np.inf))
+            self.constraints.append(_Constraint(size - low * radius, 0.0, np.inf))
+        if half_angle < NARROW:
+            self.constraints.append(_Constraint(across, 0.0, 0.0))
+            self.constraints.append(_Constraint(along, 0.0, np.inf))
+        elif half_angle <= 0.5 * np.pi:
+            for sign in (-1.0, 1.0):
+                inside = along * np.sin(half_angle) + sign * across * np.cos(half_angle)
+                self.constraints.append(_Constraint(inside, 0.0, np.inf))
+        elif half_angle < np.pi:
+            inside = along - size * np.cos(half_angle)
+            self.constraints.append(_Constraint(inside, 0.0, np.inf))
 
     def random(self, rng: np.random.Generator) -> Array:
-        """Shares (2,) within the arc."""
-        angle = self._middle + rng.uniform(-1.0, 1.0) * self._half
+        """Returns shares (2,) within the arc."""
+        angle = self._center + rng.uniform(-1.0, 1.0) * self._half_angle
         return rng.uniform() * np.array([np.cos(angle), np.sin(angle)])
 
 
 def _spline(casadi: Any, grid: Array, values: Array) -> Any:
-    """A function through values (K,) or (K * m,) at K points."""
+    """A function in CasADi through values (K,) or (K * m,) at K points."""
     return casadi.interpolant("spline", "bspline", [grid.tolist()], values)
 
 
-POLISH, APPROACH = 3, 30
-"""Levenberg-Marquardt steps from where IPOPT ends onto the target, or as near as they come."""
-SOLVER_OPTIONS = {"print_time": False, "error_on_fail": False} | {
-    f"ipopt.{name}": value
-    for name, value in {"print_level": 0, "sb": "yes", "max_iter": 200, "tol": 1e-9}.items()
+POLISH = 3
+"""Levenberg-Marquardt steps onto the target from where IPOPT ends."""
+APPROACH = 30
+"""Levenberg-Marquardt steps from there where a few do not meet it: as near as they come."""
+SOLVER_OPTIONS = {
+    "print_time": False,
+    "error_on_fail": False,
+    "ipopt.print_level": 0,
+    "ipopt.sb": "yes",
+    "ipopt.max_iter": 200,
+    "ipopt.tol": 1e-9,
 }
+"""Options of CasADi and IPOPT: silent, and an end that is not optimal is no error."""
 
 
 @dataclass(frozen=True)
@@ -241,10 +336,12 @@ class Ipopt(ModelBased):
     settings: IpoptSettings
 
     def prepare(self) -> None:
+        """Imports CasADi, before anything is asked."""
         super().prepare()
         self._casadi = import_casadi()
 
     def _commands(self, targets: Array, seed: int) -> Array:
+        """Solves for one target after the other."""
         answers = [self._answer(target, seed) for target in targets]
         return np.array(answers).reshape(len(targets), self.plant.n, 3)
 
@@ -263,11 +360,13 @@ class Ipopt(ModelBased):
 
     @cached_property
     def _program(self) -> ForceProgram:
+        """The program of this robot, made when it is first asked."""
         options = SOLVER_OPTIONS | {"ipopt.max_cpu_time": 0.5 * self.settings.time_limit_s}
         return ForceProgram(self._casadi, self._inverse, self.sigma, options)
 
 
 def import_casadi() -> Any:
+    """Returns the module `casadi`. Raises AllocationError: it is not installed."""
     try:
         import casadi
     except ImportError as error:

@@ -56,9 +56,11 @@ class Qp(ModelBased):
 
     @cached_property
     def _map(self) -> LinearMap:
+        """The linear map of this robot, made when it is first asked."""
         return LinearMap(self.plant, self.sigma)
 
     def _commands(self, targets: Array, seed: int) -> Array:
+        """Solves one box problem for each target."""
         linear = self._map
         plant = self.plant
         n_free = int(linear.free.sum())
@@ -98,6 +100,7 @@ class PaperSqp(ModelBased):
     settings: PaperSqpSettings
 
     def _commands(self, targets: Array, seed: int) -> Array:
+        """Descends from one start after the other, until one ends on the target."""
         plant = self.plant
         random = plant.sample(np.random.default_rng(seed), (self.settings.n_starts - 1,))
         starts = [0.5 * (plant.lower + plant.upper), *random]
@@ -115,8 +118,16 @@ class PaperSqp(ModelBased):
         return answers
 
     def descent(self, target: Array, start: Array) -> tuple[Array, list[float]]:
-        """Returns the command (n, 3) to which a start (n, 3) leads for a target (6,) [N, N m], and
-        J_norm of every iterate, the start's first."""
+        """Descends from one start.
+
+        Args:
+            target: desired wrench (6,) [N, N m].
+            start: command (n, 3).
+
+        Returns:
+            The command (n, 3) where the descent ends, and J_norm of every iterate, the start's
+            first.
+        """
         plant = self.plant
         width = self.plant.width
         free = width.ravel() > 0.0
@@ -125,41 +136,48 @@ class PaperSqp(ModelBased):
             return (target - plant.wrench(command)) / self.sigma
 
         command = start
-        missing = residual(start)
-        errors = [float(missing @ missing)]
+        r = residual(start)
+        errors = [float(r @ r)]
         for _ in range(self.settings.n_steps if free.any() else 0):
             jacobian = (plant.linearize(command)[1] / self.sigma[:, None] * width.ravel())[:, free]
-            place = ((command - plant.lower).ravel()[free] / width.ravel()[free]).clip(0.0, 1.0)
+            share = (command - plant.lower).ravel()[free] / width.ravel()[free]
+            share = share.clip(0.0, 1.0)
             step = np.zeros(free.size)
-            step[free] = box_qp(
-                jacobian, missing, self.settings.regularization, -place, 1.0 - place
-            )
-            slope = -2.0 * float(missing @ (jacobian @ step[free]))
+            step[free] = box_qp(jacobian, r, self.settings.regularization, -share, 1.0 - share)
+            slope = -2.0 * float(r @ (jacobian @ step[free]))
             length = 1.0
             for _ in range(HALVINGS):
                 tried = np.clip(
                     command + length * step.reshape(-1, 3) * width, plant.lower, plant.upper
                 )
-                after = residual(tried)
-                if after @ after <= errors[-1] + SUFFICIENT * length * min(slope, 0.0):
+                r_tried = residual(tried)
+                if r_tried @ r_tried <= errors[-1] + SUFFICIENT * length * min(slope, 0.0):
                     break
                 length *= 0.5
             else:
                 break
             command = tried
-            missing = after
-            errors.append(float(missing @ missing))
+            r = r_tried
+            errors.append(float(r @ r))
             if errors[-1] <= (0.1 * SOLVED) ** 2 or length * np.abs(step).max() < SHORTEST:
                 break
         return command, errors
 
 
 def box_qp(matrix: Array, wanted: Array, weight: float, low: Array, high: Array) -> Array:
-    """Returns the x (k,) with the least `||matrix x - wanted||^2 + weight ||x||^2` between limits
-    (k,), each `low` below its `high`, by SciPy's active-set method; `matrix` is (6, k), `weight` at
-    least 0."""
+    """Minimizes `||matrix x - wanted||^2 + weight ||x||^2` in a box, by SciPy's active-set method.
+
+    Args:
+        matrix: (6, k).
+        wanted: (6,).
+        weight: of the squared solution, at least 0.
+        low: lower limits (k,), each below its `high`.
+        high: upper limits (k,).
+
+    Returns:
+        The solution x (k,).
+    """
     k = len(low)
-    both = np.vstack([matrix, np.sqrt(weight) * np.eye(k)])
-    return np.asarray(
-        lsq_linear(both, np.concatenate([wanted, np.zeros(k)]), (low, high), method="bvls").x
-    )
+    matrix_and_weight = np.vstack([matrix, np.sqrt(weight) * np.eye(k)])
+    right = np.concatenate([wanted, np.zeros(k)])
+    return np.asarray(lsq_linear(matrix_and_weight, right, (low, high), method="bvls").x)

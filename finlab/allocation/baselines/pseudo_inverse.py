@@ -1,19 +1,19 @@
 """Pseudo-inverse of the forces, each turned into its cheapest command, and all methods that begin
 there.
 
-Methods `analytic` and `fixed_frequency` are that alone; the base of the others has it for their
-starts.
+Methods `analytic` and `fixed_frequency` are that alone; the base of the others, `ModelBased`, has
+it for their starts.
 """
 
 from abc import abstractmethod
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from finlab.actuators.response import Line, Plane, Response
-from finlab.allocation.baselines.held import held_of
+from finlab.allocation.baselines.fixed_actuators import fixed_actuators_of
 from finlab.allocation.dual.compiled import Compiled
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.method import LeastErrorMethod
@@ -27,101 +27,129 @@ from finlab.physics.objective import Name, cost_meter
 RCOND = 1e-3
 """Singular values below this share of the largest count as zero."""
 SAME_DIRECTION = 1e-6
-"""The same where directions of the wrench are told apart in which the actuators push at all."""
+"""Singular values below this share of the largest count as zero where directions of the wrench are
+told apart in which the actuators push at all."""
+NO_FORCE = 1e-9
+"""Stands for a largest force of 0 where something is divided by it [N]."""
+SOLVED = 1e-5
+"""Normalized error up to which an answer is exact."""
+LIMIT = "processor time per target after which the best command so far is the answer"
+"""What the setting `time_limit_s` of slow methods means."""
+USUAL_SHARE = 0.1
+"""What a robot is mostly asked for, as a share of its wrench scale."""
 
-_FULL = 0.0, np.pi
-"""Middle and half of an arc [rad] that cuts nothing off."""
+
+class GroupIndex(NamedTuple):
+    """Where one actuator stands among the groups of a compiled robot."""
+
+    actuator: int
+    """Its index in the layout."""
+    group: int
+    """Index of its group."""
+    in_group: int
+    """Its index there."""
 
 
 class PseudoInverse:
-    """What does not depend on the target, of a robot in the flow that it has, rows scaled by
-    `sigma` (6,). Forces are along each actuator's own two directions; the second one of a line is
-    0."""
+    """What does not depend on the target, of n actuators in the flow that they are in.
+
+    Forces (n, 2) [N] are along each actuator's own two directions; the second one of a line is 0.
+    """
 
     def __init__(self, plant: Plant, sigma: Array) -> None:
+        """Inverts the effectiveness, columns scaled by the largest forces.
+
+        Args:
+            plant: of the robot, in its flow.
+            sigma: what rows (6,) are divided by [N, N m].
+        """
         self.plant = plant
         compiled = Compiled(plant.layout, plant, sigma).at(plant.inflow(None))
-        self.groups, self._core = compiled.groups, compiled.robot.core
-        """What the actuators can do."""
-        self.places = sorted(
-            (int(i), k, j) for k, (own, _) in enumerate(self.groups) for j, i in enumerate(own)
-        )
-        """Of each actuator, in order: itself, its group, and its place there."""
-        self.responses: list[Response] = compiled.robot.responses
-        """What each offers."""
-        self.held, kept = held_of(plant)
-        """Which actuators (n,) have one command alone; forces asked of them count for nothing."""
-        self.beside = compiled.beside + kept
-        """Wrench (6,) [N, N m] of forces of 0, such as the drag of foils, and of what is held."""
-        along = (
-            compiled.robot.effectiveness
-            * ~(compiled.robot.lines[:, None] & [False, True])[..., None]
-        )
-        along[self.held] = 0.0
-        self.effectiveness: Array = along.reshape(-1, 6).T
-        """Wrench (6, 2 n) per newton along each actuator's directions."""
-        self.largest = np.array([_largest(each) for each in self.responses])
-        """The largest force (n,) of each in any direction [N]."""
-        arcs = [
-            (each.middle, each.half) if isinstance(each, Plane) else _FULL
-            for each in self.responses
+        robot = compiled.robot
+        self._core = robot.core
+        self.groups = compiled.groups
+        """What the actuators can do, by kind."""
+        indices = [
+            GroupIndex(int(actuator), group, in_group)
+            for group, (actuators, _) in enumerate(self.groups)
+            for in_group, actuator in enumerate(actuators)
         ]
-        self._middle, self._half = np.array(arcs).T
-        most = np.repeat(np.maximum(self.largest, 1e-9), 2)
-        scaled = self.effectiveness * most / sigma[:, None]
-        self.inverse = (most[:, None] * np.linalg.pinv(scaled, rcond=RCOND) / sigma).T.copy()
+        self.group_indices = sorted(indices)
+        """Of each actuator, in the order of the layout."""
+        self.responses: list[Response] = robot.responses
+        """What each offers."""
+        self.is_fixed, wrench_of_fixed = fixed_actuators_of(plant)
+        """Which actuators (n,) have one command alone; forces asked of them count for nothing."""
+        self.wrench_offset = compiled.wrench_offset + wrench_of_fixed
+        """Wrench (6,) [N, N m] of forces of 0, such as the drag of foils, and of what is fixed."""
+        is_second_of_line = robot.is_line[:, None] & [False, True]
+        effectiveness = robot.effectiveness * ~is_second_of_line[..., None]
+        effectiveness[self.is_fixed] = 0.0
+        self.effectiveness: Array = effectiveness.reshape(-1, 6).T
+        """Wrench (6, 2 n) per newton along each actuator's directions."""
+        self.largest = np.array([_largest_force(response) for response in self.responses])
+        """The largest force (n,) of each in any direction [N]."""
+        self._sector_center = np.zeros(plant.n)
+        self._sector_half_angle = np.full(plant.n, np.pi)
+        for i, response in enumerate(self.responses):
+            if isinstance(response, Plane):
+                self._sector_center[i] = response.middle
+                self._sector_half_angle[i] = response.half
+        column_scale = np.repeat(np.maximum(self.largest, NO_FORCE), 2)
+        scaled = self.effectiveness * column_scale / sigma[:, None]
+        scaled_inverse = np.linalg.pinv(scaled, rcond=RCOND)
+        self.inverse = (column_scale[:, None] * scaled_inverse / sigma).T.copy()
         """Target (6,) times this (6, 2 n) gives each actuator's forces [N]."""
 
     def command(self, targets: Array) -> Array:
-        """Commands (N, n, 3) for targets (N, 6)."""
-        return self.decoded(self.force(targets))
+        """Returns commands (N, n, 3) for targets (N, 6) [N, N m]."""
+        return self.command_of(self.force(targets))
 
     def force(self, targets: Array) -> Array:
-        """Forces (N, n, 2) [N] for targets (N, 6), whatever the limits."""
-        return ((targets - self.beside) @ self.inverse).reshape(len(targets), self.plant.n, 2)
+        """Returns forces (N, n, 2) [N] for targets (N, 6) [N, N m], whatever the limits."""
+        force = (targets - self.wrench_offset) @ self.inverse
+        return force.reshape(len(targets), self.plant.n, 2)
 
-    def decoded(self, force: Array) -> Array:
-        """The cheapest commands (N, n, 3) for forces (N, n, 2) [N]; what an actuator cannot give is
-        cut off."""
-        angle = wrapped(np.arctan2(force[..., 1], force[..., 0]) - self._middle)
-        held = np.clip(angle, -self._half, self._half)
-        excess = np.minimum(np.abs(angle - held), 0.5 * np.pi)
+    def command_of(self, force: Array) -> Array:
+        """Returns the cheapest commands (N, n, 3) for forces (N, n, 2) [N]; of what lies beyond a
+        sector its projection on the nearer end, of what is too large the largest."""
+        direction = np.arctan2(force[..., 1], force[..., 0])
+        from_center = wrapped(direction - self._sector_center)
+        within = np.clip(from_center, -self._sector_half_angle, self._sector_half_angle)
+        excess = np.minimum(np.abs(from_center - within), 0.5 * np.pi)
         size = np.hypot(force[..., 0], force[..., 1]) * np.cos(excess)
-        angle = self._middle + held
+        angle = self._sector_center + within
         inside = size[..., None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
         return self.plant.feasible(self._core.commands(inside))
 
 
-def _largest(response: Response) -> float:
+def _largest_force(response: Response) -> float:
+    """The largest force [N] in any direction."""
     if isinstance(response, Line):
         reverse = 0.0 if response.reverse is None else response.reverse.largest
         return max(response.table.largest, reverse)
-    return response.table.largest * (1.0 if response.gauge is None else float(response.gauge.max()))
+    largest_radius = 1.0 if response.gauge is None else float(response.gauge.max())
+    return response.table.largest * largest_radius
 
 
 def pushed_axes(effectiveness: Array) -> Array:
-    """Directions (r, 6) of the wrench in which columns (6, k) push at all, each once."""
+    """Returns the directions (r, 6) of the wrench, orthonormal, in which columns (6, k) push."""
     axes, size, _ = np.linalg.svd(effectiveness)
-    return np.asarray(axes[:, : int((size > SAME_DIRECTION * size[0]).sum())].T)
-
-
-SOLVED = 1e-5
-"""Normalized error up to which an answer is exact."""
-LIMIT = "processor time per target after which the best command so far is the answer"
-USUAL_SHARE = 0.1
-"""What a robot is mostly asked for, as a share of its yardstick."""
+    rank = int((size > SAME_DIRECTION * size[0]).sum())
+    return np.asarray(axes[:, :rank].T)
 
 
 class ModelBased(LeastErrorMethod):
-    """A method that optimizes over the actuators' own laws and tables, those that score every
+    """Base of methods that optimize over the actuators' own laws and tables, those that score every
     method."""
 
     settings_class: ClassVar[type[Settings]] = Settings
 
     def prepare(self) -> None:
-        self.aim: Name = getattr(self.settings, "objective", "power")
+        """Reads what is kept least."""
+        self.objective: Name = getattr(self.settings, "objective", "power")
         """What is kept least."""
-        if self.aim == "effort":
+        if self.objective == "effort":
             self.layout.only("objective 'effort'")
         self.sigma = USUAL_SHARE * self.scale
         """What wrenches (6,) are divided by: what a robot is mostly asked for."""
@@ -133,19 +161,30 @@ class ModelBased(LeastErrorMethod):
 
     @abstractmethod
     def _commands(self, targets: Array, seed: int) -> Array:
-        """Commands (N, n, 3) for targets (N, 6). Random starts are drawn once and shared by all
-        targets, so that a target gets the same answer alone and among others."""
+        """Returns commands (N, n, 3) for targets (N, 6) [N, N m]. Random starts are drawn once and
+        shared by all targets, so that a target gets the same answer alone and among others."""
 
     def _best(self, target: Array, commands: Array, steps: int) -> Array:
-        """Of commands (S, n, 3), each brought onto a target (6,) by some Levenberg-Marquardt steps,
-        the cheapest one (n, 3) that meets it, else the one with the smallest error."""
+        """Chooses among commands that are first made exact.
+
+        Args:
+            target: desired wrench (6,) [N, N m].
+            commands: (S, n, 3) at which Levenberg-Marquardt steps begin.
+            steps: how many are taken from each.
+
+        Returns:
+            The cheapest command (n, 3) that meets the target, else the one with the smallest error.
+        """
         problem = CommandProblem.of(self.plant, self.sigma)
-        ends = refine(problem, target[None] / self.sigma, commands, steps)
-        missed = ends.error > SOLVED
-        cost = np.where(missed, ends.error, cost_meter(self.aim, self.plant)(ends.command))
-        return np.array(ends.command[np.lexsort((cost, missed))[0]])
+        refined = refine(problem, target[None] / self.sigma, commands, steps)
+        is_missed = refined.error > SOLVED
+        cost = cost_meter(self.objective, self.plant)(refined.command)
+        merit = np.where(is_missed, refined.error, cost)
+        best_first = np.lexsort((merit, is_missed))
+        return np.array(refined.command[best_first[0]])
 
     def _solve(self, targets: Array, *, seed: int, previous: Array | None) -> Solution:
+        """Solves for targets, whatever the command before."""
         return Solution(self.plant.feasible(self._commands(targets, seed)))
 
 
@@ -165,6 +204,7 @@ class Analytic(ModelBased):
     takes = "any actuator"
 
     def _commands(self, targets: Array, seed: int) -> Array:
+        """Returns the pseudo-inverse's commands."""
         return self._inverse.command(targets)
 
 
@@ -198,25 +238,27 @@ class FixedFrequency(ModelBased):
 
     @cached_property
     def _inverse(self) -> PseudoInverse:
+        """The pseudo-inverse of the robot whose fins all beat at the frequency."""
         layout = self.layout
         fins = []
         for fin in layout.actuators:
             low, high = fin.value("frequency")
-            wanted = self.settings.frequency
-            held = min(max(wanted, low), high)
-            fins.append(fin.with_value("frequency", (held, held)))
+            frequency = min(max(self.settings.frequency, low), high)
+            fins.append(fin.with_value("frequency", (frequency, frequency)))
         plant = plant_of(replace(layout, actuators=tuple(fins))).counting(layout.commanded)
         return PseudoInverse(plant.at(self.plant.flow), self.sigma)
 
     def _commands(self, targets: Array, seed: int) -> Array:
+        """Scales the pseudo-inverse's forces down together, and stops fins that give too little."""
         inverse = self._inverse
         lower = self.plant.lower
         force = inverse.force(targets)
-        share = np.linalg.norm(force, axis=-1) / np.maximum(inverse.largest, 1e-9)
-        force /= np.maximum(share.max(axis=1), 1.0)[:, None, None]
-        command = inverse.decoded(force)
-        least = command.copy()
-        least[..., 0] = lower[:, 0]
-        stops = np.linalg.norm(force, axis=-1) < np.linalg.norm(inverse.plant.force(least), axis=-1)
+        used_share = np.linalg.norm(force, axis=-1) / np.maximum(inverse.largest, NO_FORCE)
+        force /= np.maximum(used_share.max(axis=1), 1.0)[:, None, None]
+        command = inverse.command_of(force)
+        at_least_amplitude = command.copy()
+        at_least_amplitude[..., 0] = lower[:, 0]
+        least_force = np.linalg.norm(inverse.plant.force(at_least_amplitude), axis=-1)
+        stops = np.linalg.norm(force, axis=-1) < least_force
         command[..., :2] = np.where(stops[..., None], lower[:, :2], command[..., :2])
         return command

@@ -20,8 +20,10 @@ from finlab.physics.objective import CostMeter, Name, cost_meter
 
 NEAR = 1e-3
 """Normalized error from which on a start is no way to the target: its cost does not matter."""
-APPROACH, POLISH = 30, 2
-"""Levenberg-Marquardt steps from a start onto the target, and after the last quadratic program."""
+APPROACH = 30
+"""Levenberg-Marquardt steps from a start onto the target."""
+POLISH = 2
+"""Levenberg-Marquardt steps after the last quadratic program."""
 SETTLED = 1e-8
 """Change of the cost, as a share of a usual one, at which the programs end."""
 
@@ -60,11 +62,13 @@ class Sqp(ModelBased):
 
     @cached_property
     def _program(self) -> tuple[CommandProblem, Solve]:
-        meter = cost_meter(self.aim, self.plant)
+        """What brings starts onto a target, and what makes them cheap there."""
+        meter = cost_meter(self.objective, self.plant)
         solve = cheapest_program(self.plant, meter, self.sigma, self.settings.n_steps)
         return CommandProblem.of(self.plant, self.sigma), solve
 
     def _commands(self, targets: Array, seed: int) -> Array:
+        """Solves for one target after the other."""
         problem, solve = self._program
         plant = self.plant
         answer = self._inverse.command(targets)
@@ -82,8 +86,18 @@ class Sqp(ModelBased):
 
 
 def cheapest_program(plant: Plant, meter: CostMeter, sigma: Array, steps: int) -> Solve:
-    """Returns what finds the commands of least cost, by the meter, near a start that deliver a
-    target, by SciPy's SLSQP with at most some steps; `sigma` (6,) divides the wrenches."""
+    """Makes what finds the commands of least cost that deliver a target, by SciPy's SLSQP.
+
+    Args:
+        plant: of the robot.
+        meter: of the cost.
+        sigma: what wrenches (6,) are divided by [N, N m].
+        steps: most quadratic programs from a start.
+
+    Returns:
+        A function of a normalized target (6,) and a start (n, 3), that returns the command (n, 3)
+        where SLSQP ends.
+    """
     axes = pushed_axes(layout_effectiveness(plant.layout) / sigma[:, None])
     width = plant.width
     free = width.ravel() > 0.0

@@ -1,50 +1,78 @@
-"""Where pods turn when the wrenches of the next ticks are known.
+"""Where pods turn when the wrenches of the next ticks are known; docs/theory/method.md, "Turning
+ahead".
 
 Beside the wrench of now, that of a later tick is answered, within what the drives allow until then,
 and with what turning costs over that time. Its angles are those that the pods will want. Their
-small part is left, as turning there and back with every wave gains little; half of the rest is
+small part is left, as turning there and back with every wave gains little; half of the remainder is
 wanted now, the next tick wants half of what then remains.
 """
 
-from typing import Any
+from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
-from finlab.allocation.policy import CLOSEST
+from finlab.allocation.policy import CLOSEST, Policy
 from finlab.arrays import Array
-from finlab.core.calls import Now
+from finlab.axes import TURN
+from finlab.core.calls import Conditions, CoreAnswer
+from finlab.layout.layout import Layout
 
-MOST_AHEAD = 8
-"""Ticks to which pods look ahead."""
-LEFT = 0.1
+MAX_TICKS_AHEAD = 8
+"""Ticks to which pods look ahead at most."""
+IGNORED_SHARE = 0.1
 """Share of the turn that the drives allow until then, up to which a pod stays where it is."""
-AT_ONCE = 0.5
+SHARE_NOW = 0.5
 """Share of the remaining turn that is wanted now."""
-HELD_BY = 10.0
-"""Times as much as usual does it cost to stand elsewhere than is wanted."""
+CALM_FACTOR = 10.0
+"""Factor of what turning costs: to stand at another angle than is wanted is that much dearer."""
 
 
-def turning_ahead(method: Any, reference: Array, now: Now) -> Now:
-    """Returns what holds now, with the angles near which pods are to stand.
+class PodMethod(Protocol):
+    """What is asked of method `dual` here, in its flow."""
+
+    layout: Layout
+
+    @property
+    def period_s(self) -> float:
+        """Time between ticks [s]."""
+        ...
+
+    @property
+    def turning_pods(self) -> NDArray[np.bool_]:
+        """Which actuators (n,) are pods whose turning costs."""
+        ...
+
+    def forces(
+        self, targets: Array, policy: Policy | None, lam: Array | None, conditions: Conditions
+    ) -> CoreAnswer:
+        """Answers wrenches (N, 6); see `Dual.forces`."""
+        ...
+
+
+def conditions_ahead(method: PodMethod, reference: Array, conditions: Conditions) -> Conditions:
+    """Returns what holds, with the angles near which pods are to stand.
 
     Args:
         method: of the robot.
         reference: wrenches (K, 6) of the next ticks [N, N m], at least one.
-        now: what holds, with the commands before.
+        conditions: what holds, in a tick.
 
     Returns:
-        The same with angles (n,) [rad], NaN of actuators that are no pods, are lost, or have no
-        known command before, and with what it costs to stand elsewhere.
+        The same with the wanted angles (n,) [rad], NaN of actuators that are no pods, are lost, or
+        have no known command before, and with what it costs to stand elsewhere.
     """
-    assert now.previous is not None
-    last = min(len(reference), MOST_AHEAD)
+    assert conditions.command_previous is not None
+    last = min(len(reference), MAX_TICKS_AHEAD)
     ticks = last + 1
-    later = method.forces(reference[last - 1 : last], CLOSEST, None, now._replace(ticks=ticks))
-    angle_before = now.previous[:, 0]
-    turn = later.command[0, :, 0] - angle_before
-    turn = (turn + np.pi) % (2.0 * np.pi) - np.pi
+    then = method.forces(
+        reference[last - 1 : last], CLOSEST, None, conditions._replace(ticks=ticks)
+    )
+    angle_previous = conditions.command_previous[:, 0]
+    turn = then.command[0, :, 0] - angle_previous
+    turn = (turn + np.pi) % TURN - np.pi
     largest_turn = ticks * method.period_s * method.layout.rates[:, 0]
-    left = LEFT * largest_turn
-    wanted = np.sign(turn) * np.maximum(np.abs(turn) - left, 0.0)
-    toward = np.where(method.turning, angle_before + AT_ONCE * wanted, np.nan)
-    return now._replace(toward=toward, calm=HELD_BY * now.calm)
+    ignored_turn = IGNORED_SHARE * largest_turn
+    wanted_turn = np.sign(turn) * np.maximum(np.abs(turn) - ignored_turn, 0.0)
+    angles_wanted = np.where(method.turning_pods, angle_previous + SHARE_NOW * wanted_turn, np.nan)
+    return conditions._replace(angles_wanted=angles_wanted, calm=CALM_FACTOR * conditions.calm)

@@ -1,159 +1,258 @@
-"""A layout compiled for the dual: the answers of its actuators, and the commands for the forces
-found."""
+"""A layout compiled for the dual: the responses of its actuators, as the core reads them, and the
+bound that their conjugates prove.
+
+Method `dual` compiles a robot once and in each flow. Other methods and the null space use the same
+for the commands that give forces.
+"""
 
 from copy import copy
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.actuators.actuator import Indices
 from finlab.actuators.kinds import groups_of
 from finlab.actuators.response import Group, Line, Plane, with_square
-from finlab.allocation.dual.robot import DualRobot
+from finlab.allocation.dual.robot import CommandLimits, DualRobot
+from finlab.allocation.settings import USUAL_PERIOD_S
 from finlab.arrays import ROUNDING, Array
-from finlab.core.calls import STILL, Now, Worth
+from finlab.core.calls import NOMINAL, Conditions, Conjugates
 from finlab.layout.layout import Layout
-from finlab.physics.plant import Plant
+from finlab.physics.objective import yardstick
+from finlab.physics.plant import Plant, plant_of
 
 
 class Compiled:
-    """The actuators of one robot, ready for prices."""
+    """The n actuators of one robot in one flow, ready for multipliers."""
 
     def __init__(
         self,
         layout: Layout,
         plant: Plant,
-        yardstick: Array,
-        period_s: float = 0.1,
-        doubt: Array | None = None,
+        wrench_scale: Array,
+        period_s: float = USUAL_PERIOD_S,
+        miss_cost: Array | None = None,
     ) -> None:
-        """Compiles the actuators of a layout with the effectiveness of a plant, for errors on a
-        yardstick
-        (6,) and ticks of a period; what a squared force costs beside its power is `doubt`, see
-        `price_of_doubt`. Errors as for `FinGroup`."""
+        """Compiles the actuators of a layout.
+
+        Args:
+            layout: the robot.
+            plant: of the layout, at rest in the water; its effectiveness and the axes that count
+                are used.
+            wrench_scale: (6,) [N, N m], by which errors are normalized.
+            period_s: time between ticks [s].
+            miss_cost: of `miss_cost_of`, (n, 6); None where a squared force costs nothing beside
+                its power.
+
+        Raises:
+            DataError: a force table cannot be read.
+        """
         self.count = layout.n
+        """How many actuators there are."""
+        self.miss_cost = miss_cost
+        """As it was given; None where it costs nothing."""
         self._actuators = layout.actuators
-        self._yardstick = yardstick
-        self._limits = layout.lower, layout.upper, layout.rates * period_s, plant.turns
+        self._wrench_scale = wrench_scale
+        max_change = layout.rates * period_s
+        self._limits = CommandLimits(layout.lower, layout.upper, max_change, plant.turns)
         self._effectiveness = plant.effectiveness
         self._counts = plant.counts.astype(np.float64)
-        self.doubt = doubt
-        """The same; None where it costs nothing."""
         self.groups = groups_of(layout.actuators, plant.effectiveness)
-        self._alike: list[tuple[Group, Group]] = []
-        for places, group in self.groups:
-            tables = [(r.table, r.reverse) for r in group.responses if isinstance(r, Plane)]
-            same = all(a is b for pair in tables for a, b in zip(pair, tables[0], strict=True))
-            if same and len(tables) == len(group.responses) > 1:
-                first = slice(places[0], places[0] + 1)
-                self._alike += [
-                    (group, groups_of(layout.actuators[first], plant.effectiveness[first])[0][1])
-                ]
-        self._prepare()
+        """Actuators by kind: indices, and the group of their responses."""
+        self._single_of_group: dict[int, Group] = {}
+        """Of each group all of whose responses are by the same tables, by its index: the first of
+        its actuators as a group of its own, which answers for all."""
+        for index, (indices, group) in enumerate(self.groups):
+            if _shares_tables(group):
+                first = slice(indices[0], indices[0] + 1)
+                single = groups_of(layout.actuators[first], plant.effectiveness[first])
+                self._single_of_group[index] = single[0][1]
+        self._compile()
 
-    def _prepare(self) -> None:
+    @classmethod
+    def of(cls, layout: Layout) -> Self:
+        """Compiles a layout at rest in the water, with its own wrench scale and axes.
+
+        Args:
+            layout: the robot.
+
+        Returns:
+            What method `dual` compiles of it by its usual settings.
+
+        Raises:
+            DataError: a force table cannot be read.
+        """
+        return cls(layout, plant_of(layout).counting(layout.commanded), yardstick(layout))
+
+    def _compile(self) -> None:
+        """Makes the robot of the core from the responses of all groups."""
         responses: list[Any] = [None] * self.count
         forms: list[Any] = [None] * self.count
-        self.weight = np.zeros(self.count)
-        """What doubt makes a squared force (n,) cost [W/N^2]."""
-        for places, group in self.groups:
-            for place, response, form in zip(places, group.responses, group.forms, strict=True):
-                if self.doubt is not None:
-                    self.weight[place] = (response.effectiveness**2 @ self.doubt[place]).sum()
-                weight = float(self.weight[place])
+        self.uncertainty_cost = np.zeros(self.count)
+        """What a squared force costs beside its power (n,) [W/N^2]."""
+        for indices, group in self.groups:
+            for i, response, form in zip(indices, group.responses, group.forms, strict=True):
+                if self.miss_cost is not None:
+                    squared_effectiveness = response.effectiveness**2
+                    cost = (squared_effectiveness @ self.miss_cost[i]).sum()
+                    self.uncertainty_cost[i] = cost
+                cost = float(self.uncertainty_cost[i])
+                # Of a foil the core adds the cost itself, since the drag has a price of its own.
                 drags = isinstance(response, Line) and response.drag is not None
-                doubted = with_square(response, weight) if weight and not drags else response
-                responses[place] = doubted
-                forms[place] = form
-        self.beside = self.beside_of_working(np.ones(self.count, bool))
-        """Wrench (6,) [N, N m] beside the answers' forces, such as the drag of foils without
-        lift."""
+                dearer = with_square(response, cost) if cost and not drags else response
+                responses[i] = dearer
+                forms[i] = form
+        self.wrench_offset = self.wrench_offset_of(np.ones(self.count, bool))
+        """Wrench (6,) [N, N m] at forces of 0, such as the drag of foils without lift."""
         self.robot = DualRobot(
             responses,
             forms,
             self._limits,
             self._effectiveness,
-            self._yardstick,
-            self.beside,
-            self.weight,
+            self._wrench_scale,
+            self.wrench_offset,
+            self.uncertainty_cost,
             self._counts,
         )
+        """The robot as the core reads it."""
 
-    def beside_of_working(self, works: NDArray[np.bool_]) -> Array:
-        """Returns the wrench (6,) beside the forces of the actuators that work (n,)."""
-        each = (group.beside[works[places]].sum(axis=0) for places, group in self.groups)
-        return sum(each, np.zeros(6)) * self._counts
+    def wrench_offset_of(self, works: NDArray[np.bool_]) -> Array:
+        """Returns the wrench (6,) [N, N m] at forces of 0 of the actuators that work (n,)."""
+        wrench = np.zeros(6)
+        for indices, group in self.groups:
+            wrench = wrench + group.beside[works[indices]].sum(axis=0)
+        return wrench * self._counts
 
     def at(self, inflow: Array | None) -> "Compiled":
-        """The same in another flow: velocities (n, 3) [m/s] of the actuators' places in their own
-        frames."""
+        """Returns the robot compiled in another flow.
+
+        Args:
+            inflow: velocities (n, 3) [m/s] of the actuators' positions through the water, in their
+                own frames; None at rest.
+
+        Returns:
+            Another one; itself where no actuator feels the flow.
+        """
         if not any(group.feels_flow for _, group in self.groups):
             return self
         other = copy(self)
-        other.groups = [
-            (places, group.at(None if inflow is None else inflow[places]))
-            for places, group in self.groups
-        ]
-        other._prepare()
+        other.groups = []
+        other._single_of_group = {}
+        for index, (indices, group) in enumerate(self.groups):
+            inflow_of_group = None if inflow is None else inflow[indices]
+            moved = group.at(inflow_of_group)
+            other.groups.append((indices, moved))
+            if moved is group and index in self._single_of_group:
+                other._single_of_group[index] = self._single_of_group[index]
+        other._compile()
         return other
 
     @cached_property
     def _directions(self) -> Array:
         """Directions (n, 2, 3) of each actuator's forces in its own axes."""
-        own = np.zeros((self.count, 2, 6))
-        for places, group in groups_of(
-            self._actuators, np.broadcast_to(np.eye(3, 6), (self.count, 3, 6))
-        ):
-            for place, response in zip(places, group.responses, strict=True):
-                own[place] = response.rows
-        return own[..., :3]
+        directions = np.zeros((self.count, 2, 6))
+        own_axes = np.broadcast_to(np.eye(3, 6), (self.count, 3, 6))
+        for indices, group in groups_of(self._actuators, own_axes):
+            for i, response in zip(indices, group.responses, strict=True):
+                directions[i] = response.rows
+        return directions[..., :3]
 
     def forces_along(self, force: Array) -> Array:
-        """Forces (..., n, 2) [N] along each actuator's directions of forces (..., n, 3) [N] in own
-        axes."""
+        """Returns forces (..., n, 3) [N] in own axes as those (..., n, 2) [N] along each actuator's
+        directions."""
         return np.asarray(np.einsum("nka,...na->...nk", self._directions, force))
 
-    def radial_worth(self, group: Group, places: Indices, worth: Worth) -> Array | None:
-        """Returns what forces are worth by the laws of a group at some places; see
-        `Group.radial_worth`. Where all actuators are alike, one answers for all."""
-        ahead = worth.price_ahead[:, places]
-        back = worth.price_reverse[:, places]
-        ends = np.stack([worth.force_min[0, places], worth.force_max[0, places]], axis=-1)
-        for alike, one in self._alike:
-            if alike is group:
-                most = one.radial_worth(ahead.reshape(-1, 1), back.reshape(-1, 1), None)
-                return None if most is None else most.reshape(ahead.shape)
-        return group.radial_worth(ahead, back, ends)
+    def conjugates_by_laws(self, index: int, by_tables: Conjugates) -> Array | None:
+        """Returns the conjugates of forces along their prices, by the laws of one group.
+
+        Args:
+            index: of the group, in `groups`.
+            by_tables: conjugates of all n actuators, at N multipliers.
+
+        Returns:
+            Conjugates (N, m) [W] of the group's m actuators, or upper bounds of them; NaN, or None
+            for all, where the tables say the same as the laws.
+        """
+        indices, group = self.groups[index]
+        price = by_tables.price_ahead[:, indices]
+        price_reverse = by_tables.price_reverse[:, indices]
+        single = self._single_of_group.get(index)
+        if single is not None:
+            # Identical tables: one actuator, within all that its limits allow, answers for all.
+            bound = single.radial_worth(price.reshape(-1, 1), price_reverse.reshape(-1, 1), None)
+            return None if bound is None else bound.reshape(price.shape)
+        force_limits = np.stack(
+            [by_tables.force_min[0, indices], by_tables.force_max[0, indices]], axis=-1
+        )
+        return group.radial_worth(price, price_reverse, force_limits)
 
 
-def price_of_doubt(layout: Layout, scale: Array, robust: float) -> Array | None:
-    """Returns what a squared force of each actuator costs for the squared effectiveness of each
-    axis (n, 6) [W, W/m^2 per N^2] where a miss of 1 % of the yardstick `scale` (6,) costs `robust`
-    [W], growing with the square; None where nothing does. A `DataError` where a force table cannot
-    be read."""
+def _shares_tables(group: Group) -> bool:
+    """Whether all of two or more actuators push in planes by the very same tables."""
+    if len(group.responses) < 2:
+        return False
+    planes = [response for response in group.responses if isinstance(response, Plane)]
+    if len(planes) < len(group.responses):
+        return False
+    first = planes[0]
+    return all(
+        plane.table is first.table and plane.reverse is first.reverse for plane in planes[1:]
+    )
+
+
+def miss_cost_of(layout: Layout, wrench_scale: Array, robust: float) -> Array | None:
+    """Returns what the expected miss of actuators costs.
+
+    Args:
+        layout: the robot of n actuators.
+        wrench_scale: (6,) [N, N m].
+        robust: what a miss of 1 % of the wrench scale costs [W], growing with its square.
+
+    Returns:
+        Cost (n, 6) [W, W/m^2 per N^2] of a squared force for the squared effectiveness along each
+        axis; None where nothing costs anything.
+
+    Raises:
+        DataError: a force table cannot be read.
+    """
     if robust == 0.0:
         return None
     from finlab.physics.expected_miss import uncertainties
 
     shares = np.array([0.0 if own is None else own.share for own in uncertainties(layout)])
-    return np.multiply.outer(robust * shares**2, (0.01 * scale) ** -2.0) if shares.any() else None
+    if not shares.any():
+        return None
+    return np.multiply.outer(robust * shares**2, (0.01 * wrench_scale) ** -2.0)
 
 
-def proved_power(compiled: Compiled, wrench: Array, price: Array, now: Now = STILL) -> Array:
-    """Returns the power (N,) [W] that no answer undercuts which gives wrenches (N, 6) with what may
-    be given now, by prices (N, 6) [W/N, W/(N m)]."""
-    worth = compiled.robot.core.worth(price, now)
-    most = worth.conjugate.copy()
-    for places, group in compiled.groups:
-        for own in (compiled.radial_worth(group, places, worth), group.worth(price)):
-            if own is not None:
-                most[:, places] = np.where(np.isnan(own), most[:, places], own)
-    beside = compiled.beside
-    if now.lost is not None:
-        most[:, now.lost] = 0.0
-        beside = compiled.beside_of_working(~now.lost)
-    paid = price * (wrench - beside)
-    rounding = ROUNDING * (np.abs(paid).sum(axis=1) + np.abs(most).sum(axis=1))
-    return np.asarray(paid.sum(axis=1) - most.sum(axis=1) - rounding)
+def power_bound(
+    compiled: Compiled, wrench: Array, lam: Array, conditions: Conditions = NOMINAL
+) -> Array:
+    """Returns a lower bound of the power by weak duality (Eq. 3), with conjugates by the laws.
+
+    Args:
+        compiled: the robot.
+        wrench: (N, 6) [N, N m] that is given.
+        lam: multipliers (N, 6) [W/N, W/(N m)]; any prove a bound.
+        conditions: what holds of the robot.
+
+    Returns:
+        Power (N,) [W] that no answer undercuts which gives these wrenches under the conditions.
+    """
+    by_tables = compiled.robot.core.conjugates(lam, conditions)
+    conjugate = by_tables.conjugate.copy()
+    for index, (indices, group) in enumerate(compiled.groups):
+        along_price = compiled.conjugates_by_laws(index, by_tables)
+        in_all_directions = group.worth(lam)
+        for by_laws in (along_price, in_all_directions):
+            if by_laws is not None:
+                is_said = ~np.isnan(by_laws)
+                conjugate[:, indices] = np.where(is_said, by_laws, conjugate[:, indices])
+    wrench_offset = compiled.wrench_offset
+    if conditions.lost is not None:
+        conjugate[:, conditions.lost] = 0.0
+        wrench_offset = compiled.wrench_offset_of(~conditions.lost)
+    paid = lam * (wrench - wrench_offset)
+    rounding = ROUNDING * (np.abs(paid).sum(axis=1) + np.abs(conjugate).sum(axis=1))
+    return np.asarray(paid.sum(axis=1) - conjugate.sum(axis=1) - rounding)

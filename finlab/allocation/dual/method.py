@@ -1,20 +1,20 @@
 """The default method: least watts by the dual, exact by the actuators' own laws.
 
-The core in C (`finlab.core`) finds prices, forces and commands for a robot that Python has
-compiled, within what may be given now: limits, rates from the command before, losses. What its
-tables leave undone, by the actuators' own laws, is removed by Levenberg-Marquardt steps on the
+The core in C (`finlab.core`) finds multipliers, forces and commands for a robot that Python has
+compiled, under the conditions of a question: limits, rates from the command before, losses. What
+its tables leave undone, by the actuators' own laws, is removed by Levenberg-Marquardt steps on the
 commands, within the same limits.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.dual.compiled import Compiled, price_of_doubt, proved_power
+from finlab.allocation.dual.compiled import Compiled, miss_cost_of, power_bound
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.method import Method
 from finlab.allocation.policy import CLOSEST, Policy
@@ -22,17 +22,22 @@ from finlab.allocation.settings import Settings, number
 from finlab.allocation.solution import Solution
 from finlab.arrays import CLOSE, NEARLY, NOTHING, ROUNDING, ROUNDS, Array
 from finlab.axes import axes_in
-from finlab.core.calls import STILL, Found, Now
+from finlab.core.calls import NOMINAL, Conditions, CoreAnswer
 from finlab.layout.effectiveness import wrench_of_forces
 
 if TYPE_CHECKING:
-    from finlab.core.whole import Whole
+    from finlab.core.coupled_core import CoupledCore
 
 EXACT = 1e-8
-"""Error, on the yardstick, up to which commands need no further step."""
-MOST_SPANS = 32
-"""States of losses and free axes whose driven directions are kept."""
-_ENDED = "the search for a better answer was ended by its limit of steps"
+"""Normalized error up to which commands need no further step."""
+MAX_BASES = 32
+"""States of losses and free axes of which the basis of what is driven is kept."""
+TABLE_ERROR = 10.0 * CLOSE
+"""Share of a power by which the core's tables may be off."""
+_TRUNCATED = "the search for a better answer was ended by its limit of steps"
+"""Note of an answer whose search ended early."""
+_NONE_ALONE = "no share of the target was found that the actuators can give alone"
+"""Note of an answer that is off the ray of its target."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +57,14 @@ class DualSettings(Settings):
     )
 
 
+class _MethodInFlow(NamedTuple):
+    """A method for a robot in one flow: one is kept, as a control loop asks in the same flow for
+    many ticks, or in another one at each."""
+
+    flow: bytes
+    method: "Dual"
+
+
 class Dual(Method):
     """Exact and cheapest on any actuators whose laws are known, without a network."""
 
@@ -66,34 +79,40 @@ class Dual(Method):
     settings: DualSettings
 
     def prepare(self) -> None:
-        doubt = price_of_doubt(self.layout, self.scale, self.settings.robust)
-        self.compiled = Compiled(self.layout, self.plant, self.scale, self.settings.period_s, doubt)
-        self._last: tuple[bytes, Self] | None = None
-        self._spans: dict[bytes, Array] = {}
+        """Compiles the robot for the core."""
+        miss_cost = miss_cost_of(self.layout, self.scale, self.settings.robust)
+        self.compiled = Compiled(
+            self.layout, self.plant, self.scale, self.settings.period_s, miss_cost
+        )
+        """The robot as the core reads it."""
+        self._in_last_flow: _MethodInFlow | None = None
+        self._bases: dict[bytes, Array] = {}
 
     @cached_property
     def problem(self) -> CommandProblem:
-        """The robot by its own laws."""
+        """Steps on the commands, by the laws themselves."""
         return CommandProblem.of(self.plant, self.scale)
 
     @cached_property
-    def whole(self) -> "Whole":
-        from finlab.allocation.dual.turns import whole_of
+    def coupled(self) -> "CoupledCore":
+        """The robot in the core with what its actuators do to each other, where they do."""
+        from finlab.allocation.dual.outer_iterations import coupled_core
 
-        return whole_of(self)
+        return coupled_core(self.plant, self.compiled)
 
     def at(self, flow: Array | None) -> Self:
+        """Returns the method in a flow; see `Method.at`. The last flow's is kept."""
         if flow is None:
             return self
         key = flow.tobytes()
-        if self._last is not None and self._last[0] == key:
-            return self._last[1]
+        if self._in_last_flow is not None and self._in_last_flow.flow == key:
+            return self._in_last_flow.method  # type: ignore[return-value]
         other = super().at(flow)
         if other is not self:
             other.compiled = self.compiled.at(other.plant.inflow(None))
-            other._last = None
-            other._spans = {}
-            self._last = key, other
+            other._in_last_flow = None
+            other._bases = {}
+            self._in_last_flow = _MethodInFlow(key, other)
         return other
 
     def solve(
@@ -109,378 +128,469 @@ class Dual(Method):
         free: NDArray[np.bool_] | None = None,
         reference: Array | None = None,
     ) -> Solution:
-        """Solves for targets; see `Method.solve`.
+        """Solves for targets; what is not listed is as for `Method.solve`.
 
         Args:
-            targets: as for `Method`.
-            policy: as for `Method`.
-            previous: as for `Method`.
-            flow: as for `Method`.
-            seed: as for `Method`.
-            prices: (6,) [W/N, W/(N m)] at which Newton's method begins, for a single target.
+            prices: multipliers (6,) [W/N, W/(N m)] at which Newton's method begins, for a single
+                target; None for its own.
             lost: which actuators (n,) do not work; None where all do.
             free: which axes (6,) may take any wrench; None for none.
             reference: wrenches (K, 6) of the next ticks [N, N m]; pods turn in time for them.
+
+        Returns:
+            Commands (N, n, 3), NaN for lost actuators, and the lower bound of their power.
         """
         if len(targets) == 0:
             return Solution(np.empty((0, self.layout.n, 3)), lambda _: np.empty(0))
-        now = Now(previous, lost, free, 0.0 if previous is None else self.settings.calm)
+        calm = 0.0 if previous is None else self.settings.calm
+        conditions = Conditions(previous, lost, free, calm)
         method = self.at(flow)
         if reference is not None and len(reference) and method.turns_ahead and previous is not None:
-            from finlab.allocation.dual.ahead import turning_ahead
+            from finlab.allocation.dual.ahead import conditions_ahead
 
-            now = turning_ahead(method, reference, now)
-        return method.solve_now(targets, policy, now, prices)
+            conditions = conditions_ahead(method, reference, conditions)
+        return method.solve_under(conditions, targets, policy, prices)
 
     @cached_property
-    def turning(self) -> NDArray[np.bool_]:
+    def turning_pods(self) -> NDArray[np.bool_]:
         """Which actuators (n,) are pods whose turning costs."""
-        is_pod = self.compiled.robot.pods
+        is_pod = self.compiled.robot.is_pod
         return np.asarray(is_pod & np.isfinite(self.layout.rates[:, 0]))
 
     @property
     def turns_ahead(self) -> bool:
         """Whether wrenches to come tell where pods are to turn."""
-        return self.settings.calm > 0.0 and bool(self.turning.any())
+        return self.settings.calm > 0.0 and bool(self.turning_pods.any())
 
     def in_time(self, target: Array, reference: Array) -> Array:
-        # Turning is what makes pods late, and they turn ahead: what is asked for is given now.
+        """Returns which wrench is answered; see `Method.in_time`."""
+        # Turning is what makes pods late, and they turn ahead: what is asked for is given at once.
         return target if self.turns_ahead else super().in_time(target, reference)
 
-    def solve_now(
-        self, targets: Array, policy: Policy, now: Now, prices: Array | None = None
+    def solve_under(
+        self, conditions: Conditions, targets: Array, policy: Policy, lam: Array | None = None
     ) -> Solution:
-        """Solves for targets with what may be given now, in the water of `flow`.
+        """Solves for targets in the flow of this method.
 
         Args:
-            targets: wrenches (N, 6), at least one [N, N m].
-            policy: what to give beyond reach.
-            now: limits, rates, losses and free axes that hold now.
-            prices: (6,) [W/N, W/(N m)] at which Newton's method begins, for a single target.
+            conditions: rates, losses and free axes.
+            targets: desired wrenches (N, 6), at least one [N, N m].
+            policy: what to give out of reach.
+            lam: multipliers (6,) [W/N, W/(N m)] at which Newton's method begins, for a single
+                target; None for its own.
 
         Returns:
             Commands, with the lower bound of their power.
         """
         if self.plant.interaction is not None:
-            from finlab.allocation.dual.turns import settled
+            from finlab.allocation.dual.outer_iterations import solve_outer
 
-            return settled(self, targets, policy, now, prices)
-        found = self.forces(targets, policy, prices, now)
-        # A search of bytes, in a third of the time of numpy's `all`.
-        beyond = (
-            np.flatnonzero(~found.is_attainable).tolist()
-            if 0 in found.is_attainable.tobytes()
-            else []
-        )
-        wrench_served = found.wrench_served if beyond else targets
-        notes = {_ENDED} if found.is_truncated else set()
-        command = self.exact(found, now)
+            return solve_outer(self, targets, policy, conditions, lam)
+        answer = self.forces(targets, policy, lam, conditions)
+        # A search of bytes takes a third of the time of numpy's `all`, and every tick pays for it.
+        all_reachable = 0 not in answer.is_attainable.tobytes()
+        unreachable = [] if all_reachable else np.flatnonzero(~answer.is_attainable).tolist()
+        wrench_served = targets if all_reachable else answer.wrench_served
+        notes = {_TRUNCATED} if answer.is_truncated else set()
+        command = self.exact(answer, conditions)
         if policy.kind == "direction":
-            for row in beyond:
-                notes.add(self._kept_on_the_ray(targets[row], row, found, command, now))
-        if beyond:
-            notes |= self.not_held(targets[beyond], now)
+            for row in unreachable:
+                notes.add(self._keep_on_ray(targets[row], row, answer, command, conditions))
+        if unreachable:
+            notes |= self.undriven_notes(targets[unreachable], conditions)
         return self.solution(
-            command, wrench_served, found.prices, found.gap_power_bound, notes, now
+            command, wrench_served, answer.lam, answer.gap_power_bound, notes, conditions
         )
 
     def solution(
         self,
         command: Array,
         wrench_served: Array,
-        price: Array,
+        lam: Array,
         gap_power_bound: Array,
         notes: set[str],
-        now: Now,
+        conditions: Conditions,
     ) -> Solution:
-        """Returns commands (N, n, 3) for wrenches (N, 6) as a solution, with the bound that prices
-        (N, 6) and values (N,) [W] prove, and sentences."""
-        if now.lost is not None:
-            command[:, now.lost] = np.nan
+        """Puts an answer together.
+
+        Args:
+            command: (N, n, 3); its rows of lost actuators become NaN.
+            wrench_served: (N, 6) [N, N m] that the commands give.
+            lam: multipliers (N, 6) [W/N, W/(N m)], which prove the bound.
+            gap_power_bound: power (N,) [W] that gaps are proved to need.
+            notes: sentences, of which empty ones are left out.
+            conditions: under which the commands were found.
+
+        Returns:
+            The solution, whose bound is computed when it is asked for.
+        """
+        if conditions.lost is not None:
+            command[:, conditions.lost] = np.nan
         bound: Callable[[Array], Array] = partial(
-            self.bound, wrench_served, price, gap_power_bound, now
+            self.bound, wrench_served, lam, gap_power_bound, conditions
         )
         return Solution(
             command,
-            bound=None if self.unproved else bound,
-            calm_power=partial(self.calm_power, now) if now.calm > 0.0 else None,
-            prices=price,
+            bound=None if self.has_no_bound else bound,
+            calm_power=partial(self.calm_power, conditions) if conditions.calm > 0.0 else None,
+            prices=lam,
             notes=tuple(sorted(notes - {""})),
         )
 
-    def calm_power(self, now: Now, command: Array) -> Array:
-        """Power (N,) [W] that commands (N, n, 3) take now beyond those that give the same wrenches
-        where turning costs nothing."""
-        works, given = self._working(command, now)
-        wrench = self.problem_now(now).wrench(given) * self.scale
-        other = self.solve_now(wrench, CLOSEST, now._replace(calm=0.0)).command
-        power = self.plant.power(given)[:, works].sum(axis=-1)
-        least = self.plant.power(other)[:, works].sum(axis=-1)
-        return np.asarray(np.maximum(power - least, 0.0))
+    def calm_power(self, conditions: Conditions, command: Array) -> Array:
+        """Returns the power that commands take beyond those that give the same wrenches where
+        turning costs nothing.
 
-    def _working(self, command: Array, now: Now) -> tuple[NDArray[np.bool_], Array]:
+        Args:
+            conditions: of the tick.
+            command: (N, n, 3), NaN for lost actuators.
+
+        Returns:
+            (N,) [W].
+        """
+        works, finite_command = self._without_nan(command, conditions)
+        wrench = self.problem_under(conditions).wrench(finite_command) * self.scale
+        for_nothing = conditions._replace(calm=0.0)
+        other_command = self.solve_under(for_nothing, wrench, CLOSEST).command
+        power = self.plant.power(finite_command)[:, works].sum(axis=-1)
+        least_power = self.plant.power(other_command)[:, works].sum(axis=-1)
+        return np.asarray(np.maximum(power - least_power, 0.0))
+
+    def _without_nan(
+        self, command: Array, conditions: Conditions
+    ) -> tuple[NDArray[np.bool_], Array]:
         """Returns which actuators (n,) work, and commands (N, n, 3) with numbers in place of the
         lost ones' NaN, whose forces and powers do not count."""
-        works = np.ones(self.layout.n, bool) if now.lost is None else ~now.lost
+        works = np.ones(self.layout.n, bool) if conditions.lost is None else ~conditions.lost
         return works, np.where(works[:, None], command, self.plant.lower)
 
-    def problem_now(self, now: Now) -> CommandProblem:
-        """Returns the problem of steps on commands within what may be given now."""
+    def problem_under(self, conditions: Conditions) -> CommandProblem:
+        """Returns the problem of steps on commands under some conditions: within the rates, with
+        the actuators that work, in the axes that count."""
         problem = self.problem
-        if now.lost is not None or now.free is not None:
-            works = None if now.lost is None else ~now.lost
-            counts = None if now.free is None else ~now.free
-            problem = problem.standing(works, counts)
-        return problem if now.previous is None else problem.after(self.rates.box(now.previous))
+        if conditions.lost is not None or conditions.free is not None:
+            works = None if conditions.lost is None else ~conditions.lost
+            counts = None if conditions.free is None else ~conditions.free
+            problem = problem.restricted(works, counts)
+        if conditions.command_previous is None:
+            return problem
+        return problem.in_tick(self.rates.box(conditions.command_previous))
 
-    def _kept_on_the_ray(
-        self, target: Array, row: int, found: Found, command: Array, now: Now
+    def _keep_on_ray(
+        self, target: Array, row: int, answer: CoreAnswer, command: Array, conditions: Conditions
     ) -> str:
         """Keeps one answer on the ray of its target, where the laws differ from the core's tables.
 
         Args:
-            target: wrench (6,) [N, N m] along which the answer is to lie.
-            row: of the answer in `found` and `command`, which are overwritten by the largest share
+            target: desired wrench (6,) [N, N m], along which the answer is to lie.
+            row: of the target in `answer` and `command`, which is overwritten by the largest share
                 of the target that the laws give (Eq. 14), found by bisection.
-            found: aims (N, 6), prices and values of all answers.
+            answer: of the core, to N targets.
             command: (N, n, 3).
-            now: what may be given.
+            conditions: what holds of the robot.
 
         Returns:
-            The sentence where no share can be given; else none.
+            The note where no share can be given; else none.
         """
         ray = target / self.scale
-        wrench_served = found.wrench_served
+        wrench_served = answer.wrench_served
         size_squared = max(float(ray @ ray), 1e-300)
-        projection = float(wrench_served[row] / self.scale @ ray)
-        error = self.error(command[row : row + 1], wrench_served[row : row + 1], now)[0]
-        off_ray = wrench_served[row] / self.scale - projection / size_squared * ray
+        along_ray = float(wrench_served[row] / self.scale @ ray)
+        error = self.error(command[row : row + 1], wrench_served[row : row + 1], conditions)[0]
+        off_ray = wrench_served[row] / self.scale - along_ray / size_squared * ray
         if error <= NEARLY and np.abs(off_ray).max() <= NEARLY:
             return ""
-        if now.previous is not None:
-            return ""  # what the drives' rates leave is nearest to the ray already
+        if conditions.command_previous is not None:
+            return ""  # what the rates leave is the nearest to the ray already (Eq. 15)
 
         low = 0.0
-        high = projection
+        high = along_ray
         is_kept = False
         while high > low + NEARLY * size_squared:
             middle = 0.5 * (low + high)
             tried = middle / size_squared * target[None]
-            answer = self.forces(tried, None, None, now)
-            answer_command = self.exact(answer, now)
-            if self.error(answer_command, tried, now)[0] > NEARLY:
+            tried_answer = self.forces(tried, None, None, conditions)
+            tried_command = self.exact(tried_answer, conditions)
+            if self.error(tried_command, tried, conditions)[0] > NEARLY:
                 high = middle
                 continue
             low = middle
             is_kept = True
-            command[row] = answer_command[0]
+            command[row] = tried_command[0]
             wrench_served[row] = tried[0]
-            found.prices[row] = answer.prices[0]
-            found.gap_power_bound[row] = answer.gap_power_bound[0]
+            answer.lam[row] = tried_answer.lam[0]
+            answer.gap_power_bound[row] = tried_answer.gap_power_bound[0]
         if is_kept:
             return ""
-        cancelled = self._cancelled(now)
-        if cancelled is None:
-            return "no share of the target was found that the actuators can give alone"
-        command[row] = cancelled
+        cancelling = self._cancelling_command(conditions)
+        if cancelling is None:
+            return _NONE_ALONE
+        command[row] = cancelling
         wrench_served[row] = 0.0
-        found.prices[row] = 0.0
-        found.gap_power_bound[row] = 0.0
+        answer.lam[row] = 0.0
+        answer.gap_power_bound[row] = 0.0
         return ""
 
-    def _cancelled(self, now: Now) -> Array | None:
+    def _cancelling_command(self, conditions: Conditions) -> Array | None:
         """A command (n, 3) of actuators that cannot rest whose least forces, nearly, cancel; None
         without any."""
         lower = self.layout.lower
         width = self.layout.upper - lower
         share = np.random.default_rng(0).random((ROUNDS, *lower.shape))
         share[..., :-1] **= 4  # most of them near the least forces
-        start = lower + share * width
-        return self._meeting(self.problem_now(now), np.zeros(6), start)
+        starts = lower + share * width
+        return self._cheapest_exact(self.problem_under(conditions), np.zeros(6), starts)
 
-    def _meeting(self, problem: CommandProblem, wrench: Array, starts: Array) -> Array | None:
-        """The cheapest command (n, 3) that gives a normalized wrench (6,) where steps from starts
-        (R, n, 3) lead; None where none does."""
-        ends = refine(problem, wrench[None], starts, 2 * ROUNDS, EXACT)
-        met = ends.command[ends.error <= NEARLY]
-        if len(met) == 0:
+    def _cheapest_exact(
+        self, problem: CommandProblem, wrench_normalized: Array, starts: Array
+    ) -> Array | None:
+        """The cheapest command (n, 3) that gives a normalized wrench (6,), of those to which steps
+        from starts (R, n, 3) lead; None where none does."""
+        refined = refine(problem, wrench_normalized[None], starts, 2 * ROUNDS, EXACT)
+        exact = refined.command[refined.error <= NEARLY]
+        if len(exact) == 0:
             return None
-        power = self.plant.power(met).sum(axis=-1)
-        return np.asarray(met[power.argmin()])
+        power = self.plant.power(exact).sum(axis=-1)
+        return np.asarray(exact[power.argmin()])
 
-    def _span(self, now: Now) -> Array:
-        """Directions (6, r) of scaled wrenches that the actuators drive now, orthonormal."""
+    def _basis_under(self, conditions: Conditions) -> Array:
+        """Directions (6, r) of scaled wrenches that the actuators drive, orthonormal."""
         robot = self.compiled.robot
-        if now.lost is None and now.free is None:
+        if conditions.lost is None and conditions.free is None:
             return robot.basis
-        works = np.ones(self.layout.n, bool) if now.lost is None else ~now.lost
-        counts = np.ones(6, bool) if now.free is None else ~now.free
+        works = np.ones(self.layout.n, bool) if conditions.lost is None else ~conditions.lost
+        counts = np.ones(6, bool) if conditions.free is None else ~conditions.free
         key = works.tobytes() + counts.tobytes()
-        if key not in self._spans:
-            while len(self._spans) >= MOST_SPANS:
-                self._spans.pop(next(iter(self._spans)), None)
-            self._spans[key] = robot.span(works, counts)
-        return self._spans[key]
+        if key not in self._bases:
+            while len(self._bases) >= MAX_BASES:
+                self._bases.pop(next(iter(self._bases)), None)
+            self._bases[key] = robot.span(works, counts)
+        return self._bases[key]
 
-    def not_held(self, targets: Array, now: Now) -> set[str]:
-        """The sentence about axes that come together only, and that targets (N, 6) ask for
-        apart."""
+    def undriven_notes(self, targets: Array, conditions: Conditions) -> set[str]:
+        """Tells of axes that come together only, and that targets ask for apart.
+
+        Args:
+            targets: desired wrenches (N, 6) [N, N m], out of reach.
+            conditions: what holds of the robot.
+
+        Returns:
+            One sentence, or none.
+        """
         robot = self.compiled.robot
-        basis = self._span(now)
-        scaled = targets / robot.scale
-        if now.free is not None:
-            scaled = np.where(now.free, 0.0, scaled)
-        left = np.abs(scaled - (scaled @ basis) @ basis.T)
-        beside = (left > NEARLY * np.abs(scaled).max(initial=0.0)).any(axis=0)
-        axes = axes_in(np.asarray(beside & self._driven(now)))
+        basis = self._basis_under(conditions)
+        scaled = targets / robot.axis_scale
+        if conditions.free is not None:
+            scaled = np.where(conditions.free, 0.0, scaled)
+        outside_span = np.abs(scaled - (scaled @ basis) @ basis.T)
+        is_outside = (outside_span > NEARLY * np.abs(scaled).max(initial=0.0)).any(axis=0)
+        axes = axes_in(np.asarray(is_outside & self._driven(conditions)))
         if not axes:
             return set()
         return {
             f"no actuators give {', '.join(axes)} apart as is asked: where one of them does not "
-            "count, leave "
-            "it out of the layout's axes, or name it in free"
+            "count, leave it out of the layout's axes, or name it in free"
         }
 
     @cached_property
     def undriven(self) -> tuple[str, ...]:
-        return axes_in(~self._driven(STILL))
+        """Names of the axes of a wrench that no actuator gives."""
+        return axes_in(~self._driven(NOMINAL))
 
-    def _driven(self, now: Now) -> NDArray[np.bool_]:
+    def _driven(self, conditions: Conditions) -> NDArray[np.bool_]:
         """Which axes (6,) of the wrench some actuator gives, whatever it gives along others."""
         effectiveness = np.abs(self.compiled.robot.effectiveness)
-        if now.lost is not None:
-            effectiveness = effectiveness[~now.lost]
+        if conditions.lost is not None:
+            effectiveness = effectiveness[~conditions.lost]
         size = effectiveness.max(axis=(0, 1))
         driven = size > NOTHING * size.max()
-        return np.asarray(driven if now.free is None else driven & ~now.free)
+        return np.asarray(driven if conditions.free is None else driven & ~conditions.free)
+
+    @property
+    def has_no_bound(self) -> bool:
+        """Whether the bound would be one of something else than the power of the answer: with what
+        an expected miss costs."""
+        return self.compiled.miss_cost is not None
 
     def bound(
-        self, wrench_served: Array, price: Array, gap_power_bound: Array, now: Now, command: Array
+        self,
+        wrench_served: Array,
+        lam: Array,
+        gap_power_bound: Array,
+        conditions: Conditions,
+        command: Array,
     ) -> Array:
         """Proves a lower bound of the power by weak duality (Eq. 3).
 
         Args:
-            wrench_served: wrenches (N, 6) that were found [N, N m].
-            price: multipliers (N, 6) of them [W/N, W/(N m)].
+            wrench_served: (N, 6) [N, N m] for which the core found forces.
+            lam: its multipliers (N, 6) [W/N, W/(N m)].
             gap_power_bound: power (N,) [W] that gaps of the actuators' sets are proved to need for
-                them.
-            now: what may be given.
-            command: (N, n, 3), whose wrenches count: they are the aims to rounding, or as near as
-                the laws come.
+                these wrenches, by the core's tables.
+            conditions: under which they were found.
+            command: (N, n, 3), whose wrenches count: they are the served ones to rounding, or as
+                near as the laws come.
 
         Returns:
-            Power (N,) [W] that no answer undercuts which gives these wrenches now; never above
-            theirs.
+            Power (N,) [W] that no answer undercuts which gives these wrenches under the conditions;
+            never above theirs.
         """
-        works, command = self._working(command, now)
+        works, command = self._without_nan(command, conditions)
         force = np.where(works[:, None], self.plant.force(command), 0.0)
         wrench = wrench_of_forces(force, self.plant.effectiveness)
-        if now.free is not None:  # its price is 0
-            wrench = np.where(now.free, 0.0, wrench)
-        is_finite = np.isfinite(price).all(axis=-1, keepdims=True)
-        price = np.where(is_finite, price, 0.0)
+        if conditions.free is not None:  # its multiplier is 0
+            wrench = np.where(conditions.free, 0.0, wrench)
+        is_finite = np.isfinite(lam).all(axis=-1, keepdims=True)
+        lam = np.where(is_finite, lam, 0.0)
         power = self.plant.power(command)[:, works].sum(axis=-1)
 
-        # The last row is that of the price 0, which proves for any wrench what all take at rest.
-        prices = np.concatenate([price, np.zeros((1, 6))])
-        wrenches = np.concatenate([wrench, np.zeros((1, 6))])
-        proved = proved_power(self.compiled, wrenches, prices, now)
-        bound = np.maximum(proved[:-1], proved[-1])
-        largest_power = self.compiled.robot.largest_power
-        if not self._measured:
-            # The value is one of tables, which are off by a share of full power, at the least
-            # forces by more.
-            value_by_laws = (1.0 - 10.0 * CLOSE) * gap_power_bound - NEARLY * largest_power
-            value_by_laws = np.minimum(value_by_laws, power)
-            is_of_served = _sizes((wrench - wrench_served) / self.scale) <= NEARLY
-            bound = np.where(is_of_served, np.maximum(bound, value_by_laws), bound)
+        bound = self._bound_by_laws(wrench, lam, conditions)
+        if not self._reads_tables:
+            is_served = _norms((wrench - wrench_served) / self.scale) <= NEARLY
+            with_gaps = np.maximum(bound, self._bound_of_gaps(gap_power_bound, power))
+            bound = np.where(is_served, with_gaps, bound)
         elif works.all():
-            # The prices are those of the smooth shapes that stand for tables.
-            rows = np.flatnonzero(bound < (1.0 - 10.0 * CLOSE) * power)
-            bound[rows] = np.maximum(
-                bound[rows], self._bound_of_tables(wrench, price, command, rows, now)
+            # The multipliers are those of the smooth shapes that stand for measured tables.
+            low = np.flatnonzero(bound < (1.0 - TABLE_ERROR) * power)
+            by_measurements = self._bound_of_measured_tables(
+                wrench[low], lam[low], command[low], conditions
             )
+            bound[low] = np.maximum(bound[low], by_measurements)
 
         # Above the power it is off by what tables are off; by more than that it proves nothing.
-        above_by_tables = (1.0 + 10.0 * CLOSE) * power + NEARLY * largest_power
-        bound = np.where(bound > above_by_tables, 0.0, np.clip(bound, 0.0, power))
+        largest_by_tables = (1.0 + TABLE_ERROR) * power + self._least_table_error
+        bound = np.where(bound > largest_by_tables, 0.0, np.clip(bound, 0.0, power))
         return np.asarray(bound * (1.0 - ROUNDING))
 
-    def _bound_of_tables(
-        self, wrench: Array, price: Array, command: Array, rows: NDArray[np.intp], now: Now
-    ) -> Array:
-        """Lower bounds (R,) [W] for some rows (R,) of answers, at prices that are raised by the
-        measured tables themselves."""
-        from finlab.allocation.dual.price_ascent import raised_price
+    def _bound_by_laws(self, wrench: Array, lam: Array, conditions: Conditions) -> Array:
+        """Lower bounds (N,) [W] by the laws' conjugates: at multipliers (N, 6), or at 0 where that
+        proves more."""
+        # The last row is the multiplier 0, which proves for any wrench what all take at rest.
+        multipliers = np.concatenate([lam, np.zeros((1, 6))])
+        wrenches = np.concatenate([wrench, np.zeros((1, 6))])
+        bounds = power_bound(self.compiled, wrenches, multipliers, conditions)
+        return np.asarray(np.maximum(bounds[:-1], bounds[-1]))
 
-        if len(rows) == 0:
-            return np.empty(0)
-        questions = zip(wrench[rows], price[rows], command[rows], strict=True)
-        raised = np.stack(
-            [raised_price(self.plant, self.scale, *question) for question in questions]
-        )
-        return proved_power(self.compiled, wrench[rows], raised, now)
+    def _bound_of_gaps(self, gap_power_bound: Array, power: Array) -> Array:
+        """Lower bounds (N,) [W] of what the core proved of gaps by its tables, which are off by a
+        share of full power, and at the least forces by more; never above the power (N,)."""
+        by_laws = (1.0 - TABLE_ERROR) * gap_power_bound - self._least_table_error
+        return np.minimum(by_laws, power)
 
     @cached_property
-    def _measured(self) -> bool:
-        return any(part.reads for part in self.layout.actuators)
+    def _least_table_error(self) -> float:
+        """By how much [W] tables may be off at the least forces."""
+        return NEARLY * self.compiled.robot.largest_power
 
-    @property
-    def unproved(self) -> bool:
-        """Whether the bound would be one of something else than the power of the answer: with what
-        doubt costs."""
-        return self.compiled.doubt is not None
+    def _bound_of_measured_tables(
+        self, wrench: Array, lam: Array, command: Array, conditions: Conditions
+    ) -> Array:
+        """Lower bounds (R,) [W] for wrenches (R, 6) of commands (R, n, 3), at multipliers (R, 6)
+        that are raised by the measured tables themselves."""
+        from finlab.allocation.dual.multiplier_ascent import raised_multipliers
+
+        if len(wrench) == 0:
+            return np.empty(0)
+        raised = [
+            raised_multipliers(self.plant, self.scale, *row)
+            for row in zip(wrench, lam, command, strict=True)
+        ]
+        return power_bound(self.compiled, wrench, np.stack(raised), conditions)
+
+    @cached_property
+    def _reads_tables(self) -> bool:
+        """Whether an actuator's law is a measured table."""
+        return any(actuator.reads for actuator in self.layout.actuators)
 
     def forces(
-        self, targets: Array, policy: Policy | None, prices: Array | None = None, now: Now = STILL
-    ) -> Found:
-        """Forces of least power for wrenches (N, 6), or for those that a policy gives in their
-        place, of what may be given now; for a single one the search begins at prices (6,) of the
-        wrench."""
+        self,
+        targets: Array,
+        policy: Policy | None,
+        lam: Array | None = None,
+        conditions: Conditions = NOMINAL,
+    ) -> CoreAnswer:
+        """Asks the core for forces of least power, by the laws alone (Eq. 1).
+
+        Args:
+            targets: desired wrenches (N, 6) [N, N m].
+            policy: what to give out of reach; None for nothing else than the targets.
+            lam: multipliers (6,) [W/N, W/(N m)] at which Newton's method begins, for a single
+                target; None for its own.
+            conditions: what holds of the robot.
+
+        Returns:
+            Forces, multipliers and commands, by the core's tables.
+        """
         core = self.compiled.robot.core
         if len(targets) == 1:
-            return core.one(targets[0], policy, prices, now)
-        return core.many(targets, policy, now)
+            return core.answer_one(targets[0], policy, lam, conditions)
+        return core.answer_many(targets, policy, conditions)
 
-    def exact(self, found: Found, now: Now = STILL) -> Array:
-        """Commands (N, n, 3) that give what was found exactly, by the plant, within what may be
-        given now; or as near to it as they come."""
-        command = found.command
-        problem = self.problem_now(now)
-        missing = problem.wrench(command) - found.wrench_served / self.scale
+    def exact(self, answer: CoreAnswer, conditions: Conditions = NOMINAL) -> Array:
+        """Makes commands exact by the plant: steps by the laws where the core's grids leave an
+        error (Eq. 11).
+
+        Args:
+            answer: of the core; its commands are overwritten.
+            conditions: what holds of the robot.
+
+        Returns:
+            Commands (N, n, 3) that give the wrenches served, within the limits and rates; or as
+            near to them as they come.
+        """
+        command = answer.command
+        wanted = answer.wrench_served / self.scale
+        problem = self.problem_under(conditions)
+        missing = problem.wrench(command) - wanted
         if problem.counts is not None:
             missing = np.where(problem.counts, missing, 0.0)
-        if (each := missing.ravel()).dot(each) <= EXACT**2:
+        all_missing = missing.ravel()
+        if all_missing.dot(all_missing) <= EXACT**2:
             return command
-        # Where the core's tables say what the laws say, it has done all that steps on commands can
-        # do.
-        error = _sizes(missing)
-        rough = np.flatnonzero(
-            (error > found.error + EXACT) | (found.is_attainable & (error > NEARLY))
-        )
+        # Where the core's grids say what the laws say, it has done all that steps can do.
+        error = _norms(missing)
+        off_by_grids = error > answer.error + EXACT
+        off_within_reach = answer.is_attainable & (error > NEARLY)
+        rough = np.flatnonzero(off_by_grids | off_within_reach)
         if not len(rough):
             return command
-        ends = refine(
-            problem, found.wrench_served[rough] / self.scale, command[rough], ROUNDS, EXACT
-        )
-        command[rough] = ends.command
-        if now.previous is not None:
-            return self.rates.box(now.previous).held(command, self.plant)
-        for row in rough[(ends.error > NEARLY) & found.is_attainable[rough]].tolist():
+        refined = refine(problem, wanted[rough], command[rough], ROUNDS, EXACT)
+        command[rough] = refined.command
+        if conditions.command_previous is not None:
+            box = self.rates.box(conditions.command_previous)
+            return box.clip_feasible(command, self.plant)
+        unmet = (refined.error > NEARLY) & answer.is_attainable[rough]
+        for row in rough[unmet].tolist():
             # Such as idle fins in line, or a least force: no small change of these commands helps.
-            draw = np.random.default_rng(0).uniform(-1.0, 1.0, (2 * ROUNDS, *command.shape[1:]))
-            shares = np.geomspace(10.0 * CLOSE, 1.0, len(draw))[:, None, None]
-            starts = command[row] + shares * draw * self.problem.width
-            other = self._meeting(problem, found.wrench_served[row] / self.scale, starts)
+            starts = self._starts_around(command[row])
+            other = self._cheapest_exact(problem, wanted[row], starts)
             command[row] = command[row] if other is None else other
         return self.plant.rested(command)
 
-    def error(self, command: Array, wrench_served: Array, now: Now = STILL) -> Array:
-        """Distance (N,), on the yardstick, of what commands (N, n, 3) give now from wrenches (N,
-        6)."""
-        missing = self.problem_now(now).wrench(command) - wrench_served / self.scale
-        return _sizes(missing if now.free is None else np.where(now.free, 0.0, missing))
+    def _starts_around(self, command: Array) -> Array:
+        """Commands (R, n, 3) around one (n, 3), from near to as far as the limits are apart."""
+        rng = np.random.default_rng(0)
+        change = rng.uniform(-1.0, 1.0, (2 * ROUNDS, *command.shape))
+        reach = np.geomspace(10.0 * CLOSE, 1.0, len(change))[:, None, None]
+        return np.asarray(command + reach * change * self.problem.width)
+
+    def error(self, command: Array, wrench: Array, conditions: Conditions = NOMINAL) -> Array:
+        """Returns how far what commands give is from wrenches, over the wrench scale.
+
+        Args:
+            command: (N, n, 3).
+            wrench: (N, 6) [N, N m].
+            conditions: which actuators work, and which axes count.
+
+        Returns:
+            (N,).
+        """
+        missing = self.problem_under(conditions).wrench(command) - wrench / self.scale
+        if conditions.free is not None:
+            missing = np.where(conditions.free, 0.0, missing)
+        return _norms(missing)
 
 
-def _sizes(missing: Array) -> Array:
-    return np.asarray(np.sqrt(np.einsum("ni,ni->n", missing, missing)))
+def _norms(vectors: Array) -> Array:
+    """Euclidean norms (N,) of vectors (N, 6)."""
+    return np.asarray(np.sqrt(np.einsum("ni,ni->n", vectors, vectors)))

@@ -1,7 +1,10 @@
-"""A robot as the core sees it: scaled effectiveness in the range that its actuators span, and
-tables."""
+"""A robot as the core reads it: scaled effectiveness in the range that its actuators span, and
+tables, in one block of numbers.
 
-from collections.abc import Callable, Sequence
+`Compiled` makes it; who changes it reads docs/develop/block.md first.
+"""
+
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any, NamedTuple, cast
 
@@ -24,6 +27,28 @@ from finlab.core.calls import MAGIC, Core
 from finlab.core.fields import numbers_of, struct, tables_begin
 from finlab.core.library import VERSION
 
+_FORMS = ("thruster", "pod", "fin", "foil")
+"""How forces become commands, in the order of FL_THRUSTER ... in finlab/core/finlab.h."""
+_NO_FORCE = 1e-12
+"""Added to largest forces [N], so that nothing is divided by 0."""
+_LEAST_POSITIVE = 1e-300
+"""Stands for 0 where a number is divided by."""
+_INFINITE_CHANGE = 1e30
+"""Stands for an infinite change of a command in a tick: C reads no infinity."""
+
+
+class CommandLimits(NamedTuple):
+    """What limits the commands of n actuators, in the units of the commands."""
+
+    lower: AnyArray
+    """Least commands (n, 3)."""
+    upper: AnyArray
+    """Largest commands (n, 3)."""
+    max_change: AnyArray
+    """Largest changes (n, 3) in a tick; infinite where nothing limits them."""
+    turns: AnyArray
+    """Which are angles (n, 3) without limits."""
+
 
 class DualRobot:
     """One robot, prepared of the responses of its n actuators: forces along one or two directions
@@ -33,11 +58,11 @@ class DualRobot:
         self,
         responses: list[Response],
         forms: list[Form],
-        limits: Sequence[AnyArray],
+        limits: CommandLimits,
         effectiveness: Array,
-        yardstick: Array,
-        beside: Array | None = None,
-        doubt: Array | None = None,
+        wrench_scale: Array,
+        wrench_offset: Array | None = None,
+        uncertainty_cost: Array | None = None,
         counts: Array | None = None,
     ) -> None:
         """Prepares a robot for the core.
@@ -45,36 +70,36 @@ class DualRobot:
         Args:
             responses: what each actuator offers for prices.
             forms: how the forces of each become commands.
-            limits: least and largest commands (n, 3), largest changes in a tick (n, 3), and which
-                angles turn freely (n, 3).
+            limits: of the commands.
             effectiveness: wrench (n, 3, 6) per newton along the actuators' own axes [1, m].
-            yardstick: scale (6,) of errors [N, N m].
-            beside: wrench (6,) on top of that of the forces [N, N m], such as the drag of foils;
-                None for none.
-            doubt: what a squared force of each foil costs beside its power (n,) [W/N^2]; None for
-            nothing.
+            wrench_scale: (6,) [N, N m], by which errors are normalized.
+            wrench_offset: wrench (6,) [N, N m] at forces of 0, such as the drag of foils; None for
+                none.
+            uncertainty_cost: what a squared force of each foil costs beside its power (n,)
+                [W/N^2]; None for nothing.
             counts: 1 of axes (6,) that the robot commands, else 0; None where it commands all.
         """
         n = len(responses)
         self.responses = responses
         self._forms = forms
         self._limits = limits
-        self.yardstick = yardstick
-        self.beside = np.zeros(6) if beside is None else beside
+        self._wrench_scale = wrench_scale
+        self._wrench_offset = np.zeros(6) if wrench_offset is None else wrench_offset
         self._counts = np.ones(6) if counts is None else counts
-        self._doubt = np.zeros(n) if doubt is None else doubt
+        no_cost = np.zeros(n)
+        self._uncertainty_cost = no_cost if uncertainty_cost is None else uncertainty_cost
         self.ends = np.array([response.ends for response in responses])
         """Least and largest forces (n, 2) [N], of planes below 0 in reverse."""
-        self.lines = np.array([isinstance(response, Line) for response in responses])
+        self.is_line = np.array([isinstance(response, Line) for response in responses])
         """Which have one direction (n,)."""
-        self.pods = np.array([form.kind == "pod" for form in forms])
+        self.is_pod = np.array([form.kind == "pod" for form in forms])
         """Which push at an angle of their own (n,)."""
-        self.speed = np.array([_drag_speed(response) for response in responses])
+        self.flow_speed = np.array([_flow_speed(response) for response in responses])
         """Power per newton of drag (n,) [m/s] of what drags; 0 of all else."""
-        self._sizes = self._largest_forces()
-        self.most = self._sizes + 1e-12
-        """Largest force (n, 2) [N] along each direction."""
-        self._gain = self._gains()
+        self._largest_force = self._largest_forces()
+        self.row_force_max = self._largest_force + _NO_FORCE
+        """Largest force (n, 2) [N] along each direction, never 0."""
+        self._secant = self._usual_secants()
         tables = _Tables(tables_begin(n))
         self._offsets = [tables.of(*pair) for pair in zip(responses, forms, strict=True)]
         self._tables = tables.numbers
@@ -82,9 +107,10 @@ class DualRobot:
         """Wrench (n, 2, 6) per newton along each direction."""
         self.axes = np.array([_axes_of(form) for form in forms])
         """Axes (n, 3, 3) of the laws' forces in the actuators' own ones."""
-        self._own = self.axes @ effectiveness / yardstick
-        self.scale = self._wrench_sizes()
-        """Size (6,) of what the robot can push along each axis [N, N m]; 1 where it cannot."""
+        self._effectiveness_normalized = self.axes @ effectiveness / wrench_scale
+        self.axis_scale = self._largest_wrench()
+        """Size (6,) of what the robot can push along each axis [N, N m]; 1 where it cannot. Scaled
+        wrenches are wrenches over it."""
         self.basis = self.span(np.ones(n, bool), np.ones(6, bool))
         """Directions (6, r) of scaled wrenches that the actuators span, orthonormal."""
         self.block = self._block()
@@ -96,33 +122,40 @@ class DualRobot:
         """Largest forces (n, 2) [N] along both directions; the second one of a foil is its drag."""
         largest = np.abs(self.ends).max(axis=1)
         drag = np.array([self._drag(i, force) for i, force in enumerate(largest)])
-        second = np.where(self.lines, drag, largest)
+        second = np.where(self.is_line, drag, largest)
         return np.stack([largest, second], axis=1)
 
-    def _gains(self) -> Array:
+    def _usual_secants(self) -> Array:
         """Forces over prices (n, 2) [N^2/W] at the largest force, by half of it; of drag, which
         grows with the square of lift, by the square of its share."""
         usual_price = np.array([[_usual_price(response)] for response in self.responses])
-        gain = self.most[:, :1] / usual_price
-        share = self.most / self.most[:, :1]
+        secant = self.row_force_max[:, :1] / usual_price
+        share = self.row_force_max / self.row_force_max[:, :1]
         exponent = [0.0, 2.0]
-        return np.asarray(gain * share**exponent)
+        return np.asarray(secant * share**exponent)
 
-    def _wrench_sizes(self) -> Array:
+    def _largest_wrench(self) -> Array:
         """Size (6,) of what the robot can push along each axis [N, N m]; 1 where it cannot."""
-        columns = (self.effectiveness * self._sizes[..., None]).reshape(-1, 6)
+        columns = (self.effectiveness * self._largest_force[..., None]).reshape(-1, 6)
         size = np.sqrt((columns**2).sum(axis=0))
-        largest = max(size.max(), 1e-300)
+        largest = max(size.max(), _LEAST_POSITIVE)
         return np.where(size > NOTHING * largest, size, 1.0)
 
     def span(self, works: NDArray[np.bool_], counts: NDArray[np.bool_]) -> Array:
-        """Returns directions (6, r) of scaled wrenches, orthonormal, that the actuators which work
-        (n,) drive in the axes that count (6,)."""
-        scaled = self.effectiveness * self._sizes[..., None] / self.scale
+        """Finds what some actuators span in some axes.
+
+        Args:
+            works: which actuators (n,) work.
+            counts: which axes (6,) count.
+
+        Returns:
+            Directions (6, r) of scaled wrenches that these actuators drive, orthonormal.
+        """
+        scaled = self.effectiveness * self._largest_force[..., None] / self.axis_scale
         is_driven = works[:, None, None] & counts
         columns = np.where(is_driven, scaled, 0.0).reshape(-1, 6).T
         left, singular_values, _ = np.linalg.svd(columns, full_matrices=False)
-        least = NOTHING * max(singular_values[0], 1e-300)
+        least = NOTHING * max(singular_values[0], _LEAST_POSITIVE)
         return np.asarray(left[:, singular_values > least])
 
     @cached_property
@@ -133,12 +166,12 @@ class DualRobot:
 
     def _drag(self, i: int, force: float) -> float:
         """Drag [N], beyond that at rest, of a foil's lift; 0 of all else."""
-        if self.speed[i] == 0.0:
+        if self.flow_speed[i] == 0.0:
             return 0.0
         response = self.responses[i]
         power = power_of(response, np.array(force))
         power_at_rest = response.table.rest
-        return float((power - power_at_rest) / self.speed[i])
+        return float((power - power_at_rest) / self.flow_speed[i])
 
     def _block(self) -> Array:
         """The robot as the core reads it: head, actuators, then the tables."""
@@ -148,28 +181,28 @@ class DualRobot:
         head["version"] = VERSION
         head["n"] = len(self.responses)
         head["rank"] = rank
-        head["axis_scale"] = self.scale
-        head["wrench_scale"] = self.yardstick
+        head["axis_scale"] = self.axis_scale
+        head["wrench_scale"] = self._wrench_scale
         head["is_commanded"] = self._counts
-        head["wrench_offset"] = self.beside
+        head["wrench_offset"] = self._wrench_offset
         head["basis"][:, :rank] = self.basis
 
         actuators = np.zeros(len(self.responses), struct("fl_actuator"))
         actuators["force_min"] = self.ends[:, 0]
         actuators["force_max"] = self.ends[:, 1]
-        actuators["flow_speed"] = self.speed
-        actuators["secant"] = self._gain
-        actuators["row_force_max"] = self.most
+        actuators["flow_speed"] = self.flow_speed
+        actuators["secant"] = self._secant
+        actuators["row_force_max"] = self.row_force_max
         actuators["effectiveness_reduced"][..., :rank] = (
-            self.effectiveness / self.scale
+            self.effectiveness / self.axis_scale
         ) @ self.basis
-        actuators["effectiveness_normalized"] = self._own
-        actuators["uncertainty_cost"] = self._doubt
-        lower, upper, step, turns = self._limits
-        actuators["command_min"] = lower
-        actuators["command_max"] = upper
-        actuators["max_change"] = np.minimum(step, 1e30)  # C reads no infinity
-        actuators["is_free_angle"] = np.any(turns, axis=1)
+        actuators["effectiveness_normalized"] = self._effectiveness_normalized
+        actuators["uncertainty_cost"] = self._uncertainty_cost
+        limits = self._limits
+        actuators["command_min"] = limits.lower
+        actuators["command_max"] = limits.upper
+        actuators["max_change"] = np.minimum(limits.max_change, _INFINITE_CHANGE)
+        actuators["is_free_angle"] = np.any(limits.turns, axis=1)
         described = zip(actuators, self.responses, self._forms, self._offsets, strict=True)
         for actuator, response, form, offsets in described:
             _describe(actuator, response, form, offsets)
@@ -180,9 +213,9 @@ class DualRobot:
 
 def _describe(actuator: Any, response: Response, form: Form, offsets: "TableOffsets") -> None:
     """Writes what one actuator offers, and how its forces become commands, into its fields."""
-    _, share, worth = response.table.origin
-    actuator["force_scale"] = share
-    actuator["power_scale"] = worth
+    _, force_scale, power_scale = response.table.origin
+    actuator["force_scale"] = force_scale
+    actuator["power_scale"] = power_scale
     actuator["dead_band"] = response.band
     # A foil has two rows: lift, and the drag of that lift.
     actuator["rows"] = 1.0 if actuator["flow_speed"] == 0.0 else 2.0
@@ -194,7 +227,7 @@ def _describe(actuator: Any, response: Response, form: Form, offsets: "TableOffs
         if _needs_no_reverse(response):
             actuator["force_min_needed"] = 0.0
 
-    actuator["command_kind"] = _KINDS.index(form.kind)
+    actuator["command_kind"] = _FORMS.index(form.kind)
     for field, offset in offsets._asdict().items():
         actuator[field] = offset
     actuator["command_sign"] = form.sign
@@ -207,17 +240,19 @@ def _describe(actuator: Any, response: Response, form: Form, offsets: "TableOffs
 
 
 class TableOffsets(NamedTuple):
-    """Offsets of one actuator's tables in the block, by the fields that hold them; 0 for none."""
+    """Offsets of one actuator's tables in the block, by the fields of `fl_actuator` that hold them;
+    0 for none."""
 
     force_table: int
+    """Of force over price."""
     force_table_reverse: int
+    """Of the same in reverse."""
     gauge_table: int
+    """Of how the force differs between directions."""
     law_grid: int
+    """Of the grid of the law."""
     command_table: int
-
-
-_KINDS = "thruster", "pod", "fin", "foil"
-"""In the order of FL_THRUSTER ... in finlab/core/finlab.h."""
+    """Of a fin's amplitudes and frequencies, or a foil's lifts and angles."""
 
 
 class _Tables:
@@ -268,7 +303,7 @@ class _Tables:
         return np.concatenate(self._numbers)
 
 
-def _drag_speed(response: Response) -> float:
+def _flow_speed(response: Response) -> float:
     """Power per newton of drag [m/s] of a foil; 0 of all else."""
     if isinstance(response, Line) and response.drag is not None:
         return response.speed
@@ -315,7 +350,7 @@ def gauge_numbers(gauge: Array, deflection: Array) -> Array:
     h1 = reached[row, best]
     h2 = reached[row, (best + 1) % count]
     curvature = h0 - 2.0 * h1 + h2
-    peak = 0.5 * (h0 - h2) / np.minimum(curvature, -1e-300)
+    peak = 0.5 * (h0 - h2) / np.minimum(curvature, -_LEAST_POSITIVE)
     x = np.clip(np.where(curvature < 0.0, peak, 0.0), -0.5, 0.5)
     support = h1 + x * (0.5 * (h2 - h0) + 0.5 * x * curvature)
 

@@ -1,8 +1,8 @@
-"""Constants of the formula of jets, fitted to samples of one robot by least squares on their
-logarithms.
+"""Fits the constants of the formula of jets to samples of one robot.
 
-Few samples leave some of the constants open; a normal prior about the usual values, in which a
-factor of two is one standard deviation, holds those.
+The fit is least squares on the logarithms of the constants. Few samples leave some of them open; a
+normal prior about the default values, in which a factor of two is one standard deviation, holds
+those.
 """
 
 from dataclasses import asdict, replace
@@ -17,81 +17,106 @@ from finlab.fit.interaction.samples import Samples, left_by_laws
 from finlab.interaction.jets import Jets
 from finlab.layout.jet_geometry import jet_geometry_of
 
-FITTED = ("length", "width", "spread", "lag", "most", "side", "housing", "hull")
-PRIOR = float(np.log(2.0))
+FITTED_CONSTANTS = ("length", "width", "spread", "lag", "most", "side", "housing", "hull")
+"""Fields of `Jets` that are fitted."""
+PRIOR_DEVIATION = float(np.log(2.0))
 """Standard deviation of the logarithm of a constant before anything is measured."""
-LEAST_SAMPLES = 5
-LEAST, MOST = 2e-3, 9.0
-"""Smallest and largest constant, over the usual one."""
-NOISE = 0.01
-"""Error of a sample, on the yardstick, that least counts as noise."""
+MIN_SAMPLES = 5
+"""Fewest samples of a fit."""
+MIN_RATIO = 2e-3
+"""Least constant over its default."""
+MAX_RATIO = 9.0
+"""Largest constant over its default."""
+MIN_NOISE = 0.01
+"""Least standard deviation of a sample, over the wrench scale."""
+MAX_UNCERTAINTY = 10.0
+"""Largest `uncertain` of the fitted jets."""
 
 
 class FittedJets(NamedTuple):
-    """What samples say."""
+    """The result of a fit."""
 
     jets: Jets
+    """The formula with the fitted constants."""
     laws: float
-    """Root mean square of what the laws alone miss of the samples, on the yardstick."""
+    """Root mean square error of the laws alone, over the wrench scale."""
     left: float
-    """The same of what the fitted jets miss."""
+    """The same with the fitted jets."""
 
 
 def fit_constants(samples: Samples) -> FittedJets:
-    """Returns the constants that fit samples best. Raises DataError: there are fewer than five."""
-    if len(samples.wrench) < LEAST_SAMPLES:
-        raise DataError(f"expected at least {LEAST_SAMPLES} samples, got {len(samples.wrench)}")
+    """Returns the constants that fit samples best.
+
+    Raises:
+        DataError: there are fewer than five samples.
+    """
+    if len(samples.wrench) < MIN_SAMPLES:
+        raise DataError(f"expected at least {MIN_SAMPLES} samples, got {len(samples.wrench)}")
     force, missed, scale = left_by_laws(samples)
     geometry = jet_geometry_of(samples.layout)
-    start = np.log([getattr(Jets(), name) for name in FITTED])
+    start = np.log([getattr(Jets(), name) for name in FITTED_CONSTANTS])
 
     def jets_at(logarithms: Array) -> Jets:
-        values = np.exp(start + np.clip(logarithms - start, *np.log([LEAST, MOST])))
-        return Jets(**dict(zip(FITTED, values.tolist(), strict=True)))
+        values = np.exp(start + np.clip(logarithms - start, *np.log([MIN_RATIO, MAX_RATIO])))
+        return Jets(**dict(zip(FITTED_CONSTANTS, values.tolist(), strict=True)))
 
-    def left(logarithms: Array) -> Array:
-        known = jets_at(logarithms).of(geometry)
-        return np.asarray(missed - known.offset(force) / scale)
+    def residuals(logarithms: Array) -> Array:
+        interaction = jets_at(logarithms).of(geometry)
+        return np.asarray(missed - interaction.offset(force) / scale)
 
     def with_prior(logarithms: Array) -> Array:
-        return np.concatenate([(left(logarithms) / noise).ravel(), (logarithms - start) / PRIOR])
+        data = (residuals(logarithms) / noise).ravel()
+        return np.concatenate([data, (logarithms - start) / PRIOR_DEVIATION])
 
-    noise = NOISE
-    for _ in range(2):  # the noise is what the first fit leaves
+    noise = MIN_NOISE
+    for _ in range(2):  # the noise of the second fit is the residual of the first
         fit: Any = least_squares(with_prior, start)
-        rest = left(fit.x)
-        noise = max(NOISE, float(np.sqrt((rest**2).mean())))
-    each = replace(jets_at(fit.x), uncertain=1.0).of(geometry).deviation(force) / scale
+        residual = residuals(fit.x)
+        noise = max(MIN_NOISE, float(np.sqrt((residual**2).mean())))
+    # Deviation of the jets' wrenches per `uncertain`, and the share of it that explains residuals.
+    deviation = replace(jets_at(fit.x), uncertain=1.0).of(geometry).deviation(force) / scale
     size = np.sqrt(((samples.wrench / scale) ** 2).mean(axis=0))
-    share, floor = parts_of_error(rest, each, size)
-    by_constants = noise * fit.jac[: rest.size]
-    measured = (floor * size) ** 2 + (share * each) ** 2 + 1e-12
-    known = (by_constants / measured.reshape(-1, 1)).T @ by_constants + np.eye(
-        len(start)
-    ) / PRIOR**2
-    spread = ((by_constants @ np.linalg.inv(known)) * by_constants).sum()
-    uncertain = np.sqrt(share**2 + spread / max((each**2).sum(), 1e-12))
-    jets = {name: float(f"{value:.4g}") for name, value in asdict(jets_at(fit.x)).items()}
-    made = Jets(**{**jets, "uncertain": float(f"{min(uncertain, 10.0):.3g}")})
-    return FittedJets(made, _size(missed), _size(rest))
+    share, floor = parts_of_error(residual, deviation, size)
+    # Variance of the wrenches by the uncertainty of the constants: J C J^T, where C is the inverse
+    # of the Fisher information J^T V^-1 J and of the prior's.
+    jacobian = noise * fit.jac[: residual.size]
+    variance = (floor * size) ** 2 + (share * deviation) ** 2 + 1e-12
+    prior_information = np.eye(len(start)) / PRIOR_DEVIATION**2
+    information = (jacobian / variance.reshape(-1, 1)).T @ jacobian + prior_information
+    jet_variance = ((jacobian @ np.linalg.inv(information)) * jacobian).sum()
+    uncertain = np.sqrt(share**2 + jet_variance / max((deviation**2).sum(), 1e-12))
+    constants = {name: float(f"{value:.4g}") for name, value in asdict(jets_at(fit.x)).items()}
+    constants["uncertain"] = float(f"{min(uncertain, MAX_UNCERTAINTY):.3g}")
+    return FittedJets(Jets(**constants), _root_mean_square(missed), _root_mean_square(residual))
 
 
-def parts_of_error(rest: Array, each: Array, size: Array) -> tuple[float, float]:
-    """Returns the share of a known deviation (N, 6), and of a size (6,) or (N, 6), whose squares
-    together are the variances of normal errors (N, 6), what a model lacks and noise: root mean
-    squares over all shares, each as likely as it makes the errors."""
+def parts_of_error(error: Array, deviation: Array, size: Array) -> tuple[float, float]:
+    """Splits errors into a share of a known deviation and noise of a known size.
+
+    The errors are normal with the variance (share deviation)^2 + (floor size)^2; both are root mean
+    squares over a grid, weighted by the likelihood.
+
+    Args:
+        error: errors (N, 6).
+        deviation: the known deviation (N, 6).
+        size: the size of the noise (6,) or (N, 6).
+
+    Returns:
+        Share and floor.
+    """
     shares = np.geomspace(3e-3, 10.0, 60)
     floors = np.geomspace(1e-4, 0.3, 40)
     costs = np.empty((len(shares), len(floors)))
     for i, share in enumerate(shares):
-        variance = (share * each) ** 2 + (floors[:, None, None] * size) ** 2 + 1e-18
-        costs[i] = (np.log(variance) + rest**2 / variance).sum(axis=(-1, -2))
-    likely = np.exp(-0.5 * (costs - costs.min()))
-    likely /= likely.sum()
-    return float(np.sqrt(likely.sum(axis=1) @ shares**2)), float(
-        np.sqrt(likely.sum(axis=0) @ floors**2)
-    )
+        variance = (share * deviation) ** 2 + (floors[:, None, None] * size) ** 2 + 1e-18
+        costs[i] = (np.log(variance) + error**2 / variance).sum(axis=(-1, -2))
+    likelihood = np.exp(-0.5 * (costs - costs.min()))
+    likelihood /= likelihood.sum()
+    share = np.sqrt(likelihood.sum(axis=1) @ shares**2)
+    floor = np.sqrt(likelihood.sum(axis=0) @ floors**2)
+    return float(share), float(floor)
 
 
-def _size(rows: Array) -> float:
+def _root_mean_square(rows: Array) -> float:
+    """Root mean square of the norms of rows (N, 6)."""
     return float(np.sqrt((rows**2).sum(axis=1).mean()))

@@ -1,5 +1,4 @@
-"""Forward data of what actuators do to each other: robots, commands, and the wrenches that these
-caused.
+"""Samples of robots whose actuators act on each other: commands, and the wrenches that they gave.
 
 An NPZ file holds `layouts`, JSON text of a list of layout files, `command` (L, K, n, 3) in SI
 units, NaN where a robot has no more actuators, and `wrench` (L, K, 6) [N, N m] in the body frame,
@@ -31,7 +30,8 @@ from finlab.whole_file import write_whole
 
 MAX_BYTES = 1_000_000_000
 """Largest file of samples that is read [bytes]."""
-WHAT = "samples of wrenches (.npz)"
+EXPECTED = "samples of wrenches (.npz)"
+"""What a sentence says was expected."""
 
 
 class Samples(NamedTuple):
@@ -44,52 +44,65 @@ class Samples(NamedTuple):
     """(K, 6) [N, N m]."""
 
 
-class Left(NamedTuple):
-    """What the laws of a robot's actuators leave of its samples."""
+class LawResiduals(NamedTuple):
+    """Residuals of the samples of a robot under the laws of its actuators alone."""
 
     force: Array
     """Forces (K, n, 3) [N] by the laws, body frame."""
     missed: Array
-    """Measured wrenches (K, 6) less those of these forces, on the yardstick."""
+    """Measured wrenches (K, 6) less those of these forces, over the wrench scale."""
     scale: Array
-    """The yardstick (6,) [N, N m]."""
+    """The wrench scale (6,) [N, N m]."""
 
 
-def left_by_laws(samples: Samples) -> Left:
-    """Returns what the laws leave of samples, whatever interaction their layout names."""
+def left_by_laws(samples: Samples) -> LawResiduals:
+    """Returns the residuals of samples under the laws, whatever interaction their layout names."""
     layout = replace(samples.layout, interaction=None)
     plant = Plant(layout)
     scale = yardstick(layout)
-    own = plant.force(samples.command)
-    return Left(
-        body_force(own, layout.frames), (samples.wrench - plant.wrench_of(own)) / scale, scale
+    force = plant.force(samples.command)
+    return LawResiduals(
+        body_force(force, layout.frames), (samples.wrench - plant.wrench_of(force)) / scale, scale
     )
 
 
 def write_samples(path: Path, samples: Sequence[Samples]) -> None:
-    """Writes an NPZ file; a `DataError` where it cannot be written."""
-    n = max(one.layout.n for one in samples)
-    most = max(len(one.command) for one in samples)
-    command = np.full((len(samples), most, n, 3), np.nan)
-    wrench = np.full((len(samples), most, 6), np.nan)
-    for k, one in enumerate(samples):
-        command[k, : len(one.command), : one.layout.n] = one.command
-        wrench[k, : len(one.wrench)] = one.wrench
-    text = json.dumps([layout_to_dict(one.layout) for one in samples])
+    """Writes the samples of several robots into an NPZ file.
+
+    Args:
+        path: the file.
+        samples: samples of each robot.
+
+    Raises:
+        DataError: the file cannot be written.
+    """
+    n = max(robot_samples.layout.n for robot_samples in samples)
+    n_samples = max(len(robot_samples.command) for robot_samples in samples)
+    command = np.full((len(samples), n_samples, n, 3), np.nan)
+    wrench = np.full((len(samples), n_samples, 6), np.nan)
+    for k, robot_samples in enumerate(samples):
+        command[k, : len(robot_samples.command), : robot_samples.layout.n] = robot_samples.command
+        wrench[k, : len(robot_samples.wrench)] = robot_samples.wrench
+    text = json.dumps([layout_to_dict(robot_samples.layout) for robot_samples in samples])
     content = BytesIO()
     np.savez_compressed(content, layouts=np.array(text), command=command, wrench=wrench)
     write_whole(path, content.getvalue(), DataError)
 
 
 def read_samples(path: Path) -> list[Samples]:
-    """Returns the samples in an NPZ file or a folder. Raises DataError: they cannot be read, or do
-    not fit the robots; LayoutError: a robot is none."""
+    """Returns the samples in an NPZ file or a folder.
+
+    Raises:
+        DataError: they cannot be read, or do not fit the robots.
+        LayoutError: a layout is not valid.
+    """
     if path.is_dir():
-        if tables := sorted(path.glob("*.csv")):
-            return [_beside(table) for table in tables]
+        tables = sorted(path.glob("*.csv"))
+        if tables:
+            return [_read_with_layout(table) for table in tables]
         expected = "expected for each robot a layout file and a CSV file of one name"
         raise DataError(f"{path}: {expected}, got no CSV file")
-    arrays = read_arrays(path, ("layouts", "command", "wrench"), MAX_BYTES, WHAT)
+    arrays = read_arrays(path, ("layouts", "command", "wrench"), MAX_BYTES, EXPECTED)
     values = json_of(arrays["layouts"], f"{path}: layouts")
     if not isinstance(values, list) or not values:
         raise DataError(f"{path}: layouts: expected JSON text of a list of layout files")
@@ -98,37 +111,50 @@ def read_samples(path: Path) -> list[Samples]:
         for k, v in enumerate(values)
     ]
     count, n = (arrays["command"].shape + (0, 0, 0))[1:3]
-    most = max(n, max(robot.n for robot in robots))
-    shapes = {"command": (len(robots), count, most, 3), "wrench": (len(robots), count, 6)}
+    n_actuators = max(n, max(robot.n for robot in robots))
+    shapes = {"command": (len(robots), count, n_actuators, 3), "wrench": (len(robots), count, 6)}
     check_shapes(arrays, shapes, str(path))
     result = []
     for layout, command, wrench in zip(robots, arrays["command"], arrays["wrench"], strict=True):
-        known = np.isfinite(wrench).all(axis=1)
-        own = command[known][:, : layout.n].astype(np.float64)
-        if not np.isfinite(own).all():
+        is_measured = np.isfinite(wrench).all(axis=1)
+        robot_command = command[is_measured][:, : layout.n].astype(np.float64)
+        if not np.isfinite(robot_command).all():
             raise DataError(
                 f"{path}: command: NaN or infinity for an actuator of {layout.name}, expected "
                 "numbers"
             )
-        result.append(Samples(layout, own, wrench[known].astype(np.float64)))
+        result.append(Samples(layout, robot_command, wrench[is_measured].astype(np.float64)))
     return result
 
 
-def _beside(table: Path) -> Samples:
+def _read_with_layout(table: Path) -> Samples:
+    """The samples in a CSV file whose layout file has the same name."""
     for suffix in (".yaml", ".yml", ".json"):
-        if (robot := table.with_suffix(suffix)).exists():
-            return read_table(load_layout(robot), table)
+        layout_file = table.with_suffix(suffix)
+        if layout_file.exists():
+            return read_table(load_layout(layout_file), table)
     raise DataError(
         f"{table}: expected a layout file of the same name beside it, such as {table.stem}.yaml"
     )
 
 
 def read_table(layout: Layout, path: Path) -> Samples:
-    """Returns the samples of one robot in a CSV file; errors as for `read_samples`."""
-    wanted = [*sum(command_columns(layout), []), *AXES]
+    """Returns the samples of one robot in a CSV file.
+
+    Args:
+        layout: the robot.
+        path: the file.
+
+    Raises:
+        DataError: the file cannot be read, or lacks a column.
+    """
+    columns = []
+    for names in command_columns(layout):
+        columns += names
+    columns += AXES
     units = {"": 1.0, "n": 1.0, "rad": 1.0, "hz": 1.0, "nm": 1.0, "deg": TURNS["deg"]}
     table = read_columns(
-        path, {name: name for name in wanted}, wanted, ", ".join(wanted), units
+        path, {name: name for name in columns}, columns, ", ".join(columns), units
     ).values
     return Samples(
         layout, commands_in(table, layout), np.stack([table[axis] for axis in AXES], axis=-1)

@@ -104,9 +104,9 @@ def load_method_spec(
     if ":" in name:
         kind = own_method(name)
         return MethodSpec(kind.name, methods.MethodChoice(kind, kind.settings_class()))
-    spec = MethodSpec(
-        name, methods.choose_method(name, checkpoint if name in methods.LEARNED else None)
-    )
+    if not methods.method_class(name).needs_networks:
+        checkpoint = None
+    spec = MethodSpec(name, methods.choose_method(name, checkpoint))
     return spec if objective is None else spec.with_settings(objective=objective)
 
 

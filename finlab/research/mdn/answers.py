@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
-from finlab.allocation.rates import Box
+from finlab.allocation.rates import CommandBox
 from finlab.arrays import AnyArray, Array
 from finlab.physics.objective import ZERO_DIRECTION, EffortMeter, effort_scale
 from finlab.physics.plant import Plant
@@ -51,7 +51,7 @@ class EffortRobot(NamedTuple):
     exact: float = EXACT
     """Normalized error up to which an answer is exact."""
 
-    def within(self, box: Box) -> "EffortRobot":
+    def within(self, box: CommandBox) -> "EffortRobot":
         """The same robot, each fin kept within what may follow a previous command."""
         fins = self.forces.fins
         free = box.free[:, 2]
@@ -60,7 +60,7 @@ class EffortRobot(NamedTuple):
         half = np.where(free, np.pi, 0.5 * (upper - lower))
         arcs = replace(fins, middle=middle + fins.deflection(middle), half=half)
         forces = self.forces._replace(fins=arcs)
-        commands = replace(self.commands, lower=box.lower, upper=box.upper, full_turn=free)
+        commands = self.commands.in_tick(box)
         return self._replace(forces=forces, commands=commands)
 
 

@@ -10,6 +10,7 @@ the network.
 Where a target is out of reach the default method says which wrench is to be delivered in its place.
 """
 
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar, NamedTuple
 
@@ -19,11 +20,11 @@ from finlab.allocation.dual.method import Dual
 from finlab.allocation.method import Method, Takes
 from finlab.allocation.policy import Policy
 from finlab.allocation.rates import Rates
-from finlab.allocation.settings import MdnSettings, Settings
+from finlab.allocation.settings import MAX_CANDIDATES, Settings, number
 from finlab.allocation.solution import Candidates, Solution
 from finlab.arrays import Array
 from finlab.layout import Layout
-from finlab.physics.objective import costs
+from finlab.physics.objective import Name, costs
 from finlab.research.mdn.answers import (
     OTHER_START,
     PRESENT_MOTION,
@@ -71,6 +72,23 @@ def names_of(proposal: Proposal) -> tuple[str, ...]:
     """What the proposals for a single target are called: the components they come from, from 1."""
     names = [f"component {k + 1}" for k in proposal.component[0]]
     return tuple(names)
+
+
+@dataclass(frozen=True)
+class MdnSettings(Settings):
+    """Settings of method `mdn`: how many ways the mixture proposes, and how many of them are
+    refined."""
+
+    objective: ClassVar[Name] = "effort"
+    """What is kept least."""
+    n_candidates: int = number(
+        48, 1, MAX_CANDIDATES, "proposals K: the components' means by falling weight, then samples"
+    )
+    n_refined: int = number(6, 1, 256, "proposals that are refined and offered as candidates")
+    temperature: float = number(
+        1.0, 0.0, 100.0, "what the variances of the samples are multiplied by"
+    )
+    period_s: float = number(0.1, 0.0, 1000.0, "time between ticks", "s", above=True)
 
 
 class Mdn(LearnedMethod):

@@ -23,6 +23,7 @@ from finlab.research.networks.trained import TrainedWeights
 class LearnedMethod(Method):
     """A method with trained networks."""
 
+    needs_networks = True
     weights: TrainedWeights
     shipped_checkpoint: ClassVar[str] = "default"
     """Name of the shipped checkpoint that holds its networks."""

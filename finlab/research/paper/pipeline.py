@@ -8,7 +8,7 @@ import numpy as np
 
 from finlab.allocation.levenberg_marquardt import CommandProblem
 from finlab.allocation.method import LeastErrorMethod, Takes
-from finlab.allocation.settings import MOST_CANDIDATES, Settings, choice, number, switch
+from finlab.allocation.settings import MAX_CANDIDATES, Settings, choice, number, switch
 from finlab.allocation.solution import Candidates, Solution
 from finlab.arrays import AnyArray, Array
 from finlab.layout import FinModelSpec, Layout
@@ -32,7 +32,7 @@ class PaperSettings(Settings):
     turn on beyond the seam.
     """
 
-    n_candidates: int = number(64, 1, MOST_CANDIDATES, "candidates K drawn from the mixture")
+    n_candidates: int = number(64, 1, MAX_CANDIDATES, "candidates K drawn from the mixture")
     temperature: float = number(0.02, 0.0, 100.0, "T of the sampling; 0.02 in the paper")
     gamma: float = number(1e-4, 0.0, 1e6, "weight of the effort in J = J_norm + gamma J_en")
     n_refined: int = number(4, 1, 256, "best-ranked candidates that are refined")

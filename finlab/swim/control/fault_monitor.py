@@ -173,7 +173,7 @@ class FaultMonitor:
         is_limited = is_probed | self._is_returning
         is_idle = np.isnan(self._sent[:, :1])
         box = self._rates.box(np.where(is_idle, self._model.motion.command, self._sent))
-        result = np.where(is_limited[:, None], box.clipped(probed), probed)
+        result = np.where(is_limited[:, None], box.clip(probed), probed)
         self._is_returning = (np.isfinite(result) & ~(result == command)).any(axis=1)
         self._sent = result
         return result

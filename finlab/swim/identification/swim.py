@@ -172,8 +172,8 @@ def _csv(path: Path, layout: Layout) -> Swim:
     pairs = [f"{pose}|{rate}" for pose, rate in zip(CHANNELS[:6], CHANNELS[6:], strict=True)]
     expected = f"t, what was measured, and what was commanded, {', '.join(commands)}"
     read = read_columns(path, names, ("t", *commands, *pairs), expected, UNITS, gaps=True)
-    n = len(read.places)
-    places = read.places
+    n = len(read.sources)
+    places = read.sources
     time = read.values["t"]
     _check_time(time, places)
     _check_duration(float(time[-1] - time[0]), path)

@@ -10,7 +10,7 @@ import pytest
 
 from finlab.actuators.response import Plane, RadialTable, price_grid
 from finlab.allocation import Allocator
-from finlab.allocation.baselines.ipopt import _Plane
+from finlab.allocation.baselines.ipopt import _PlaneProgram
 from finlab.errors import AllocationError
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout
 from finlab.physics import Plant, plant_of
@@ -185,10 +185,12 @@ def test_the_conditions_of_a_plane_hold_for_its_forces_alone(
 ) -> None:
     plane, least = plane_of(*case), case[2]
     share = casadi.MX.sym("share", 2)
-    part = _Plane(casadi, plane, share)
-    told = casadi.Function("told", [share], [part.cost, *(value for value, _, _ in part.limits)])
+    part = _PlaneProgram(casadi, plane, share)
+    told = casadi.Function(
+        "told", [share], [part.power, *(value for value, _, _ in part.constraints)]
+    )
     strongest = 1.0 if plane.gauge is None else float(plane.gauge.max())
-    assert part.full_cost == pytest.approx(20.0**1.5, rel=1e-3)
+    assert part.full_power == pytest.approx(20.0**1.5, rel=1e-3)
     rng = np.random.default_rng(1)
     judged = set[bool]()
     for _ in range(300):
@@ -205,7 +207,7 @@ def test_the_conditions_of_a_plane_hold_for_its_forces_alone(
             continue  # too near to an edge to tell
         kept = all(
             low - 1e-6 <= one <= high + 1e-6
-            for one, (_, low, high) in zip(values, part.limits, strict=True)
+            for one, (_, low, high) in zip(values, part.constraints, strict=True)
         )
         assert kept == (outside < 0.0), (angle, size)
         judged.add(kept)
@@ -219,7 +221,7 @@ def test_random_starts_of_a_plane_are_anywhere_in_its_arc(
     case: tuple[float, float, float, bool],
 ) -> None:
     plane = plane_of(*case)
-    part = _Plane(casadi, plane, casadi.MX.sym("share", 2))
+    part = _PlaneProgram(casadi, plane, casadi.MX.sym("share", 2))
     rng = np.random.default_rng(2)
     drawn = np.array([part.random(rng) for _ in range(300)])
     off = [math.remainder(math.atan2(y, x) - plane.middle, 2.0 * np.pi) for x, y in drawn]
@@ -235,4 +237,4 @@ def test_power_is_measured_by_that_of_all_actuators_at_full_load(kind: str) -> N
     flow = random_flow(kind, 1, 7)
     program = AnyRobot("ipopt").method(layout).at(flow)._program
     most = AnyRobot().method(layout).at(flow).compiled.robot.largest_power
-    assert sum(part.full_cost for part in program._parts) == pytest.approx(most, rel=0.02)
+    assert sum(part.full_power for part in program._actuators) == pytest.approx(most, rel=0.02)

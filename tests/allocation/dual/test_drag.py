@@ -9,6 +9,7 @@ import finlab
 from finlab import Allocator
 from finlab.actuators.rudder import Rudder
 from finlab.actuators.thrust_model import PowerLaw
+from finlab.allocation.dual.compiled import Compiled
 from finlab.layout import Actuator, Thruster, load_layout
 from finlab.layout.layout import Layout
 from finlab.physics.plant import Plant
@@ -164,9 +165,10 @@ def test_a_torpedo_that_loses_actuators_has_an_answer_and_a_bound_below_it(polic
 def test_a_foil_whose_drag_is_welcome_answers_with_the_dearest_lift() -> None:
     """Power counts U newtons of drag; where each is paid more, the conjugate is that of the law."""
     rudder = Rudder("r", (-0.5, 0, 0), (0, 0, 1), (1, 0, 0), 0.05, (-0.3, 0.3), 2.0)
-    allocator = Allocator(Layout("rudder", (rudder,)))
-    group = allocator._whole.method.at(AHEAD).compiled.groups[0][1]  # type: ignore[attr-defined]
-    plant = Plant(Layout("rudder", (rudder,)))
+    layout = Layout("rudder", (rudder,))
+    plant = Plant(layout)
+    compiled = Compiled.of(layout).at(plant.at(AHEAD).inflow(None))
+    group = compiled.groups[0][1]
     turned = np.linspace(-0.3, 0.3, 20_001)[:, None, None] * [1.0, 0.0, 0.0]
     given = plant.wrench(turned, flow=AHEAD)
     power = plant.power(turned, flow=AHEAD).sum(axis=-1)

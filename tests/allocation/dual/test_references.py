@@ -10,7 +10,7 @@ from scipy.optimize import lsq_linear
 from finlab.actuators.response import Form, Line, RadialTable, price_grid
 from finlab.allocation import Allocator, Policy
 from finlab.allocation.baselines.autopilots import PX4_ORDER
-from finlab.allocation.dual.robot import DualRobot
+from finlab.allocation.dual.robot import CommandLimits, DualRobot
 from finlab.axes import AXES
 from finlab.layout import load_layout
 from finlab.research.evaluation.experiments.thrusters import _draws, misses_more, missing_by_group
@@ -105,18 +105,22 @@ def _table(watts: float, most: float) -> RadialTable:
 
 def test_costly_reverse_is_within_reach() -> None:
     lines = [Line(np.eye(6)[i], _table(1.0, 10.0), _table(5.0, 10.0)) for i in range(3)]
-    limits = [np.array([end] * 3) for end in ([-10.0, 0, 0], [10.0, 0, 0], [np.inf] * 3, [0.0] * 3)]
+    limits = CommandLimits(
+        lower=np.array([[-10.0, 0.0, 0.0]] * 3),
+        upper=np.array([[10.0, 0.0, 0.0]] * 3),
+        max_change=np.full((3, 3), np.inf),
+        turns=np.zeros((3, 3), bool),
+    )
     own = np.zeros((3, 3, 6))
     own[:, 0] = np.eye(6)[:3]
     robot = DualRobot(lines, [Form("thruster")] * 3, limits, own, np.ones(6))
     wrench = np.array([-9.0, -9.0, -9.0, 0.0, 0.0, 0.0])
-    found = robot.core.one(wrench, None)
-    inner = np.append(robot.basis.T @ (robot.scale * found.prices[0]), np.zeros(3))
-    assert found.is_attainable[0]
-    np.testing.assert_allclose(
-        robot.core.dual_value(wrench, inner)[1], 3 * 5.0 * 9.0**1.5, rtol=1e-9
-    )
-    np.testing.assert_allclose(found.command[0, :, 0], -9.0, atol=1e-9)
+    answer = robot.core.answer_one(wrench, None)
+    lambda_reduced = np.append(robot.basis.T @ (robot.axis_scale * answer.lam[0]), np.zeros(3))
+    assert answer.is_attainable[0]
+    dual_value = robot.core.dual_value(wrench, lambda_reduced)[1]
+    np.testing.assert_allclose(dual_value, 3 * 5.0 * 9.0**1.5, rtol=1e-9)
+    np.testing.assert_allclose(answer.command[0, :, 0], -9.0, atol=1e-9)
 
 
 @pytest.mark.parametrize("lost", [0, 1, 2])

@@ -15,6 +15,7 @@ from finlab.axes import AXES
 from finlab.interaction.jets import Jets
 from finlab.layout import Layout, load_layout
 from finlab.layout.load import parse_layout
+from finlab.physics import plant_of
 from tests.hostile_robots import hostile_robot
 from tests.mixed_robots import (
     KINDS,
@@ -57,7 +58,7 @@ def jump(robot: Layout, allocator: Allocator, rng: np.random.Generator) -> Array
     lower = np.nan_to_num(robot.lower)
     upper = np.nan_to_num(robot.upper)
     command = lower + rng.random(lower.shape) * (upper - lower)
-    wrench = allocator._whole.plant.wrench(command)
+    wrench = plant_of(allocator.layout).wrench(command)
     times = rng.choice([0.0, 0.3, 1.0, 3.0, 1e3])
     aside = rng.choice([0.0, 0.1]) * allocator.scale * rng.normal(size=6)
     return np.clip(times * wrench + aside, -MAX_WRENCH, MAX_WRENCH)

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from finlab.allocation.settings import MdnSettings
 from finlab.assets import checkpoint_path
 from finlab.errors import AllocationError, CheckpointError
 from finlab.layout import FinModelSpec, Layout, load_layout
@@ -16,7 +15,7 @@ from finlab.physics import Plant
 from finlab.physics.objective import command_effort
 from finlab.research.mdn.answers import follow
 from finlab.research.mdn.features import features_of, shares
-from finlab.research.mdn.method import STEPS, Mdn
+from finlab.research.mdn.method import STEPS, Mdn, MdnSettings
 from finlab.research.networks.checkpoint import read_checkpoint
 from finlab.research.random_layouts import random_layout
 from tests.any_robot import AnyRobot

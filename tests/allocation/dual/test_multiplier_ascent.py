@@ -1,4 +1,4 @@
-"""Raised prices prove nearly as much as drawn commands allow: beside a linear program over their
+"""Raised multipliers prove nearly as much as drawn commands allow: beside a linear program over their
 mixtures."""
 
 import numpy as np
@@ -6,7 +6,7 @@ import pytest
 from scipy.optimize import linprog
 
 from finlab.allocation import Allocator
-from finlab.allocation.dual.price_ascent import raised_price
+from finlab.allocation.dual.multiplier_ascent import raised_multipliers
 from finlab.arrays import Array
 from finlab.layout import load_layout
 from finlab.physics import Plant
@@ -52,7 +52,7 @@ def test_prices_are_raised_to_what_mixtures_of_commands_take(name: str, off: flo
     answer = Allocator(layout).allocate(target)
     assert answer.reachable and answer.prices is not None
     begun = off * answer.prices
-    raised = raised_price(plant, answer.scale, answer.wrench, begun, answer.command)
+    raised = raised_multipliers(plant, answer.scale, answer.wrench, begun, answer.command)
 
     drawn = commands_around(plant, answer.command, rng)
     given = np.einsum("kna,naw->nkw", plant.force(drawn), plant.effectiveness)

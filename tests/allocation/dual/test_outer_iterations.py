@@ -1,4 +1,5 @@
-"""Answers where jets meet, in turns: where they begin anew, and how far they go along a ray."""
+"""Answers where jets meet, by outer iterations: where they begin anew, and how far they go along a
+ray."""
 
 from dataclasses import replace
 
@@ -7,10 +8,15 @@ import pytest
 from scipy.optimize import minimize
 
 from finlab.allocation import Allocator
-from finlab.allocation.dual.turns import ASIDE, RANDOM, WALSH, _turned_aside
+from finlab.allocation.dual.outer_iterations import (
+    JET_ROTATION,
+    RANDOM_STARTS,
+    WALSH,
+    _rotated_starts,
+)
 from finlab.allocation.policy import CLOSEST
 from finlab.arrays import ROUNDS, Array
-from finlab.core.calls import STILL
+from finlab.core.calls import NOMINAL
 from finlab.interaction.jets import Jets
 from finlab.layout import Layout, load_layout
 from finlab.layout.load import parse_layout
@@ -19,23 +25,25 @@ from finlab.research.random_layouts import random_jet_robot
 from tests.mixed_robots import bluerov2_heavy
 
 MOST_STEPS = 540.0
-"""Steps of the turns of all questions: what they took when this was written, and a tenth more."""
+"""Steps of the iterations of all questions: what they took when this was written, and a tenth more."""
 
 
-def test_other_beginnings_turn_planes_and_change_sizes() -> None:
+def test_other_starts_rotate_planes_and_change_sizes() -> None:
     rng = np.random.default_rng(1)
     lines = np.array([False, True, False, False, True, False])
     force = rng.normal(size=(6, 2))
     force[lines, 1] = 0.0
-    starts = _turned_aside(force, lines)
+    starts = _rotated_starts(force, lines).all()
     patterns = len(WALSH) + 1
-    assert starts.shape == (patterns + RANDOM, 6, 2)
+    assert starts.shape == (patterns + RANDOM_STARTS, 6, 2)
 
     complex_force = force[:, 0] + 1j * force[:, 1]
     turned = (starts[..., 0] + 1j * starts[..., 1]) / complex_force
     # By the patterns each plane turns by the same angle, one way or the other, and keeps its size.
     np.testing.assert_allclose(np.abs(turned[:patterns, ~lines]), 1.0, rtol=1e-12)
-    np.testing.assert_allclose(np.abs(np.angle(turned[:patterns, ~lines])), ASIDE, rtol=1e-12)
+    np.testing.assert_allclose(
+        np.abs(np.angle(turned[:patterns, ~lines])), JET_ROTATION, rtol=1e-12
+    )
     signs = np.sign(np.angle(turned[:patterns, ~lines]))
     np.testing.assert_allclose(
         signs[:8].T @ signs[:8], 8.0 * np.eye(4), atol=1e-12
@@ -45,9 +53,9 @@ def test_other_beginnings_turn_planes_and_change_sizes() -> None:
     assert (np.abs(turned) <= 2.0).all() and np.abs(
         np.abs(turned[patterns:, ~lines]) - 1.0
     ).min() > 1e-6
-    assert np.unique(np.angle(turned[patterns:, ~lines]).round(9)).size == 4 * RANDOM
+    assert np.unique(np.angle(turned[patterns:, ~lines]).round(9)).size == 4 * RANDOM_STARTS
     np.testing.assert_allclose(turned[:, lines].imag, 0.0, atol=1e-12)
-    assert np.unique(turned[:, lines].real.round(9)).size == 2 * (patterns + RANDOM)
+    assert np.unique(turned[:, lines].real.round(9)).size == 2 * (patterns + RANDOM_STARTS)
     assert (turned[:, lines].real >= 0.0).all()
 
 
@@ -118,9 +126,9 @@ def test_a_direction_is_kept_on_its_ray_whatever_the_robot(seed: int) -> None:
         )
 
 
-def test_turns_settle_in_few_steps_at_the_conditions_of_a_minimum() -> None:
-    """Each turn is exact on the model that is linear at the last answer: a fault of that model costs
-    turns, or ends elsewhere."""
+def test_iterations_settle_in_few_steps_at_the_conditions_of_a_minimum() -> None:
+    """Each iteration is exact on the model that is linear at the last answer: a fault of that model
+    costs iterations, or ends elsewhere."""
     steps = 0.0
     for seed in range(4):
         rng = np.random.default_rng([5, seed])
@@ -128,9 +136,9 @@ def test_turns_settle_in_few_steps_at_the_conditions_of_a_minimum() -> None:
         plant = Plant(layout)
         dual = Allocator(layout)._whole.method
         for target in 0.6 * plant.wrench(plant.sample(rng, (3,))):
-            laws = dual.forces(target[None], CLOSEST, None, STILL)
-            ended = dual.whole.settled(
-                target, laws.force[0], ROUNDS, CLOSEST, laws.prices[0], STILL, most_steps=1e6
+            laws = dual.forces(target[None], CLOSEST, None, NOMINAL)
+            ended = dual.coupled.iterate(
+                target, laws.force[0], ROUNDS, CLOSEST, laws.lam[0], NOMINAL, max_steps=1e6
             )
             steps += ended.steps
     assert steps <= MOST_STEPS

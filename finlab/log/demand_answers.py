@@ -1,4 +1,7 @@
-"""Answers to the demands of a log, whose rows may ask for different axes."""
+"""Allocates the demands of a log, each of which may leave other axes free.
+
+`judging` asks it what an autopilot would have given, and `replay` what other methods would.
+"""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -7,7 +10,7 @@ import numpy as np
 
 from finlab.allocation.allocator import Allocator
 from finlab.arrays import Array
-from finlab.axes import AXES
+from finlab.axes import axes_in
 
 
 class DemandAnswers(NamedTuple):
@@ -16,23 +19,23 @@ class DemandAnswers(NamedTuple):
     command: Array
     """(N, n, 3), NaN of a lost actuator."""
     unallocated: Array
-    """What is missing (N, 6) [N, N m]; 0 along axes that are not asked for."""
+    """The missing wrench (N, 6) [N, N m]; 0 along free axes."""
     err_norm: Array
-    """Its size (N,) on the yardstick."""
+    """Its norm (N,), normalized by the wrench scale."""
     power: Array
-    """(N,) [W]."""
+    """Power (N,) [W]."""
 
 
 def answers_to(
     allocator: Allocator, wrench: Array, lost: Sequence[str] = (), **options: Any
 ) -> DemandAnswers:
-    """Returns answers to demands, those that ask for the same axes together.
+    """Returns answers to demands; those that leave the same axes free are one batch.
 
     Args:
-        allocator: of the robot.
-        wrench: (N, 6) [N, N m]; NaN along axes that a demand does not ask for.
+        allocator: allocator of the robot.
+        wrench: demands (N, 6) [N, N m]; NaN along axes that a demand leaves free.
         lost: names of actuators that do not work.
-        **options: of `Allocator.allocate_batch`.
+        **options: further arguments of `Allocator.allocate_batch`.
 
     Raises:
         CommandError: a demand asks for no axis.
@@ -44,11 +47,10 @@ def answers_to(
         np.empty(count),
         np.empty(count),
     )
-    open_axes = np.isnan(wrench)
-    patterns, group = np.unique(open_axes, axis=0, return_inverse=True)
-    for k, pattern in enumerate(patterns):
+    patterns, group = np.unique(np.isnan(wrench), axis=0, return_inverse=True)
+    for k, is_free in enumerate(patterns):
         rows = np.flatnonzero(group.ravel() == k)
-        free = tuple(axis for axis, is_open in zip(AXES, pattern, strict=True) if is_open)
+        free = axes_in(is_free)
         batch = allocator.allocate_batch(
             np.nan_to_num(wrench[rows]), lost=lost, free=free, **options
         )

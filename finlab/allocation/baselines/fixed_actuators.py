@@ -1,5 +1,5 @@
 """Actuators that cannot be commanded, since damage or limits leave them one command: what they
-give."""
+give, which the others have to make up for."""
 
 from typing import NamedTuple
 
@@ -10,18 +10,18 @@ from finlab.arrays import Array
 from finlab.physics import Plant
 
 
-class Held(NamedTuple):
+class FixedActuators(NamedTuple):
     """The actuators of a robot that have one command alone."""
 
-    held: NDArray[np.bool_]
+    is_fixed: NDArray[np.bool_]
     """Which they are (n,)."""
     wrench: Array
-    """What they give together (6,) [N, N m], jets apart; the others have to make up for it."""
+    """What they give together (6,) [N, N m], jets apart."""
 
 
-def held_of(plant: Plant) -> Held:
+def fixed_actuators_of(plant: Plant) -> FixedActuators:
     """Returns the actuators of a plant whose least and greatest commands are the same."""
-    held = (plant.lower == plant.upper).all(axis=1)
+    is_fixed = (plant.lower == plant.upper).all(axis=1)
     force = plant.force(plant.lower)
-    wrench = np.einsum("nk,nkw->w", force[held], plant.effectiveness[held])
-    return Held(held, np.asarray(wrench))
+    wrench = np.einsum("nk,nkw->w", force[is_fixed], plant.effectiveness[is_fixed])
+    return FixedActuators(is_fixed, np.asarray(wrench))

@@ -12,7 +12,7 @@ import pytest
 from finlab.allocation import Allocator
 from finlab.assets import shipped_layouts
 from finlab.cli import main
-from finlab.deploy.bundle import features_of, graph_text, write_graph
+from finlab.deploy.robot_graph import features_of, graph_text, write_graph
 from finlab.errors import LayoutError
 from finlab.layout import load_layout
 from finlab.research.paper.network import raw_features

@@ -1,0 +1,309 @@
+"""Answers where actuators act on each other: outer iterations on the dual of the model made linear
+at the last forces.
+
+With y the forces and o(y) the wrench offset that they cause (Eq. 18), an iteration takes o(y) for
+its value and slope at the last forces. Its answer is exact and cheapest on that linear model;
+Levenberg-Marquardt steps make it exact on the whole one, and shorter steps are taken where it is
+no cheaper. Where the iterations settle, the gradient of the power lies in the range of the slope
+of the whole model: the conditions of Karush, Kuhn and Tucker hold there (sequential convex
+programming). The iterations themselves are in finlab/core/src/sequential_convex.c. Here is where
+they begin: the whole model is not convex, so several starts are tried.
+"""
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.allocation.dual.compiled import Compiled
+from finlab.allocation.levenberg_marquardt import CommandProblem, refine
+from finlab.allocation.policy import Policy
+from finlab.allocation.rates import Rates
+from finlab.allocation.solution import Solution
+from finlab.arrays import CLOSE, NEARLY, ROUNDS, Array
+from finlab.core.calls import Conditions, CoreAnswer
+from finlab.core.coupled_core import CoupledCore, OuterResult, WrenchOffset
+from finlab.interaction.jets import JetInteraction
+from finlab.physics.plant import Plant
+
+JET_ROTATION = 0.38
+"""Angle [rad] by which jets are rotated where an answer begins anew: the half width of a jet."""
+ITERATIONS_IN_TICK = 2
+"""Outer iterations of a tick; the next tick goes on from there."""
+RANDOM_STARTS = 3
+"""Starts whose forces are rotated, and changed in size, at random."""
+REVERSED_FOLLOWED = 2
+"""How many starts are followed, the cheapest first, of those with one force reversed."""
+ROTATED_FOLLOWED = 1
+"""How many starts are followed, the cheapest first, of those with rotated forces."""
+MAX_WORK = 400_000
+"""Steps times actuators after which no other iteration is begun: about a tenth of a second."""
+CHEAPER = 10.0 * CLOSE
+"""Share of the power by which an answer has to be cheaper for others like it to be tried."""
+
+_PAIR = np.array([[1.0, 1.0], [1.0, -1.0]])
+"""Signs of two: the same, and opposite."""
+WALSH = np.kron(_PAIR, np.kron(_PAIR, _PAIR))
+"""Signs (8, 8) of the patterns of Walsh, one pattern in each column."""
+
+
+class OuterMethod(Protocol):
+    """What is asked of method `dual` here, in its flow."""
+
+    plant: Plant
+    scale: Array
+    compiled: Compiled
+
+    @property
+    def coupled(self) -> CoupledCore:
+        """The robot in the core, with its wrench offset."""
+        ...
+
+    @property
+    def rates(self) -> Rates:
+        """How far commands may change in a tick."""
+        ...
+
+    def forces(
+        self, targets: Array, policy: Policy | None, lam: Array | None, conditions: Conditions
+    ) -> CoreAnswer:
+        """Answers wrenches (N, 6) by the laws alone; see `Dual.forces`."""
+        ...
+
+    def exact(self, answer: CoreAnswer, conditions: Conditions) -> Array:
+        """Makes commands (N, n, 3) exact; see `Dual.exact`."""
+        ...
+
+    def error(self, command: Array, wrench: Array, conditions: Conditions) -> Array:
+        """Measures errors (N,) of commands; see `Dual.error`."""
+        ...
+
+    def undriven_notes(self, targets: Array, conditions: Conditions) -> set[str]:
+        """Tells of axes that come together only; see `Dual.undriven_notes`."""
+        ...
+
+    def problem_under(self, conditions: Conditions) -> CommandProblem:
+        """Poses the steps on commands; see `Dual.problem_under`."""
+        ...
+
+    def solution(
+        self,
+        command: Array,
+        wrench_served: Array,
+        lam: Array,
+        gap_power_bound: Array,
+        notes: set[str],
+        conditions: Conditions,
+    ) -> Solution:
+        """Makes a solution; see `Dual.solution`."""
+        ...
+
+
+def coupled_core(plant: Plant, compiled: Compiled) -> CoupledCore:
+    """Returns a robot in the core, with what its actuators do to each other.
+
+    Args:
+        plant: of a layout with an interaction, in its flow.
+        compiled: the same robot by its laws alone.
+
+    Returns:
+        What runs outer iterations for it.
+    """
+    interaction = plant.interaction
+    assert interaction is not None
+    robot = compiled.robot
+    return CoupledCore(
+        robot.block,
+        WrenchOffset(
+            frames=robot.axes @ plant.layout.frames,
+            counts=plant.counts,
+            inflow=plant.met_by_all(None),
+            jets=interaction.table if isinstance(interaction, JetInteraction) else None,
+            effect=interaction.effect,
+        ),
+    )
+
+
+def solve_outer(
+    method: OuterMethod, targets: Array, policy: Policy, conditions: Conditions, lam: Array | None
+) -> Solution:
+    """Solves for targets, one after the other, by outer iterations.
+
+    Args:
+        method: `dual` for the robot, in its flow.
+        targets: desired wrenches (N, 6) [N, N m], at least one.
+        policy: what to give out of reach.
+        conditions: what holds of the robot.
+        lam: multipliers (6,) [W/N, W/(N m)] at which Newton's method begins; None for its own.
+
+    Returns:
+        Commands, with the lower bound of their power by the laws alone.
+    """
+    commands: list[Array] = []
+    wrenches: list[Array] = []
+    multipliers: list[Array] = []
+    notes: set[str] = set()
+    for target in targets:
+        answer = _best_of_starts(method, target, policy, conditions, lam)
+        command = method.exact(answer, conditions)
+        wrench_served = answer.wrench_served
+        if policy.kind == "direction" and not answer.is_attainable.all():
+            command, wrench_served = _on_the_ray(method, target[None], command, conditions)
+        if method.error(command, target[None], conditions)[0] > NEARLY:
+            notes |= method.undriven_notes(target[None], conditions)
+        commands.append(command)
+        wrenches.append(wrench_served)
+        multipliers.append(answer.lam)
+    return method.solution(
+        np.concatenate(commands),
+        np.concatenate(wrenches),
+        np.concatenate(multipliers),
+        np.zeros(len(targets)),
+        notes,
+        conditions,
+    )
+
+
+def _best_of_starts(
+    method: OuterMethod, target: Array, policy: Policy, conditions: Conditions, lam: Array | None
+) -> CoreAnswer:
+    """What outer iterations come to for one target (6,): in a tick from the command before, else
+    from the forces by the laws alone and, where the whole model takes more power, from others."""
+    coupled = method.coupled
+    if conditions.command_previous is not None:
+        in_tick = coupled.iterate(target, None, ITERATIONS_IN_TICK, policy, lam, conditions)
+        return in_tick.answer
+    by_laws = method.forces(target[None], policy, lam, conditions)
+    force_by_laws = by_laws.force[0]
+    lam_by_laws = by_laws.lam[0]
+    steps_left = MAX_WORK / len(force_by_laws)
+    best = coupled.iterate(
+        target, force_by_laws, ROUNDS, policy, lam_by_laws, conditions, max_steps=steps_left
+    )
+    steps_left -= best.steps
+
+    def follow_cheapest(starts: Array, followed: int) -> bool:
+        """Follows the cheapest of some starts (K, n, 2), and keeps what comes out better; returns
+        whether that is cheaper."""
+        nonlocal best, steps_left
+        power_before = best.power
+        # Without an iteration: the nearest forces that give the target, with what they cost.
+        tried = [
+            coupled.iterate(target, start, 0, conditions=conditions, error_price=best.error_price)
+            for start in starts
+        ]
+        merits = [one.power + one.error_price * one.error for one in tried]
+        for k in np.argsort(merits)[:followed]:
+            if steps_left <= 0:
+                break
+            other = coupled.iterate(
+                target,
+                tried[k].answer.force[0],
+                ROUNDS,
+                policy,
+                lam_by_laws,
+                conditions,
+                max_steps=steps_left,
+            )
+            steps_left -= other.steps
+            best = other if _is_better(other, best) else best
+        return best.power < (1.0 - CHEAPER) * power_before
+
+    works = slice(None) if conditions.lost is None else ~conditions.lost
+    power_by_laws = float(method.plant.power(by_laws.command)[:, works].sum())
+    if best.power <= (1.0 + CHEAPER) * power_by_laws:
+        return best.answer
+    one_reversed = 1.0 - 2.0 * np.eye(len(force_by_laws))[..., None]
+    for _ in range(ROUNDS):
+        is_cheaper = follow_cheapest(one_reversed * best.answer.force, REVERSED_FOLLOWED)
+        if not is_cheaper:
+            break
+    rotated = _rotated_starts(force_by_laws, method.compiled.robot.is_line).all()
+    follow_cheapest(rotated, ROTATED_FOLLOWED)
+    return best.answer
+
+
+def _is_better(one: OuterResult, other: OuterResult) -> bool:
+    """Whether one comes nearer to the target, or as near at less power."""
+    nearer = other.error - one.error
+    return nearer > NEARLY or (nearer >= -NEARLY and one.power < other.power)
+
+
+def _on_the_ray(
+    method: OuterMethod, target: Array, command: Array, conditions: Conditions
+) -> tuple[Array, Array]:
+    """Finds the largest share of a target that steps on the commands come to (Eq. 14), by
+    bisection.
+
+    Args:
+        method: `dual` for the robot, in its flow.
+        target: desired wrench (1, 6) [N, N m].
+        command: (1, n, 3) where the steps begin.
+        conditions: what holds of the robot.
+
+    Returns:
+        The command (1, n, 3), and the wrench (1, 6) [N, N m] on the ray that it gives.
+    """
+    target_normalized = target / method.scale
+    problem = method.problem_under(conditions)
+    along = float((problem.wrench(command) * target_normalized).sum())
+    ray_share = along / max((target_normalized * target_normalized).sum(), 1e-300)
+    low = 0.0
+    high = min(max(ray_share * (1.0 + CLOSE), 0.0), 1.0)
+    best = command
+    for k in range(ROUNDS):
+        tried = high if k == 0 else 0.5 * (low + high)
+        refined = refine(problem, tried * target_normalized, best, ROUNDS, 0.1 * NEARLY)
+        if refined.error[0] <= NEARLY:
+            low = tried
+            best = refined.command
+        else:
+            high = tried
+        if high - low <= CLOSE * high:
+            break
+    if conditions.command_previous is not None:
+        box = method.rates.box(conditions.command_previous)
+        best = box.clip_feasible(best, method.plant)
+    return best, low * target
+
+
+class _RotatedStarts(NamedTuple):
+    """Forces at which iterations begin anew, with those of planes rotated: a jet that meets a
+    neighbour in a symmetric robot has no slope that would turn it aside, and which of two jets
+    gives way is a choice between minima."""
+
+    walsh: Array
+    """(8, n, 2) [N], rotated one way or the other in the patterns of Walsh."""
+    opposite: Array
+    """(1, n, 2) [N], all rotated the other way than in the first pattern, which is one sign."""
+    random: Array
+    """(RANDOM_STARTS, n, 2) [N], rotated by random angles, and changed in size."""
+
+    def all(self) -> Array:
+        """All of them (12, n, 2) [N]."""
+        return np.concatenate(self)
+
+
+def _rotated_starts(force: Array, is_line: NDArray[np.bool_]) -> _RotatedStarts:
+    """Makes starts of forces (n, 2) [N]; forces of lines (n,) are changed in size at random, since
+    they cannot rotate."""
+    planes = np.flatnonzero(~is_line)
+    n = len(is_line)
+    rng = np.random.default_rng(0)
+    walsh_signs = WALSH[np.arange(len(planes)) % len(WALSH)].T
+    random_turns = rng.normal(size=(len(planes), RANDOM_STARTS)).T
+    turns = np.concatenate([walsh_signs, -walsh_signs[:1], random_turns])
+
+    angle = np.zeros((len(turns), n))
+    angle[:, planes] = JET_ROTATION * turns
+    size = np.ones(angle.shape)
+    size[-RANDOM_STARTS:] = rng.uniform(0.0, 2.0, (RANDOM_STARTS, n))
+    size[:, is_line] = rng.uniform(0.0, 2.0, (len(size), is_line.sum()))
+
+    cos = np.cos(angle)
+    sin = np.sin(angle)
+    x = cos * force[:, 0] - sin * force[:, 1]
+    y = sin * force[:, 0] + cos * force[:, 1]
+    starts = size[..., None] * np.stack([x, y], axis=-1)
+    walsh, opposite, random = np.split(starts, [len(WALSH), len(WALSH) + 1])
+    return _RotatedStarts(walsh, opposite, random)

@@ -1,0 +1,72 @@
+"""The page of the default method has every number set by hand, with its value and its reason."""
+
+import ast
+import re
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+ROW = re.compile(r"^\| `(\w+)` \| ([^|]+) \| `([^`|]+)` \| ([^|]+) \|$", re.MULTILINE)
+"""A row of the page's table: name, value, file, reason."""
+PYTHON = [
+    ROOT / "finlab/arrays.py",
+    ROOT / "finlab/allocation/levenberg_marquardt.py",
+    *sorted((ROOT / "finlab/allocation/dual").glob("*.py")),
+    *(
+        ROOT / "finlab/actuators" / f"{name}.py"
+        for name in ("response", "fin/fin_response", "thruster")
+    ),
+    *(ROOT / "finlab/actuators" / f"{name}.py" for name in ("rudder", "thrust_power", "kinds")),
+]
+
+
+CORE = sorted((ROOT / "finlab/core").rglob("*.[ch]"))
+DEFINED = re.compile(r"^#define (\w+) (?:R\()?([\d.]+(?:e-?\d+)?)\b", re.MULTILINE)
+"""A constant in C: name, value."""
+SINGLE = re.compile(r"^#ifdef FL_SINGLE\n.*?^#else\n", re.MULTILINE | re.DOTALL)
+"""Constants of single precision, which the page leaves out."""
+NO_CHOICE = {
+    "PI",
+    "TINY",
+    "LARGEST",
+    "NONE",
+    "FL_MOST",
+    "FL_VERSION",
+    "FL_MAGIC",
+    "FL_POINTS",
+    "FL_SCORES",
+}
+"""Constants in C that nobody has chosen: sizes, versions, numbers of mathematics."""
+
+
+def numbers(path: Path) -> dict[str, object]:
+    """The public constants of a file that are numbers, or tuples of them."""
+    found = {}
+    for line in ast.parse(path.read_text()).body:
+        if not (isinstance(line, ast.Assign) and isinstance(line.targets[0], ast.Name)):
+            continue
+        name = line.targets[0].id
+        if name.isupper() and not name.startswith("_"):
+            try:
+                found[name] = ast.literal_eval(line.value)
+            except ValueError:
+                continue
+    return found
+
+
+def test_the_page_has_every_number_with_a_reason() -> None:
+    rows = ROW.findall((ROOT / "docs" / "theory" / "method.md").read_text())
+    on_page = {(file, name): ast.literal_eval(value) for name, value, file, _ in rows}
+    in_code: dict[tuple[str, str], object] = {}
+    for path in PYTHON:
+        for name, value in numbers(path).items():
+            in_code[str(path.relative_to(ROOT)), name] = value
+    for path in CORE:
+        for name, text in DEFINED.findall(SINGLE.sub("", path.read_text())):
+            same = [value for (_, other), value in in_code.items() if other == name]
+            if same:  # said in both languages
+                assert float(text) in same, name
+            elif name not in NO_CHOICE:
+                in_code[str(path.relative_to(ROOT)), name] = ast.literal_eval(text)
+    assert on_page == in_code
+    assert len(rows) == len(on_page)
+    assert all(len(reason.split()) > 3 for *_, reason in rows)
