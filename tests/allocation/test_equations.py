@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-CITED = re.compile(r"\bEqs?\. (\d+)(?: (?:to|and) (\d+))?")
+CITED = re.compile(r"\bEqs?\. (?P<first>\d+)(?: (?P<word>to|and) (?P<last>\d+))?")
 """`Eq. 8`, `Eqs. 6 to 10`; equations of papers are cited in brackets, `Eq. (1)`."""
 
 
@@ -28,15 +28,29 @@ def test_no_equation_stands_within_a_sentence() -> None:
             assert line.endswith("$$"), line
 
 
-def test_cited_equations_exist() -> None:
-    known = {str(number) for number in numbers_of_page()}
-    wrong = []
+def citations() -> dict[str, set[int]]:
+    """The numbers that comments of the core and of the allocation cite, by `file: citation`."""
+    cited: dict[str, set[int]] = {}
     for room in ("core", "allocation"):
-        for path in sorted((ROOT / "finlab" / room).rglob("*.[pch]*")):
+        for path in sorted((ROOT / "finlab" / room).rglob("*")):
             if path.suffix not in (".py", ".c", ".h"):
                 continue
             for match in CITED.finditer(path.read_text(encoding="utf-8")):
-                cited = {number for number in match.groups() if number is not None}
-                if not cited <= known:
-                    wrong.append(f"{path.relative_to(ROOT)}: {match.group()}")
+                first = int(match["first"])
+                last = int(match["last"] or first)
+                numbers = {first, last}
+                if match["word"] == "to":
+                    numbers = set(range(first, last + 1))
+                cited[f"{path.relative_to(ROOT)}: {match.group()}"] = numbers
+    return cited
+
+
+def test_cited_equations_exist() -> None:
+    known = set(numbers_of_page())
+    wrong = [place for place, numbers in citations().items() if not numbers <= known]
     assert wrong == []
+
+
+def test_every_equation_of_the_page_is_cited_in_code() -> None:
+    cited = set().union(*citations().values())
+    assert set(numbers_of_page()) - cited == set()

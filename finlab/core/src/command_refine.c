@@ -1,16 +1,16 @@
 /* Levenberg-Marquardt steps that make commands exact by the laws, Eq. 11.
 
-       step = J' (J J' + (mu + ..) tr(J J'))^-1 r
+       step = J' (J J' + (mu + epsilon) tr(J J') I)^-1 r    with    epsilon = ROUNDING REGULAR
 
-   r is the residual of the wrench on the yardstick, J its slopes by the commands over the
-   widths of their limits. What a step would take out of the limits is held, and the step
-   found anew without it. */
+   r is the residual of the wrench on the yardstick, J the Jacobian of that wrench by the
+   commands over the widths of their limits, so that `step` is a share of these widths. What a
+   step would take out of the limits is held, and the step found anew without it. */
 #include "internal.h"
 
 #define HOLDS 3         /* how often a step is found anew without commands that leave the box */
 #define MU_KEPT R(0.3)  /* damping after a kept step, over that before */
 #define MU_REFUSED 10   /* the same after a refused step */
-#define REGULAR R(0.01) /* damping at least, over the rounding of numbers */
+#define REGULAR R(0.01) /* least damping (epsilon of Eq. 11) over the rounding of numbers */
 
 /* The residual (6,) of commands, on the yardstick. Returns its square. */
 static real residual_of(const real *block, const fl_work *work, const real *wrench_wanted,
@@ -83,7 +83,8 @@ static void damped_step(const real *block, fl_work *work, const real *residual, 
       if (!held[i][c]) fl_add_square(gram, work->jacobian[i][c], 1);
     }
   }
-  const real ridge = (mu + ROUNDING * REGULAR) * fl_trace(gram) + TINY;
+  const real epsilon = ROUNDING * REGULAR;
+  const real ridge = (mu + epsilon) * fl_trace(gram) + TINY; /* TINY: where nothing is free */
   for (int j = 0; j < 6; j++) gram[j][j] += ridge;
   real multiplier[6] = {0};
   if (fl_factor(gram)) fl_solve(gram, residual, multiplier);

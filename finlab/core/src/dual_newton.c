@@ -4,11 +4,15 @@
        with gradient       r = w - sum B y(B'lambda)
 
    g is concave, its Hessian is -G with G = sum B (dy/ds) B'. Where actuators are at their
-   limits G loses rank: a ridge mu (S + c tr(G) M) keeps the step finite and is adapted to
-   what a step brought (Levenberg, Marquardt). S = sum B (|y|/|s|) B' is the same as G, but
-   of forces over prices, which limits leave as they are, and M the Hessian of quadratic
-   costs over its mean; where foils drag, S is left out and c is 1. Vectors in the basis have
-   6 numbers, those behind its range are 0.
+   limits G loses rank. A damping mu keeps the step finite, and is adapted to what a step
+   brought (Levenberg, Marquardt):
+
+       (G_mu + mu c max(tr G_mu, tau) M) step = r    with    G_mu = G + mu S
+
+   S = sum B (|y|/|s|) B' is the same as G, but of forces over prices, which limits leave as
+   they are. M is the Hessian of quadratic costs over its mean, and tau a millionth of that
+   Hessian's trace (trace_min). c is SATURATED; where foils drag, S is left out and c is 1.
+   Vectors in the basis have 6 numbers, those behind its range are 0.
 
        lambda  multipliers of the wrench, in the basis of driven directions [W]    Eq. 3
        s       price of one actuator's force, s = B' lambda [W/N]                  Eq. 4
@@ -228,10 +232,11 @@ static void add_plane(real H[6][6], const real *bx, const real *by, real xx, rea
   }
 }
 
-/* Solves (G + mu (S + c tr(G + mu S) M)) step = r, Eq. 8; 0 where that is singular to rounding. */
+/* Solves (G_mu + mu c max(tr G_mu, tau) M) step = r with G_mu = G + mu S, Eq. 8; 0 where that is
+   singular to rounding. */
 static int newton_step(const real *block, const fl_work *work, const fl_state *at, real mu,
                        real *step) {
-  real H[6][6] = {{0}};
+  real H[6][6] = {{0}}; /* G_mu */
   for (int i = 0; i < COUNT(block); i++) {
     const real(*B)[6] = work->span.effectiveness_reduced[i];
     const real *dy_ds = at->dy_ds[i];
@@ -245,7 +250,8 @@ static int newton_step(const real *block, const fl_work *work, const fl_state *a
   }
   real c = SATURATED;
   if (work->has_drag) c = 1; /* S is left out there */
-  const real weight = c * mu * fl_larger(fl_trace(H), work->trace_min);
+  const real trace = fl_larger(fl_trace(H), work->trace_min);
+  const real weight = c * mu * trace; /* of M */
   for (int row = 0; row < 6; row++) {
     for (int col = 0; col <= row; col++) H[row][col] += weight * work->metric[row][col];
   }

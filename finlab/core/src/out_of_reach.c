@@ -60,7 +60,7 @@ static void ray_of(const real *block, const fl_work *work, const real *wrench, w
   }
 }
 
-/* The point nearest to any share of a ray, from 0 to 1: the share. */
+/* The point nearest to any share t of a ray, from 0 to 1, Eq. 15. Returns the share. */
 static wide nearest_to_ray(const real *block, fl_work *work, const wide *from, const wide *ray,
                            real *score) {
   fl_mixture *m = &work->mixture;
@@ -75,7 +75,7 @@ static wide nearest_to_ray(const real *block, fl_work *work, const wide *from, c
 }
 
 /* The largest share of a wrench that can be given alone, Eq. 14. In a tick there may be
-   none, as drives cannot stop or turn at once: then what is nearest to any share. */
+   none, as drives cannot stop or turn at once: then what is nearest to any share, Eq. 15. */
 static void serve_direction(const real *block, fl_work *work, const real *wrench, real *score) {
   fl_mixture *m = &work->mixture;
   const wide weight[6] = {1, 1, 1, 1, 1, 1};
