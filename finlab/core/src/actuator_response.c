@@ -3,17 +3,18 @@
 
    A line responds with T(|s|) sign(s), a plane with T(v) g where v = s.g and g is the direction of
    the force. Where it may choose between two responses, the ends of a wide arc or the two ways of a
-   pod, it gives a blend of both: the gradient of a smooth maximum of their conjugates.
+   pod, it gives a blend of both: the gradient of a smooth maximum of their conjugates, Eqs. 25 to
+   27.
 
-   A foil gives lift and with it drag. With drag paid a [W/N], lift is as dear as r = 1 - a/U times
-   its power, so that its response to a price v is T(v/r). Where r < 0 drag is welcome: then r is
-   softened to q(r) > 0, and (q - r) times the chord of the power is on top of the conjugate.
+   A foil gives lift and with it drag, whose price s_2 makes lift as dear as r = 1 - s_2/U times its
+   power, Eq. 19. Where drag is welcome r < 0: r is softened to q(r) > 0, Eq. 20, and the chord of
+   the power stands for the power in what q has more than r, Eqs. 21 to 23.
 
    Prices are in W/N along the actuator's own rows, forces in N. */
 #include "internal.h"
 
-#define SOFT R(0.2) /* r of a foil below which it is softened */
-#define BLEND_REST R(1e-12) /* least width [W] of a blend */
+#define SOFT R(0.2)         /* rho of Eq. 20: r of a foil below which it is softened */
+#define BLEND_REST R(1e-12) /* least width omega [W] of a blend */
 
 /* A direction in which a plane may push. */
 typedef struct {
@@ -82,15 +83,14 @@ static push_direction direction_of(const fl_set *set, const real *gauge, const r
   return g;
 }
 
-/* Blends a response with another one: c* becomes the smooth maximum (a + b + root) / 2 of both
-   conjugates, with root = sqrt((a - b)^2 + width^2), and all else follows from its derivatives by
-   the price. `width` is in W. */
-static void blend(response *own, const response *other, real width) {
-  const real lead = own->conjugate - other->conjugate;
-  const real root = SQRT(lead * lead + width * width);
-  const real p = (1 + lead / root) / 2; /* weight of the one, q of the other */
-  const real q = 1 - p;
-  const real dp = width * width / (2 * root * root * root); /* dp / dlead [1/W] */
+/* Blends a response with another one: c* becomes the smooth maximum of both conjugates, Eq. 25, and
+   all else follows from its derivatives by the price, Eqs. 26 and 27. `omega` is in W. */
+static void blend(response *own, const response *other, real omega) {
+  const real delta = own->conjugate - other->conjugate;
+  const real root = SQRT(delta * delta + omega * omega);
+  const real p = (1 + delta / root) / 2; /* weight of the one */
+  const real q = 1 - p;                  /* of the other */
+  const real dp = omega * omega / (2 * root * root * root); /* dp / ddelta [1/W] */
   const real dx = own->force[0] - other->force[0];
   const real dy = own->force[1] - other->force[1];
   own->force[0] = p * own->force[0] + q * other->force[0];
@@ -98,10 +98,10 @@ static void blend(response *own, const response *other, real width) {
   own->xx = p * own->xx + q * other->xx + dp * dx * dx;
   own->xy = p * own->xy + q * other->xy + dp * dx * dy;
   own->yy = p * own->yy + q * other->yy + dp * dy * dy;
-  own->conjugate += (root - lead) / 2;
+  own->conjugate += (root - delta) / 2; /* c1 + (R - delta) / 2 = (c1 + c2 + R) / 2 */
 }
 
-/* Width [W] of a blend of two responses whose largest force costs so much. */
+/* omega [W] of a blend of two responses whose largest force costs so much. */
 static real blend_width(real high_cost) { return FINE * high_cost + BLEND_REST; }
 
 /* The response of a size T along a direction g: y = T g, dy/ds = T' g g' + T dg/ds. */
@@ -142,85 +142,81 @@ static response plane_response(const real *block, const fl_actuator *a, const fl
   return own;
 }
 
-/* Power [W] of a foil without lift: its drag is there all the same. */
+/* P_0 of Eq. 19, the power [W] of a foil without lift: its drag is there all the same. */
 static real power_at_rest(const real *block, const fl_actuator *a) {
   const real *table = block + (int)a->force_table;
   return a->power_scale * table[2];
 }
 
-/* r = 1 - a/U of a foil, and q(r): r above SOFT, and e^(r/SOFT - 1) SOFT below, at least CLOSE of
-   it. */
+/* r of a foil, Eq. 19, and q(r), Eq. 20. */
 typedef struct {
   real r, q;
-  real slope; /* q'(r), 0 where q is held */
-  real bend;  /* q''(r) */
+  real dq;  /* q'(r), 0 where q is held at its least value */
+  real ddq; /* q''(r) */
 } soft_ratio;
 
 static soft_ratio soft_ratio_of(real r) {
-  soft_ratio ratio;
-  const real below = fl_smaller(r / SOFT - 1, 0);
-  const real decay = EXP(below);
-  ratio.r = r;
-  ratio.q = r;
-  ratio.slope = 0;
-  ratio.bend = 0;
-  if (decay > CLOSE) ratio.slope = decay;
-  if (below < 0) {
+  soft_ratio ratio = {r, r, 0, 0};
+  const real exponent = fl_smaller(r / SOFT - 1, 0);
+  const real decay = EXP(exponent);
+  if (decay > CLOSE) ratio.dq = decay; /* 1 where q = r */
+  if (exponent < 0) {
     ratio.q = SOFT * fl_larger(decay, CLOSE);
-    ratio.bend = ratio.slope / SOFT;
+    ratio.ddq = ratio.dq / SOFT;
   }
   return ratio;
 }
 
-/* The response of a foil to the prices of its lift and its drag. With P the power beyond that at
-   rest, chord(y) its chord between the limits and y the lift,
+/* The chord of a foil's power, beyond that without lift, between the limits of its lift. */
+typedef struct {
+  real at_zero; /* at no lift [W] */
+  real at_lift; /* at the lift of the response [W] */
+  real slope;   /* [W/N] */
+} power_chord;
 
-       c*(s) = q max over y of (v y - P(y)) + (q - r) chord(0) - rest,
-       v     = (s_lift + (q - r) chord') / q,
-
-   its drag is the derivative of c* by the price of drag, where dr/ds = -1/U. */
+/* The response of a foil to the prices s of its lift and its drag, Eqs. 21 to 23. */
 static response foil_response(const real *block, const fl_actuator *a, const fl_set *set,
                               const real *price) {
-  const soft_ratio ratio = soft_ratio_of(1 - price[1] / a->flow_speed);
+  const real U = a->flow_speed;
+  const soft_ratio ratio = soft_ratio_of(1 - price[1] / U);
   const real q = ratio.q;
   const real excess = q - ratio.r;
-  const real rest = power_at_rest(block, a);
-  const real range = fl_larger(set->force_max - set->force_min, TINY);
-  const real chord_slope = (set->cost_at_max - set->cost_at_min) / range; /* [W/N] */
-  const real v = (price[0] + excess * chord_slope) / q;
+  const real P_0 = power_at_rest(block, a);
 
-  const line_response lift = fl_limited_response(block, a, set, 1, v);
-  const real power = v * lift.force - lift.conjugate - rest;
-  const real chord = set->cost_at_min - rest + chord_slope * (lift.force - set->force_min);
-  const real chord_at_zero = set->cost_at_min - rest - chord_slope * set->force_min;
-  const real dlift = lift.slope / q;
-  /* Drag per lift along the curve of responses: marginal power over speed, P' = v or that of the
-     chord. */
-  const real drag_slope = (ratio.slope * v + (1 - ratio.slope) * chord_slope) / a->flow_speed;
+  power_chord chord;
+  const real range = fl_larger(set->force_max - set->force_min, TINY);
+  chord.slope = (set->cost_at_max - set->cost_at_min) / range;
+  const real v = (price[0] + excess * chord.slope) / q;
+  const line_response lift = fl_limited_response(block, a, set, 1, v); /* y = T(v), with P_0 + P */
+  const real P = v * lift.force - lift.conjugate - P_0;
+  chord.at_lift = set->cost_at_min - P_0 + chord.slope * (lift.force - set->force_min);
+  chord.at_zero = set->cost_at_min - P_0 - chord.slope * set->force_min;
+
+  const real dy = lift.slope / q; /* dy/ds_1 */
+  const real D_y = (ratio.dq * v + (1 - ratio.dq) * chord.slope) / U;
+  const real softening = (chord.at_lift - P) * ratio.ddq / (U * U);
 
   response y;
   y.force[0] = lift.force;
-  y.force[1] = (ratio.slope * power + (1 - ratio.slope) * chord) / a->flow_speed;
-  y.xx = dlift;
-  y.xy = dlift * drag_slope;
-  y.yy = dlift * drag_slope * drag_slope +
-         (chord - power) * ratio.bend / (a->flow_speed * a->flow_speed);
-  y.conjugate = q * (lift.conjugate + rest) + excess * chord_at_zero - rest;
+  y.force[1] = (ratio.dq * P + (1 - ratio.dq) * chord.at_lift) / U;
+  y.xx = dy;
+  y.xy = dy * D_y;
+  y.yy = dy * D_y * D_y + softening;
+  y.conjugate = q * (lift.conjugate + P_0) + excess * chord.at_zero - P_0;
   y.angle = 0;
   return y;
 }
 
-/* The response of a foil near to a command, in a step d [rad] of its angle from there: with
-   y = y_0 + d y' and a cost c_0 + c' d + c'' / 2 d^2, it is d = (s.y' - c') / c'' within its
-   limits. */
+/* The response of a foil near to a command, Eq. 24: a step d [rad] of its angle from there, where
+   the force is y_0 + d y' and the cost c_0 + d c' + d^2 c'' / 2. */
 static response tangent_response(const fl_set *set, const real *price) {
   const fl_tangent *t = set->tangent;
-  const real gain = dot(price, t->force_slope, 2) - t->cost_slope; /* [W/rad] */
+  const real gain = dot(price, t->force_slope, 2) - t->cost_slope; /* s.y' - c' [W/rad] */
   const real d = fl_clipped(gain / t->curvature, set->force_min, set->force_max);
+  real dd = 0; /* derivative of d by the gain; 0 at the limits */
+  if (d > set->force_min && d < set->force_max) dd = 1 / t->curvature;
   const real x = t->force_slope[0];
   const real y = t->force_slope[1];
-  real dd = 0; /* derivative of d by the gain */
-  if (d > set->force_min && d < set->force_max) dd = 1 / t->curvature;
   response o;
   o.force[0] = t->force[0] + d * x;
   o.force[1] = t->force[1] + d * y;
@@ -339,9 +335,10 @@ int fl_undecided(const real *block, int i, const fl_set *set, const real *price,
   const fl_set reversed = fl_reversed_set(set);
   const response ahead = sector_response(block, a, set, 0, price);
   const response reverse = sector_response(block, a, &reversed, 0, price);
-  const real lead = ahead.conjugate - reverse.conjugate;
-  const real width = blend_width(reversed.cost_at_max);
-  const real p = (1 + lead / SQRT(lead * lead + width * width)) / 2;
+  const real delta = ahead.conjugate - reverse.conjugate;
+  const real omega = blend_width(reversed.cost_at_max);
+  const real root = SQRT(delta * delta + omega * omega);
+  const real p = (1 + delta / root) / 2; /* Eq. 26 */
   const real dx = ahead.force[0] - reverse.force[0];
   const real dy = ahead.force[1] - reverse.force[1];
   *off = fl_smaller(p, 1 - p) * SQRT(dx * dx + dy * dy);

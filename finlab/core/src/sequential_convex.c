@@ -1,4 +1,4 @@
-/* Answers where actuators act on each other, in outer iterations: the dual of the model made
+/* Answers where actuators act on each other, Eq. 18, in outer iterations: the dual of the model made
    linear at the last forces, then Levenberg-Marquardt steps on the whole model (sequential
    convex programming). finlab/allocation/dual/turns.py says why they settle. */
 #include "internal.h"
