@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from finlab.arrays import Array
 from finlab.core.calls import NOMINAL, Conditions, Core, CoreAnswer, PolicyFields
+from finlab.core.fields import Record, struct
 from finlab.core.library import library
 
 _OFFSET_CALLBACK = ctypes.CFUNCTYPE(
@@ -65,19 +66,6 @@ class OuterResult(NamedTuple):
     """Steps of Newton's method and on commands that the iterations took."""
 
 
-class _FlWhole(ctypes.Structure):
-    """The `fl_whole` of finlab/core/src/internal.h: a robot, and the offset of its forces."""
-
-    _fields_ = [
-        ("effect", ctypes.c_void_p),
-        ("known", ctypes.c_void_p),
-        ("inflow", ctypes.c_void_p),
-        ("plain", ctypes.c_void_p),
-        ("frames", ctypes.c_void_p),
-        ("counts", ctypes.c_double * 6),
-    ]
-
-
 class CoupledCore(Core):
     """One robot in the core, with the wrench offset of its forces."""
 
@@ -100,19 +88,20 @@ class CoupledCore(Core):
         frames = np.ascontiguousarray(wrench_offset.frames)
         self._pointed_at = (wrench_offset.jets, wrench_offset.inflow, block, frames, callback)
         """What the struct points at, which has to live as long."""
-        self._whole = _FlWhole(
-            effect=ctypes.cast(callback, ctypes.c_void_p),
-            known=_address_of(wrench_offset.jets),
-            inflow=_address_of(wrench_offset.inflow),
-            plain=_address_of(block),
-            frames=_address_of(frames),
-            counts=tuple(wrench_offset.counts),
-        )
+        robot = np.zeros(1, struct("fl_coupled_robot"))
+        robot["offset"] = ctypes.cast(callback, ctypes.c_void_p).value
+        robot["constants"] = _address_of(wrench_offset.jets)
+        robot["inflow"] = _address_of(wrench_offset.inflow)
+        robot["block_uncoupled"] = _address_of(block)
+        robot["frames"] = _address_of(frames)
+        robot["axis_counts"] = wrench_offset.counts
+        self._robot: Record = robot
+        self._limits: Record = np.zeros(1, struct("fl_settle_limits"))
+        """When the iterations end."""
+        self._result: Record = np.zeros(1, struct("fl_settle_result"))
+        """What they end with."""
         self._force = np.zeros((1, self._count, 2))
         """Forces [N] at which the iterations begin, and then those at which they end."""
-        self._end = np.zeros(4)
-        """The numbers of an `OuterResult`, of which the second and the last are read, too."""
-        self._iterations = 0
 
     def iterate(
         self,
@@ -146,23 +135,29 @@ class CoupledCore(Core):
         """
         with self._iterations_lock:
             self._force[0] = 0.0 if force is None else force
-            self._iterations = iterations
-            self._end[1] = error_price
-            self._end[3] = max_steps
+            self._limits["penalty_least"] = error_price
+            self._limits["most_steps"] = max_steps
+            self._limits["most_iterations"] = iterations
             answer = self.answer_one(wrench, policy, lam, conditions)
-            return OuterResult(answer._replace(force=self._force.copy()), *self._end.tolist())
+            return OuterResult(
+                answer=answer._replace(force=self._force.copy()),
+                power=float(self._result["power"][0]),
+                error_price=float(self._result["penalty"][0]),
+                error=float(self._result["error"][0]),
+                steps=float(self._result["steps"][0]),
+            )
 
     def _call(self) -> int:
         """Runs the iterations for the question that is written; returns an error code."""
         error: int = self._core.fl_settle(
-            ctypes.addressof(self._whole),
+            self._robot.ctypes.data,
             self._block_address,
             self._work_address,
             self._question.address,
-            self._iterations,
+            self._limits.ctypes.data,
             self._force.ctypes.data,
             self._answer.address,
-            self._end.ctypes.data,
+            self._result.ctypes.data,
         )
         if self._raised is not None:
             raised = self._raised
@@ -185,9 +180,9 @@ class CoupledCore(Core):
             self._raised = error
 
 
-def _address_of(array: Array | None) -> int | None:
-    """The address of an array's numbers; None for none."""
-    return None if array is None else array.ctypes.data
+def _address_of(array: Array | None) -> int:
+    """The address of an array's numbers; 0 for none."""
+    return 0 if array is None else array.ctypes.data
 
 
 def _numbers_at(address: int, shape: tuple[int, ...]) -> Array:

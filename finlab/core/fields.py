@@ -22,6 +22,7 @@ _NUMPY_TYPES: dict[str, Any] = {
     "fl_reals": np.uintp,
     "fl_bytes": np.uintp,
     "fl_policy_at": np.uintp,
+    "fl_offset_at": np.uintp,
 }
 """Types of fields in numpy by those in C; addresses are whole numbers."""
 

@@ -45,7 +45,7 @@ typedef double fl_wide; /* where differences of large numbers matter, in single 
 #define FL_STARTS (4 * (2 * (FL_PARTS + 1) + 2 * FL_MOST + 2 + 6) + 48)
 #define FL_BOUND (4 * (1740 + 840 * (FL_PARTS + 1)) + FL_SETTLE * FL_STARTS)
 
-#define FL_VERSION 6   /* of all structs and functions here */
+#define FL_VERSION 7   /* of all structs and functions here */
 #define FL_MAGIC 41721 /* first number of a block */
 
 /* The structs that cross the border of the library. */
@@ -53,6 +53,19 @@ typedef unsigned char fl_byte;
 typedef const fl_byte *fl_bytes;
 typedef const fl_real *fl_reals;
 typedef const struct fl_policy *fl_policy_at;
+
+/* The wrench offset of actuators that act on each other, o of Eq. 18.
+
+   @param constants  what the function works with
+   @param force      (count, n, 3) of the actuators [N], body frame
+   @param count      how many questions
+   @param inflow     (count, n, 3) velocities of their positions through the water [m/s]; 0 at rest
+   @param change     becomes what each actuator's force changes by (count, n, 3) [N]
+   @param offset     becomes the offsets (count, 6) [N, N m]
+   @param slope      becomes their derivatives by the forces (count, n, 3, 6); 0 for none */
+typedef void (*fl_offset_at)(const fl_real *constants, const fl_real *force, int count,
+                             const fl_real *inflow, fl_real *change, fl_real *offset,
+                             fl_real *slope);
 
 #define FL_BEGIN(type) typedef struct type type; struct type {
 #define FL_FIELD(type, name, shape, unit, meaning) type name shape;
@@ -186,6 +199,35 @@ void fl_reach(const fl_real *block, fl_work *work, const fl_real *sets, const fl
    @return                the dual value for the wrench [W], Eq. 3 */
 fl_real fl_dual_value(const fl_real *block, fl_work *work, const fl_real *wrench,
                       const fl_real *lambda_reduced, fl_real *force);
+
+/* Finds commands of a robot whose actuators act on each other, in outer iterations: the dual's
+   answer on the model made linear at the last forces, and steps on the whole model.
+
+   @param robot     what its actuators do to each other
+   @param block     a copy of robot->block_uncoupled, which becomes the linear model
+   @param work      work area, prepared for that block
+   @param question  as for fl_answer_one, with the multipliers of the wrench in prices
+   @param limits    when the iterations end
+   @param force     (n, 2) where they begin, unless the question has commands of the tick before
+                    [N]; becomes what they come to
+   @param answer    becomes the last answer of the dual by which the commands got better, with
+                    these commands
+   @param result    becomes what the iterations end with
+   @return          as fl_answer_one */
+int fl_settle(const fl_coupled_robot *robot, fl_real *block, fl_work *work,
+              const fl_question *question, const fl_settle_limits *limits, fl_real *force,
+              fl_answer *answer, fl_settle_result *result);
+
+/* The wrench offset of jets, an fl_offset_at.
+
+   @param constants  of the water, then of each actuator; finlab/core/src/jets.c has their order */
+void fl_jets(const fl_real *constants, const fl_real *force, int count, const fl_real *inflow,
+             fl_real *change, fl_real *offset, fl_real *slope);
+
+/* @param i      which actuator
+   @param force  along its direction; of planes its size, below 0 in reverse [N]
+   @return       the least power for it, Eq. 2 [W] */
+fl_real fl_power_of_force(const fl_real *block, int i, fl_real force);
 
 #ifdef __cplusplus
 }

@@ -122,3 +122,30 @@ FL_FIELD(int, tick_parts, , "1",
 FL_FIELD(int, command_steps, , "1",
          "Levenberg-Marquardt steps that end an answer; most end after three")
 FL_END(fl_settings)
+
+FL_BEGIN(fl_coupled_robot)
+FL_FIELD(fl_offset_at, offset, , "address",
+         "function of the wrench offset o of Eq. 18, such as fl_jets")
+FL_FIELD(fl_reals, constants, , "address", "what that function works with, such as those of jets")
+FL_FIELD(fl_reals, inflow, , "address",
+         "(n, 3) velocities of the actuators' positions through the water [m/s]; 0 at rest")
+FL_FIELD(fl_reals, block_uncoupled, , "address", "block of the robot by its laws alone")
+FL_FIELD(fl_reals, frames, , "address",
+         "(n, 3, 3) axes of the laws' forces in the body frame, in rows")
+FL_FIELD(fl_real, axis_counts, [6], "1", "1 of axes that count, else 0")
+FL_END(fl_coupled_robot)
+
+FL_BEGIN(fl_settle_limits)
+FL_FIELD(fl_real, penalty_least, , "W", "what an error as large as the yardstick counts at least")
+FL_FIELD(fl_real, most_steps, , "1",
+         "steps after which no iteration but the first is begun, infinity for no limit")
+FL_FIELD(int, most_iterations, , "1",
+         "outer iterations at most; 0 for commands of the nearest forces that give the wrench")
+FL_END(fl_settle_limits)
+
+FL_BEGIN(fl_settle_result)
+FL_FIELD(fl_real, power, , "W", "of the forces that the iterations come to")
+FL_FIELD(fl_real, penalty, , "W", "what an error as large as the yardstick counted last")
+FL_FIELD(fl_real, error, , "1", "distance of the wrench from the one desired, on the yardstick")
+FL_FIELD(fl_real, steps, , "1", "steps of Newton's method and on commands")
+FL_END(fl_settle_result)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from finlab.errors import FinlabError
 
-VERSION = 6
+VERSION = 7
 """What `fl_version()` of the C files returns; both rise together where a signature or a struct
 changes."""
 SIGNATURES = {
@@ -23,7 +23,7 @@ SIGNATURES = {
     "fl_worth": "ippppip",
     "fl_reach": "vpppppirppp",
     "fl_jets": "vppipppp",
-    "fl_settle": "ippppippp",
+    "fl_settle": "ipppppppp",
 }
 """What each function returns and takes: i int, r real, p pointer, s text, v nothing."""
 _TYPES = {

@@ -111,7 +111,6 @@ void fl_limit_set(const real *block, int i, fl_set *set, real low, real high, re
                   real half);
 void fl_prepare_set(const real *block, int i, fl_set *set);
 void fl_fix_force(const real *block, int i, fl_set *set, const real *force);
-real fl_power_of_force(const real *block, int i, real force);
 real fl_power_and_price(const real *block, int i, real force, real *price);
 real fl_largest_slope(const real *block, int i);
 fl_set fl_reversed_set(const fl_set *set);
@@ -279,21 +278,5 @@ void fl_mixed_forces(const real *block, const fl_mixture *m, real force[][2]);
 /* out_of_reach.c: what a policy gives beyond reach */
 void fl_out_of_reach(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,
                      fl_answer *out);
-
-/* sequential_convex.c, jets.c: actuators that act on each other */
-/* The wrench (6,) that comes beside forces (n, 3), body frame, with its derivatives (n, 3, 6);
-   see fl_jets. */
-typedef void (*fl_effect)(const real *known, const real *force, int count, const real *inflow,
-                          real *change, real *wrench, real *slope);
-typedef struct {
-  fl_effect effect;
-  const real *known, *inflow, *plain; /* for `effect`; block of the laws alone */
-  const real *frames; /* axes (n, 3, 3) of the laws' forces in the body frame, in rows */
-  real axis_counts[6]; /* 1 of axes that count, else 0 */
-} fl_whole;
-int fl_settle(const fl_whole *w, real *block, fl_work *work, const fl_question *question, int turns,
-              real *forces, fl_answer *out, real *end);
-void fl_jets(const real *known, const real *force, int count, const real *inflow, real *change,
-             real *wrench, real *slope);
 
 #endif

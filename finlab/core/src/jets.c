@@ -230,18 +230,15 @@ static void offset_of(const water *w, const real *force, const real *inflow, rea
   }
 }
 
-/* What comes beside forces (count, n, 3) [N], body frame, where the positions move at
-   `inflow` (count, n, 3) [m/s], 0 at rest: forces (count, n, 3), their wrench (count, 6),
-   and, where there is room, its derivatives (count, n, 3, 6). */
-void fl_jets(const real *known, const real *force, int count, const real *inflow, real *change,
-             real *wrench, real *slope) {
-  const water *w = (const water *)known;
+void fl_jets(const real *constants, const real *force, int count, const real *inflow, real *change,
+             real *offset, real *slope) {
+  const water *w = (const water *)constants;
   const int n = (int)w->n;
   for (int k = 0; k < count; k++) {
-    offset_of(w, force, inflow, change, wrench, slope);
+    offset_of(w, force, inflow, change, offset, slope);
     force += 3 * n;
     change += 3 * n;
-    wrench += 6;
+    offset += 6;
     if (inflow) inflow += 3 * n;
     if (slope) slope += 18 * n;
   }

@@ -5,14 +5,16 @@
 
 /* Parts of sets with gaps that are looked at after the first iteration, which begins near
    its answer. */
-#define TURN_PARTS 200
-/* Steps on commands, to be exact on the whole model; most times that a step is made shorter. */
-#define STEPS (ROUNDS / 3)
+#define PARTS_LATER 200
+#define MODEL_STEPS 4  /* steps on commands that make them exact on the whole model */
+#define TRIALS 4       /* shares of a step that are tried in one iteration */
 #define SHORTEN R(0.3) /* a step that gets no better is shortened to this share */
+/* Error on the yardstick that commands on the way may leave. */
+#define EXACT_ON_WAY (NEARLY / 10)
 
 /* Forces of commands along the laws' axes, and in the body frame, where a foil's drag at
    rest is on top. */
-static void forces_of_commands(const fl_whole *w, const real *block, const fl_span *span,
+static void forces_of_commands(const fl_coupled_robot *robot, const real *block, const fl_span *span,
                                real command[][3], real force[][3], real body[][3]) {
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
@@ -23,7 +25,7 @@ static void forces_of_commands(const fl_whole *w, const real *block, const fl_sp
     for (int c = 0; c < 3; c++) {
       real along = force[i][c];
       if (a->command_kind == FL_FOIL && c == 1) along += a->pressure_area * a->zero_lift_drag;
-      const real *axis = w->frames + 9 * i + 3 * c;
+      const real *axis = robot->frames + 9 * i + 3 * c;
       for (int b = 0; b < 3; b++) body[i][b] += along * axis[b];
     }
   }
@@ -32,7 +34,7 @@ static void forces_of_commands(const fl_whole *w, const real *block, const fl_sp
 /* Makes the wrench of a block linear at commands: its effectiveness becomes that of the laws
    and the slope of what the actuators do to each other, its offset what is left. Their
    residual from a wrench, on the yardstick; its size. */
-static real linearize_at(const fl_whole *w, real *block, fl_work *work, const real *wrench,
+static real linearize_at(const fl_coupled_robot *robot, real *block, fl_work *work, const real *wrench,
                          real command[][3], real *residual) {
   const fl_span *span = &work->span;
   const int n = COUNT(block);
@@ -42,21 +44,21 @@ static real linearize_at(const fl_whole *w, real *block, fl_work *work, const re
   real unused[FL_MOST][3];
   real offset[6];
   real slope[FL_MOST][3][6];
-  forces_of_commands(w, block, span, command, force, body);
-  w->effect(w->known, *body, 1, w->inflow, *unused, offset, **slope);
+  forces_of_commands(robot, block, span, command, force, body);
+  robot->offset(robot->constants, *body, 1, robot->inflow, *unused, offset, **slope);
   for (int k = 0; k < 6; k++) {
-    head->wrench_offset[k] = HEAD(w->plain)->wrench_offset[k] + w->axis_counts[k] * offset[k];
+    head->wrench_offset[k] = HEAD(robot->block_uncoupled)->wrench_offset[k] + robot->axis_counts[k] * offset[k];
     residual[k] = (wrench[k] - head->wrench_offset[k]) / head->wrench_scale[k];
   }
   for (int i = 0; i < n; i++) {
-    const fl_actuator *plain = ACTUATOR(w->plain, i);
+    const fl_actuator *plain = ACTUATOR(robot->block_uncoupled, i);
     fl_actuator *linear = (fl_actuator *)ACTUATOR(block, i);
     for (int c = 0; c < 3; c++) {
-      const real *axis = w->frames + 9 * i + 3 * c;
+      const real *axis = robot->frames + 9 * i + 3 * c;
       for (int k = 0; k < 6; k++) {
         const real along =
             axis[0] * slope[i][0][k] + axis[1] * slope[i][1][k] + axis[2] * slope[i][2][k];
-        const real more = w->axis_counts[k] * along;
+        const real more = robot->axis_counts[k] * along;
         linear->effectiveness_normalized[c][k] =
             plain->effectiveness_normalized[c][k] + more / head->wrench_scale[k];
         head->wrench_offset[k] -= force[i][c] * more;
@@ -72,9 +74,9 @@ static real linearize_at(const fl_whole *w, real *block, fl_work *work, const re
 }
 
 /* Has fins of a block commanded by direction and size of the force, without their tables. */
-static void command_fins_by_force(const fl_whole *w, real *block) {
+static void command_fins_by_force(const fl_coupled_robot *robot, real *block) {
   for (int i = 0; i < COUNT(block); i++) {
-    const fl_actuator *plain = ACTUATOR(w->plain, i);
+    const fl_actuator *plain = ACTUATOR(robot->block_uncoupled, i);
     fl_actuator *a = (fl_actuator *)ACTUATOR(block, i);
     if (plain->command_kind != FL_FIN) continue;
     const real low[3] = {plain->sector_center - plain->sector_half_angle, plain->force_min};
@@ -87,9 +89,9 @@ static void command_fins_by_force(const fl_whole *w, real *block) {
 }
 
 /* Has fins of a block commanded as they are. */
-static void command_fins_by_law(const fl_whole *w, real *block) {
+static void command_fins_by_law(const fl_coupled_robot *robot, real *block) {
   for (int i = 0; i < COUNT(block); i++) {
-    const fl_actuator *plain = ACTUATOR(w->plain, i);
+    const fl_actuator *plain = ACTUATOR(robot->block_uncoupled, i);
     fl_actuator *a = (fl_actuator *)ACTUATOR(block, i);
     if (plain->command_kind != FL_FIN) continue;
     a->command_kind = FL_FIN;
@@ -101,13 +103,13 @@ static void command_fins_by_law(const fl_whole *w, real *block) {
 
 /* Steps on commands to a wrench, by the whole model, which the block is linear at where they
    end, until an error is enough; the error that is left. */
-static real step_to_wrench(const fl_whole *w, real *block, fl_work *work, const fl_box *box,
+static real step_to_wrench(const fl_coupled_robot *robot, real *block, fl_work *work, const fl_box *box,
                            const real *wrench, real enough, real command[][3]) {
   const size_t size = (size_t)COUNT(block) * sizeof *command;
   real residual[6];
   real share = 1;
-  real error = linearize_at(w, block, work, wrench, command, residual);
-  for (int k = 0; k < STEPS && error > enough; k++) {
+  real error = linearize_at(robot, block, work, wrench, command, residual);
+  for (int k = 0; k < MODEL_STEPS && error > enough; k++) {
     real stepped[FL_MOST][3];
     real nearer[6]; /* than the wrench, by a share of the way */
     real residual_stepped[6];
@@ -116,7 +118,7 @@ static real step_to_wrench(const fl_whole *w, real *block, fl_work *work, const 
       nearer[c] = wrench[c] - (1 - share) * residual[c] * HEAD(block)->wrench_scale[c];
     }
     fl_refine_commands(block, work, box, nearer, stepped, 1);
-    const real error_stepped = linearize_at(w, block, work, wrench, stepped, residual_stepped);
+    const real error_stepped = linearize_at(robot, block, work, wrench, stepped, residual_stepped);
     if (error_stepped < error) {
       memcpy(command, stepped, size);
       memcpy(residual, residual_stepped, sizeof residual);
@@ -125,7 +127,7 @@ static real step_to_wrench(const fl_whole *w, real *block, fl_work *work, const 
       continue;
     }
     share *= SHORTEN;
-    linearize_at(w, block, work, wrench, command, residual);
+    linearize_at(robot, block, work, wrench, command, residual);
   }
   return error;
 }
@@ -148,7 +150,7 @@ static int answer_linear(real *block, fl_work *work, const fl_question *q, int i
                          fl_answer *answer) {
   if (!fl_prepare_span(block, work, 0)) return FL_BAD_NUMBER;
   const fl_settings usual = work->settings;
-  if (!is_first && TURN_PARTS < usual.most_parts) work->settings.most_parts = TURN_PARTS;
+  if (!is_first && PARTS_LATER < usual.most_parts) work->settings.most_parts = PARTS_LATER;
   const int code = fl_answer_one(block, work, q, answer);
   work->settings = usual;
   return code;
@@ -170,94 +172,152 @@ static void part_of_way(const real *block, real from[][2], real to[][2], real sh
   }
 }
 
-/* Error that is enough before the first iteration: a tick begins where the robot is; forces
-   that are only looked at need not be exact. */
-static real enough_to_begin(int turns, const real *previous) {
-  if (previous) return 1 / NOTHING;
-  if (turns == 0) return 10 * CLOSE;
-  return NEARLY / 10;
+/* Outer iterations so far: the best forces, and what they cost. */
+typedef struct {
+  const fl_coupled_robot *robot;
+  real *block; /* the linear model */
+  fl_work *work;
+  fl_question question; /* whose prices become those of the best answer */
+  real lambda[6];       /* that they point at */
+  fl_box box;           /* of the commands by which the block is commanded now */
+  real (*force)[2];     /* (n, 2) the best ones [N] */
+  real power;           /* of these [W] */
+  real penalty;         /* what an error as large as the yardstick counts [W] */
+  real error;           /* of the wrench, on the yardstick */
+  real newton_steps;
+} outer_search;
+
+static real merit_of(const outer_search *search) {
+  return search->power + search->penalty * search->error;
 }
 
-/* Outer iterations from forces (n, 2) on, as many as are given, or from the previous
-   commands of the question; its price is one of the wrench. The forces that they come to,
-   the last answer of the dual by which they got better, with their commands, and what they
-   end with (4,): power [W], what an error as large as the yardstick counts [W], the error,
-   steps of Newton's method and on commands. The second and the last are also taken: what an
-   error counts at least; steps after which no other iteration is begun. */
-int fl_settle(const fl_whole *w, real *block, fl_work *work, const fl_question *question, int turns,
-              real *forces, fl_answer *out, real *end) {
-  const real exact_enough = NEARLY / 10;
-  const real *previous = question->previous;
-  const real most_steps = end[3];
-  const size_t size_of_forces = (size_t)COUNT(block) * sizeof(real[2]);
-  real(*force)[2] = (real(*)[2])forces;
-  fl_question q = *question;
-  fl_answer answer;
-  fl_box box;
-  real command[FL_MOST][3];
-  real lambda[6];
-  real penalty = end[1];
-  real steps = 0;
+/* Steps of Newton's method and on commands that the iterations took. */
+static real steps_of(const outer_search *search) {
+  return search->newton_steps + (real)search->work->refine_steps;
+}
+
+/* Error that is enough before the first iteration: a tick begins where the robot is; forces
+   that are only looked at need not be exact. */
+static real enough_to_begin(int most_iterations, const real *previous) {
+  if (previous) return 1 / NOTHING;
+  if (most_iterations == 0) return 10 * CLOSE;
+  return EXACT_ON_WAY;
+}
+
+/* Makes the model linear at the forces where the iterations begin, those of the previous commands
+   in a tick, and finds what they cost. Returns an error code. */
+static int begin_search(outer_search *search, int most_iterations) {
+  real *block = search->block;
+  fl_work *work = search->work;
+  const fl_question *q = &search->question;
+  const real *previous = q->previous;
   work->refine_steps = 0;
-  if (previous)
-    command_fins_by_law(w, block);
-  else
-    command_fins_by_force(w, block);
-  if (!fl_span_of_question(block, work, q.lost, q.free)) return FL_BAD_NUMBER;
-  if (previous) fl_power_of_commands(block, work, (real(*)[3])previous, force);
-  box_now(block, work, &q, &box);
-  fl_commands_for_forces(block, &box, force, previous, command);
-  const real enough = enough_to_begin(turns, previous);
-  real error = step_to_wrench(w, block, work, &box, q.wrench, enough, command);
-  real power = fl_power_of_commands(block, work, command, force);
-
-  for (int turn = 0; turn < turns; turn++) {
-    if (turn > 0 && !(steps + (real)work->refine_steps < most_steps)) break;
-    const int code = answer_linear(block, work, &q, turn == 0, &answer);
-    if (code) return code;
-    steps += (real)answer.newton_steps;
-    penalty = fl_larger(penalty, penalty_at(block, answer.prices));
-    const real merit = power + penalty * error;
-    if (turn == 0) *out = answer;
-    box_now(block, work, &q, &box);
-
-    /* Shorter and shorter steps from the forces so far to those of the answer, until one is
-       better. */
-    int is_better = 0;
-    real share = 1;
-    for (int k = 0; k < STEPS && !is_better; k++) {
-      real(*stepped)[3] = answer.command;
-      real force_wanted[FL_MOST][2];
-      real force_stepped[FL_MOST][2];
-      part_of_way(block, force, answer.force, share, force_wanted);
-      if (k > 0 || previous) {
-        fl_commands_for_forces(block, &box, force_wanted, previous, stepped);
-      }
-      const real error_stepped =
-          step_to_wrench(w, block, work, &box, q.wrench, exact_enough, stepped);
-      const real power_stepped = fl_power_of_commands(block, work, stepped, force_stepped);
-      is_better = power_stepped + penalty * error_stepped < merit;
-      share *= SHORTEN;
-      if (!is_better) continue;
-      power = power_stepped;
-      error = error_stepped;
-      *out = answer;
-      memcpy(force, force_stepped, size_of_forces);
-      memcpy(lambda, out->prices, sizeof lambda);
-      q.prices = lambda;
-    }
-    if (!is_better || merit - power - penalty * error <= CLOSE / 2 * merit) break;
+  search->newton_steps = 0;
+  if (previous) {
+    command_fins_by_law(search->robot, block);
+  } else {
+    command_fins_by_force(search->robot, block);
   }
-  end[0] = power;
-  end[1] = penalty;
-  end[2] = error;
-  end[3] = steps + (real)work->refine_steps;
-  if (turns == 0) return 0;
-  command_fins_by_law(w, block);
-  box_now(block, work, &q, &box);
-  fl_commands_for_forces(block, &box, force, previous, out->command);
-  end[2] = step_to_wrench(w, block, work, &box, q.wrench, EXACT, out->command);
-  fl_rest_in_dead_bands(block, &box, out->command);
-  fl_clip_commands(block, &box, out->command);
+  if (!fl_span_of_question(block, work, q->lost, q->free)) return FL_BAD_NUMBER;
+  if (previous) fl_power_of_commands(block, work, (real(*)[3])previous, search->force);
+  box_now(block, work, q, &search->box);
+
+  real command[FL_MOST][3];
+  fl_commands_for_forces(block, &search->box, search->force, previous, command);
+  const real enough = enough_to_begin(most_iterations, previous);
+  search->error =
+      step_to_wrench(search->robot, block, work, &search->box, q->wrench, enough, command);
+  search->power = fl_power_of_commands(block, work, command, search->force);
+  return FL_OK;
+}
+
+/* Tries shorter and shorter steps from the best forces so far to those of an answer, until one has
+   less merit. Its commands are those of the answer then. Returns whether there is one. */
+static int step_to_answer(outer_search *search, fl_answer *answer, real merit) {
+  real *block = search->block;
+  const fl_question *q = &search->question;
+  real(*stepped)[3] = answer->command;
+  real share = 1;
+  for (int k = 0; k < TRIALS; k++) {
+    real force_wanted[FL_MOST][2];
+    real force_stepped[FL_MOST][2];
+    part_of_way(block, search->force, answer->force, share, force_wanted);
+    /* Outside of ticks the answer's own commands are tried first, else those for its forces. */
+    if (k > 0 || q->previous) {
+      fl_commands_for_forces(block, &search->box, force_wanted, q->previous, stepped);
+    }
+    const real error = step_to_wrench(search->robot, block, search->work, &search->box, q->wrench,
+                                      EXACT_ON_WAY, stepped);
+    const real power = fl_power_of_commands(block, search->work, stepped, force_stepped);
+    if (power + search->penalty * error < merit) {
+      search->power = power;
+      search->error = error;
+      memcpy(search->force, force_stepped, (size_t)COUNT(block) * sizeof force_stepped[0]);
+      return 1;
+    }
+    share *= SHORTEN;
+  }
   return 0;
+}
+
+/* One outer iteration: the dual's answer on the linear model, and a step to its forces. `has_ended`
+   becomes whether another one would gain nothing. Returns an error code. */
+static int iterate(outer_search *search, int is_first, fl_answer *out, int *has_ended) {
+  fl_answer answer;
+  const int code = answer_linear(search->block, search->work, &search->question, is_first, &answer);
+  if (code) return code;
+  search->newton_steps += (real)answer.newton_steps;
+  search->penalty = fl_larger(search->penalty, penalty_at(search->block, answer.prices));
+  const real merit = merit_of(search);
+  if (is_first) *out = answer;
+  box_now(search->block, search->work, &search->question, &search->box);
+
+  const int is_better = step_to_answer(search, &answer, merit);
+  if (is_better) {
+    *out = answer;
+    memcpy(search->lambda, answer.prices, sizeof search->lambda);
+    search->question.prices = search->lambda;
+  }
+  const real gain = merit - search->power - search->penalty * search->error;
+  *has_ended = !is_better || gain <= CLOSE / 2 * merit;
+  return FL_OK;
+}
+
+/* Commands by the laws for the best forces, as exact as the whole model can tell. */
+static void finish_search(outer_search *search, fl_answer *out) {
+  const fl_question *q = &search->question;
+  command_fins_by_law(search->robot, search->block);
+  box_now(search->block, search->work, q, &search->box);
+  fl_commands_for_forces(search->block, &search->box, search->force, q->previous, out->command);
+  search->error = step_to_wrench(search->robot, search->block, search->work, &search->box,
+                                 q->wrench, EXACT, out->command);
+  fl_rest_in_dead_bands(search->block, &search->box, out->command);
+  fl_clip_commands(search->block, &search->box, out->command);
+}
+
+int fl_settle(const fl_coupled_robot *robot, real *block, fl_work *work,
+              const fl_question *question, const fl_settle_limits *limits, real *force,
+              fl_answer *answer, fl_settle_result *result) {
+  outer_search search = {0};
+  search.robot = robot;
+  search.block = block;
+  search.work = work;
+  search.question = *question;
+  search.force = (real(*)[2])force;
+  search.penalty = limits->penalty_least;
+  int code = begin_search(&search, limits->most_iterations);
+  if (code) return code;
+  for (int k = 0; k < limits->most_iterations; k++) {
+    if (k > 0 && !(steps_of(&search) < limits->most_steps)) break;
+    int has_ended;
+    code = iterate(&search, k == 0, answer, &has_ended);
+    if (code) return code;
+    if (has_ended) break;
+  }
+  result->steps = steps_of(&search);
+  if (limits->most_iterations > 0) finish_search(&search, answer);
+  result->power = search.power;
+  result->penalty = search.penalty;
+  result->error = search.error;
+  return FL_OK;
 }
