@@ -38,12 +38,35 @@ typedef double fl_wide; /* where differences of large numbers matter, in single 
 #define FL_PARTS 1000 /* the usual fl_settings.most_parts */
 #endif
 
-/* Most steps of Newton's method in one answer by the usual settings: two searches of two parts,
-   each a dive and two for each cut. Where foils drag, steps of a start take FL_SETTLE more: starts
-   of a part, of the foils' ends, of a lattice of their angles (6) and of the shares of a ray. */
-#define FL_SETTLE (12 * 60)
-#define FL_STARTS (4 * (2 * (FL_PARTS + 1) + 2 * FL_MOST + 2 + 6) + 48)
-#define FL_BOUND (4 * (1740 + 840 * (FL_PARTS + 1)) + FL_SETTLE * FL_STARTS)
+/* Bounds of loops. From these follows the time that an answer takes at most. */
+#define FL_STEPS 200          /* steps of Newton's method to a target */
+#define FL_STEPS_AT_KINK 60   /* the same where sets have kinks or gaps, or at the rim */
+#define FL_DIVE_ROUNDS 12     /* in which a search leaves all gaps on their nearer sides */
+#define FL_FOIL_STEPS 12      /* steps that make commands of foils cheaper, each a target */
+#define FL_LATTICE_FOLLOWED 6 /* points of a lattice of foils' angles that are made cheaper */
+#define FL_RAY_SHARES 24      /* shares of a ray that are tried where foils drag */
+
+/* Most steps of Newton's method (fl_answer.newton_steps) of one answer by the usual settings.
+
+   FL_DIVE    a search for least power leaves all gaps at once, solved anew in each round
+   FL_SEARCH  two dives before the first cut; then for each part its dive and two targets: a cut
+              makes two parts, whose sides take two targets, one more to go back to the cheaper
+              side, and one when the other is taken up. Cuts come in twos, so that FL_PARTS + 1
+              parts are looked at
+   FL_FORCES  forces for a wrench: its target and a search; beyond reach three targets at the rim,
+              one for what is served there, and another search
+   FL_STARTS  where foils drag, commands of one search that are made cheaper: those of each part
+              and of the first dive, of both ends of each foil's angles, of two multipliers, and of
+              points of a lattice
+   FL_FOILS   steps for these: of two searches, and twice for each share of a ray (begun at the last
+              commands and anew)
+   FL_BOUND   forces are found twice in a tick in which drives pass their dead bands */
+#define FL_DIVE (FL_DIVE_ROUNDS * FL_STEPS_AT_KINK)
+#define FL_SEARCH (2 * FL_DIVE + (FL_PARTS + 1) * (FL_DIVE + 2 * FL_STEPS_AT_KINK))
+#define FL_FORCES (2 * (FL_STEPS + FL_SEARCH) + 3 * FL_STEPS_AT_KINK)
+#define FL_STARTS ((FL_PARTS + 2) + 1 + 2 * FL_MOST + 2 + FL_LATTICE_FOLLOWED)
+#define FL_FOILS (FL_FOIL_STEPS * FL_STEPS_AT_KINK * 2 * (FL_STARTS + FL_RAY_SHARES))
+#define FL_BOUND (2 * (FL_FORCES + FL_FOILS))
 
 #define FL_VERSION 7   /* of all structs and functions here */
 #define FL_MAGIC 41721 /* first number of a block */

@@ -7,6 +7,7 @@
 
 #define LARGEST R(1e12) /* wrench, price or command of a question */
 #define MOST_CALM 1000
+#define STEPS_BY_LAWS 12 /* on commands, to a wrench a little beyond the tables */
 /* Error on the yardstick, beyond reach, up to which the laws may yet meet the target. */
 #define BEYOND_TABLES (10 * CLOSE)
 /* A drive that passes a dead band stays within it by this share of the band. */
@@ -72,8 +73,8 @@ static void find_forces(const real *block, fl_work *work, const real *wrench,
   }
   const int has_kinks = work->has_forks || work->has_drag || work->has_turn_cost;
   const int is_in_range = fl_is_in_range(work, wrench, target);
-  int most_steps = MOST_STEPS;
-  if (has_kinks) most_steps = STEPS_AT_KINK;
+  int most_steps = FL_STEPS;
+  if (has_kinks) most_steps = FL_STEPS_AT_KINK;
   const int status = fl_dual_newton(block, work, target, lambda, most_steps);
   const int may_be_met = status == FL_MET || (status == FL_STUCK && has_kinks);
   int within = may_be_met && is_in_range;
@@ -174,7 +175,7 @@ static void meet_by_laws(const real *block, fl_work *work, const real *wrench_de
   real command[FL_MOST][3];
   copy_commands(block, out->command, command);
   const real error =
-      fl_refine_commands(block, work, &work->box, wrench_desired, command, ROUNDS);
+      fl_refine_commands(block, work, &work->box, wrench_desired, command, STEPS_BY_LAWS);
   if (error > NEARLY) return;
   copy_commands(block, command, out->command);
   memcpy(out->wrench_served, wrench_desired, sizeof out->wrench_served);

@@ -12,7 +12,11 @@
    (foil_lattice.c), each kept within the branches of the lifts on which it lies. */
 #include "internal.h"
 
-#define FOLLOWED (ROUNDS / 2)     /* points of a lattice made cheaper; FL_STARTS counts them */
+#define APPROACH_STEPS 24         /* steps on commands from a start towards a wrench, at most */
+#define APPROACH_ROUND 6          /* the same in a row, which have to halve the error */
+#define EXACT_STEPS 24            /* steps that end them, to rounding */
+#define SURE_STEPS 12             /* the same from forces that the dual is sure of */
+#define STALL_SAMPLES 12          /* angles of a stalled foil that are looked at for its worth */
 #define CHEAPER (R(0.1) * NEARLY) /* share of the cost below which a gain ends the steps */
 #define NONE R(1e30)              /* cost where no commands give a wrench */
 #define STEP_SHORTER R(0.25)      /* a step that is no cheaper is shortened to this share */
@@ -83,7 +87,7 @@ static int are_few(const real *block, const fl_work *work, const fl_box *box) {
 static void approach(const real *block, fl_work *work, const fl_box *box, real command[][3],
                      int steps) {
   real error = NONE;
-  for (int k = 0; k < 2 * ROUNDS; k += steps) {
+  for (int k = 0; k < APPROACH_STEPS; k += steps) {
     const real before = error;
     error = fl_refine_commands(block, work, box, work->wrench_target, command, steps);
     if (error <= EXACT || error > before / 2) return;
@@ -98,7 +102,7 @@ static int come_to_give(const real *block, fl_work *work, const fl_box *box, rea
   real size = 0;
   for (int k = 0; k < 6; k++) size += FABS(work->wrench_target[k]) / HEAD(block)->wrench_scale[k];
   if (most_error > EXACT) {
-    approach(block, work, box, command, ROUNDS / 2);
+    approach(block, work, box, command, APPROACH_ROUND);
     steps = 0;
   }
   const real error = fl_refine_commands(block, work, box, work->wrench_target, command, steps);
@@ -131,10 +135,10 @@ static real cheapen(const real *block, fl_work *work, const fl_box *box, const r
                     real force[][2]) {
   real share = 1;
   int has_moved = 1;
-  for (int k = 0; k < ROUNDS; k++) {
+  for (int k = 0; k < FL_FOIL_STEPS; k++) {
     if (has_moved) draw_tangents(block, work, box, lambda, command);
     fl_prepare_sets(block, work);
-    if (has_moved && fl_dual_newton(block, work, target, lambda, STEPS_AT_KINK) == FL_MET) {
+    if (has_moved && fl_dual_newton(block, work, target, lambda, FL_STEPS_AT_KINK) == FL_MET) {
       memcpy(lambda, work->state_found->lambda_reduced, sizeof work->state_found->lambda_reduced);
     }
     real stepped[FL_MOST][3];
@@ -142,7 +146,7 @@ static real cheapen(const real *block, fl_work *work, const fl_box *box, const r
     memcpy(stepped, command, sizeof stepped);
     take_step(block, work, box, force, share, stepped);
     real gain = -NONE;
-    if (come_to_give(block, work, box, stepped, 2 * ROUNDS, most_error)) {
+    if (come_to_give(block, work, box, stepped, EXACT_STEPS, most_error)) {
       gain = cost - fl_power_of_commands(block, work, stepped, force_stepped);
     }
     has_moved = gain > 0;
@@ -169,7 +173,7 @@ static real settle(const real *block, fl_work *work, const real *target, real mo
   fl_power_of_commands(block, work, command, force);
   take_sides(block, work, &box, command, force);
   real cost = NONE;
-  if (come_to_give(block, work, &box, command, 2 * ROUNDS, most_error)) {
+  if (come_to_give(block, work, &box, command, EXACT_STEPS, most_error)) {
     cost = fl_power_of_commands(block, work, command, force);
     cost = cheapen(block, work, &box, target, most_error, cost, lambda, command, force);
   }
@@ -222,9 +226,9 @@ static real worth_of_stall(const real *block, const fl_work *work, int i, int en
   if (!end) stall_angle = -stall_angle;
   const real begin = a->zero_lift_angle + stall_angle;
   real more = 0;
-  for (int k = 1; k <= ROUNDS; k++) {
+  for (int k = 1; k <= STALL_SAMPLES; k++) {
     fl_tangent tangent;
-    fl_foil_at(block, i, begin + (limit - begin) * (real)k / ROUNDS, &tangent);
+    fl_foil_at(block, i, begin + (limit - begin) * (real)k / STALL_SAMPLES, &tangent);
     const real conjugate = dot(s, tangent.force, 2) - tangent.cost;
     more = fl_larger(more, conjugate - known.conjugate);
   }
@@ -256,8 +260,8 @@ static void begin_at(const real *block, fl_work *work, const fl_lattice *lattice
                      const real *target, const fl_lattice_point *point, real command[][3]) {
   fl_box branches = work->box;
   fl_commands_of_point(block, work, lattice, target, point, &branches, command);
-  approach(block, work, &branches, command, ROUNDS / 2);
-  approach(block, work, &work->box, command, ROUNDS / 2);
+  approach(block, work, &branches, command, APPROACH_ROUND);
+  approach(block, work, &work->box, command, APPROACH_ROUND);
 }
 
 /* The cheapest point that costs more than the last one followed: commands that cost the same
@@ -279,7 +283,7 @@ static void improve_from_lattice(const real *block, fl_work *work, const real *t
                                  const real *lambda, real enough, real *best_cost) {
   const real most_error = error_allowed(block, work, &work->box);
   fl_lattice lattice;
-  fl_lattice_point points[FL_SPREAD];
+  fl_lattice_point points[FL_LATTICE_STARTS];
   real command[FL_MOST][3];
   fl_lay_lattice(block, work, &lattice);
   const int count = fl_cheapest_points(block, work, &lattice, target, points);
@@ -292,7 +296,7 @@ static void improve_from_lattice(const real *block, fl_work *work, const real *t
     }
   }
   real last_cost = 0;
-  for (int tried = 0; tried < FOLLOWED && *best_cost > enough; tried++) {
+  for (int tried = 0; tried < FL_LATTICE_FOLLOWED && *best_cost > enough; tried++) {
     const fl_lattice_point *next = next_point(points, count, last_cost);
     if (!next || !(next->cost < fl_smaller(*best_cost * WITHIN_BEST, NONE))) return;
     last_cost = next->cost;
@@ -360,7 +364,7 @@ int fl_are_forces_sure(const real *block, fl_work *work) {
   fl_commands_for_forces(block, &work->box, work->best_force, work->command_previous,
                          work->best_command);
   const real most_error = error_allowed(block, work, &work->box);
-  return come_to_give(block, work, &work->box, work->best_command, ROUNDS, most_error);
+  return come_to_give(block, work, &work->box, work->best_command, SURE_STEPS, most_error);
 }
 
 /* Whether some foil may stall within its limits: it then gives more than its table. */
@@ -383,7 +387,7 @@ void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, 
   real start[FL_MOST][3];
   if (may_any_stall(block, work)) most = fl_smaller(most_by_dual * (1 + STALLED_MORE), 1);
   fl_commands_for_forces(block, &work->box, out->force, work->command_previous, start);
-  for (int k = 0; k < 2 * ROUNDS; k++) {
+  for (int k = 0; k < FL_RAY_SHARES; k++) {
     if (!(below_most < 1 && most - found > NEARLY / 4 * most_by_dual)) return;
     const int has_found = found > 0;
     real ray_share = most_by_dual * (1 - below_most);

@@ -4,8 +4,9 @@
    and cost there is told from quadratic costs, so that a point takes no step. */
 #include "internal.h"
 
-#define LATTICE (1 << 2 * FL_LAID) /* points at most: one on each branch of so many foils */
-#define EACH_MOST (ROUNDS / 2)     /* nodes on a branch */
+#define LATTICE (1 << 2 * FL_LATTICE_FOILS) /* points at most: one on each branch of so many foils */
+#define EACH_MOST 6    /* nodes on a branch */
+#define MISS_WEIGHT 12 /* cost of missing one scaled wrench, over the largest cost of all actuators */
 
 /* Ends of the branches of a foil's lift within its limits; how many branches there are. */
 static int edges_of(const real *block, const fl_work *work, int i, real *edge) {
@@ -38,7 +39,7 @@ static int nodes_of_branch(const fl_lattice *lattice) {
   for (int each = EACH_MOST; each > 1; each--) {
     int points = choices;
     for (int f = 0; f < lattice->foils; f++) points *= each;
-    if (points <= LATTICE && branches * each <= FL_NODES) return each;
+    if (points <= LATTICE && branches * each <= FL_LATTICE_NODES) return each;
   }
   return 1;
 }
@@ -46,7 +47,7 @@ static int nodes_of_branch(const fl_lattice *lattice) {
 /* Foils, their branches, and how many nodes each branch has. */
 static void find_branches(const real *block, const fl_work *work, fl_lattice *lattice) {
   lattice->foils = 0;
-  for (int i = 0; i < COUNT(block) && lattice->foils < FL_LAID; i++) {
+  for (int i = 0; i < COUNT(block) && lattice->foils < FL_LATTICE_FOILS; i++) {
     if (!fl_is_foil(ACTUATOR(block, i)) || work->span.is_lost[i]) continue;
     const int f = lattice->foils;
     lattice->branches[f] = edges_of(block, work, i, lattice->edge[f]);
@@ -113,8 +114,8 @@ static real held_force(const fl_actuator *a, const fl_set *set, real *force) {
 }
 
 /* Forces of the other actuators at a point for a target, held within their limits, and what
-   all cost there: watts as force^1.5, and ROUNDS times those of all actuators for a miss of
-   one scaled wrench. */
+   all cost there: watts as force^1.5, and MISS_WEIGHT times those of all actuators for a miss
+   of one scaled wrench. */
 static real cost_at_point(const real *block, const fl_work *work, const fl_lattice *lattice,
                           const real *target, const unsigned char *node, real force[][2]) {
   real cost = 0;
@@ -142,15 +143,15 @@ static real cost_at_point(const real *block, const fl_work *work, const fl_latti
       for (int j = 0; j < 6; j++) residual[j] -= y[q] * work->span.effectiveness_reduced[i][q][j];
     }
   }
-  return cost + ROUNDS * work->power_cost_max * SQRT(dot(residual, residual, 6));
+  return cost + MISS_WEIGHT * work->power_cost_max * SQRT(dot(residual, residual, 6));
 }
 
-/* Puts a point among the `count` cheapest ones (FL_SPREAD,), which are in order; how many there
+/* Puts a point among the `count` cheapest ones (FL_LATTICE_STARTS,), which are in order; how many there
    are then. */
 static int put_in_order(fl_lattice_point *points, int count, const fl_lattice_point *added) {
   int index = count;
-  if (count == FL_SPREAD) {
-    index = FL_SPREAD - 1;
+  if (count == FL_LATTICE_STARTS) {
+    index = FL_LATTICE_STARTS - 1;
     if (!(added->cost < points[index].cost)) return count;
   }
   while (index > 0 && added->cost < points[index - 1].cost) {
@@ -158,7 +159,7 @@ static int put_in_order(fl_lattice_point *points, int count, const fl_lattice_po
     index--;
   }
   points[index] = *added;
-  if (count == FL_SPREAD) return count;
+  if (count == FL_LATTICE_STARTS) return count;
   return count + 1;
 }
 
@@ -185,7 +186,7 @@ static fl_lattice_point cheapest_of_choice(const real *block, const fl_work *wor
   return best;
 }
 
-/* The cheapest point of each choice of branches, and of these the cheapest ones (FL_SPREAD,);
+/* The cheapest point of each choice of branches, and of these the cheapest ones (FL_LATTICE_STARTS,);
    how many there are. */
 int fl_cheapest_points(const real *block, const fl_work *work, const fl_lattice *lattice,
                            const real *target, fl_lattice_point *points) {

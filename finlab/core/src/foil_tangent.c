@@ -2,8 +2,7 @@
    which stands for it in a step of foil_drag.c. */
 #include "internal.h"
 
-/* Share of its range that a foil turns in a step: in all thrice, if need be. */
-#define TRUST (R(3.0) / ROUNDS)
+#define TRUST R(0.25) /* trust radius: share of its range that a foil turns in one step */
 
 /* The last lift coefficient of a foil's table, and behind it the angle of attack [rad] at which
    it has that: beyond, it stalls and drags more. */

@@ -2,6 +2,10 @@
    direction. */
 #include "internal.h"
 
+/* Steps of Newton's method to a size of force in a cell: an error of the price that is left counts
+   squared in the power. */
+#define CUBIC_STEPS 12
+
 #define THIRD (R(1.0) / 3)
 
 static const real *knots(const real *table) { return table + 3; }
@@ -86,7 +90,7 @@ static real solve_cubic(const cubic *force, real rise, real size, int is_first) 
   real t = 0;
   if (rise > 0) t = fl_larger((size - force->value) / rise, 0);
   if (is_first) t = SQRT(t); /* as of costs ~ T^1.5 */
-  for (int k = 0; k < ROUNDS; k++) { /* an error of the price counts squared in the power */
+  for (int k = 0; k < CUBIC_STEPS; k++) {
     const real slope = slope_of(force, t);
     const real before = t;
     if (slope > 0) t = fl_clipped(t - (value_of(force, t) - size) / slope, 0, 1);

@@ -55,7 +55,7 @@ static int is_restless(const real *block, int i, const fl_set *set, const real *
    that cannot rest keep their direction. */
 static void dive(const real *block, fl_work *work, const real *target, int status,
                  real *best_cost) {
-  for (int round = 0; round < ROUNDS; round++) {
+  for (int round = 0; round < FL_DIVE_ROUNDS; round++) {
     fl_state *state = work->state_found;
     const real largest = fl_largest_force(block, state->force);
     const int gap = fl_worst_gap(block, work, state->force, state->lambda_reduced);
@@ -75,7 +75,7 @@ static void dive(const real *block, fl_work *work, const real *target, int statu
     fl_prepare_sets(block, work);
     real lambda[6];
     memcpy(lambda, state->lambda_reduced, sizeof lambda);
-    status = fl_dual_newton(block, work, target, lambda, STEPS_AT_KINK);
+    status = fl_dual_newton(block, work, target, lambda, FL_STEPS_AT_KINK);
   }
 }
 
@@ -90,7 +90,7 @@ static int cheaper_side(const real *block, fl_work *work, const real *target, fl
   memcpy(lambda_begin, work->state_found->lambda_reduced, sizeof lambda_begin);
   for (int k = 0; k < 2; k++) {
     fl_take_side(block, work, node, side[k]);
-    status[k] = fl_dual_newton(block, work, target, lambda_begin, STEPS_AT_KINK);
+    status[k] = fl_dual_newton(block, work, target, lambda_begin, FL_STEPS_AT_KINK);
     cost[k] = work->state_found->dual_value;
     if (status[k] == FL_BEYOND) cost[k] = NONE;
     memcpy(lambda[k], work->state_found->lambda_reduced, sizeof lambda[k]);
@@ -102,7 +102,7 @@ static int cheaper_side(const real *block, fl_work *work, const real *target, fl
   memcpy(node->lambda_reduced, lambda[other], sizeof node->lambda_reduced);
   if (cheaper == 1) return status[1];
   fl_take_side(block, work, node, side[0]);
-  return fl_dual_newton(block, work, target, lambda[0], STEPS_AT_KINK);
+  return fl_dual_newton(block, work, target, lambda[0], FL_STEPS_AT_KINK);
 }
 
 /* How many parts a search may look at. */
@@ -181,7 +181,7 @@ int fl_search_gaps(const real *block, fl_work *work, const real *target, int sta
     node = last_cheaper_cut(block, work, &depth, best_cost, &least_bound);
     if (!node) break;
     fl_take_side(block, work, node, -node->first_side);
-    status = fl_dual_newton(block, work, target, node->lambda_reduced, STEPS_AT_KINK);
+    status = fl_dual_newton(block, work, target, node->lambda_reduced, FL_STEPS_AT_KINK);
   }
   fl_restore_sets(block, work, work->set_before);
   *bound = least_bound;

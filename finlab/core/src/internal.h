@@ -36,7 +36,7 @@ typedef fl_wide wide;
 #define FABS fabs
 #define TOLERANCE 1e-10
 #define ENOUGH TOLERANCE
-#define IDLE MOST_STEPS
+#define IDLE FL_STEPS
 #define EXACT 1e-8
 #define ROUNDING 1e-12
 #define TINY 1e-300
@@ -48,7 +48,6 @@ typedef fl_wide wide;
 #define NEARLY R(1e-6)
 #define FINE R(1e-5)
 #define CLOSE R(1e-4)
-#define ROUNDS 12
 #define TICK_PARTS 60 /* the usual fl_settings.tick_parts */
 #define LAST_STEPS 36 /* the usual fl_settings.command_steps */
 
@@ -169,7 +168,6 @@ void fl_limits_of_tick(const real *block, fl_work *work, const fl_question *q);
 int fl_prepare_question(const real *block, fl_work *work, const fl_question *q);
 
 /* dual_newton.c: Newton's method on the dual, Eq. 8 */
-#define MOST_STEPS 200
 void fl_prepare_sets(const real *block, fl_work *work);
 void fl_restore_sets(const real *block, fl_work *work, const fl_set *set);
 void fl_dual_start(const real *block, fl_work *work, const real *target, const real *lambda);
@@ -187,7 +185,6 @@ void fl_wrench_of_forces(const real *block, const fl_work *work, real force[][2]
 /* set_gaps.c: sets with gaps */
 #define NARROW R(0.2) /* half of an arc up to which its chord stands for its least forces */
 #define SHORTER R(0.98) /* a force below this share of the least one lies in the gap at rest */
-#define STEPS_AT_KINK 60 /* Newton's steps after which a target at a gap is left to its parts */
 int fl_worst_gap(const real *block, const fl_work *work, real force[][2], const real *lambda);
 int fl_nearer_side(const real *block, int i, const fl_set *set, const real *force);
 int fl_may_have_gaps(const real *block, const fl_work *work, real force[][2]);
@@ -216,26 +213,24 @@ real fl_power_of_commands(const real *block, const fl_work *work, real command[]
                           real force[][2]);
 
 /* foil_lattice.c: where searches for commands of foils may begin */
-enum {
-  FL_BRANCHES = 4,        /* of a foil's lift */
-  FL_LAID = 6,            /* foils on the lattice; others begin at rest */
-  FL_NODES = 4 * ROUNDS,  /* angles of all foils: of 4 branches 24 of one foil, 8 of 4 */
-  FL_SPREAD = 5 * ROUNDS /* points at which steps on the commands begin */
-};
+enum { FL_BRANCHES = 4 };    /* of a foil's lift */
+#define FL_LATTICE_FOILS 6   /* foils on the lattice at most; others begin at rest */
+#define FL_LATTICE_NODES 48  /* nodes of all foils at most, angles of which a point has one a foil */
+#define FL_LATTICE_STARTS 60 /* points at which steps on the commands begin */
 typedef struct {
   int foils;                              /* how many there are */
-  int foil[FL_LAID];                      /* which actuators these are */
-  int branches[FL_LAID];                  /* of each foil */
-  int first[FL_LAID];                     /* its first node */
+  int foil[FL_LATTICE_FOILS];                      /* which actuators these are */
+  int branches[FL_LATTICE_FOILS];                  /* of each foil */
+  int first[FL_LATTICE_FOILS];                     /* its first node */
   int each;                               /* nodes on a branch */
-  real edge[FL_LAID][FL_BRANCHES + 1];    /* ends of the branches [rad] */
-  real angle[FL_NODES];                   /* of each node [rad] */
-  real cost[FL_NODES];                    /* of each node [W] */
-  real wrench[FL_NODES][6];               /* of each node, in the basis */
+  real edge[FL_LATTICE_FOILS][FL_BRANCHES + 1];    /* ends of the branches [rad] */
+  real angle[FL_LATTICE_NODES];                   /* of each node [rad] */
+  real cost[FL_LATTICE_NODES];                    /* of each node [W] */
+  real wrench[FL_LATTICE_NODES][6];               /* of each node, in the basis */
   real row[FL_MOST][2][6];                /* of other actuators: force by a wrench in the basis */
 } fl_lattice;
 typedef struct {
-  unsigned char node[FL_LAID]; /* of each foil */
+  unsigned char node[FL_LATTICE_FOILS]; /* of each foil */
   real cost;                   /* [W], with the price of a miss */
 } fl_lattice_point;
 void fl_lay_lattice(const real *block, const fl_work *work, fl_lattice *lattice);

@@ -7,6 +7,9 @@
    held. Sets with gaps are cut until the best answer of all lies in none. */
 #include "internal.h"
 
+#define REACH_PARTS 96     /* parts that a policy may look at, of any robot */
+#define REACH_PARTS_EACH 8 /* the same, for each of its actuators */
+
 /* Distance, on the yardstick, up to which the point of a part is the nearest one. */
 #define ROUGHLY (NEARLY / 10)
 #define HELD 1e3  /* weight of an axis that is held over one of the group that is served */
@@ -231,7 +234,7 @@ static void cheapest_forces(const real *block, fl_work *work, real force[][2], c
       if (trial == WANTED) wrench[k] = wanted[k];
     }
     fl_reduce_wrench(work, wrench, target);
-    fl_dual_newton(block, work, target, 0, STEPS_AT_KINK);
+    fl_dual_newton(block, work, target, 0, FL_STEPS_AT_KINK);
     const real dual_value = work->state_found->dual_value;
     const int has_met = !(work->state_found->residual_size > fl_larger(AT_RIM, ENOUGH));
     if (!has_met || dual_value > most_power) continue;
@@ -262,9 +265,9 @@ static void better_side(const real *block, fl_work *work, const real *wrench,
   fl_take_side(block, work, node, node->first_side);
 }
 
-/* How many parts a policy may look at. */
+/* How many parts of sets with gaps a policy may look at: each takes a search for a nearest point. */
 static int most_parts_of(const real *block, const fl_work *work) {
-  const int most = 8 * (ROUNDS + COUNT(block));
+  const int most = REACH_PARTS + REACH_PARTS_EACH * COUNT(block);
   if (most < work->settings.most_parts) return most;
   return work->settings.most_parts;
 }
@@ -378,7 +381,7 @@ void fl_out_of_reach(const real *block, fl_work *work, const real *wrench,
   real target[6];
   fl_reduce_wrench(work, out->wrench_served,
                    target); /* another part of the sets may give it for less */
-  const int status = fl_dual_newton(block, work, target, 0, MOST_STEPS);
+  const int status = fl_dual_newton(block, work, target, 0, FL_STEPS);
   if (!work->has_drag) {
     cheapen_by_parts(block, work, target, status, out);
     return;
