@@ -1,8 +1,7 @@
 // The core in C (finlab/core/finlab.h) as WebAssembly: one robot, questions and answers.
-import { fieldAt, structsOf } from "./fields.js";
+import { constantsOf, fieldAt, structsOf } from "./fields.js";
 
 const math = { atan2: Math.atan2, cos: Math.cos, sin: Math.sin, exp: Math.exp, tanh: Math.tanh };
-const POLICIES = ["closest", "direction", "priority"];
 
 export async function loadCore(url) {
   const { instance } = await WebAssembly.instantiateStreaming(fetch(url), { env: math });
@@ -25,7 +24,8 @@ function placesFor(core, sizes) {
 // A robot's block (Float64Array) and n actuators, ready for questions.
 export function prepare(core, block, n) {
   const { fl_policy, fl_question, fl_answer } = structsOf(core);
-  const sizes = [8 * block.length, core.fl_sizes(3), fl_policy.size, fl_question.size, fl_answer.size, n];
+  const constants = constantsOf(core);
+  const sizes = [8 * block.length, constants["sizeof fl_work"], fl_policy.size, fl_question.size, fl_answer.size, n];
   const [robot, work, policy, question, answer, losses] = placesFor(core, sizes);
   new Float64Array(core.memory.buffer, robot, block.length).set(block);
   const error = core.fl_check(robot, block.length) || core.fl_prepare(robot, work);
@@ -40,7 +40,7 @@ export function prepare(core, block, n) {
   };
   // Of the actuators the one whose number is `lost` does not work; -1 for none. Its rows are null.
   return (wrench, kind = "closest", groups = [], lost = -1) => {
-    served("policy")[0] = POLICIES.indexOf(kind);
+    served("policy")[0] = constants[`FL_${kind.toUpperCase()}`];
     served("group_count")[0] = groups.length;
     served("axis_weight").fill(1);
     served("group").set(groups.flat());

@@ -4,10 +4,25 @@ const VIEWS = { fl_real: Float64Array, fl_byte: Uint8Array, int: Int32Array };
 
 const upTo = (place, size) => Math.ceil(place / size) * size;
 
+// A text of the core that lies at an address.
+function textAt(core, address) {
+  const bytes = new Uint8Array(core.memory.buffer, address);
+  return new TextDecoder().decode(bytes.subarray(0, bytes.indexOf(0)));
+}
+
+// { FL_FIN: 2, "sizeof fl_work": 12345, ... }: the constants of finlab.h, and bytes of structs.
+export function constantsOf(core) {
+  const constants = {};
+  for (let k = 0; ; k++) {
+    const name = core.fl_constant_name(k);
+    if (name === 0) return constants;
+    constants[textAt(core, name)] = core.fl_constant_value(k);
+  }
+}
+
 // { fl_answer: { size, force: { at, count, type }, ... }, ... }; places and sizes in bytes.
 export function structsOf(core) {
-  const bytes = new Uint8Array(core.memory.buffer, core.fl_fields());
-  const text = new TextDecoder().decode(bytes.subarray(0, bytes.indexOf(0)));
+  const text = textAt(core, core.fl_fields());
   const structs = {};
   for (const line of text.trim().split("\n")) {
     const [name, ...rest] = line.split(" ");

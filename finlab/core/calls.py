@@ -14,27 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.arrays import Array
-from finlab.core.fields import Record, struct
+from finlab.core.fields import Record, constant, struct
 from finlab.core.library import library
 from finlab.errors import CommandError, DataError
 
-MAGIC = 41721.0
-"""First number of a block, FL_MAGIC of the core; the second is its version."""
-
-CODES = (
-    "",
-    "no block of a robot",
-    "a block of another version",
-    "a number out of range",
-    "a bad argument",
-)
-"""What the core found, by the error codes FL_OK, FL_BAD_BLOCK, ... that its functions return."""
-
 POLICIES = ("closest", "direction", "priority")
-"""Kinds of policies, in the order of FL_CLOSEST, FL_DIRECTION, FL_PRIORITY."""
-
-SIZE_OF_WORK_AREA = 3
-"""What `fl_sizes` is to be asked for the bytes of an `fl_work`."""
+"""Kinds of policies: FL_CLOSEST, FL_DIRECTION, FL_PRIORITY."""
 
 
 class CoreAnswer(NamedTuple):
@@ -132,7 +117,7 @@ def _policy_record(policy: PolicyFields) -> Record:
     """The `fl_policy` (1,) of a policy; who hands its address to the core keeps the record."""
     weights = np.array(policy.axis_weights)
     record = np.zeros(1, struct("fl_policy"))
-    record["policy"] = POLICIES.index(policy.kind)
+    record["policy"] = constant(f"FL_{policy.kind.upper()}")
     record["group_count"] = len(policy.groups)
     record["axis_weight"] = weights / weights.max()
     for index, axes in enumerate(policy.groups):
@@ -266,7 +251,7 @@ class Core:
         self._core = core
         self._block = block
         self._count = count
-        self._work = ctypes.create_string_buffer(core.fl_sizes(SIZE_OF_WORK_AREA))
+        self._work = ctypes.create_string_buffer(constant("sizeof fl_work"))
         self._lock = Lock()
         """Held during a call: work area, question and answer are the same for all threads."""
         self._block_address = block.ctypes.data
@@ -278,9 +263,7 @@ class Core:
         if not error:
             error = core.fl_prepare(self._block_address, self._work_address)
         if error:
-            raise DataError(
-                f"the core takes the robot for {CODES[error]}; check its forces, powers and sizes"
-            )
+            raise DataError(f"the core refuses the robot: {error_text(error)}")
 
     def answer_one(
         self,
@@ -447,10 +430,16 @@ class Core:
         )
 
 
+def error_text(code: int) -> str:
+    """Returns what a code that the core has returned means, and what to do."""
+    text: bytes = library().fl_error_text(code)
+    return text.decode()
+
+
 def _raise_refusal(code: int) -> None:
     """Raises a `CommandError` at a code other than FL_OK of a question."""
     if code:
         raise CommandError(
-            f"the core cannot work with these numbers: it found {CODES[code]}; check the wrench "
-            "and the previous command"
+            f"the core cannot work with these numbers: {error_text(code)}; check the wrench and "
+            "the previous command"
         )

@@ -1,8 +1,9 @@
-"""The structs of the core as numpy sees them; the loaded library says which fields it has
-(fl_fields.h)."""
+"""The structs of the core as numpy sees them, and its constants; the loaded library says which it
+has (fl_fields.h, finlab.h)."""
 
 import re
 from functools import cache
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -55,6 +56,31 @@ def _dtype(fields: str) -> np.dtype[np.void]:
         lengths = tuple(int(length) for length in re.findall(r"\d+", shape))
         columns.append((name, _NUMPY_TYPES[c_type], lengths))
     return np.dtype(columns, align=True)
+
+
+@cache
+def _constants() -> dict[str, int]:
+    """All constants of the core by name."""
+    core = library()
+    constants = {}
+    for k in count():
+        name: bytes | None = core.fl_constant_name(k)
+        if name is None:
+            break
+        constants[name.decode()] = core.fl_constant_value(k)
+    return constants
+
+
+def constant(name: str) -> int:
+    """Returns a constant of the core.
+
+    Args:
+        name: of finlab.h, such as `FL_FIN`, or `sizeof fl_work` for the bytes of a struct.
+
+    Raises:
+        KeyError: the library knows no such constant.
+    """
+    return _constants()[name]
 
 
 def count_of(name: str) -> int:

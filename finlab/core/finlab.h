@@ -126,9 +126,13 @@ const char *fl_error_text(int code);
            in another language asks the library that he has loaded. */
 const char *fl_fields(void);
 
-/* @param which  0 fl_real, 1 fl_head, 2 fl_actuator, 3 fl_work, 4 fl_policy, 5 fl_answer, 6 FL_MOST
-   @return       its bytes, of the last one its value; 0 of any other */
-int fl_sizes(int which);
+/* The constants of this header by name, such as FL_FIN, and bytes of structs, such as
+   "sizeof fl_work": who calls from another language asks for them, too.
+
+   @param k  from 0 on
+   @return   name of a constant, 0 behind the last one; its value, 0 there */
+const char *fl_constant_name(int k);
+int fl_constant_value(int k);
 
 /* Checks a block before it is used: its version, its tables, its ranges.
 

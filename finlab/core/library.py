@@ -13,7 +13,9 @@ VERSION = 7
 changes."""
 SIGNATURES = {
     "fl_fields": "s",
-    "fl_sizes": "ii",
+    "fl_constant_name": "si",
+    "fl_constant_value": "ii",
+    "fl_error_text": "si",
     "fl_check": "ipi",
     "fl_prepare": "ipp",
     "fl_answer_one": "ipppp",

@@ -6,8 +6,7 @@ import ctypes
 import numpy as np
 
 from finlab.arrays import Array
-from finlab.core.calls import SIZE_OF_WORK_AREA
-from finlab.core.fields import actuators_of, head_of, tables_begin
+from finlab.core.fields import actuators_of, constant, head_of, tables_begin
 from finlab.core.library import library
 
 LARGEST_CLOSE = 1e30
@@ -47,7 +46,7 @@ def ray_reach(
     size = np.empty(count)
     normal = np.empty((count, 6))
     force = np.empty((count, n, 2))
-    work = ctypes.create_string_buffer(core.fl_sizes(SIZE_OF_WORK_AREA))
+    work = ctypes.create_string_buffer(constant("sizeof fl_work"))
     core.fl_reach(
         block.ctypes.data,
         ctypes.addressof(work),

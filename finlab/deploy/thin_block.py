@@ -13,7 +13,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 from finlab.actuators.response import table_numbers
 from finlab.arrays import NOTHING, Array
-from finlab.core.fields import Record, actuators_of, head_of, tables_begin
+from finlab.core.fields import Record, actuators_of, constant, head_of, tables_begin
 
 TOLERANCE = 1e-5
 """Largest error of the grid of a law, over its largest value."""
@@ -24,8 +24,6 @@ POINTS = 64
 TABLES = ("force_table", "force_table_reverse", "gauge_table", "law_grid", "command_table")
 """Fields of an actuator that name a table: force over price, the same in reverse, gauge, law, and a
 fin's beat or a foil's curve."""
-FIN = 2
-"""`command_kind` of a fin, FL_FIN."""
 
 
 class Table(NamedTuple):
@@ -44,7 +42,8 @@ def tables_of(block: Array) -> list[dict[int, Table]]:
         for field in TABLES:
             offset = int(actuator[field])
             if offset > 0:
-                length = _length(field, block[offset:], is_fin=actuator["command_kind"] == FIN)
+                is_fin = actuator["command_kind"] == constant("FL_FIN")
+                length = _length(field, block[offset:], is_fin)
                 by_offset[offset] = Table(field, block[offset : offset + length])
         tables.append(by_offset)
     return tables
@@ -179,7 +178,7 @@ def _reached(knot: Array, value: Array, period: float, foils: Record) -> tuple[A
     begin = np.searchsorted(around, angle_min) - 3
     stop = np.searchsorted(around, angle_max) + 3
     has_room = begin >= 0 and stop <= len(around) and stop - begin < len(knot)
-    if not period or foils["command_kind"][0] == FIN or not has_room:
+    if not period or foils["command_kind"][0] == constant("FL_FIN") or not has_room:
         return knot, value, period
     rows = np.arange(begin, stop)
     return around[rows], value[rows % len(knot)], 0.0

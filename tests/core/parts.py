@@ -17,7 +17,7 @@ from finlab import core
 from finlab.actuators.thrust_model import PowerLaw
 from finlab.allocation import Allocator
 from finlab.arrays import Array
-from finlab.core.fields import Record, actuators_of, head_of, struct
+from finlab.core.fields import Record, actuators_of, constant, head_of, struct
 from finlab.core.library import PATH, library
 from finlab.layout import Azimuth, Layout
 from finlab.layout.load import parse_layout
@@ -28,7 +28,8 @@ CORE = Path(core.__path__[0])
 REAL = ctypes.c_double
 MOST = 64
 """Most actuators of a robot."""
-FIN, POD = 2, 1
+FIN = constant("FL_FIN")
+POD = constant("FL_POD")
 """Forms of commands, FL_FIN and FL_POD."""
 _MEMBER = re.compile(r"^\s*(fl_real|int|const fl_tangent \*)\s*([^;]*);", re.M)
 
@@ -191,7 +192,7 @@ class Robot:
 
     def work(self) -> Any:
         """A work area that is prepared."""
-        made = ctypes.create_string_buffer(library().fl_sizes(3))
+        made = ctypes.create_string_buffer(constant("sizeof fl_work"))
         assert functions().fl_prepare(at(self.block), made) == 0
         return made
 

@@ -24,7 +24,8 @@ ROOT = Path(__file__).resolve().parents[2]
 ROBOTS = "bluerov2_heavy", "A", "turtle_hybrid", "catamaran"
 EXPORTS = (
     "fl_fields",
-    "fl_sizes",
+    "fl_constant_name",
+    "fl_constant_value",
     "fl_check",
     "fl_prepare",
     "fl_answer_one",

@@ -23,12 +23,10 @@ from finlab.actuators.response import (
 )
 from finlab.arrays import CLOSE, NEARLY, NOTHING, AnyArray, Array
 from finlab.axes import TURN
-from finlab.core.calls import MAGIC, Core
-from finlab.core.fields import numbers_of, struct, tables_begin
+from finlab.core.calls import Core
+from finlab.core.fields import constant, numbers_of, struct, tables_begin
 from finlab.core.library import VERSION
 
-_FORMS = ("thruster", "pod", "fin", "foil")
-"""How forces become commands, in the order of FL_THRUSTER ... in finlab/core/finlab.h."""
 _NO_FORCE = 1e-12
 """Added to largest forces [N], so that nothing is divided by 0."""
 _LEAST_POSITIVE = 1e-300
@@ -177,7 +175,7 @@ class DualRobot:
         """The robot as the core reads it: head, actuators, then the tables."""
         rank = self.basis.shape[1]
         head = np.zeros((), struct("fl_head"))
-        head["magic"] = MAGIC
+        head["magic"] = constant("FL_MAGIC")
         head["version"] = VERSION
         head["n"] = len(self.responses)
         head["rank"] = rank
@@ -227,7 +225,7 @@ def _describe(actuator: Any, response: Response, form: Form, offsets: "TableOffs
         if _needs_no_reverse(response):
             actuator["force_min_needed"] = 0.0
 
-    actuator["command_kind"] = _FORMS.index(form.kind)
+    actuator["command_kind"] = constant(f"FL_{form.kind.upper()}")
     for field, offset in offsets._asdict().items():
         actuator[field] = offset
     actuator["command_sign"] = form.sign

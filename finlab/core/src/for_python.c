@@ -1,12 +1,54 @@
-/* What Python alone asks: sizes, many answers, commands of other methods, and what prices prove. */
+/* What Python alone asks: fields and constants, many answers, commands of other methods, and what prices prove. */
 #include "internal.h"
 
-int fl_sizes(int which) {
-  const int sizes[] = {sizeof(real), sizeof(fl_head), sizeof(fl_actuator), sizeof(fl_work),
-                       sizeof(fl_policy), sizeof(fl_answer), FL_MOST};
-  const int count = (int)(sizeof sizes / sizeof *sizes);
-  if (which < 0 || which >= count) return 0;
-  return sizes[which];
+typedef struct {
+  const char *name;
+  int value;
+} constant;
+
+#define CONSTANT(name) {#name, name}
+#define FL_BEGIN(type) {"sizeof " #type, (int)sizeof(type)},
+#define FL_FIELD(type, name, shape, unit, meaning)
+#define FL_END(type)
+static const constant CONSTANTS[] = {
+#include "fl_fields.h"
+    {"sizeof fl_work", (int)sizeof(fl_work)},
+    {"sizeof fl_real", (int)sizeof(fl_real)},
+    CONSTANT(FL_MAGIC),
+    CONSTANT(FL_VERSION),
+    CONSTANT(FL_MOST),
+    CONSTANT(FL_THRUSTER),
+    CONSTANT(FL_POD),
+    CONSTANT(FL_FIN),
+    CONSTANT(FL_FOIL),
+    CONSTANT(FL_CLOSEST),
+    CONSTANT(FL_DIRECTION),
+    CONSTANT(FL_PRIORITY),
+    CONSTANT(FL_OK),
+    CONSTANT(FL_BAD_BLOCK),
+    CONSTANT(FL_BAD_VERSION),
+    CONSTANT(FL_BAD_NUMBER),
+    CONSTANT(FL_BAD_ARGUMENT),
+    CONSTANT(FL_MET),
+    CONSTANT(FL_BEYOND),
+    CONSTANT(FL_STUCK),
+};
+#undef FL_BEGIN
+#undef FL_FIELD
+#undef FL_END
+
+static int is_constant(int k) {
+  return k >= 0 && k < (int)(sizeof CONSTANTS / sizeof CONSTANTS[0]);
+}
+
+const char *fl_constant_name(int k) {
+  if (!is_constant(k)) return 0;
+  return CONSTANTS[k].name;
+}
+
+int fl_constant_value(int k) {
+  if (!is_constant(k)) return 0;
+  return CONSTANTS[k].value;
 }
 
 #define TEXT_OF(x) #x

@@ -1,6 +1,6 @@
 /* Answers where actuators act on each other, Eq. 18, in outer iterations: the dual of the model made
    linear at the last forces, then Levenberg-Marquardt steps on the whole model (sequential
-   convex programming). finlab/allocation/dual/turns.py says why they settle. */
+   convex programming). finlab/allocation/dual/outer_iterations.py says why they settle. */
 #include "internal.h"
 
 /* Parts of sets with gaps that are looked at after the first iteration, which begins near
