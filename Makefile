@@ -107,7 +107,10 @@ test-fast: setup
 check: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/clang-format --dry-run -Werror $(CORE_FILES)
 	$(BIN)/mypy
+
+CORE_FILES = $(wildcard finlab/core/*.h finlab/core/src/*.[ch] finlab/core/tests/test_*.c finlab/core/tests/golden.h)
 
 figures: setup
 	$(THREADS) $(BIN)/python tools/figures.py $(PAGE)
@@ -121,6 +124,7 @@ docs: setup
 format: setup
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
+	$(BIN)/clang-format -i $(CORE_FILES)
 
 # The checkpoint `default`.
 checkpoint: setup

@@ -90,9 +90,11 @@ typedef void (*fl_offset_at)(const fl_real *constants, const fl_real *force, int
                              const fl_real *inflow, fl_real *change, fl_real *offset,
                              fl_real *slope);
 
+/* clang-format off */
 #define FL_BEGIN(type) typedef struct type type; struct type {
 #define FL_FIELD(type, name, shape, unit, meaning) type name shape;
 #define FL_END(type) };
+/* clang-format on */
 #include "fl_fields.h"
 #undef FL_BEGIN
 #undef FL_FIELD

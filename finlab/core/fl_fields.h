@@ -37,8 +37,7 @@ FL_FIELD(fl_real, sector_half_angle, , "rad", "half of that arc; pi for all dire
 FL_FIELD(fl_real, dead_band, , "N", "forces smaller than this, other than 0, cannot be held")
 FL_FIELD(fl_real, flow_speed, , "m/s",
          "U; above 0: the second row is drag, whose power is U times drag")
-FL_FIELD(fl_real, secant, [2], "N^2/W",
-         "|y| / |s| of each row at the largest force, by half of it")
+FL_FIELD(fl_real, secant, [2], "N^2/W", "|y| / |s| of each row at the largest force, by half of it")
 FL_FIELD(fl_real, row_force_max, [2], "N", "largest force of each row")
 FL_FIELD(fl_real, effectiveness_reduced, [2][6], "1/N",
          "columns of B: scaled wrench in the basis per newton of each row")

@@ -26,36 +26,40 @@ typedef struct {
 
 /* What one actuator may give now. Forces of a plane are sizes, from 0 on. */
 typedef struct {
-  fl_real force_min, force_max;       /* [N] */
-  fl_real cost_at_min, cost_at_max;   /* [W] */
-  fl_real sector_center;              /* of the arc of directions [rad] */
-  fl_real sector_half_angle;          /* pi for all directions [rad] */
-  fl_real cos_center, sin_center;     /* of sector_center */
-  fl_real cos_half_angle, sin_half_angle;
-  fl_real force_max_reverse;          /* of a plane that pushes either way, else 0 [N] */
-  fl_real cost_at_max_reverse;        /* [W] */
-  fl_real price_floor_squared;        /* below its root a price has no direction [W^2/N^2] */
-  fl_real turn_cost;   /* kappa: turning by d costs kappa / 2 d^2 [W/rad^2]; 0: nothing */
-  fl_real turn_origin; /* angle from which it turns, within a turn of sector_center [rad] */
-  fl_real slope_max;   /* where turning costs: largest slope T' [N^2/W] */
-  fl_real jump_angle;  /* where its response jumps: angle between the two [rad] */
-  int is_flipped;      /* whether it pushes in reverse alone */
-  int is_forked;       /* whether both ends of its arc may be worth the same */
-  int has_jumped;      /* whether its response jumps where Newton's method stood still */
+  fl_real force_min;           /* least force [N] */
+  fl_real force_max;           /* largest force [N] */
+  fl_real cost_at_min;         /* power of the least force [W] */
+  fl_real cost_at_max;         /* power of the largest one [W] */
+  fl_real sector_center;       /* of the arc of directions [rad] */
+  fl_real sector_half_angle;   /* pi for all directions [rad] */
+  fl_real cos_center;          /* cosine of sector_center */
+  fl_real sin_center;          /* its sine */
+  fl_real cos_half_angle;      /* cosine of sector_half_angle */
+  fl_real sin_half_angle;      /* its sine */
+  fl_real force_max_reverse;   /* of a plane that pushes either way, else 0 [N] */
+  fl_real cost_at_max_reverse; /* power of that force [W] */
+  fl_real price_floor_squared; /* below its root a price has no direction [W^2/N^2] */
+  fl_real turn_cost;           /* kappa: turning by d costs kappa / 2 d^2 [W/rad^2]; 0: nothing */
+  fl_real turn_origin;         /* angle from which it turns, within a turn of sector_center [rad] */
+  fl_real slope_max;           /* where turning costs: largest slope T' [N^2/W] */
+  fl_real jump_angle;          /* where its response jumps: angle between the two [rad] */
+  int is_flipped;              /* whether it pushes in reverse alone */
+  int is_forked;               /* whether both ends of its arc may be worth the same */
+  int has_jumped;              /* whether its response jumps where Newton's method stood still */
   /* of a foil near to a command, whose limits are angles from there; else 0 */
   const fl_tangent *tangent;
 } fl_set;
 
 /* Multipliers, and what they give. */
 typedef struct {
-  fl_real lambda_reduced[6];       /* [W] */
-  fl_real residual[6];             /* r of Eq. 6, reduced */
-  fl_real force[FL_MOST][2];       /* y of Eq. 5 [N] */
-  fl_real dy_ds[FL_MOST][3];       /* its derivative: xx, xy, yy [N^2/W] */
-  fl_real secant[FL_MOST];         /* |y| / |s| of Eq. 9; 0 where it is left out [N^2/W] */
-  fl_real push_angle[FL_MOST];     /* of a plane whose turning costs [rad] */
-  fl_real dual_value;              /* g of Eq. 3 [W] */
-  fl_real residual_size;
+  fl_real lambda_reduced[6];   /* [W] */
+  fl_real residual[6];         /* r of Eq. 6, reduced */
+  fl_real force[FL_MOST][2];   /* y of Eq. 5 [N] */
+  fl_real dy_ds[FL_MOST][3];   /* its derivative: xx, xy, yy [N^2/W] */
+  fl_real secant[FL_MOST];     /* |y| / |s| of Eq. 9; 0 where it is left out [N^2/W] */
+  fl_real push_angle[FL_MOST]; /* of a plane whose turning costs [rad] */
+  fl_real dual_value;          /* g of Eq. 3 [W] */
+  fl_real residual_size;       /* |r|, of scaled wrenches */
 } fl_state;
 
 #define FL_POINTS 8 /* of a mixture near to a point out of reach */
@@ -66,95 +70,103 @@ typedef struct {
 
 /* A mixture of points, and an orthonormal basis of their differences from the first one. */
 typedef struct {
-  fl_wide force[FL_POINTS][FL_MOST][2];
-  fl_wide point[FL_POINTS][6];
-  fl_wide weight[FL_POINTS];    /* of each point, their sum 1 */
-  fl_wide miss[6];              /* m, of a target */
-  fl_wide ray_share[FL_POINTS]; /* of each point, how much of the ray (0 or 1) it takes */
-  fl_wide q[FL_POINTS][6];
-  fl_wide r[FL_POINTS][FL_POINTS]; /* on the diagonal its inverse, 0 where a point depends */
+  fl_wide force[FL_POINTS][FL_MOST][2]; /* of each point [N] */
+  fl_wide point[FL_POINTS][6];          /* wrenches in weighted axes, on the yardstick */
+  fl_wide weight[FL_POINTS];            /* of each point, their sum 1 */
+  fl_wide miss[6];                      /* m, mixture less target */
+  fl_wide ray_share[FL_POINTS];         /* of each point, how much of the ray (0 or 1) it takes */
+  fl_wide q[FL_POINTS][6];         /* orthonormal basis of the differences, Q of their QR factors */
+  fl_wide r[FL_POINTS][FL_POINTS]; /* R of these; on the diagonal its inverse, 0 where a point
+                                      depends on those before */
   int count;                       /* points */
   int basis_count;                 /* how many of them the basis knows */
 } fl_mixture;
 
-#define FL_SCORES 6
+#define FL_SCORES 6 /* numbers by which a policy compares parts, the first one first */
 /* A cut on the way to one part of sets with gaps. */
 typedef struct {
-  fl_set set_before;
-  fl_real force[2];
-  fl_real lambda_reduced[6], score[FL_SCORES]; /* of the side that was not taken first */
-  int actuator;
-  int first_side;     /* side taken first */
-  int has_both_sides; /* whether the other one was taken, too */
+  fl_set set_before;         /* of the actuator, before the cut */
+  fl_real force[2];          /* of the actuator, in the gap [N] */
+  fl_real lambda_reduced[6]; /* multipliers on the side that was not taken first [W] */
+  fl_real score[FL_SCORES];  /* of that side: its dual value [W], or a policy's numbers */
+  int actuator;              /* whose set is cut */
+  int first_side;            /* side taken first, 1 or -1 as fl_narrow_set has them */
+  int has_both_sides;        /* whether the other one was taken, too */
 } fl_node;
 
 /* Commands that are allowed. */
 typedef struct {
-  fl_real command_min[FL_MOST][3], command_max[FL_MOST][3];
-  int is_free_angle[FL_MOST]; /* whether the angle may be any */
+  fl_real command_min[FL_MOST][3]; /* least numbers of a command, by its kind */
+  fl_real command_max[FL_MOST][3]; /* largest ones */
+  int is_free_angle[FL_MOST];      /* whether the angle may be any */
 } fl_box;
 
 /* What the actuators that work span in the axes that count. */
 typedef struct {
-  unsigned char is_lost[FL_MOST], axis_counts[6];
-  fl_real axis_scale[6]; /* wrench = axis_scale * scaled wrench [N, N m] */
-  fl_real basis[6][6];   /* 6 x rank: directions of scaled wrenches that are driven */
+  unsigned char is_lost[FL_MOST]; /* 1 of an actuator that does not work */
+  unsigned char axis_counts[6];   /* 1 of an axis that has to be met */
+  fl_real axis_scale[6];          /* wrench = axis_scale * scaled wrench [N, N m] */
+  fl_real basis[6][6];            /* 6 x rank: directions of scaled wrenches that are driven */
   /* columns of B: scaled wrench in the basis per newton of each row; 0 of a lost actuator */
   fl_real effectiveness_reduced[FL_MOST][2][6];
   fl_real wrench_offset[6]; /* wrench beside that of the forces [N, N m] */
-  int rank;
+  int rank;                 /* of the effectiveness: how many directions are driven */
 } fl_span;
 
 struct fl_work {
-  fl_span span;
-  int is_whole; /* whether `set` and `box` are those of the robot outside of ticks */
-  fl_set set[FL_MOST];
-  fl_box box;
-  fl_settings settings;
+  fl_span span;         /* of this question */
+  int is_whole;         /* whether `set` and `box` are those of the robot outside of ticks */
+  fl_set set[FL_MOST];  /* of each actuator, as a search has cut it */
+  fl_box box;           /* of this question */
+  fl_settings settings; /* that bound searches */
 
   /* Newton's method. */
-  fl_state state[2];
-  fl_state *state_found;      /* which of these it came to */
-  fl_real metric[6][6];       /* M of Eq. 8 */
+  fl_state state[2];            /* the one so far, and a trial */
+  fl_state *state_found;        /* which of these it came to */
+  fl_real metric[6][6];         /* M of Eq. 8 */
   fl_real hessian_factor[6][6]; /* of quadratic costs, L D L' */
-  fl_real trace_min;          /* trace below which H is singular to rounding */
-  fl_real power_cost_max;     /* C of Eq. 13 [W] */
-  int is_convex;              /* whether no set has a gap or a kink */
-  int has_forks;              /* whether one is forked, or pushes either way */
-  int has_drag;               /* whether a foil drags */
-  int has_turn_cost;          /* whether turning costs */
-  int newton_steps;           /* of this question */
-  int is_truncated;           /* whether a search ended at its bound of steps */
+  fl_real trace_min;            /* trace below which H is singular to rounding */
+  fl_real power_cost_max;       /* C of Eq. 13 [W] */
+  int is_convex;                /* whether no set has a gap or a kink */
+  int has_forks;                /* whether one is forked, or pushes either way */
+  int has_drag;                 /* whether a foil drags */
+  int has_turn_cost;            /* whether turning costs */
+  int newton_steps;             /* of this question */
+  int is_truncated;             /* whether a search ended at its bound of steps */
 
   /* Points of the attainable set near to a wrench out of reach. */
-  fl_mixture mixture;
+  fl_mixture mixture;                            /* that comes nearest */
   fl_wide effectiveness_weighted[FL_MOST][2][6]; /* wrench per newton of each row, weighted axes */
-  int polygon_offset[FL_MOST]; /* of polygons that stand for sets; 0 for none */
-  fl_wide distance_enough;     /* on the yardstick, up to which a point is the nearest one */
+  int polygon_offset[FL_MOST];                   /* of polygons that stand for sets; 0 for none */
+  fl_wide distance_enough; /* on the yardstick, up to which a point is the nearest one */
   const fl_wide *ray; /* (6,) of which a mixture may take a share, in weighted axes; 0 for none */
 
   /* Sets with gaps. */
-  fl_node node[FL_DEPTH];
-  fl_set set_before[FL_MOST]; /* that a search began with */
-  fl_set best_set[FL_MOST];   /* of its best part, its forces [N] */
-  fl_real best_force[FL_MOST][2];
+  fl_node node[FL_DEPTH];           /* cuts on the way to the part that is looked at */
+  fl_set set_before[FL_MOST];       /* that a search began with */
+  fl_set best_set[FL_MOST];         /* of its best part */
+  fl_real best_force[FL_MOST][2];   /* of that part [N] */
   fl_real best_command[FL_MOST][3]; /* of the best part where there are foils */
   fl_real best_lambda[6];           /* reduced multipliers near these commands [W] */
 
   /* Commands. */
   fl_real jacobian[FL_MOST][3][6]; /* J of Eq. 11, on the yardstick, over the widths of the box */
-  fl_tangent tangent[FL_MOST];
-  fl_real wrench_target[6]; /* that the commands are to give [N, N m] */
+  fl_tangent tangent[FL_MOST];     /* of each foil, at the commands of a step */
+  fl_real wrench_target[6];        /* that the commands are to give [N, N m] */
   int refine_steps; /* Levenberg-Marquardt steps on commands since whoever asks set it to 0 */
 
   /* Ticks. */
   const fl_real *command_previous; /* commands of the tick before; 0 for none */
-  fl_real lambda_begin[6]; /* reduced multipliers at which these were given [W] */
-  int has_lambda_begin;    /* whether there are such multipliers */
-  fl_real power_max[FL_MOST]; /* of each actuator [W] */
-  fl_real slope_max[FL_MOST]; /* of each pod: largest slope T' [N^2/W] */
+  fl_real lambda_begin[6];         /* reduced multipliers at which these were given [W] */
+  int has_lambda_begin;            /* whether there are such multipliers */
+  fl_real power_max[FL_MOST];      /* of each actuator [W] */
+  fl_real slope_max[FL_MOST];      /* of each pod: largest slope T' [N^2/W] */
 };
 
-/* How Newton's method ended: the target is met, is beyond reach, or prices stood still. */
-enum { FL_MET, FL_BEYOND, FL_STUCK };
+/* How Newton's method ended: fl_answer.newton_status. */
+enum {
+  FL_MET,    /* the target is met */
+  FL_BEYOND, /* it is proved to be beyond reach, Eq. 13 */
+  FL_STUCK   /* multipliers stood still */
+};
 #endif

@@ -88,8 +88,8 @@ static push_direction direction_of(const fl_set *set, const real *gauge, const r
 static void blend(response *own, const response *other, real omega) {
   const real delta = own->conjugate - other->conjugate;
   const real root = SQRT(delta * delta + omega * omega);
-  const real p = (1 + delta / root) / 2; /* weight of the one */
-  const real q = 1 - p;                  /* of the other */
+  const real p = (1 + delta / root) / 2;                    /* weight of the one */
+  const real q = 1 - p;                                     /* of the other */
   const real dp = omega * omega / (2 * root * root * root); /* dp / ddelta [1/W] */
   const real dx = own->force[0] - other->force[0];
   const real dy = own->force[1] - other->force[1];
@@ -271,8 +271,7 @@ static void farthest_foil(const real *block, int i, const fl_set *set, const rea
 
 /* The direction in which a plane's farthest force lies: of an uneven fin beyond an end of its arc
    the farther end may be worth more. */
-static push_direction farthest_direction(const fl_set *set, const real *gauge,
-                                         const real *price) {
+static push_direction farthest_direction(const fl_set *set, const real *gauge, const real *price) {
   const int is_unpriced = size_of(price) * size_of(price) <= TINY;
   if (is_unpriced) { /* any force will do, but it must be one of the set */
     const real middle[2] = {set->cos_center, set->sin_center};

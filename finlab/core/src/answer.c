@@ -138,8 +138,7 @@ static void take_off_offset(const fl_span *span, const real *wrench, real *of_fo
 
 /* Has drives that give nothing in a tick pass through their dead bands: each goes, within its band,
    towards the command that it would have if drives were as quick as can be. */
-static void pass_bands(const real *block, fl_work *work, const fl_question *q,
-                       real command[][3]) {
+static void pass_bands(const real *block, fl_work *work, const fl_question *q, real command[][3]) {
   const fl_box box = work->box;
   fl_answer later;
   real wrench[6];

@@ -197,8 +197,8 @@ static void pod_force(const real *block, const fl_actuator *a, const real *comma
     const real *gauge = block + (int)a->gauge_table;
     const real rho = fl_gauge_radius(gauge, angle);
     if (has_slope) {
-      const real rise =
-          fl_gauge_radius(gauge, angle + GAUGE_STEP) - fl_gauge_radius(gauge, angle - GAUGE_STEP);
+      const real rise = fl_gauge_radius(gauge, angle + GAUGE_STEP) -
+                        fl_gauge_radius(gauge, angle - GAUGE_STEP);
       bend = rise / (2 * GAUGE_STEP * rho);
     }
     along_x *= rho;

@@ -38,8 +38,7 @@ static real residual_of(const real *block, const fl_work *work, const real *wren
 
 /* The Jacobian J of the wrench on the yardstick by the commands over the widths of their
    limits, into the work area. */
-static void find_jacobian(const real *block, fl_work *work, const fl_box *box,
-                          real command[][3]) {
+static void find_jacobian(const real *block, fl_work *work, const fl_box *box, real command[][3]) {
   const unsigned char *counts = work->span.axis_counts;
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);

@@ -266,8 +266,8 @@ static int jumps_between(const real *block, fl_work *work, const fl_state *one,
                          const fl_state *other, const real *step, int marked) {
   const real full = NOTHING * work->power_cost_max; /* in a hole around rest multipliers go to 0 */
   const real step_squared = dot(step, step, 6);
-  const real lambda_squared =
-      dot(one->lambda_reduced, one->lambda_reduced, 6) + 100 * work->power_cost_max * full;
+  const real lambda_squared = dot(one->lambda_reduced, one->lambda_reduced, 6) +
+                              100 * work->power_cost_max * full;
   if (!(step_squared < JUMP_STEP * lambda_squared)) return 0;
   const int is_short = step_squared < SHORT_STEP * lambda_squared;
   int jumps = 0;

@@ -66,8 +66,7 @@ static real power_at(const real *block, int i, const real *command, real *price)
 
 /* Mean power P [W] of the actuators at the commands before (n, 3), or a little of full power, as
    there is none at rest; and the price (n,) of each there [W/N], 0 where it is not known. */
-static real mean_power(const real *block, const fl_work *work, const real *previous,
-                       real *price) {
+static real mean_power(const real *block, const fl_work *work, const real *previous, real *price) {
   real power = 0;
   real full = 0;
   int count = 0;
@@ -218,8 +217,8 @@ void fl_limits_of_tick(const real *block, fl_work *work, const fl_question *q) {
       continue;
     }
     real angle = before[0];
-    const int is_wanted =
-        q->angles_wanted && q->angles_wanted[i] == q->angles_wanted[i]; /* not NaN */
+    const int is_wanted = q->angles_wanted &&
+                          q->angles_wanted[i] == q->angles_wanted[i]; /* not NaN */
     if (is_wanted) angle = q->angles_wanted[i];
     box_after(block, &work->box, i, before, ticks);
     const real kappa = turning_cost_of(ACTUATOR(block, i), q->calm, power, ticks);

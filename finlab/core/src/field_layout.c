@@ -5,9 +5,11 @@
 
 /* A struct has the size of its fields: no padding, so each lies where those before it end, and a
    block is read in place. */
+/* clang-format off */
 #define FL_BEGIN(type) enum { type##_bytes = 0
 #define FL_FIELD(type, name, shape, unit, meaning) + (int)sizeof(type shape)
 #define FL_END(type) };
+/* clang-format on */
 #include "fl_fields.h"
 #undef FL_BEGIN
 #undef FL_FIELD

@@ -131,8 +131,7 @@ static void draw_tangents(const real *block, fl_work *work, const fl_box *box, c
    programming that keep giving work->wrench_target; `lambda` becomes that of the last step.
    Their cost. */
 static real cheapen(const real *block, fl_work *work, const fl_box *box, const real *target,
-                    real most_error, real cost, real *lambda, real command[][3],
-                    real force[][2]) {
+                    real most_error, real cost, real *lambda, real command[][3], real force[][2]) {
   real share = 1;
   int has_moved = 1;
   for (int k = 0; k < FL_FOIL_STEPS; k++) {
@@ -325,8 +324,7 @@ static void improve_from_stalls(const real *block, fl_work *work, const real *ta
 
 /* The same as fl_improve_commands of several starts, as steps from a cheap one may end
    early: each has its own valley. */
-void fl_improve_from_starts(const real *block, fl_work *work, const real *target,
-                            real *best_cost) {
+void fl_improve_from_starts(const real *block, fl_work *work, const real *target, real *best_cost) {
   real most_cost;
   const real proved = proved_value(block, work, &most_cost);
   const real enough = proved * (1 + CLOSE);

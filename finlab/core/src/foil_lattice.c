@@ -4,9 +4,9 @@
    and cost there is told from quadratic costs, so that a point takes no step. */
 #include "internal.h"
 
-#define LATTICE (1 << 2 * FL_LATTICE_FOILS) /* points at most: one on each branch of so many foils */
-#define EACH_MOST 6    /* nodes on a branch */
-#define MISS_WEIGHT 12 /* cost of missing one scaled wrench, over the largest cost of all actuators */
+#define LATTICE (1 << 2 * FL_LATTICE_FOILS) /* points at most: one on each branch of all foils */
+#define EACH_MOST 6                         /* nodes on a branch */
+#define MISS_WEIGHT 12 /* cost of a miss of 1, over the largest cost of all actuators */
 
 /* Ends of the branches of a foil's lift within its limits; how many branches there are. */
 static int edges_of(const real *block, const fl_work *work, int i, real *edge) {
@@ -15,7 +15,7 @@ static int edges_of(const real *block, const fl_work *work, int i, real *edge) {
   const real high = work->box.command_max[i][0];
   const real stall_angle = fl_lift_end(block, a)[1];
   const real turn[FL_BRANCHES - 1] = {a->zero_lift_angle - stall_angle, a->zero_lift_angle,
-                                   a->zero_lift_angle + stall_angle};
+                                      a->zero_lift_angle + stall_angle};
   int branches = 0;
   edge[0] = low;
   for (int k = 0; k < FL_BRANCHES - 1; k++) {
@@ -146,8 +146,8 @@ static real cost_at_point(const real *block, const fl_work *work, const fl_latti
   return cost + MISS_WEIGHT * work->power_cost_max * SQRT(dot(residual, residual, 6));
 }
 
-/* Puts a point among the `count` cheapest ones (FL_LATTICE_STARTS,), which are in order; how many there
-   are then. */
+/* Puts a point among the `count` cheapest ones (FL_LATTICE_STARTS,), which are in order; how many
+   there are then. */
 static int put_in_order(fl_lattice_point *points, int count, const fl_lattice_point *added) {
   int index = count;
   if (count == FL_LATTICE_STARTS) {
@@ -165,8 +165,8 @@ static int put_in_order(fl_lattice_point *points, int count, const fl_lattice_po
 
 /* The cheapest point of the lattice on one choice of branches, numbered in mixed radix. */
 static fl_lattice_point cheapest_of_choice(const real *block, const fl_work *work,
-                                        const fl_lattice *lattice, const real *target, int choice,
-                                        int points) {
+                                           const fl_lattice *lattice, const real *target,
+                                           int choice, int points) {
   fl_lattice_point best = {{0}, 0};
   fl_lattice_point tried = {{0}, 0};
   for (int k = 0; k < points; k++) {
@@ -186,10 +186,10 @@ static fl_lattice_point cheapest_of_choice(const real *block, const fl_work *wor
   return best;
 }
 
-/* The cheapest point of each choice of branches, and of these the cheapest ones (FL_LATTICE_STARTS,);
-   how many there are. */
+/* The cheapest point of each choice of branches, and of these the cheapest ones
+   (FL_LATTICE_STARTS,); how many there are. */
 int fl_cheapest_points(const real *block, const fl_work *work, const fl_lattice *lattice,
-                           const real *target, fl_lattice_point *points) {
+                       const real *target, fl_lattice_point *points) {
   int choices = 1;
   int points_of_choice = 1;
   for (int f = 0; f < lattice->foils; f++) {

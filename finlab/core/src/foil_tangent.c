@@ -25,8 +25,8 @@ void fl_foil_at(const real *block, int i, real angle, fl_tangent *tangent) {
   memcpy(tangent->force, force, sizeof tangent->force);
   memcpy(tangent->force_slope, by[0], sizeof tangent->force_slope);
   tangent->cost = a->flow_speed * drag + a->uncertainty_cost * (lift * lift + drag * drag);
-  tangent->cost_slope =
-      a->flow_speed * d_drag + 2 * a->uncertainty_cost * (lift * d_lift + drag * d_drag);
+  tangent->cost_slope = a->flow_speed * d_drag +
+                        2 * a->uncertainty_cost * (lift * d_lift + drag * d_drag);
 }
 
 /* Makes the set of a step the tangent of a foil at an angle, curved as much as its cost less

@@ -1,4 +1,5 @@
-/* What Python alone asks: fields and constants, many answers, commands of other methods, and what prices prove. */
+/* What Python alone asks: fields and constants, many answers, commands of other methods, and what
+   prices prove. */
 #include "internal.h"
 
 typedef struct {
@@ -95,8 +96,8 @@ int fl_answer_many(const real *block, fl_work *work, const fl_question *question
   return FL_OK;
 }
 
-real fl_dual_value(const real *block, fl_work *work, const real *wrench,
-                   const real *lambda_reduced, real *force) {
+real fl_dual_value(const real *block, fl_work *work, const real *wrench, const real *lambda_reduced,
+                   real *force) {
   fl_state *state = work->state;
   real target[6];
   fl_reduce_wrench(work, wrench, target);

@@ -24,9 +24,7 @@ static real value_of(const cubic *p, real t) {
   return p->value + t * (p->m0 + t * (p->b + t * p->c));
 }
 
-static real slope_of(const cubic *p, real t) {
-  return p->m0 + t * (2 * p->b + 3 * t * p->c);
-}
+static real slope_of(const cubic *p, real t) { return p->m0 + t * (2 * p->b + 3 * t * p->c); }
 
 /* Price of knot j of k, over that of the largest force: (j / k)^4. */
 static real fourth_power(real share) {
@@ -62,8 +60,8 @@ line_response fl_force_of_price(const real *table, real price) {
   }
   const cubic force = cubic_between(knot[0], knot[3], knot[1] * scale, knot[4] * scale);
   /* The integral of the cubic over t: the conjugate is that of the force over the price. */
-  const real integral =
-      knot[0] + t * (force.m0 * R(0.5) + t * (force.b * THIRD + t * force.c * R(0.25)));
+  const real integral = knot[0] +
+                        t * (force.m0 * R(0.5) + t * (force.b * THIRD + t * force.c * R(0.25)));
   line_response answer;
   answer.force = value_of(&force, t);
   answer.slope = slope_of(&force, t) * dt_dv;

@@ -2,14 +2,14 @@
    gives on each side of a cut. */
 #include "internal.h"
 
-#define NONE R(1e30)        /* cost where no part meets the target */
+#define NONE R(1e30) /* cost where no part meets the target */
 /* an answer below this share of the least force is no answer of an arc */
 #define HOLLOW_FORCE R(0.9)
 
 /* Whether the smoothed response of an arc has a force that is smaller than any in it. */
 static int is_hollow(const real *block, int i, const fl_set *set, const real *force) {
-  const int is_narrow =
-      is_plane(ACTUATOR(block, i)) && set->turn_cost == 0 && set->sector_half_angle <= NARROW;
+  const int is_narrow = is_plane(ACTUATOR(block, i)) && set->turn_cost == 0 &&
+                        set->sector_half_angle <= NARROW;
   return is_narrow && size_of(force) < HOLLOW_FORCE * set->force_min;
 }
 
@@ -64,8 +64,8 @@ static void dive(const real *block, fl_work *work, const real *target, int statu
       fl_set *set = work->set + i;
       const real *force = state->force[i];
       const int hollow = is_hollow(block, i, set, force);
-      const int is_cut =
-          hollow || fl_gap_of(block, work, i, force, largest, state->lambda_reduced) > 0;
+      const int is_cut = hollow ||
+                         fl_gap_of(block, work, i, force, largest, state->lambda_reduced) > 0;
       if (!is_cut) continue;
       if (hollow || is_restless(block, i, set, force))
         fl_fix_at_least_force(block, i, set, force);

@@ -94,8 +94,12 @@ void fl_solve(real factor[6][6], const real *right, real *x);
 int fl_are_within(const real *values, int count, real most);
 
 /* force_table.c: tables of force over price, gauges of directions */
-typedef struct { real force, slope, conjugate; } line_response;
-typedef struct { real value, slope, bend; } gauge_point;
+typedef struct {
+  real force, slope, conjugate;
+} line_response;
+typedef struct {
+  real value, slope, bend;
+} gauge_point;
 line_response fl_force_of_price(const real *table, real price);
 real fl_marginal_cost(const real *table, real size, real *price);
 gauge_point fl_gauge_support(const real *gauge, real x, real y);
@@ -149,7 +153,9 @@ int fl_force_number(const fl_actuator *a);
 int fl_is_in_dead_band(const fl_actuator *a, const real *command);
 
 /* command_law.c: forces of commands and commands for forces */
-typedef struct { real low, high, middle, half; } force_range;
+typedef struct {
+  real low, high, middle, half;
+} force_range;
 void fl_force_of_command(const real *block, int i, const real *command, real *force,
                          real (*slope)[3]);
 void fl_command_for_force(const real *block, int i, const fl_box *box, const real *force,
@@ -183,7 +189,7 @@ int fl_is_in_range(const fl_work *work, const real *wrench, const real *target);
 void fl_wrench_of_forces(const real *block, const fl_work *work, real force[][2], real *wrench);
 
 /* set_gaps.c: sets with gaps */
-#define NARROW R(0.2) /* half of an arc up to which its chord stands for its least forces */
+#define NARROW R(0.2)   /* half of an arc up to which its chord stands for its least forces */
 #define SHORTER R(0.98) /* a force below this share of the least one lies in the gap at rest */
 int fl_worst_gap(const real *block, const fl_work *work, real force[][2], const real *lambda);
 int fl_nearer_side(const real *block, int i, const fl_set *set, const real *force);
@@ -213,25 +219,25 @@ real fl_power_of_commands(const real *block, const fl_work *work, real command[]
                           real force[][2]);
 
 /* foil_lattice.c: where searches for commands of foils may begin */
-enum { FL_BRANCHES = 4 };    /* of a foil's lift */
-#define FL_LATTICE_FOILS 6   /* foils on the lattice at most; others begin at rest */
-#define FL_LATTICE_NODES 48  /* nodes of all foils at most, angles of which a point has one a foil */
+enum { FL_BRANCHES = 4 };   /* of a foil's lift */
+#define FL_LATTICE_FOILS 6  /* foils on the lattice at most; others begin at rest */
+#define FL_LATTICE_NODES 48 /* nodes of all foils at most, angles of which a point has one a foil */
 #define FL_LATTICE_STARTS 60 /* points at which steps on the commands begin */
 typedef struct {
-  int foils;                              /* how many there are */
-  int foil[FL_LATTICE_FOILS];                      /* which actuators these are */
-  int branches[FL_LATTICE_FOILS];                  /* of each foil */
-  int first[FL_LATTICE_FOILS];                     /* its first node */
-  int each;                               /* nodes on a branch */
-  real edge[FL_LATTICE_FOILS][FL_BRANCHES + 1];    /* ends of the branches [rad] */
-  real angle[FL_LATTICE_NODES];                   /* of each node [rad] */
-  real cost[FL_LATTICE_NODES];                    /* of each node [W] */
-  real wrench[FL_LATTICE_NODES][6];               /* of each node, in the basis */
-  real row[FL_MOST][2][6];                /* of other actuators: force by a wrench in the basis */
+  int foils;                                    /* how many there are */
+  int foil[FL_LATTICE_FOILS];                   /* which actuators these are */
+  int branches[FL_LATTICE_FOILS];               /* of each foil */
+  int first[FL_LATTICE_FOILS];                  /* its first node */
+  int each;                                     /* nodes on a branch */
+  real edge[FL_LATTICE_FOILS][FL_BRANCHES + 1]; /* ends of the branches [rad] */
+  real angle[FL_LATTICE_NODES];                 /* of each node [rad] */
+  real cost[FL_LATTICE_NODES];                  /* of each node [W] */
+  real wrench[FL_LATTICE_NODES][6];             /* of each node, in the basis */
+  real row[FL_MOST][2][6]; /* of other actuators: force by a wrench in the basis */
 } fl_lattice;
 typedef struct {
   unsigned char node[FL_LATTICE_FOILS]; /* of each foil */
-  real cost;                   /* [W], with the price of a miss */
+  real cost;                            /* [W], with the price of a miss */
 } fl_lattice_point;
 void fl_lay_lattice(const real *block, const fl_work *work, fl_lattice *lattice);
 int fl_cheapest_points(const real *block, const fl_work *work, const fl_lattice *lattice,

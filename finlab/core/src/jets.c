@@ -85,8 +85,8 @@ static jet_at jet_at_outlet(const water *w, const outlet *from, const jet *j, co
   const real half_speed = j->speed * profile / SQRT(SQRT(decay)) / 2;
   met.speed = half_speed * (1 + onset);
   /* Logarithmic derivatives of the profile and of the decay. */
-  const real d_profile =
-      2 * w->spread * x * (width_squared + aside_squared) / (width_squared * width_squared);
+  const real d_profile = 2 * w->spread * x * (width_squared + aside_squared) /
+                         (width_squared * width_squared);
   const real d_decay = q * q * q / (decay * w->length);
   met.slope = half_speed * (1 - onset * onset) / w->behind + met.speed * (d_profile - d_decay);
   return met;
@@ -155,8 +155,8 @@ static void add_taken(const water *w, const outlet *p, const jet *j, const real 
 
 /* Adds what a speed v [m/s] of the position through the water takes: the advance ratio's
    share of the force. */
-static void add_lost(const outlet *p, const jet *j, const real *force, const real *v,
-                     real *change, real by_force[3][3]) {
+static void add_lost(const outlet *p, const jet *j, const real *force, const real *v, real *change,
+                     real by_force[3][3]) {
   const real *a = j->ahead;
   const real along = dot(v, a, 3);
   const real per_speed = p->advance / j->speed;

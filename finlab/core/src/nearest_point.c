@@ -15,7 +15,7 @@
 #define MOST_SHARES 60 /* shares of a ray that are tried, each a point nearest to it */
 /* of a point's length, less than which is left: orthogonalized again */
 #define NEARLY_DEPENDENT 0.1
-#define PROOF_OF_SHARE 0.5   /* of a miss that is to be proved, for a plane across a ray */
+#define PROOF_OF_SHARE 0.5 /* of a miss that is to be proved, for a plane across a ray */
 
 static wide larger_wide(wide a, wide b) {
   if (a > b) return a;

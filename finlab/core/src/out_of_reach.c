@@ -16,7 +16,7 @@
 #define PULL 2e-3 /* miss of a group for which held axes give way by a millionth at a curved rim */
 /* Scaled wrench by which an answer at the rim may be off: what it gives is then what is served. */
 #define AT_RIM (R(0.1) * NEARLY)
-#define NONE R(1e30)    /* power that no answer reaches */
+#define NONE R(1e30) /* power that no answer reaches */
 
 /* Whether so many bytes are the same, one of which was copied from the other. Not memcmp:
    WebAssembly has no library. */
@@ -265,7 +265,7 @@ static void better_side(const real *block, fl_work *work, const real *wrench,
   fl_take_side(block, work, node, node->first_side);
 }
 
-/* How many parts of sets with gaps a policy may look at: each takes a search for a nearest point. */
+/* How many parts of sets with gaps a policy may look at: each takes a nearest point. */
 static int most_parts_of(const real *block, const fl_work *work) {
   const int most = REACH_PARTS + REACH_PARTS_EACH * COUNT(block);
   if (most < work->settings.most_parts) return most;
@@ -283,9 +283,8 @@ static fl_node *last_better_cut(const real *block, fl_work *work, int *depth, co
 /* The best part of sets with gaps for a policy: its forces; its sets become those of the
    work area, and those that it began with are kept. Of a ray the share that it gives, and
    the most that all parts could. */
-static void best_part(const real *block, fl_work *work, const real *wrench,
-                      const fl_policy *policy, real force[][2], real *ray_share,
-                      real *most_ray_share) {
+static void best_part(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,
+                      real force[][2], real *ray_share, real *most_ray_share) {
   const size_t size_of_sets = (size_t)COUNT(block) * sizeof *work->set_before;
   const int most_parts = most_parts_of(block, work);
   real score[FL_SCORES];
@@ -359,8 +358,8 @@ static void cheapen_by_parts(const real *block, fl_work *work, const real *targe
     out->gap_power_bound = bound * (1 - FINE); /* with turning it is more than power */
 }
 
-void fl_out_of_reach(const real *block, fl_work *work, const real *wrench,
-                     const fl_policy *policy, fl_answer *out) {
+void fl_out_of_reach(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,
+                     fl_answer *out) {
   const int keeps_direction = policy->policy == FL_DIRECTION;
   real force[FL_MOST][2];
   real ray_share;

@@ -1,5 +1,5 @@
-/* Answers where actuators act on each other, Eq. 18, in outer iterations: the dual of the model made
-   linear at the last forces, then Levenberg-Marquardt steps on the whole model (sequential
+/* Answers where actuators act on each other, Eq. 18, in outer iterations: the dual of the model
+   made linear at the last forces, then Levenberg-Marquardt steps on the whole model (sequential
    convex programming). finlab/allocation/dual/outer_iterations.py says why they settle. */
 #include "internal.h"
 
@@ -14,8 +14,9 @@
 
 /* Forces of commands along the laws' axes, and in the body frame, where a foil's drag at
    rest is on top. */
-static void forces_of_commands(const fl_coupled_robot *robot, const real *block, const fl_span *span,
-                               real command[][3], real force[][3], real body[][3]) {
+static void forces_of_commands(const fl_coupled_robot *robot, const real *block,
+                               const fl_span *span, real command[][3], real force[][3],
+                               real body[][3]) {
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
     memset(force[i], 0, sizeof force[i]);
@@ -34,8 +35,8 @@ static void forces_of_commands(const fl_coupled_robot *robot, const real *block,
 /* Makes the wrench of a block linear at commands: its effectiveness becomes that of the laws
    and the slope of what the actuators do to each other, its offset what is left. Their
    residual from a wrench, on the yardstick; its size. */
-static real linearize_at(const fl_coupled_robot *robot, real *block, fl_work *work, const real *wrench,
-                         real command[][3], real *residual) {
+static real linearize_at(const fl_coupled_robot *robot, real *block, fl_work *work,
+                         const real *wrench, real command[][3], real *residual) {
   const fl_span *span = &work->span;
   const int n = COUNT(block);
   fl_head *head = (fl_head *)block;
@@ -47,7 +48,8 @@ static real linearize_at(const fl_coupled_robot *robot, real *block, fl_work *wo
   forces_of_commands(robot, block, span, command, force, body);
   robot->offset(robot->constants, *body, 1, robot->inflow, *unused, offset, **slope);
   for (int k = 0; k < 6; k++) {
-    head->wrench_offset[k] = HEAD(robot->block_uncoupled)->wrench_offset[k] + robot->axis_counts[k] * offset[k];
+    head->wrench_offset[k] = HEAD(robot->block_uncoupled)->wrench_offset[k] +
+                             robot->axis_counts[k] * offset[k];
     residual[k] = (wrench[k] - head->wrench_offset[k]) / head->wrench_scale[k];
   }
   for (int i = 0; i < n; i++) {
@@ -56,11 +58,11 @@ static real linearize_at(const fl_coupled_robot *robot, real *block, fl_work *wo
     for (int c = 0; c < 3; c++) {
       const real *axis = robot->frames + 9 * i + 3 * c;
       for (int k = 0; k < 6; k++) {
-        const real along =
-            axis[0] * slope[i][0][k] + axis[1] * slope[i][1][k] + axis[2] * slope[i][2][k];
+        const real along = axis[0] * slope[i][0][k] + axis[1] * slope[i][1][k] +
+                           axis[2] * slope[i][2][k];
         const real more = robot->axis_counts[k] * along;
-        linear->effectiveness_normalized[c][k] =
-            plain->effectiveness_normalized[c][k] + more / head->wrench_scale[k];
+        linear->effectiveness_normalized[c][k] = plain->effectiveness_normalized[c][k] +
+                                                 more / head->wrench_scale[k];
         head->wrench_offset[k] -= force[i][c] * more;
         residual[k] -= force[i][c] * plain->effectiveness_normalized[c][k];
       }
@@ -103,8 +105,8 @@ static void command_fins_by_law(const fl_coupled_robot *robot, real *block) {
 
 /* Steps on commands to a wrench, by the whole model, which the block is linear at where they
    end, until an error is enough; the error that is left. */
-static real step_to_wrench(const fl_coupled_robot *robot, real *block, fl_work *work, const fl_box *box,
-                           const real *wrench, real enough, real command[][3]) {
+static real step_to_wrench(const fl_coupled_robot *robot, real *block, fl_work *work,
+                           const fl_box *box, const real *wrench, real enough, real command[][3]) {
   const size_t size = (size_t)COUNT(block) * sizeof *command;
   real residual[6];
   real share = 1;
