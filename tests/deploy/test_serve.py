@@ -451,6 +451,15 @@ def test_after_a_pause_of_the_process_the_first_line_is_rest(folder: Path) -> No
     service.wait(60)
 
 
+@pytest.fixture
+def hangup_ends() -> Iterator[None]:
+    """SIGHUP as it is by default, which the service inherits, also where the tests run by nohup."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    yield
+    signal.signal(signal.SIGHUP, before)
+
+
+@pytest.mark.usefixtures("hangup_ends")
 @pytest.mark.parametrize("number", SIGNALS)
 @pytest.mark.parametrize("part", [b"", b'{"wrench": [1, '])
 def test_the_fins_rest_once_when_told_to_stop(
