@@ -21,7 +21,7 @@ def add_html(gui: viser.GuiApi, content: str) -> viser.GuiHtmlHandle:
     return gui.add_html(str(escape(content)))
 
 
-def put(handle: Any, **values: Any) -> None:
+def set_properties(handle: Any, **values: Any) -> None:
     """Set those properties of a handle that differ, so that an unchanged page gets no message;
     content not marked as markup is text."""
     for key, value in values.items():

@@ -19,7 +19,7 @@ import viser
 
 from finlab.errors import FinlabError
 from tests.webapp.test_app import app, on_loop, server, until, view
-from webapp.handles import put
+from webapp.handles import set_properties
 from webapp.markup.words import html
 from webapp.session import files
 from webapp.session.looking import DRAWERS
@@ -207,9 +207,9 @@ def test_what_is_put_into_markup_is_escaped_once() -> None:
 
 def test_text_that_is_not_marked_is_shown_as_text() -> None:
     handle: Any = type("Handle", (), {"content": ""})()
-    put(handle, content=EVIL)
+    set_properties(handle, content=EVIL)
     assert handle.content.startswith("&lt;img") and type(handle.content) is str
-    put(handle, content=html("<b>{}</b>", 1))
+    set_properties(handle, content=html("<b>{}</b>", 1))
     assert handle.content == "<b>1</b>" and type(handle.content) is str
 
 

@@ -9,7 +9,7 @@ import pytest
 from finlab.layout import load_layout
 from tests.log.conftest import px4_dive
 from tests.webapp.stand_in import Direct, context_of
-from webapp.panels.log_tab import _losses, _said, log_plots, replays_table
+from webapp.panels.log_tab import _losses, _summary, log_plots, replays_table
 from webapp.session import Session
 from webapp.tasks.log_reading import LogReading
 
@@ -29,7 +29,7 @@ def judged(tmp_path_factory: pytest.TempPathFactory) -> tuple[Session, LogReadin
 def test_it_says_what_was_lost_and_draws_it(judged: tuple[Session, LogReading]) -> None:
     log = judged[1].answer
     assert log is not None and log.source == "dive.ulg"
-    said = _said(log, None, None)
+    said = _summary(log, None, None)
     assert "Yaw (Tz) was lost" in said and "--" not in said
     assert _losses(log, None).count("data-press='spell'") == len(log.spells) > 0
     assert log_plots(log, None).count("<svg") == sum(value > 0.0 for value in log.asked) + 1

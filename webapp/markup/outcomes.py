@@ -4,7 +4,7 @@ first."""
 from markupsafe import Markup
 
 from webapp.markup.words import fins_words, html, row, three_digits, unlearned_sentence
-from webapp.tasks.fitting import Fitted
+from webapp.tasks.fitting import FitResult
 from webapp.tasks.swimmer import Moment, Swimmer
 from webapp.tasks.swimming import Swimming
 
@@ -99,7 +99,7 @@ def _warnings(swimmer: Swimmer, shown: Moment) -> str:
 MOST_NAMED = 8
 
 
-def fit_card(result: Fitted) -> str:
+def fit_card(result: FitResult) -> str:
     """What came of a file that was dropped on an actuator."""
     from finlab.fit.thruster_fit import ThrusterFit, summary  # scipy comes with it
 
@@ -109,7 +109,7 @@ def fit_card(result: Fitted) -> str:
         sentence = html(
             "<b>{} is a finished table.</b> It is on {} as it stands.",
             name,
-            result.upload.part.name,
+            result.upload.actuator.name,
         )
         return html("<div class='fl said'>{}</div>", sentence)
     if isinstance(fit, ThrusterFit):

@@ -15,7 +15,7 @@ from finlab.layout import Layout
 from webapp.markup.answer import swatch
 from webapp.markup.words import html
 from webapp.page import Page
-from webapp.panels.actuator_model import add_fit, add_model, of_part
+from webapp.panels.actuator_model import add_fit, add_model, of_selected
 from webapp.panels.inspectors import Box, NumberBox, RangeBox, all_inspectors, inspector_of
 from webapp.session.state import number
 
@@ -65,68 +65,85 @@ def _add_place(page: Page) -> None:
         session.turn_selected(math.radians(number(degrees, "shaft [°]", -3600.0, 3600.0)))
 
     def aim(degrees: tuple[Any, Any]) -> None:
-        turn, rise = (
-            math.radians(number(end, "direction [°]", -3600.0, 3600.0)) for end in degrees
+        azimuth, elevation = (
+            math.radians(number(angle, "direction [°]", -3600.0, 3600.0)) for angle in degrees
         )
-        level = math.cos(rise)
-        session.point_selected((level * math.cos(turn), level * math.sin(turn), math.sin(rise)))
+        level = math.cos(elevation)
+        x = level * math.cos(azimuth)
+        y = level * math.sin(azimuth)
+        session.point_selected((x, y, math.sin(elevation)))
 
-    about = "x forward, y left, z up, from the centre of gravity."
-    place = gui.add_vector3("Position [m]", (0.0, 0.0, 0.0), step=0.005, hint=about)
-    page.bind_number(place, session.place_selected, of_part(lambda part: part.position))
-    about = "Azimuth of the shaft, 0 is ahead, 90 to the left."
-    shaft = gui.add_slider("Shaft [°]", -180.0, 180.0, 1.0, 0.0, hint=about)
+    hint = "x forward, y left, z up, from the centre of gravity."
+    position = gui.add_vector3("Position [m]", (0.0, 0.0, 0.0), step=0.005, hint=hint)
     page.bind_number(
-        shaft, turn, of_part(lambda part: math.degrees(_mounting(part) or 0.0)), digits=2
+        position, session.place_selected, of_selected(lambda actuator: actuator.position)
     )
-    board.show(shaft, visible=of_part(lambda part: _mounting(part) is not None))
-    about = (
+    hint = "Azimuth of the shaft, 0 is ahead, 90 to the left."
+    shaft = gui.add_slider("Shaft [°]", -180.0, 180.0, 1.0, 0.0, hint=hint)
+    page.bind_number(
+        shaft,
+        turn,
+        of_selected(lambda actuator: math.degrees(_mounting(actuator) or 0.0)),
+        digits=2,
+    )
+    board.show(shaft, visible=of_selected(lambda actuator: _mounting(actuator) is not None))
+    hint = (
         "Force of a thruster, of an azimuth at angle 0, or the shaft out of the hull; any length."
     )
-    way = gui.add_vector3("Axis", (1.0, 0.0, 0.0), step=0.05, hint=about)
-    page.bind_number(way, session.point_selected, of_part(lambda part: part.direction))
-    board.show(way, label=of_part(lambda part: part.KIND.pointed.capitalize()))
-    about = "The same: azimuth, 90 is to the left, and how far it rises."
+    direction = gui.add_vector3("Axis", (1.0, 0.0, 0.0), step=0.05, hint=hint)
     page.bind_number(
-        gui.add_vector2("Angles [°]", (0.0, 0.0), step=5.0, hint=about), aim, of_part(_angles), 2
+        direction, session.point_selected, of_selected(lambda actuator: actuator.direction)
+    )
+    board.show(direction, label=of_selected(lambda actuator: actuator.KIND.pointed.capitalize()))
+    hint = "The same: azimuth, 90 is to the left, and how far it rises."
+    page.bind_number(
+        gui.add_vector2("Angles [°]", (0.0, 0.0), step=5.0, hint=hint),
+        aim,
+        of_selected(_angles),
+        digits=2,
     )
     snaps = {word: partial(session.point_selected, vector) for word, vector in SNAPS.items()}
     page.add_buttons("Snap to", snaps, hint="Ahead, astern, left, right, up, down.")
-    about = "Across that: where a fin pushes at φ = 0, the leading edge, or what a pod turns about."
-    other = gui.add_vector3("Zero", (0.0, 0.0, 0.0), step=0.05, hint=about)
+    hint = "Across that: where a fin pushes at φ = 0, the leading edge, or what a pod turns about."
+    second_axis = gui.add_vector3("Zero", (0.0, 0.0, 0.0), step=0.05, hint=hint)
     page.bind_number(
-        other,
+        second_axis,
         session.turn_about,
-        of_part(lambda part: part.frame[0 if part.KIND.pointed_row else 1]),
+        of_selected(lambda actuator: actuator.frame[0 if actuator.KIND.pointed_row else 1]),
     )
     board.show(
-        other,
-        label=of_part(lambda part: inspector_of(type(part)).other_axis),
-        visible=of_part(lambda part: len(part.KIND.axes) > 1 and _mounting(part) is None),
+        second_axis,
+        label=of_selected(lambda actuator: inspector_of(type(actuator)).other_axis),
+        visible=of_selected(_has_second_axis),
     )
 
 
-def _mounting(part: Actuator) -> float | None:
-    return getattr(part, "mounting_angle", None)
+def _has_second_axis(actuator: Actuator) -> bool:
+    """Whether its second axis is free: a mounting angle fixes that of a fin."""
+    return len(actuator.KIND.axes) > 1 and _mounting(actuator) is None
 
 
-def _angles(part: Actuator) -> tuple[float, float]:
+def _mounting(actuator: Actuator) -> float | None:
+    return getattr(actuator, "mounting_angle", None)
+
+
+def _angles(actuator: Actuator) -> tuple[float, float]:
     """Azimuth and rise of a direction [deg]."""
-    x, y, z = part.direction
+    x, y, z = actuator.direction
     return math.degrees(math.atan2(y, x)), math.degrees(math.atan2(z, math.hypot(x, y)))
 
 
-def _has(part: Actuator, box: Box) -> bool:
+def _has(actuator: Actuator, box: Box) -> bool:
     """Whether the inspector of an actuator, with the model that it has, shows a box."""
-    inspector = inspector_of(type(part))
+    inspector = inspector_of(type(actuator))
     if box not in inspector.limits and box not in inspector.law:
         return False
-    return isinstance(box, RangeBox) or box.model in ("", part.model_type)
+    return isinstance(box, RangeBox) or box.model in ("", actuator.model_type)
 
 
-def _value(part: Actuator, box: Box) -> Any:
+def _value(actuator: Actuator, box: Box) -> Any:
     """Value of an actuator that a box shows, in its unit; the box's default where it has none."""
-    value = part.value(box.key) if _has(part, box) else None
+    value = actuator.value(box.key) if _has(actuator, box) else None
     if value is not None:
         return np.degrees(value).tolist() if box.degrees else value
     if isinstance(box, RangeBox):
@@ -147,35 +164,37 @@ def _add_boxes(page: Page, boxes_by_kind: Sequence[Sequence[Box]]) -> None:
 
 
 def _add_range_box(page: Page, box: RangeBox) -> None:
-    def set_range(shown: tuple[Any, Any]) -> None:
-        page.session.set_value(box.key, tuple(_in_field(box, end) for end in shown))
+    def set_range(typed: tuple[Any, Any]) -> None:
+        page.session.set_value(box.key, tuple(_in_field(box, end) for end in typed))
 
     handle = page.gui.add_vector2(
         box.label, (0.0, 0.0), step=box.step, hint=box.hint, visible=False
     )
     digits = 2 if box.degrees else 4
-    page.bind_number(handle, set_range, of_part(lambda part: _value(part, box)), digits)
-    page.board.show(handle, visible=of_part(lambda part: _has(part, box)))
+    page.bind_number(handle, set_range, of_selected(lambda actuator: _value(actuator, box)), digits)
+    page.board.show(handle, visible=of_selected(lambda actuator: _has(actuator, box)))
 
 
 def _add_number_box(page: Page, box: NumberBox) -> None:
     """A box that may be empty is so where the field is None, and a 0 empties it again."""
 
-    def set_number(shown: Any) -> None:
-        value = _in_field(box, shown)
+    def set_number(typed: Any) -> None:
+        value = _in_field(box, typed)
         page.session.set_value(box.key, None if box.may_be_empty and not value else value)
 
     handle = page.gui.add_number(
         box.label, box.default, step=box.step, hint=box.hint, visible=False
     )
     digits = 2 if box.degrees else 5
-    page.bind_number(handle, set_number, of_part(lambda part: _value(part, box)), digits)
-    page.board.show(handle, visible=of_part(lambda part: _has(part, box)))
+    page.bind_number(
+        handle, set_number, of_selected(lambda actuator: _value(actuator, box)), digits
+    )
+    page.board.show(handle, visible=of_selected(lambda actuator: _has(actuator, box)))
 
 
-def _in_field(box: Box, shown: Any) -> float:
+def _in_field(box: Box, typed: Any) -> float:
     """A number of a box in the unit of its field. Raises FinlabError: it is none."""
-    value = number(shown, box.label, -LARGEST, LARGEST)
+    value = number(typed, box.label, -LARGEST, LARGEST)
     return math.radians(value) if box.degrees else value
 
 

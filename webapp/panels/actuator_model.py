@@ -20,7 +20,7 @@ from finlab.physics import make_law, plant_of
 from webapp.markup.plot import Plot, exact_axis, positive
 from webapp.markup.words import degrees, html, in_app
 from webapp.page import Page
-from webapp.tasks.fitting import MAX_BYTES, Fitted
+from webapp.tasks.fitting import MAX_BYTES, FitResult
 from webapp.theme import BLUE, GREEN, ORANGE
 
 BEYOND = 0.01
@@ -42,33 +42,36 @@ CSV = ".csv,.txt,.xlsx"
 NOMINAL = Fin("nominal", (0.0, 0.0, 0.0), 0.0)
 
 
-def part_shown(selected: str | None, layout: Layout) -> Actuator:
+def selected_actuator(selected: str | None, layout: Layout) -> Actuator:
     """The actuator that was selected last; a nominal fin where none is."""
     return NOMINAL if selected is None else layout.part(selected)
 
 
-def of_part(value: Callable[[Actuator], Any]) -> Callable[[str | None, Layout], Any]:
+def of_selected(value: Callable[[Actuator], Any]) -> Callable[[str | None, Layout], Any]:
     """What is shown of the actuator that was selected last."""
-    return lambda selected, layout: value(part_shown(selected, layout))
+    return lambda selected, layout: value(selected_actuator(selected, layout))
 
 
 def add_model(page: Page) -> None:
     """The choice of a formula, and what is said of it."""
 
-    def options(part: Actuator) -> tuple[str, ...]:
-        return tuple(dict.fromkeys((*part.KIND.models, part.model_type)))
+    def options(actuator: Actuator) -> tuple[str, ...]:
+        return tuple(dict.fromkeys((*actuator.KIND.models, actuator.model_type)))
 
-    def words(selected: str | None, layout: Layout, fitted: Fitted | None) -> str:
-        part = part_shown(selected, layout)
-        reported = fitted is not None and fitted.found["model"] == getattr(part, "model", None)
-        return model_card(part, doubts=not reported)
+    def words(selected: str | None, layout: Layout, fit_result: FitResult | None) -> str:
+        actuator = selected_actuator(selected, layout)
+        reported = fit_result is not None and fit_result.fields["model"] == getattr(
+            actuator, "model", None
+        )
+        return model_card(actuator, doubts=not reported)
 
     about = "The formula that gives force and power; a table comes from a file, below."
     kinds = page.board.show(
-        page.gui.add_dropdown("Model", NOMINAL.KIND.models, hint=about), options=of_part(options)
+        page.gui.add_dropdown("Model", NOMINAL.KIND.models, hint=about),
+        options=of_selected(options),
     )
-    page.board.show(kinds, visible=of_part(lambda part: len(options(part)) > 1))
-    page.bind(kinds, page.session.choose_model, of_part(lambda part: part.model_type))
+    page.board.show(kinds, visible=of_selected(lambda actuator: len(options(actuator)) > 1))
+    page.bind(kinds, page.session.choose_model, of_selected(lambda actuator: actuator.model_type))
     page.add_html(words)
 
 
@@ -87,7 +90,7 @@ def add_fit(page: Page) -> None:
         fitting.start(session.selected, name, content)
         session.show_task("Design")
 
-    page.add_html(of_part(drawn_curves))
+    page.add_html(of_selected(drawn_curves))
     page.opening.add(CSV, upload)
     about = (
         "A fin: noisy rows of A, f, phi, Fx, Fy, Fz, or a force table. A thruster: PWM, force and "
@@ -101,58 +104,58 @@ def add_fit(page: Page) -> None:
             mime_type=CSV,
             hint=f"{about} Up to {MAX_BYTES // 1_000_000} MB.",
         )
-    board.show(button, disabled=lambda selected, fitting: selected is None or fitting is not None)
-    board.show(full, visible=of_part(lambda part: hasattr(part, "model")))
+    board.show(
+        button, disabled=lambda selected, fit_progress: selected is None or fit_progress is not None
+    )
+    board.show(full, visible=of_selected(lambda actuator: hasattr(actuator, "model")))
     bar = gui.add_progress_bar(100.0, animated=True, visible=False)
     hint = "The actuator stays as it is."
     cancel = page.add_button("Cancel", fitting.forget, icon=viser.Icon.X, visible=False, hint=hint)
     for handle in (bar, cancel):
-        board.show(handle, visible=lambda fitting: fitting is not None)
-    page.add_html(_written)
+        board.show(handle, visible=lambda fit_progress: fit_progress is not None)
+    page.add_html(_fit_html)
     results = {"On all like it": fitting.put_on_all, "Close": fitting.forget}
     hint = "All that had the same model. Undo takes a fit back."
     buttons = page.add_buttons("Fit", results, visible=False, hint=hint)
-    board.show(buttons, visible=lambda fitted: fitted is not None)
+    board.show(buttons, visible=lambda fit_result: fit_result is not None)
 
 
-def _written(fitted: Fitted | None, fitting: str | None, fitted_error: str | None) -> str:
-    if fitting is not None:
-        return html("<div class='fl dim'>{} …</div>", fitting)
-    if fitted_error is not None:
-        return html(
-            "<div class='fl'><div class='said missing'>{}</div></div>", in_app(fitted_error)
-        )
-    if fitted is None:
+def _fit_html(fit_result: FitResult | None, fit_progress: str | None, fit_error: str | None) -> str:
+    if fit_progress is not None:
+        return html("<div class='fl dim'>{} …</div>", fit_progress)
+    if fit_error is not None:
+        return html("<div class='fl'><div class='said missing'>{}</div></div>", in_app(fit_error))
+    if fit_result is None:
         return ""
     from webapp.markup.outcomes import fit_card  # scipy comes with it
 
-    return fit_card(fitted)
+    return fit_card(fit_result)
 
 
-def model_card(part: Actuator, doubts: bool = True) -> str:
+def model_card(actuator: Actuator, doubts: bool = True) -> str:
     """The model of an actuator; without `doubts` where they stand elsewhere already."""
-    if isinstance(part, Fin) and part.model.type == "table":
-        return html("<div class='fl'>{}</div>", _table_words(part, doubts))
-    model = getattr(part, "model", None)
+    if isinstance(actuator, Fin) and actuator.model.type == "table":
+        return html("<div class='fl'>{}</div>", _table_words(actuator, doubts))
+    model = getattr(actuator, "model", None)
     if isinstance(model, PowerTable):
         (first, *_) = model.rows[0]
         (last, *_) = model.rows[-1]
         template = "<div class='fl dim'><b>table</b> of {} rows, command {:g} to {:g} {}</div>"
         return html(template, len(model.rows), first, last, model.unit)
-    sentence = law_words(part)
+    sentence = law_words(actuator)
     return html("<div class='fl dim'>{}{}.</div>", sentence[0].upper(), sentence[1:])
 
 
-def law_words(part: Actuator) -> str:
+def law_words(actuator: Actuator) -> str:
     """What the formula of an actuator is, without a full stop: the words of `LAWS`, else, of a fin
     law, the summary of its class."""
-    kind = part.model_type
+    kind = actuator.model_type
     if kind in LAWS:
         return LAWS[kind]
-    if isinstance(part, Fin) and kind in PLANAR_LAWS:
+    if isinstance(actuator, Fin) and kind in PLANAR_LAWS:
         summary = (PLANAR_LAWS[kind].__doc__ or f"the law {kind}").split("\n\n")[0]
         return " ".join(summary.split()).removesuffix(".")
-    return f"a law of its own kind, {part.type}"
+    return f"a law of its own kind, {actuator.type}"
 
 
 def _table_words(fin: Fin, doubts: bool) -> str:
@@ -180,8 +183,8 @@ def _table_words(fin: Fin, doubts: bool) -> str:
             degrees(most_a),
             most_f,
         )
-    fitted = next((note for note in law.notes if note.startswith("fitted to ")), None)
-    origin = f", {fitted.split(',')[0]}" if fitted else " of forces"
+    fit_note = next((note for note in law.notes if note.startswith("fitted to ")), None)
+    origin = f", {fit_note.split(',')[0]}" if fit_note else " of forces"
     return html("<b>table</b>{}.{}<div class='dim'>{}; {}.</div>", origin, sentence, covers, power)
 
 
@@ -195,11 +198,11 @@ class Curves(NamedTuple):
     """Names and values of curves; a single one needs no name."""
 
 
-def drawn_curves(part: Actuator) -> str:
+def drawn_curves(actuator: Actuator) -> str:
     """Plots of one actuator; nothing where its table cannot be read, which is reported
     elsewhere."""
     try:
-        result = curves(part)
+        result = curves(actuator)
     except DataError:
         return ""
     plots = []
@@ -217,17 +220,17 @@ def drawn_curves(part: Actuator) -> str:
 
 
 @lru_cache(maxsize=64)
-def curves(part: Actuator) -> Sequence[Curves]:
+def curves(actuator: Actuator) -> Sequence[Curves]:
     """Force and power of an actuator over its command: of a fin for three amplitudes, of a rudder
     for water from ahead at 1 m/s. Raises DataError: its table cannot be read."""
-    plant = plant_of(Layout("one", (part,)))
-    if isinstance(part, Fin):
-        across = np.linspace(*part.limits.frequency, POINTS)
-        amplitude = np.array(SHARES) * part.limits.amplitude[1]
+    plant = plant_of(Layout("one", (actuator,)))
+    if isinstance(actuator, Fin):
+        across = np.linspace(*actuator.limits.frequency, POINTS)
+        amplitude = np.array(SHARES) * actuator.limits.amplitude[1]
         command = np.zeros((len(SHARES), POINTS, 1, 3))
         command[..., 0, 0] = amplitude[:, None]
         command[..., 0, 1] = across
-        command[..., 0, 2] = np.mean(part.limits.zero_direction)
+        command[..., 0, 2] = np.mean(actuator.limits.zero_direction)
         force = np.linalg.norm(plant.force(command)[..., 0, :], axis=-1)
         names = [f"A {degrees(size)}°" for size in amplitude]
         kinds = (("mean force [N]", force), ("power [W]", plant.power(command)[..., 0]))
@@ -235,27 +238,29 @@ def curves(part: Actuator) -> Sequence[Curves]:
             Curves("frequency [Hz]", across, up, tuple(zip(names, y, strict=True)))
             for up, y in kinds
         ]
-    if part.KIND.driven_by_flow:
-        across = np.linspace(part.lower[0], part.upper[0], POINTS)
+    if actuator.KIND.driven_by_flow:
+        across = np.linspace(actuator.lower[0], actuator.upper[0], POINTS)
         command = np.zeros((POINTS, 1, 3))
         command[:, 0, 0] = across
         flow = np.zeros(6)
-        flow[:3] = part.frame[1]  # whatever its place, the water meets it from ahead
-        at_origin = plant_of(Layout("one", (replace(part, position=(0.0, 0.0, 0.0)),)))
+        flow[:3] = actuator.frame[1]  # whatever its place, the water meets it from ahead
+        at_origin = plant_of(Layout("one", (replace(actuator, position=(0.0, 0.0, 0.0)),)))
         force = at_origin.force(command, flow=flow)[:, 0]
         lines = ("lift", force[:, 2]), ("drag", -force[:, 1])
         return [Curves("deflection [°], water at 1 m/s", np.degrees(across), "force [N]", lines)]
-    model = getattr(part, "model", None)
+    model = getattr(actuator, "model", None)
     if isinstance(model, PowerTable):
         across, force, power = model.columns
         word = f"command [{model.unit}]" if model.unit else "command"
         pairs = (("force [N]", force), ("power [W]", power))
         return [Curves(word, across, up, (("", y),)) for up, y in pairs]
-    if part.KIND.force_number is None:
+    if actuator.KIND.force_number is None:
         return []
     across = np.linspace(
-        part.lower[part.KIND.force_number], part.upper[part.KIND.force_number], POINTS
+        actuator.lower[actuator.KIND.force_number],
+        actuator.upper[actuator.KIND.force_number],
+        POINTS,
     )
     command = np.zeros((POINTS, 1, 3))
-    command[:, 0, part.KIND.force_number] = across
+    command[:, 0, actuator.KIND.force_number] = across
     return [Curves("force [N]", across, "power [W]", (("", plant.power(command)[:, 0]),))]

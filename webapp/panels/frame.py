@@ -15,7 +15,7 @@ from markupsafe import Markup
 
 from finlab.layout import Layout
 from finlab.physics import plant_of
-from webapp.handles import add_html, button, put
+from webapp.handles import add_html, button, set_properties
 from webapp.markup.words import html, marker
 from webapp.page import Page
 from webapp.panels import places
@@ -86,8 +86,8 @@ class Section:
         self._say("" if error is None else html(template, name, str(error)))
 
     def _say(self, text: str) -> None:
-        put(self._sentence, content=text, visible=bool(text))
-        put(self._folder, visible=self._met and not text)
+        set_properties(self._sentence, content=text, visible=bool(text))
+        set_properties(self._folder, visible=self._met and not text)
 
 
 class Frame:
@@ -133,7 +133,7 @@ class Frame:
         stop: Stop | None,
         swimmer: Swimmer | None,
         layout: Layout,
-        judged: "Judgement | None",
+        judgement: "Judgement | None",
     ) -> None:
         """Write which regions and sections are there; the drawer is low until there are plots in
         it."""
@@ -158,20 +158,20 @@ class Frame:
         }
         variables = Markup().join(f"--has-{name}: {int(there)};" for name, there in counts.items())
         swum = 2 * (swimmer is not None)
-        rows = 0 if judged is None else plot_rows(judged)
+        rows = 0 if judgement is None else plot_rows(judgement)
         rows = {places.SIMULATE: swum, places.LOG: rows}.get(desk.task, 0)
         is_timeline = drawer in (*DRAWERS[places.SIMULATE], DRAWERS[places.LOG][0])
         low = desk.task in (places.SIMULATE, places.LOG) and not rows
         height = LOW if low else USUAL.format(HEAD_PX + ROW_PX * rows) if is_timeline else ""
         hidden = Markup(f"{', '.join(gone)} {{ display: none !important; }}")
-        put(
+        set_properties(
             self._shown,
             content=html("<style>:root {{ {} }} {} {}</style>", variables, Markup(height), hidden),
         )
 
-    def _guard(self, swims: bool, fitting: str | None, improving: bool) -> None:
+    def _guard(self, swims: bool, fit_progress: str | None, improving: bool) -> None:
         """A reload asks first while there is something that it would drop."""
-        drops = str(swims or fitting is not None or improving).lower()
+        drops = str(swims or fit_progress is not None or improving).lower()
         run_script(self._page.gui, f"window.finlabDrops = {drops};")
 
     def _listen(self) -> None:

@@ -9,7 +9,7 @@ from markupsafe import Markup
 
 from finlab.analysis import AXES as MOTIONS
 from finlab.axes import AXES
-from webapp.handles import add_html, placed, press, put
+from webapp.handles import add_html, placed, press, set_properties
 from webapp.markup.plot import cost_axis, exact_axis, over_time
 from webapp.markup.words import html, in_app, marker, row, three_digits
 from webapp.page import Page
@@ -45,37 +45,41 @@ def add_log(page: Page) -> None:
     page.bind(
         gui.add_checkbox("This robot", False, hint=about), log.choose_robot, lambda by_page: by_page
     )
-    page.add_html(_said)
+    page.add_html(_summary)
     better = page.add_button(
         "Open the improved robot", lambda: _improve(page), icon=viser.Icon.SPARKLES
     )
     page.board.show(
-        better, visible=lambda judged: judged is not None and judged.improved is not None
+        better, visible=lambda judgement: judgement is not None and judgement.improved is not None
     )
 
 
 def _improve(page: Page) -> None:
-    judged = page.jobs.log.answer
-    if judged is not None and judged.improved is not None:
-        page.jobs.log.use(judged.improved, f"Robot for {judged.source}")
+    judgement = page.jobs.log.answer
+    if judgement is not None and judgement.improved is not None:
+        page.jobs.log.use(judgement.improved, f"Robot for {judgement.source}")
 
 
-def _said(judged: "Judgement | None", judging: str | None, judged_error: str | None) -> str:
-    if judging is not None:
-        return html("<div class='fl dim'>{} …</div>", judging.capitalize())
-    if judged is None:
+def _summary(
+    judgement: "Judgement | None", judgement_progress: str | None, judgement_error: str | None
+) -> str:
+    if judgement_progress is not None:
+        return html("<div class='fl dim'>{} …</div>", judgement_progress.capitalize())
+    if judgement is None:
         sentence = (
-            html("<div class='missing'>{}</div>", in_app(judged_error)) if judged_error else FIRST
+            html("<div class='missing'>{}</div>", in_app(judgement_error))
+            if judgement_error
+            else FIRST
         )
         return html("<div class='fl'>{}</div>", sentence)
     notes = [
         html("<div class='said dim'>{}</div>", in_app(note))
-        for note in (*judged.asks, *judged.notes)
+        for note in (*judgement.asks, *judgement.notes)
     ]
     return html(
         "<div class='fl'><b>{}</b><div class='said'>{}</div>{}</div>",
-        judged.source,
-        judged.sentence,
+        judgement.source,
+        judgement.sentence,
         notes,
     )
 
@@ -84,8 +88,8 @@ def add_losses(page: Page) -> None:
     """What was lost on each axis, and when; a spell that is pressed is put on the robot."""
 
     def jump(key: str, _held: str) -> None:
-        judged = page.jobs.log.answer
-        spells = () if judged is None else judged.spells
+        judgement = page.jobs.log.answer
+        spells = () if judgement is None else judgement.spells
         page.jobs.log.jump(spells[placed(key, len(spells))].start)
 
     page.presses.on("spell", jump)
@@ -94,11 +98,11 @@ def add_losses(page: Page) -> None:
     )
     page.on_change(slider, page.jobs.log.jump)
 
-    def place(judged: "Judgement | None", log_moment: float | None) -> None:
-        put(slider, visible=judged is not None)
-        if judged is not None:
-            first, last = judged.timeline.time[[0, -1]].tolist()
-            put(
+    def place(judgement: "Judgement | None", log_moment: float | None) -> None:
+        set_properties(slider, visible=judgement is not None)
+        if judgement is not None:
+            first, last = judgement.timeline.time[[0, -1]].tolist()
+            set_properties(
                 slider,
                 max=max(last, first + 0.1),
                 min=first,
@@ -109,12 +113,14 @@ def add_losses(page: Page) -> None:
     page.add_html(_losses)
 
 
-def _losses(judged: "Judgement | None", log_moment: float | None) -> str:
-    if judged is None:
+def _losses(judgement: "Judgement | None", log_moment: float | None) -> str:
+    if judgement is None:
         return html(
             "<div class='fl dim'>{}</div>", "What was lost on each axis, and when, is listed here."
         )
-    each = zip(MOTIONS, AXIS_UNITS, judged.asked, judged.missing, judged.lost_s, strict=True)
+    each = zip(
+        MOTIONS, AXIS_UNITS, judgement.asked, judgement.missing, judgement.lost_s, strict=True
+    )
     rows = [
         row(
             html("{} <span class='dim'>{} s</span>", motion, unit),
@@ -135,7 +141,7 @@ def _losses(judged: "Judgement | None", log_moment: float | None) -> str:
             ", ".join(spell.axes),
             ", ".join(spell.limits),
         )
-        for k, spell in enumerate(judged.spells)
+        for k, spell in enumerate(judgement.spells)
     ]
     when = Markup(
         "<tr><th>when [s]</th><th class='words'>lost</th><th class='words'>at a limit</th></tr>"
@@ -146,59 +152,59 @@ def _losses(judged: "Judgement | None", log_moment: float | None) -> str:
     return html("<div class='fl'>{}</div>", tables)
 
 
-def _asked_axes(judged: "Judgement") -> list[int]:
-    return np.flatnonzero(np.array(judged.asked) > 1e-3 * max(judged.asked)).tolist()
+def _asked_axes(judgement: "Judgement") -> list[int]:
+    return np.flatnonzero(np.array(judgement.asked) > 1e-3 * max(judgement.asked)).tolist()
 
 
-def plot_rows(judged: "Judgement") -> int:
+def plot_rows(judgement: "Judgement") -> int:
     """Rows that the plots of a log take, in a window of usual width."""
-    return 1 if len(_asked_axes(judged)) < ACROSS else 2
+    return 1 if len(_asked_axes(judgement)) < ACROSS else 2
 
 
-def log_plots(judged: "Judgement | None", log_moment: float | None) -> str:
+def log_plots(judgement: "Judgement | None", log_moment: float | None) -> str:
     """Demand and what was given over time, of each axis that was asked for, and actuators at their
     limits."""
-    if judged is None:
+    if judgement is None:
         return html(
             "<div class='fl dim fl-timeline'>{}</div>", "The log is plotted here over time."
         )
-    line = judged.timeline
+    line = judgement.timeline
     parts = []
-    ends: Any = np.append(line.time, line.time[-1] + judged.seconds / len(line.time))
+    ends: Any = np.append(line.time, line.time[-1] + judgement.seconds / len(line.time))
     across = exact_axis("time [s]", ends)
-    for k in _asked_axes(judged):
+    for k in _asked_axes(judgement):
         both = [line.demand[:, k], line.given[:, k]]
         up = cost_axis(f"{MOTIONS[k]} [{AXIS_UNITS[k]}]", np.append((-1e-3, 1e-3), both), 4)
         words = ("asked", "given")
         parts.append(over_time(across, line.time, up, both, (ASKED, DELIVERED), words, log_moment))
     shares = list(100.0 * line.limits.T)
     up = cost_axis("at a limit [%]", np.array((0.0, 100.0)), 4)
-    colors = [fin_color(k) for k in range(judged.robot.n)]
+    colors = [fin_color(k) for k in range(judgement.robot.n)]
     parts.append(over_time(across, line.time, up, shares, colors, (), log_moment))
     return html("<div class='fl fl-timeline'>{}</div>", parts)
 
 
-def replays_table(judged: "Judgement | None") -> str:
+def replays_table(judgement: "Judgement | None") -> str:
     """The same demands asked of other methods and policies, with each actuator lost, of a better
     robot."""
-    if judged is None:
+    if judgement is None:
         return html(
             "<div class='fl dim'>{}</div>",
             "Other methods and policies are asked the log's demands here.",
         )
-    lost = AXES.index(judged.axis) if judged.axis else int(np.argmax(judged.asked))
+    lost = AXES.index(judgement.axis) if judgement.axis else int(np.argmax(judgement.asked))
     rows = [
         html(
             "<tr><td>{}</td><td class='words'>{}</td><td "
             "class='{}'>{}</td><td>{}</td><td>{}</td></tr>",
             each.robot if each.lost is None else f"without {each.lost}",
             each.name,
-            "given" if each == judged.held_by else "",
+            "given" if each == judgement.held_by else "",
             three_digits(each.missing[lost]),
             three_digits(each.watts),
             three_digits(each.saturated_s),
         )
-        for each in judged.replays
+        for each in judgement.replays
     ]
     head = html(
         "<tr><th>robot</th><th class='words'>method</th><th>{} missing [{} s]</th><th>power "
@@ -215,5 +221,5 @@ def replays_table(judged: "Judgement | None") -> str:
         "<div class='fl fl-timeline'><table class='methods'>{}{}</table>{}</div>",
         head,
         rows,
-        sentence if judged.held_by else "",
+        sentence if judgement.held_by else "",
     )

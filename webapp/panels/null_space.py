@@ -7,7 +7,7 @@ from functools import partial
 import viser
 
 from finlab.physics.objective import REACHED
-from webapp.handles import add_html, put
+from webapp.handles import add_html, set_properties
 from webapp.markup.words import html, marker
 from webapp.page import Page
 from webapp.panels.modes_tab import add_saving, mode_table
@@ -33,7 +33,7 @@ def add_null_space(page: Page) -> None:
         known = modes.null_space
         for k, slider in enumerate(sliders):
             there = known is not None and k < len(known.names)
-            put(slider, visible=there)
+            set_properties(slider, visible=there)
             if known is None or not there:
                 continue
             low, high = known.ranges[k]
@@ -42,14 +42,14 @@ def add_null_space(page: Page) -> None:
             high = math.floor(high / step) * step
             value = shifts[k] if k < len(shifts) else 0.0
             ends = {"max": max(high, value, step), "min": min(low, value, -step)}
-            put(
+            set_properties(
                 slider,
                 label=f"{known.names[k]} [N]",
                 hint=f"Shares: {known.about[k]}.",
                 step=step,
                 **ends,
             )
-            put(slider, value=round(value, 6))
+            set_properties(slider, value=round(value, 6))
 
     page.board.act(place, *sliders)
     add_html(page.gui, marker("fl-column"))

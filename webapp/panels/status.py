@@ -8,7 +8,7 @@ from markupsafe import Markup
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.policy import AXES
 from finlab.physics.objective import REACHED
-from webapp.handles import put
+from webapp.handles import set_properties
 from webapp.markup.verdict import COLORS, WORKING, verdict_of, verdict_sentence
 from webapp.markup.words import error_digits, html, parts_word, three_digits
 from webapp.page import Page
@@ -31,7 +31,7 @@ def add_corner(page: Page) -> None:
 
     def fail(error: Exception | None) -> None:
         if error is not None:
-            put(content, content="")
+            set_properties(content, content="")
 
     page.board.group(fail)
     content = page.add_html(_written)

@@ -12,7 +12,7 @@ import viser
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.layout.layout import MAX_ACTUATORS
-from webapp.handles import add_html, put
+from webapp.handles import add_html, set_properties
 from webapp.markup.outcomes import swim_card
 from webapp.markup.plot import cost_axis, exact_axis, over_time, positive
 from webapp.markup.words import html, marker, righting_sentences, trim_sentence
@@ -142,13 +142,15 @@ def add_timeline(page: Page) -> None:
         nonlocal drawn
         now = time.monotonic()
         if swimmer is None:
-            put(content, content=html("<div class='fl fl-timeline fl-unswum dim'>{}</div>", UNSWUM))
+            set_properties(
+                content, content=html("<div class='fl fl-timeline fl-unswum dim'>{}</div>", UNSWUM)
+            )
         elif moment is None or not len(moment.record):
             return
         elif paused or moment.done or now - drawn >= EVERY_S:
             drawn = now
             plots = timeline(moment.record, len(swimmer.fins), swimmer.duration_s)
-            put(content, content=html("<div class='fl fl-timeline'>{}</div>", plots))
+            set_properties(content, content=html("<div class='fl fl-timeline'>{}</div>", plots))
 
     page.board.act(draw)
 

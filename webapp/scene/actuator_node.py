@@ -15,7 +15,7 @@ from finlab.arrays import Array
 from finlab.layout import Actuator
 from finlab.swim.hull import Surface
 from finlab.swim.hull.mesh_file import Mesh
-from webapp.handles import put
+from webapp.handles import set_properties
 from webapp.scene import actuator_shapes as shapes
 from webapp.scene.actuator_shapes import NOTHING, joined, tube
 from webapp.scene.stage import Shape
@@ -147,8 +147,8 @@ class ActuatorNode:
 
     def hide(self) -> None:
         """The layout has no actuator at this place."""
-        put(self._move, visible=False, active_axes=(False,) * 3)
-        put(self._strut.node, visible=False)
+        set_properties(self._move, visible=False, active_axes=(False,) * 3)
+        set_properties(self._strut.node, visible=False)
 
     def place(
         self,
@@ -176,21 +176,23 @@ class ActuatorNode:
             _propeller, int(is_pod) if is_pod or part.KIND.drawn_as == "thruster" else -1
         )
         for shape in (self._moving, self._spinning, self._mount):
-            put(shape.node, scale=scale)
+            set_properties(shape.node, scale=scale)
         self._pin.show(shapes.pin, size)
-        put(self._pin.node, visible=stuck)
-        put(self._move, visible=True, active_axes=(moved,) * 3, scale=GIZMO_SIZE * arrows)
+        set_properties(self._pin.node, visible=stuck)
+        set_properties(
+            self._move, visible=True, active_axes=(moved,) * 3, scale=GIZMO_SIZE * arrows
+        )
         if not owned_by_user:
-            put(self._move, position=position)
-            put(self._axes, wxyz=np.asarray(SO3.from_matrix(frame.T).wxyz))
-        put(self._label, text=label, position=np.array([0.0, 0.0, 0.04 * size]))
+            set_properties(self._move, position=position)
+            set_properties(self._axes, wxyz=np.asarray(SO3.from_matrix(frame.T).wxyz))
+        set_properties(self._label, text=label, position=np.array([0.0, 0.0, 0.04 * size]))
         if is_fin:
             position = position - 0.03 * size * frame[0]
         elif is_pod:
             column = size * shapes.COLUMN[-1, 0] * frame[0]
             position = position + (column if inward @ frame[0] >= 0.0 else -column)
         self._strut.show(_strut, position, hull, 0.008 * size)
-        put(self._strut.node, visible=True)
+        set_properties(self._strut.node, visible=True)
 
     def command(self, alive: bool) -> None:
         """Show whether it works."""

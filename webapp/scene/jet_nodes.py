@@ -10,7 +10,7 @@ from finlab.interaction.jets import Jets
 from finlab.layout import Layout
 from finlab.physics import plant_of
 from finlab.swim.hull.mesh_file import Mesh
-from webapp.handles import put
+from webapp.handles import set_properties
 from webapp.scene.actuator_shapes import NOTHING, force_arrow, tube
 from webapp.scene.stage import Shape, part_size
 from webapp.theme import TAKEN, WATER
@@ -52,8 +52,10 @@ class JetNodes:
         form = layout.interaction if isinstance(layout.interaction, Jets) else Jets()
         for i in range(layout.n):
             jet, arrow = self._node(i)
-            put(jet.node, visible=bool(blows[i]), position=layout.position[i])
-            put(arrow.node, visible=bool(counts[i]), position=layout.position[i], scale=size)
+            set_properties(jet.node, visible=bool(blows[i]), position=layout.position[i])
+            set_properties(
+                arrow.node, visible=bool(counts[i]), position=layout.position[i], scale=size
+            )
             if blows[i]:
                 jet.show(cone, ways[i], float(diameter[i]), form.width, form.spread)
             if counts[i]:
@@ -74,7 +76,7 @@ class JetNodes:
         """Nothing from a place on."""
         for pair in self._nodes[first : self.drawn]:
             for shape in pair:
-                put(shape.node, visible=False)
+                set_properties(shape.node, visible=False)
         self.drawn = first
 
 

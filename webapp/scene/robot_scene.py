@@ -15,7 +15,7 @@ from finlab.layout import Actuator, Layout
 from finlab.layout.damage import Damage
 from finlab.swim.hull.surface import has_inside, hull_of
 from webapp.board import Board
-from webapp.handles import put
+from webapp.handles import set_properties
 from webapp.intents import Intents
 from webapp.markup.words import damage_words, missing_part
 from webapp.scene.actuator_node import ActuatorNode, Motion, motion, moved_parts
@@ -86,14 +86,14 @@ class RobotScene:
 
     def hide(self) -> None:
         """What stands there may be another robot's."""
-        put(self.root, visible=False)
+        set_properties(self.root, visible=False)
 
     def show(self, swimmer: Swimmer | None) -> None:
         """A robot that does not swim stands on a floor of its own."""
-        put(self.root, visible=True)
-        put(self._stage.floor, visible=swimmer is None)
+        set_properties(self.root, visible=True)
+        set_properties(self._stage.floor, visible=swimmer is None)
         if swimmer is None:
-            put(self.root, position=np.zeros(3), wxyz=np.array([1.0, 0.0, 0.0, 0.0]))
+            set_properties(self.root, position=np.zeros(3), wxyz=np.array([1.0, 0.0, 0.0, 0.0]))
 
     def look_from(self, view: str) -> None:
         """Move the camera to one of `CAMERAS`."""
@@ -296,7 +296,7 @@ class RobotScene:
         now = {part.name: (part.position, part.frame) for part in layout.actuators}
         parts = () if other is None or other.name != layout.name else other.actuators
         moved = tuple(part for part in parts if now.get(part.name) != (part.position, part.frame))
-        put(self._offered.node, visible=bool(moved))
+        set_properties(self._offered.node, visible=bool(moved))
         if moved:
             self._offered.show(moved_parts, moved, part_size(layout))
 

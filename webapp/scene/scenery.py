@@ -11,7 +11,7 @@ from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
 from finlab.swim.hull.mesh_file import Mesh
 from webapp.board import Board
-from webapp.handles import put
+from webapp.handles import set_properties
 from webapp.intents import Intents
 from webapp.scene.actuator_shapes import NOTHING, force_arrow, joined, tube
 from webapp.scene.robot_scene import RobotScene
@@ -177,7 +177,7 @@ class SwimScene:
     def refresh(self, swimmer: Swimmer | None, moment: Moment | None, display: Display) -> None:
         """Show the newest moment."""
         for node in (self._goal.node, self._reference, self._floor, self._water.node, self._trail):
-            put(node, visible=swimmer is not None)
+            set_properties(node, visible=swimmer is not None)
         paint_floor(self._floor, display.dark)
         if swimmer is None or moment is None:
             if self._shown is not None:
@@ -189,7 +189,7 @@ class SwimScene:
         self._behind = self._ahead or moment
         self._ahead = moment
         self._clock = self._behind.time
-        put(self._reference, position=moment.reference)
+        set_properties(self._reference, position=moment.reference)
         path = swimmer.path
         flow = swimmer.shown.flow
         position = np.array(
@@ -203,7 +203,7 @@ class SwimScene:
             if len(places) > 1
             else NO_LINE
         )
-        put(self._trail, points=points, colors=np.array(DELIVERED, dtype=np.uint8))
+        set_properties(self._trail, points=points, colors=np.array(DELIVERED, dtype=np.uint8))
 
     def _begin(self, swimmer: Swimmer) -> None:
         """Another swim: its way, the robot at its start, and the camera where all of it can be
@@ -211,7 +211,9 @@ class SwimScene:
         self._shown = swimmer
         self._ahead = None
         self._goal.show(_goal, swimmer.path)
-        put(self._floor, position=np.array([0.0, 0.0, swimmer.path[:, 2].min() - DEPTH_BELOW]))
+        set_properties(
+            self._floor, position=np.array([0.0, 0.0, swimmer.path[:, 2].min() - DEPTH_BELOW])
+        )
         start = swimmer.shown.pose
         self._pose(start)
         self._look(swimmer.path, start[:3], view_size(swimmer.layout))
@@ -226,7 +228,7 @@ class SwimScene:
         aim_camera(self._client, position, start + distance * np.array([0.1, 0.0, -0.05]))
 
     def _pose(self, pose: Array) -> None:
-        put(self._root, position=pose[:3], wxyz=pose[3:] / np.linalg.norm(pose[3:]))
+        set_properties(self._root, position=pose[:3], wxyz=pose[3:] / np.linalg.norm(pose[3:]))
 
     def animate(self, elapsed: float) -> None:
         """Move on by some time on the wall [s], towards the last moment and never beyond it."""

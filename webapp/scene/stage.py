@@ -13,7 +13,7 @@ from finlab.layout import Layout
 from finlab.swim.hull import Surface, hull_of
 from finlab.swim.hull.mesh_file import Mesh
 from finlab.swim.hull.surface import STATIONS, shape_mesh
-from webapp.handles import put
+from webapp.handles import set_properties
 from webapp.scene.actuator_shapes import NOTHING
 from webapp.theme import LIGHT, Rgb, look
 
@@ -48,7 +48,7 @@ def add_floor(
 
 def paint_floor(floor: viser.GridHandle, dark: bool) -> None:
     """The floor's colours in the dark or the light theme."""
-    put(floor, cell_color=look(dark).grid, section_color=look(dark).grid_section)
+    set_properties(floor, cell_color=look(dark).grid, section_color=look(dark).grid_section)
 
 
 BOW, PROUD = 0.72, 1.012
@@ -88,15 +88,17 @@ class Stage:
         """Show another hull, theme or quality; a hull of glass, or a mere net, lets one look
         inside. Axes and floor are as large as `size` says."""
         opacity = 0.35 if glass or net else None
-        put(self._body.node, opacity=opacity, wireframe=net)
-        put(self._bow.node, opacity=opacity, visible=not net)
+        set_properties(self._body.node, opacity=opacity, wireframe=net)
+        set_properties(self._bow.node, opacity=opacity, visible=not net)
         if hull != self._hull:
             self._hull = hull
             self._body.become(hull.mesh)
             self._bow.become(_bow(hull))
         for node in (self._axes, self.floor):
-            put(node, scale=size)
-        put(self.floor, position=np.array([0.0, 0.0, hull.center[2] - hull.half[2] - BELOW * size]))
+            set_properties(node, scale=size)
+        set_properties(
+            self.floor, position=np.array([0.0, 0.0, hull.center[2] - hull.half[2] - BELOW * size])
+        )
         if self._look != (dark, shadows):
             self._look = dark, shadows
             self._scene.configure_default_lights(cast_shadow=shadows)
@@ -105,8 +107,8 @@ class Stage:
             self._scene.set_background_image(
                 np.repeat(water, 8, axis=1).astype(np.uint8), format="png"
             )
-            put(self._body.node, color=look(dark).hull)
-            put(self._bow.node, color=look(dark).glass)
+            set_properties(self._body.node, color=look(dark).hull)
+            set_properties(self._bow.node, color=look(dark).glass)
 
 
 class Shape:

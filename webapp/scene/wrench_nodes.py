@@ -11,7 +11,7 @@ from finlab.allocation.allocation import Allocation
 from finlab.analysis import AttainableSet
 from finlab.arrays import Array
 from finlab.swim.hull.mesh_file import Mesh
-from webapp.handles import put
+from webapp.handles import set_properties
 from webapp.markup.words import missing_part
 from webapp.scene.actuator_shapes import NOTHING, SHORTEST, tube, unit_arrow, unit_ring
 from webapp.scene.force_nodes import DIGITS, Arrows, linear, quaternion
@@ -224,14 +224,14 @@ class AttainableNodes:
             now, full = better, now
         scale = 1.0 if analysis is None else set_scale(analysis)
         for shape, body in ((self._now, now), (self._whole, full)):
-            put(shape.node, visible=body is not None, scale=size)
+            set_properties(shape.node, visible=body is not None, scale=size)
             if body is not None:
                 shape.show(_body, body.vertices * scale, body.faces, body.outline)
-        put(self._asked, visible=now is not None, scale=size)
+        set_properties(self._asked, visible=now is not None, scale=size)
         if now is None:
             return
         part = target[:3] if now.kind == "force" else target[3:]
-        put(self._asked, position=np.asarray(part * scale * size))
+        set_properties(self._asked, position=np.asarray(part * scale * size))
 
 
 def set_scale(analysis: Analysis) -> float:
@@ -299,14 +299,14 @@ class DirectionHandle:
 
     def show(self, position: Array | None, direction: Array, size: float, color: Rgb) -> None:
         """Show the direction (3,) of what stands at a place (3,) [m]; None hides it."""
-        put(self._root, visible=position is not None)
+        set_properties(self._root, visible=position is not None)
         if position is not None:
             self._size = size
             self._direction = direction
-            put(self._root, position=position)
-            put(self._needle, scale=size)
+            set_properties(self._root, position=position)
+            set_properties(self._needle, scale=size)
             for end, sign in self._ends:
-                put(
+                set_properties(
                     end,
                     scale=size,
                     color=color,
@@ -319,7 +319,7 @@ class DirectionHandle:
         wxyz = (
             np.array([1.0 + x, 0.0, -z, y]) if x > -1.0 + 1e-9 else np.array([0.0, 0.0, 1.0, 0.0])
         )
-        put(self._root, wxyz=wxyz / np.linalg.norm(wxyz))
+        set_properties(self._root, wxyz=wxyz / np.linalg.norm(wxyz))
 
 
 def on_sphere(eye: Array, aim: Array, radius: float, before: Array) -> Array:

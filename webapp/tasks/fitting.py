@@ -30,24 +30,24 @@ MAX_BYTES = 50_000_000
 class Upload:
     """A file that was dropped on an actuator."""
 
-    part: Actuator
+    actuator: Actuator
     name: str
     content: bytes
 
 
 @dataclass(frozen=True, eq=False)
-class Fitted:
+class FitResult:
     """What came of it."""
 
     upload: Upload
     """What it was made of; without its content."""
-    found: dict[str, Any]
+    fields: dict[str, Any]
     """Fields of the actuator: its model, and what else was found."""
     fit: "FinFit | ThrusterFit | None" = None
     """The fit; None where the file was a finished table."""
 
 
-class Fitting(Slot[Upload, Fitted]):
+class Fitting(Slot[Upload, FitResult]):
     """One file at a time for one page; what came of it goes on the fin at once, and undo takes it
     off."""
 
@@ -55,45 +55,55 @@ class Fitting(Slot[Upload, Fitted]):
         super().__init__(
             context.pools.long,
             context.bell,
-            fitted,
+            fit_upload,
             watched=True,
             stage="reading the file",
             title="Not fitted",
         )
         self._session = context.session
 
-    def start(self, actuator: str, name: str, content: bytes) -> None:
-        """Begin with a file for an actuator. FinlabError: another file is under way, the file is
-        too large, or its kind has no table."""
+    def start(self, actuator_name: str, file_name: str, content: bytes) -> None:
+        """Begin with a file for an actuator.
+
+        Args:
+            actuator_name: the actuator that was measured.
+            file_name: what the user's file is called; its ending says how it is read.
+            content: the file.
+
+        Raises:
+            FinlabError: another file is under way, the file is too large, or its kind of actuator
+                has no table.
+        """
         if self.busy:
             raise FinlabError("a fit is under way already; wait for it, or cancel it")
-        short = short_name(name)
+        short = short_name(file_name)
         if len(content) > MAX_BYTES:
             raise DataError(
                 f"{short}: has {len(content):,} bytes, expected at most {MAX_BYTES:,}; cut it "
-                "into shorter "
-                "series, write cycle means, or use `finlab fit fin`"
+                "into shorter series, write cycle means, or use `finlab fit fin`"
             )
-        part = self._session.state.layout.part(actuator)
-        if not part.KIND.models:
+        actuator = self._session.state.layout.part(actuator_name)
+        if not actuator.KIND.models:
             raise FinlabError(
-                f"{actuator} is a {part.type}, without a table; type its coefficients"
+                f"{actuator_name} is a {actuator.type}, without a table; type its coefficients"
             )
         self.forget()
-        self.ask(Upload(part, short, content))
+        self.ask(Upload(actuator, short, content))
 
     def put_on_all(self) -> None:
         """What was found for all that still have the model that this one had."""
-        found = self.answer
+        fit_result = self.answer
         session = self._session
-        if found is not None:
-            old = found.upload.part
+        if fit_result is not None:
+            old_model = _model(fit_result.upload.actuator)
             alike = [
-                part.name for part in session.state.layout.actuators if _model(part) == _model(old)
+                actuator.name
+                for actuator in session.state.layout.actuators
+                if _model(actuator) == old_model
             ]
             if not alike:
                 raise FinlabError("no other actuator has the model that this one had")
-            session.set_model(alike, **found.found)
+            session.set_model(alike, **fit_result.fields)
 
     def attend(self) -> bool:
         """Put what was found on its actuator. FinlabError: that is another one by now."""
@@ -103,30 +113,30 @@ class Fitting(Slot[Upload, Fitted]):
             self._put_on(self.answer)
         return came
 
-    def _put_on(self, fitted: Fitted) -> None:
-        upload = fitted.upload
+    def _put_on(self, fit_result: FitResult) -> None:
+        upload = fit_result.upload
         session = self._session
-        name = upload.part.name
+        name = upload.actuator.name
         layout = session.state.layout
-        if name not in layout.names or _model(layout.part(name)) != _model(upload.part):
+        if name not in layout.names or _model(layout.part(name)) != _model(upload.actuator):
             self.forget()
             raise FinlabError(f"{name} is no longer what {upload.name} was for; upload it again")
-        session.set_model([name], **fitted.found)
+        session.set_model([name], **fit_result.fields)
 
 
-def fitted(upload: Upload, work: Work[Upload]) -> Fitted:
+def fit_upload(upload: Upload, work: Work[Upload]) -> FitResult:
     """What a file is worth for its actuator. FinlabError: it cannot be read or fitted, or nobody
     waits."""
-    done = Upload(upload.part, upload.name, b"")
+    done = Upload(upload.actuator, upload.name, b"")
     with as_file(upload.name, upload.content) as path:
-        if not isinstance(upload.part, Fin):
+        if not isinstance(upload.actuator, Fin):
             return _bench(path, done)
         if in_worker(_is_table, path):
-            return Fitted(done, {"model": stored_table(upload.content, table_folder())})
+            return FitResult(done, {"model": stored_table(upload.content, table_folder())})
         return _measured(path, done, work)
 
 
-def _measured(path: Path, done: Upload, work: Work[Upload]) -> Fitted:
+def _measured(path: Path, done: Upload, work: Work[Upload]) -> FitResult:
     """A fin by noisy measurements; a fit whose result is not waited for ends before its next
     step."""
     from finlab.fit.fin_fit import fin_csv, fit_fin
@@ -140,7 +150,7 @@ def _measured(path: Path, done: Upload, work: Work[Upload]) -> Fitted:
     fit = fit_fin(in_worker(read_measurements, [path]), progress=tell)
     tell("writing the table")
     model = stored_table(fin_csv(fit).encode(), table_folder())
-    return Fitted(done, {"model": model}, fit)
+    return FitResult(done, {"model": model}, fit)
 
 
 def short_name(name: str) -> str:
@@ -161,11 +171,11 @@ def as_file(name: str, content: bytes) -> Iterator[Path]:
             raise type(error)(str(error).replace(f"{folder}/", "")) from None
 
 
-def _model(part: Actuator) -> object:
-    return getattr(part, "model", None)
+def _model(actuator: Actuator) -> object:
+    return getattr(actuator, "model", None)
 
 
-def _bench(path: Path, done: Upload) -> Fitted:
+def _bench(path: Path, done: Upload) -> FitResult:
     """A thruster, fixed or turning, by its bench table, or by a finished one."""
     from finlab.fit.thruster_bench import read_bench
     from finlab.fit.thruster_fit import fit_thruster
@@ -175,14 +185,14 @@ def _bench(path: Path, done: Upload) -> Fitted:
         most = table.rows[-1][1]
         return {
             "model": table,
-            "force": (max(least, 0.0) if done.part.KIND.sticks_at_angle else least, most),
+            "force": (max(least, 0.0) if done.actuator.KIND.sticks_at_angle else least, most),
         }
 
     with suppress(LayoutError):
-        return Fitted(done, within(in_worker(PowerTable.read, path)))
+        return FitResult(done, within(in_worker(PowerTable.read, path)))
     fit = fit_thruster(in_worker(read_bench, [path]))
     more = {"dead_band": fit.dead_band, "torque_per_newton": fit.torque_per_newton}
-    return Fitted(done, {**within(fit.table), **more, "uncertainty": None}, fit)
+    return FitResult(done, {**within(fit.table), **more, "uncertainty": None}, fit)
 
 
 def _is_table(path: Path) -> bool:

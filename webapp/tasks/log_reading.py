@@ -36,7 +36,7 @@ class LogReading(Slot[LogFile, "Judgement"]):
         super().__init__(
             context.pools.long,
             context.bell,
-            judged,
+            judge_upload,
             watched=True,
             stage="reading the log",
             title="Not judged",
@@ -65,13 +65,14 @@ class LogReading(Slot[LogFile, "Judgement"]):
 
     def jump(self, time: float) -> None:
         """Put the robot of the log, and the wrench that it asked for at a time [s], on the page."""
-        judged = self.answer
-        if judged is None:
+        judgement = self.answer
+        if judgement is None:
             raise FinlabError("open a log first")
-        place = int(np.abs(judged.timeline.time - time).argmin())
-        self.moment = float(judged.timeline.time[place])
-        self.use(judged.robot, f"Robot of {judged.source}")
-        self._session.ask_for([repr(value) for value in judged.timeline.demand[place].tolist()])
+        nearest = int(np.abs(judgement.timeline.time - time).argmin())
+        self.moment = float(judgement.timeline.time[nearest])
+        self.use(judgement.robot, f"Robot of {judgement.source}")
+        demand = judgement.timeline.demand[nearest].tolist()
+        self._session.ask_for([repr(value) for value in demand])
 
     def use(self, layout: Layout, step: str) -> None:
         """Open a robot of the log, unless it is there."""
@@ -79,7 +80,7 @@ class LogReading(Slot[LogFile, "Judgement"]):
             self._session.open_layout(layout, step)
 
 
-def judged(file: LogFile, work: Work[LogFile]) -> "Judgement":
+def judge_upload(file: LogFile, work: Work[LogFile]) -> "Judgement":
     """What is said of a log. FinlabError: it cannot be read."""
     try:
         from finlab.log import judge, read_log

@@ -222,7 +222,7 @@ class Solver:
     def reply(self, state: State) -> Reply:
         """The answer to a state with all that a page shows of it, computed to the end. Fails as
         `solve`."""
-        answer = judged(self.solve(state))
+        answer = judged_by_plant(self.solve(state))
         _ = answer.forces, answer.power, answer.effort  # here, not where the page is written
         in_reach = answer.reachable
         if not in_reach and state.method != "dual":  # which misses nothing that can be reached
@@ -291,7 +291,7 @@ def _is_papers(folder: Path) -> bool:
         return False
 
 
-def judged(answer: Allocation) -> Allocation:
+def judged_by_plant(answer: Allocation) -> Allocation:
     """An answer whose candidates and samples have the wrench by the fins' own laws, as it has
     itself. A method with a learned model ranks them by what that believes."""
     if answer.wrench_expected is None:
