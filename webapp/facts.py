@@ -45,7 +45,7 @@ def facts_of(
         "redo": session.history.redo_name,
         "stop": session.guide.stop,
         "solved": session.guide.solved,
-        # The newest answer: best, shown, in_reach, busy, error, modes ...
+        # The newest answer: best, shown_allocation, in_reach, busy, error, modes ...
         **answer._asdict(),
         "playing": jobs.refining.running,
         "jet_comparison": jet_comparison,
@@ -72,7 +72,7 @@ def facts_of(
         # A swim, and the view.
         "swims": swimming.active,
         "swimmer": swimmer,
-        "moment": None if swimmer is None else swimmer.shown,
+        "moment": None if swimmer is None else swimmer.visible_moment,
         "visible_layout": state.layout if swimmer is None else swimmer.layout,
         "paused": swimming.active and not swimming.running and not swimming.done,
         "pace": pace_words(swimming) if swimming.active else "",

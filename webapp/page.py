@@ -60,9 +60,9 @@ class Page:
         hold_uploads(client.gui, LARGEST_BUNDLE, partial(intents.notify, "Not possible"))
 
     @property
-    def shown(self) -> Allocation | None:
+    def shown_allocation(self) -> Allocation | None:
         """What is on the robot."""
-        return self.jobs.answering.shown_answer().shown
+        return self.jobs.answering.shown_answer().shown_allocation
 
     def on_change(self, handle: Any, act: Callable[[Any], object]) -> None:
         """Carry out `act(value)` when the user changes an input."""
@@ -90,7 +90,7 @@ class Page:
         exact: Any = None
 
         @wraps(value)
-        def shown(*facts: Any) -> Any:
+        def rounded(*facts: Any) -> Any:
             nonlocal exact
             exact = value(*facts)
             if isinstance(exact, (tuple, list)):
@@ -104,7 +104,7 @@ class Page:
             act(typed)
 
         handle.precision = digits  # type: ignore[attr-defined]
-        return self.bind(handle, meant, shown)
+        return self.bind(handle, meant, rounded)
 
     def add_html(
         self, content: Callable[..., str], **made: Callable[..., object]

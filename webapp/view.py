@@ -72,9 +72,9 @@ class View:
         self._task = loop.create_task(self._run())
 
     @property
-    def shown(self) -> Allocation | None:
+    def shown_allocation(self) -> Allocation | None:
         """What is on the robot."""
-        return self.page.shown
+        return self.page.shown_allocation
 
     @property
     def busy(self) -> bool:
@@ -186,10 +186,10 @@ class View:
         try:
             answer = self.jobs.answering.shown_answer()
             guide = session.guide
-            if guide.stop is not None and answer.shown is not None and not answer.busy:
-                guide.take(answer.shown)
+            if guide.stop is not None and answer.shown_allocation is not None and not answer.busy:
+                guide.take(answer.shown_allocation)
             self.scenery.follow_guide()
-            scale = self.scenery.fit(session.state.target, answer.shown)
+            scale = self.scenery.fit(session.state.target, answer.shown_allocation)
             facts = facts_of(session, self.jobs, answer, self.scenery.robot.dragged, scale)
         except Exception as error:
             board.fail(error)

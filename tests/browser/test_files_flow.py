@@ -140,7 +140,10 @@ def test_a_noisy_file_becomes_a_fin(page: Any, tmp_path: Path) -> None:
     page.until(lambda: session.state.layout.fins[0].model.type == "table" and not page.view.busy)
     page.page.get_by_text("May be trusted within what was measured.").wait_for()
     page.page.get_by_text("table, fitted to 120 samples").wait_for()
-    assert page.view.shown.layout.fins[0].model.type == "table" and page.view.shown.err_norm < 1e-3
+    assert (
+        page.view.shown_allocation.layout.fins[0].model.type == "table"
+        and page.view.shown_allocation.err_norm < 1e-3
+    )
     page.press("On all like it")
     page.until(lambda: [fin.model.type for fin in session.state.layout.fins] == ["table"] * 4)
     page.page.get_by_text("Exact by the model, expected within").first.wait_for()

@@ -63,7 +63,7 @@ def test_a_lesson_sees_when_its_task_is_done(page: Any) -> None:
     page.press("Lessons")
     page.press(f"1. {LESSONS[0].title}")
     page.until(lambda: "One wrench, several ways" in page.text(".fl-lesson"))
-    page.until(lambda: not page.view.busy and len(page.view.jobs.answering.modes.shown) > 1)
+    page.until(lambda: not page.view.busy and len(page.view.jobs.answering.modes.visible) > 1)
     assert "○" in page.text(".fl-lesson")
     page.page.locator("table.modes tr.pick").nth(1).click()
     page.until(lambda: "✓" in page.text(".fl-lesson"))

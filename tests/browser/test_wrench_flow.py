@@ -69,10 +69,12 @@ def test_failed_and_damaged_fins(page: Any) -> None:
     page.until(lambda: session.selected == "back_left")
     page.type("Strength [%]", "50")
     page.until(lambda: "weak 50 %" in page.text(".damage") and not page.view.busy)
-    now = page.view.shown.command[2, 2]
+    now = page.view.shown_allocation.command[2, 2]
     page.row("Stuck").first.click()
     page.until(lambda: "weak 50 %, stuck at" in page.text(".damage") and not page.view.busy)
-    assert page.view.shown.command[2, 2] == pytest.approx(now), "it is stuck where it was"
+    assert page.view.shown_allocation.command[2, 2] == pytest.approx(now), (
+        "it is stuck where it was"
+    )
     page.press("All")
     page.until(lambda: session.state.damage == Damage())
     page.page.locator(".damage").wait_for(state="detached")
@@ -101,7 +103,7 @@ def test_candidates_of_the_network_beside_either_answer(page: Any) -> None:
     page.until(lambda: "component" in rows.first.inner_text())
     best = answering.shown_answer().best
     rows.nth(1).click()
-    page.until(lambda: session.mode == 1 and page.view.shown is not best)
+    page.until(lambda: session.mode == 1 and page.view.shown_allocation is not best)
     page.until(lambda: page.text("table.modes tr.chosen").startswith("2"))
     page.page.locator("svg.plot:visible g.pick circle").last.click()  # the best one is drawn last
     page.until(lambda: session.mode == 0)
@@ -184,7 +186,7 @@ def test_a_robot_swims_and_one_fin_breaks(page: Any) -> None:
     ends = page.page.locator(".fl-timeline .plot").evaluate_all(BOTTOMS)
     assert max(ends) <= page.page.viewport_size["height"], f"the last plots end at {ends}"
     page.page.get_by_role("button", name="2", exact=True).locator("visible=true").first.click()
-    page.until(lambda: swimming.swimmer.shown.believed_lost == ("front_left",))
+    page.until(lambda: swimming.swimmer.visible_moment.believed_lost == ("front_left",))
     page.until(lambda: "3 of 4 fins" in page.text(".fl-status"))
     page.page.get_by_role("button", name="2 ✕", exact=True).locator("visible=true").first.wait_for()
     page.press("Pause")
@@ -212,12 +214,12 @@ def test_a_fin_lost_in_a_current_is_found(page: Any, tmp_path: Path) -> None:
     page.type("Speed", "8")
     page.press("Start")
     page.until(lambda: swimming.swimmer is not None)
-    page.until(lambda: swimming.swimmer.shown.lost == ("front_right",))
-    page.until(lambda: swimming.swimmer.shown.believed_lost == ("front_right",))
+    page.until(lambda: swimming.swimmer.visible_moment.lost == ("front_right",))
+    page.until(lambda: swimming.swimmer.visible_moment.believed_lost == ("front_right",))
     page.until(lambda: "The monitor found front_right lost" in page.page.inner_text("body"))
     page.press("Pause")
     page.until(lambda: not swimming.running and not swimming.busy)
-    assert swimming.swimmer.shown.found[0][1] < 5.0
+    assert swimming.swimmer.visible_moment.found[0][1] < 5.0
 
     held = swimming.time
     assert load_log(page.download("Log (NPZ)", tmp_path / "swim.npz")).n_ticks == round(held / 0.1)

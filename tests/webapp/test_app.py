@@ -66,8 +66,8 @@ def test_newest_question_is_answered(server: viser.ViserServer, view: View) -> N
     for k in range(60):
         on_loop(server, lambda k=k: view.do(lambda: view.session.set_target(0, 0.02 * k)))
     until(lambda: not view.busy)
-    assert view.shown is not None
-    assert view.shown.target[0] == pytest.approx(1.18)
+    assert view.shown_allocation is not None
+    assert view.shown_allocation.target[0] == pytest.approx(1.18)
     assert len(view.client.notes) == 0
 
 
@@ -92,7 +92,11 @@ def test_what_nobody_sees_is_not_asked_and_what_stays_is_not_sent(
     do(lambda: session.show_task("Design"))
     do(lambda: session.set_target(0, 0.8))
     assert jobs.ranging.question is ranges and jobs.answering.search.question is search
-    assert view.shown is not None and view.shown.target[0] == 0.8 and jobs.analyst.question is None
+    assert (
+        view.shown_allocation is not None
+        and view.shown_allocation.target[0] == 0.8
+        and jobs.analyst.question is None
+    )
     do(session.fold_drawer)
     assert jobs.analyst.answer is not None, "an opened drawer asks at once"
     listener = Listener(server)
@@ -121,7 +125,7 @@ def test_solver_errors_become_notes_and_the_page_goes_on(
     assert view.client.notes == ["No answer: ipopt is out of order in this test"]
     on_loop(server, lambda: view.do(lambda: view.session.set_setting("method", "dual")))
     until(lambda: not view.busy)
-    assert view.jobs.answering.shown_answer().error is None and view.shown is not None
+    assert view.jobs.answering.shown_answer().error is None and view.shown_allocation is not None
 
 
 def test_nodes_and_widgets_do_not_grow(server: viser.ViserServer, view: View) -> None:

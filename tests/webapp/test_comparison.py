@@ -91,16 +91,16 @@ def test_each_mode_of_mdn_tells_its_components_and_dual_has_one_answer() -> None
     samples = reply.answer.samples
     modes = solver.modes(reply)
     assert samples is not None and modes.refinement[0] == samples
-    assert modes.shown[0].mode.sources[0].startswith("component "), (
+    assert modes.visible[0].mode.sources[0].startswith("component "), (
         "the answer comes from the network"
     )
     led = {samples.source[k] for k in range(len(samples)) if modes.ends[k] == 0}
-    assert led and led <= set(modes.shown[0].mode.sources)
+    assert led and led <= set(modes.visible[0].mode.sources)
     dear = replace(samples, effort=np.full(len(samples), 1e4))
     far = mode_plot(replace(modes, refinement=(dear, *modes.refinement[1:])), 0, None, 200)
     assert "1e+04" not in far and "e+" not in far, "samples that are far too dear stand at the edge"
-    assert all(source_words(named.mode.sources).startswith("component") for named in modes.shown)
-    assert {named.badge for named in modes.shown} == {"network"}
+    assert all(source_words(named.mode.sources).startswith("component") for named in modes.visible)
+    assert {named.badge for named in modes.visible} == {"network"}
 
 
 @pytest.mark.skipif(
@@ -111,23 +111,23 @@ def test_beside_the_one_answer_of_dual_stands_what_the_network_proposes() -> Non
     state = State(UCAT, target=PRESETS["Turn"])
     reply = solver.reply(state)
     modes = solver.modes(reply)
-    first, *others = (named.mode for named in modes.shown)
-    assert [named.badge for named in modes.shown] == ["optimum", *["network"] * len(others)]
+    first, *others = (named.mode for named in modes.visible)
+    assert [named.badge for named in modes.visible] == ["optimum", *["network"] * len(others)]
     assert source_words(first.sources) == "the answer" and first.power == pytest.approx(
         reply.answer.power
     )
     assert others and all(mode.err_norm < 1e-3 and mode.power >= first.power for mode in others)
-    assert mode_plot(modes, 0, None, 200).count("class='mode'") == len(modes.shown)
+    assert mode_plot(modes, 0, None, 200).count("class='mode'") == len(modes.visible)
     end = modes.refinement[-1]
     for k, place in enumerate(modes.ends):
         assert place >= 1 and end.err_norm[k] < 1e-6, "each proposal is refined to a mode, exact"
-        assert end.effort[k] == pytest.approx(modes.shown[place].mode.effort, rel=0.02)
+        assert end.effort[k] == pytest.approx(modes.visible[place].mode.effort, rel=0.02)
     beyond = solver.reply(state.with_target(0, 500.0))
-    assert solver.modes(beyond).shown == (), "there is nothing to compare"
+    assert solver.modes(beyond).visible == (), "there is nothing to compare"
     for target in ((0.0,) * 6, (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)):
         found = solver.modes(solver.reply(State(UCAT, target=target, method="qp")))
         badges = ["qp", "network"] if any(target) else []
-        assert [named.badge for named in found.shown][:2] == badges, (
+        assert [named.badge for named in found.visible][:2] == badges, (
             "whoever answers, where there is a wrench"
         )
 

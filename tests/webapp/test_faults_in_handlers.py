@@ -108,7 +108,7 @@ def test_every_widget_survives_a_fault_in_what_it_does(
     assert "Task exception" not in printed and f"RuntimeError: {WORDS}" in printed
     on_loop(server, lambda: view.do(lambda: session.set_target(0, 0.4)))
     until(lambda: not view.busy)
-    assert view.shown is not None and view.shown.target[0] == 0.4
+    assert view.shown_allocation is not None and view.shown_allocation.target[0] == 0.4
     shown = [handle.value for handle in handles(server) if getattr(handle, "label", "") == "Fx [N]"]
     assert shown == [0.4]
     view.close()
@@ -152,4 +152,8 @@ def test_every_widget_survives_a_fault_in_what_is_written(
     on_loop(server, lambda: view.do(view.session.start_over))
     on_loop(server, lambda: view.do(lambda: view.session.set_target(0, 0.3)))
     until(lambda: not view.busy)
-    assert view.shown is not None and view.shown.target[0] == 0.3 and faults(view) == []
+    assert (
+        view.shown_allocation is not None
+        and view.shown_allocation.target[0] == 0.3
+        and faults(view) == []
+    )

@@ -98,7 +98,7 @@ def test_garbage_from_the_page_changes_nothing_but_raises_no_fault(
     assert not any("fault" in note for note in view.client.notes)
     on_loop(server, lambda: view.do(lambda: view.session.set_target(0, 0.7)))
     until(lambda: not view.busy)
-    assert view.shown is not None and view.shown.target[0] == 0.7
+    assert view.shown_allocation is not None and view.shown_allocation.target[0] == 0.7
 
 
 def link(text: str) -> str:

@@ -207,7 +207,7 @@ def test_a_table_fin_goes_through_the_whole_app(
     for axis, value in enumerate(reachable(tabled)):
         session.set_target(axis, round(value, 4))
     reply = SOLVER.reply(replace(session.state, method="mdn"))
-    assert reply.answer.err_norm < 1e-4 and len(SOLVER.modes(reply).shown) > 0
+    assert reply.answer.err_norm < 1e-4 and len(SOLVER.modes(reply).visible) > 0
     assert reply.answer.notes == (reply.answer.measure_next,)
     state = session.state
     session.undo()
@@ -239,7 +239,7 @@ def test_one_error_everywhere() -> None:
     answer = reply.answer
     plant = plant_of(layout)
     assert answer.candidates is not None and answer.wrench_expected is not None
-    modes = [named.mode for named in solver.modes(reply).shown]
+    modes = [named.mode for named in solver.modes(reply).visible]
     told = [
         (c, e)
         for found in (answer.candidates, answer.samples)

@@ -90,7 +90,7 @@ def test_jets_blow_against_the_forces_while_they_count(tab: Tab) -> None:
     use(tab.server, tab.view, switch, True)
     tab.settle()
     nodes = tab.server.scene._handle_from_node_name
-    shown = tab.view.shown
+    shown = tab.view.shown_allocation
     assert shown is not None and shown.layout.interaction == Jets()
     for i, force in enumerate(shown.forces):
         jet = nodes[f"/robot/jets/{i}"]

@@ -86,20 +86,20 @@ def test_samples_and_modes_are_drawn_and_listed() -> None:
     samples, middle, end = modes.refinement
     assert len(modes.ends) == len(samples) == len(end)
     for source, place in zip(samples.source, modes.ends, strict=True):
-        assert place < 0 or source in modes.shown[place].mode.sources, (
+        assert place < 0 or source in modes.visible[place].mode.sources, (
             "the mode that its component led to"
         )
     still = mode_plot(modes, 0, None, 200)
     moving = mode_plot(modes, 0, 1, 200)
-    assert still.count("data-press='mode'") == len(modes.shown)
-    first, *others = (named.mode.effort for named in modes.shown)
+    assert still.count("data-press='mode'") == len(modes.visible)
+    first, *others = (named.mode.effort for named in modes.visible)
     drawn = int((samples.effort <= max(first, *others, 2.0 * max(others))).sum())
     assert still.count("r='3'") == drawn and moving.count("r='3'") == 2 * drawn
     assert moving.count("class='moving'") == 1 and "class='moving'" not in still
     table = mode_table(modes, 0)
-    assert table.count("data-press=") == len(modes.shown) and "0.0000" not in table
+    assert table.count("data-press=") == len(modes.visible) and "0.0000" not in table
     assert "more are" not in table
-    assert table.count(">network</span>") == len(modes.shown)
+    assert table.count(">network</span>") == len(modes.visible)
     assert "2 more are" in mode_table(replace(modes, count=modes.count + 2), 0)
     assert mode_table(NO_MODES, 0) == mode_plot(NO_MODES, 0, None, 200) == ""
     assert "samples of the network" in step_words(modes, 0) and "median error" in step_words(
@@ -141,14 +141,14 @@ def test_a_refinement_is_played_step_by_step_on_the_robot(monkeypatch: pytest.Mo
     answering.ask()
     answering.search.attend()
     modes = answering.modes
-    best = answering.shown_answer().shown
+    best = answering.shown_answer().shown_allocation
     assert modes.steps == 2 and not answering.searching
     session.show_mode(1)
     refining.toggle()
     seen = []
     while session.step is not None:
         proposal = modes.ends.index(1)
-        shown = answering.shown_answer().shown
+        shown = answering.shown_answer().shown_allocation
         assert shown is not None and refining.running
         np.testing.assert_array_equal(
             shown.command, modes.refinement[session.step].command[proposal]
@@ -158,10 +158,10 @@ def test_a_refinement_is_played_step_by_step_on_the_robot(monkeypatch: pytest.Mo
     assert (
         seen == [0, 1]
         and not refining.running
-        and answering.shown_answer().shown not in (None, best)
+        and answering.shown_answer().shown_allocation not in (None, best)
     )
     np.testing.assert_array_equal(
-        answering.shown_answer().shown.command, modes.shown[1].mode.command
+        answering.shown_answer().shown_allocation.command, modes.visible[1].mode.command
     )
     session.set_loop(True)
     refining.toggle()
@@ -177,15 +177,15 @@ def test_a_refinement_is_played_step_by_step_on_the_robot(monkeypatch: pytest.Mo
 @pytest.mark.parametrize("spread", [0.0, 1e-6, 0.01, 1.0])
 def test_dots_stand_at_their_values_and_their_numbers_beside_them(spread: float) -> None:
     modes = found()
-    first = modes.shown[0].mode
+    first = modes.visible[0].mode
     effort = np.append(
         0.801 + spread * np.random.default_rng(3).uniform(size=MAX_SHOWN - 1), 0.957 + spread
     )
-    shown = tuple(
+    visible = tuple(
         NamedMode(replace(first, effort=float(value)), f"{k}", "network")
         for k, value in enumerate(effort)
     )
-    plot = mode_plot(replace(modes, shown=shown, ends=(0,) * len(modes.ends)), 3, None, 200)
+    plot = mode_plot(replace(modes, visible=visible, ends=(0,) * len(modes.ends)), 3, None, 200)
     across = [
         float(x)
         for x in re.findall(r"<circle cx='([\d.]+)' cy='[\d.]+' r='[\d.]+' class='mode'", plot)

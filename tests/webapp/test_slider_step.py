@@ -156,7 +156,9 @@ def test_a_step_is_cheap(
         time.sleep(SETTLED_S)  # whoever asks whether it has settled makes calls, too
         count.is_on = False
         tab.settle()
-        assert tab.view.shown is not None and tab.view.shown.target[0] == value
+        assert (
+            tab.view.shown_allocation is not None and tab.view.shown_allocation.target[0] == value
+        )
         assert (tab.view.jobs.answering.modes.steps > 0) == (drawer == "Candidates")
         assert count.pairs == set(), "files that call each other back"
         messages = len(listener.heard), listener.bytes

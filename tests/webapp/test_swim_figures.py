@@ -52,7 +52,7 @@ class Shelf:
         swimmer = self.begun()
         while swimmer.swim.time < seconds - 1e-6:
             swimmer.step()
-        swimmer.shown = swimmer.moment()
+        swimmer.visible_moment = swimmer.moment()
 
 
 @pytest.fixture
@@ -65,7 +65,7 @@ def shelf(worker: Pool) -> Iterator[Shelf]:
 def test_what_a_swim_comes_to(shelf: Shelf) -> None:
     shelf.swim(10.0, "analytic")
     swimmer = shelf.begun()
-    figures = swimmer.shown.figures
+    figures = swimmer.visible_moment.figures
     log = swimmer.log()
     assert isinstance(figures, Figures)
     power = log.driving_power.sum(axis=1)
@@ -79,7 +79,9 @@ def test_what_a_swim_comes_to(shelf: Shelf) -> None:
     assert figures.depth_m == pytest.approx(
         np.sqrt(((log.position - log.reference)[:, 2] ** 2).mean())
     )
-    swimmer.shown = swimmer.shown._replace(figures=figures._replace(mean_w=2.0, energy_wh=0.0042))
+    swimmer.visible_moment = swimmer.visible_moment._replace(
+        figures=figures._replace(mean_w=2.0, energy_wh=0.0042)
+    )
     card = swim_card(*now(shelf.swimming))
     assert "<td>2.00 W</td>" in card and "<td>4.2 mWh</td>" in card
 
@@ -107,9 +109,9 @@ def test_a_swim_that_capsizes_says_so(shelf: Shelf) -> None:
     while swimmer.moment().capsized is None:
         assert "capsized" not in pace_words(shelf.swimming)
         swimmer.step()
-        swimmer.shown = swimmer.moment()
-    assert swimmer.log().capsized_s == swimmer.shown.capsized
-    assert f"capsized at {swimmer.shown.capsized:.1f} s" in pace_words(shelf.swimming)
+        swimmer.visible_moment = swimmer.moment()
+    assert swimmer.log().capsized_s == swimmer.visible_moment.capsized
+    assert f"capsized at {swimmer.visible_moment.capsized:.1f} s" in pace_words(shelf.swimming)
 
 
 def chosen(name: str, **then: Any) -> SwimSettings:

@@ -28,7 +28,7 @@ SHORT = Trajectory("short", np.array([0.0, 2.0]), np.array([[0.0, 0.0, -1.0], [0
 def now(swimming: Swimming) -> tuple[Any, ...]:
     """What its card is made of."""
     swimmer = swimming.swimmer
-    moment = None if swimmer is None else swimmer.shown
+    moment = None if swimmer is None else swimmer.visible_moment
     return swimming.active, swimmer, moment
 
 
@@ -47,13 +47,13 @@ def test_swims_to_the_end_and_tells_how(swimming: Swimming) -> None:
     assert not swimming.running and swimming.time == pytest.approx(2.0)
     first = swimming.swimmer
     assert first is not None
-    record = first.shown.record
+    record = first.visible_moment.record
     assert record.shape == (20, FORCES + 8) and np.isfinite(record).all()
     assert np.all(np.diff(record[:, TIME]) > 0) and record[0, ERROR] < 0.1
-    figures = first.shown.figures
+    figures = first.visible_moment.figures
     assert figures is not None and figures.track_m < 0.3
     assert "arrived" in pace_words(swimming)
-    assert "arrived" in swim_corner(first, first.shown, pace_words(swimming), 2.0)
+    assert "arrived" in swim_corner(first, first.visible_moment, pace_words(swimming), 2.0)
     swimming.set_running(True)
     assert not swimming.running, "there is no way left"
 
@@ -83,25 +83,26 @@ def test_fins_break_and_are_mended_while_it_swims(swimming: Swimming) -> None:
     begin(swimming)
     swimming.set_running(False)
     swimming.toggle("front_left")
-    until(lambda: swimming.swimmer.shown.believed_lost == ("front_left",))
+    until(lambda: swimming.swimmer.visible_moment.believed_lost == ("front_left",))
     swimming.step()
     until(lambda: swimming.time > 0)
-    assert swimming.swimmer.shown.force[1].max() < 1e-6  # it hangs, and the robot is at rest
+    forces = swimming.swimmer.visible_moment.force
+    assert forces[1].max() < 1e-6, "the fin hangs, and the robot is at rest"
     for name in ("front_right", "back_left"):
         swimming.toggle(name)
-        until(lambda name=name: name in swimming.swimmer.shown.believed_lost)
+        until(lambda name=name: name in swimming.swimmer.visible_moment.believed_lost)
     assert "drift off" in swim_card(*now(swimming))
     with pytest.raises(FinlabError, match="last fin"):
         swimming.toggle("back_right")
     swimming.toggle("front_left")
-    until(lambda: "front_left" not in swimming.swimmer.shown.believed_lost)
+    until(lambda: "front_left" not in swimming.swimmer.visible_moment.believed_lost)
 
 
 def test_a_robot_that_no_fins_can_steer_is_told_with_all_its_fins(swimming: Swimming) -> None:
     aligned = replace(UCAT, actuators=tuple(replace(fin, mounting_angle=0.0) for fin in UCAT.fins))
     swimming.start(Plan(aligned, (), path=SHORT, method="analytic"))
     until(lambda: swimming.swimmer is not None)
-    assert swimming.swimmer.shown.believed_lost == ()
+    assert swimming.swimmer.visible_moment.believed_lost == ()
     assert "With these actuators surge, heave and yaw are not free" in swim_card(*now(swimming))
 
 
@@ -135,27 +136,27 @@ def test_a_fin_that_breaks_without_a_word_is_found(swimming: Swimming) -> None:
     while swimmer.swim.time < 12.0:
         swimmer.step()
     swimming.toggle("front_left", announced=False)
-    until(lambda: swimming.swimmer.shown.lost == ("front_left",))
-    assert swimmer.shown.believed_lost == () and swimmer.shown.found == ()
+    until(lambda: swimming.swimmer.visible_moment.lost == ("front_left",))
+    assert swimmer.visible_moment.believed_lost == () and swimmer.visible_moment.found == ()
     assert "does not know yet" in swim_card(*now(swimming))
     while not swimmer.swim.damage.lost and swimmer.swim.time < 20.0:
         swimmer.step()
-    swimmer.shown = swimmer.moment()
-    ((name, seconds),) = swimmer.shown.found
-    assert (name, swimmer.shown.believed_lost) == (
+    swimmer.visible_moment = swimmer.moment()
+    ((name, seconds),) = swimmer.visible_moment.found
+    assert (name, swimmer.visible_moment.believed_lost) == (
         "front_left",
         ("front_left",),
     ) and 0.0 < seconds < 8.0
     assert f"found front_left lost {seconds:.1f} s after" in swim_card(*now(swimming))
-    doubts = swimmer.shown.record[:, FORCES + 4 :]
+    doubts = swimmer.visible_moment.record[:, FORCES + 4 :]
     assert doubts[-1, UCAT.index("front_left")] > 0.99 and doubts[0].max() < 0.1
-    assert swimmer.shown.doubted == ("front_left",)
-    blind = swimmer.shown._replace(believed_lost=(), found=())
+    assert swimmer.visible_moment.doubted == ("front_left",)
+    blind = swimmer.visible_moment._replace(believed_lost=(), found=())
     assert (
         "front_left is lost, and the monitor takes it for torn or stuck" in findings_words(blind)[0]
     )
     wrong = blind._replace(lost=())
     assert "The monitor takes front_left for torn or stuck" in findings_words(wrong)[0]
     swimming.toggle("front_left", announced=False)
-    until(lambda: swimming.swimmer.shown.lost == ())
+    until(lambda: swimming.swimmer.visible_moment.lost == ())
     assert "front_left works, but the allocator takes it for lost" in swim_card(*now(swimming))

@@ -1,4 +1,8 @@
-"""What is asked and delivered: six bars, and the table of commands with one row per fin."""
+"""What is demanded and delivered: six bars, and the table of commands with one row per actuator.
+
+The panel of the wrench (`panels/wrench_tab.py`) shows both. They are written at every step of a
+slider, so rows are joined as plain strings of ours, which need no escaping.
+"""
 
 import math
 from functools import cache
@@ -16,52 +20,77 @@ from webapp.markup.words import damage_words, html, saturated
 from webapp.session.state import AXIS_WORDS
 from webapp.theme import DEAD, css, fin_color, ink
 
-HEADER = Markup(
-    "<tr><th>{}</th><th title='half amplitude'>A [°]</th><th title='frequency'>f [Hz]</th>"
-    "<th title='zero direction'>dir. [°]</th><th>force [N]</th>"
+FIN_HEADER = Markup(
+    "<tr><th>{}</th>"
+    "<th title='half amplitude'>A [°]</th>"
+    "<th title='frequency'>f [Hz]</th>"
+    "<th title='zero direction'>dir. [°]</th>"
+    "<th>force [N]</th>"
     "<th title='share of the full thrust'>load</th></tr>"
 )
+"""Columns of a robot that has fins; the first one is headed by what its actuators are called."""
+PLAIN_HEADER = Markup(
+    "<tr><th>{}</th>"
+    "<th colspan='3'>actuator</th>"
+    "<th>force [N]</th>"
+    "<th title='share of the full thrust'>load</th></tr>"
+)
+"""Columns of a robot without fins."""
 BARS_HEADER = Markup(
-    "<span class='dim scale'>{}</span><b class='right asked'>asked</b><b class='right "
-    "given'>delivered</b>"
+    "<span class='dim scale'>{}</span>"
+    "<b class='right asked'>asked</b>"
+    "<b class='right given'>delivered</b>"
     "<b class='right missing'>missing</b>"
 )
+"""Heads of the bars; the first one says what the ends of a bar stand for."""
 MIDDLE = "<i style='left:50%;top:0;width:1px;height:14px;background:rgba(128,128,128,.55)'></i>"
 """Where nothing is asked, in the track of bars."""
 LEAST_FORCE_SCALE = 2.0
 """Least force at the end of a bar [N]."""
 LEAST_TORQUE_SCALE = 0.5
 """Least torque at the end of a bar [N m]."""
-PLAIN_HEADER = Markup(
-    "<tr><th>{}</th><th colspan='3'>actuator</th><th>force [N]</th>"
-    "<th title='share of the full thrust'>load</th></tr>"
-)
+LEAST_MISSING_BAR = 0.02
+"""Share of a bar's scale up to which a missing component is not drawn."""
 
 
-def bars_of(shown: Allocation | None, target: tuple[float, ...], layout: Layout, busy: bool) -> str:
-    """The bars of an answer; one to an earlier question stands beside what was asked then."""
-    demanded = (
-        shown.target if shown is not None and busy else np.where(layout.commanded, target, np.nan)
-    )
-    return wrench_bars(demanded, None if shown is None else shown.wrench)
+def bars_of(
+    shown_allocation: Allocation | None, target: tuple[float, ...], layout: Layout, busy: bool
+) -> str:
+    """The bars of an answer; one to an earlier question stands beside what was demanded then.
+
+    Args:
+        shown_allocation: the answer that is on the robot, if any.
+        target: the present target wrench (6,) [N, N m].
+        layout: the present robot, which says which axes count.
+        busy: whether the answer is one to an earlier question.
+    """
+    if shown_allocation is None:
+        return wrench_bars(np.where(layout.commanded, target, np.nan), None)
+    demanded = shown_allocation.target if busy else np.where(layout.commanded, target, np.nan)
+    return wrench_bars(demanded, shown_allocation.wrench)
 
 
-def wrench_bars(demanded: ArrayLike, got: ArrayLike | None) -> str:
-    """The bars of all six axes: wrenches (6,) [N, N m], demanded (NaN where free) and got, if
-    anything."""
+def wrench_bars(demanded: ArrayLike, delivered: ArrayLike | None) -> str:
+    """The bars of all six axes.
+
+    Args:
+        demanded: wrench (6,) [N, N m], NaN where an axis is free.
+        delivered: wrench (6,) [N, N m]; None while there is no answer.
+    """
     demanded = np.asarray(demanded, dtype=float)
-    got = None if got is None else np.asarray(got, dtype=float)
-    wanted = np.nan_to_num(demanded)
-    values = np.array([wanted, wanted if got is None else got])
+    delivered = None if delivered is None else np.asarray(delivered, dtype=float)
+    target = np.nan_to_num(demanded)
+    values = np.array([target, target if delivered is None else delivered])
     # One scale for the forces and one for the torques, so that bars compare; it moves in coarse
     # steps only.
     force_scale = max(nice_limit(np.abs(values[:, :3]).max()), LEAST_FORCE_SCALE)
     torque_scale = max(nice_limit(np.abs(values[:, 3:]).max()), LEAST_TORQUE_SCALE)
     rows = []
-    for k in range(6):
-        wish = None if np.isnan(demanded[k]) else float(demanded[k])
-        scale = force_scale if k < 3 else torque_scale
-        rows.append(_bar_row(k, wish, None if got is None else float(got[k]), scale))
+    for axis in range(6):
+        axis_demand = None if np.isnan(demanded[axis]) else float(demanded[axis])
+        axis_delivery = None if delivered is None else float(delivered[axis])
+        scale = force_scale if axis < 3 else torque_scale
+        rows.append(_bar_row(axis, axis_demand, axis_delivery, scale))
     header = BARS_HEADER.format(f"±{force_scale:g} N, ±{torque_scale:g} N m")
     return html("<div class='fl'><div class='bars'>{}{}</div></div>", header, Markup("".join(rows)))
 
@@ -70,35 +99,58 @@ def nice_limit(value: float) -> float:
     """The next of 1, 2, 5, 10, ... above 1.2 times `value`: a scale's end."""
     if value < 1e-6:
         return 1.0
-    power = 10.0 ** math.floor(math.log10(1.2 * value))
-    share = 1.2 * value / power
-    return power * (1.0 if share <= 1.0 else 2.0 if share <= 2.0 else 5.0 if share <= 5.0 else 10.0)
+    decade = 10.0 ** math.floor(math.log10(1.2 * value))
+    mantissa = 1.2 * value / decade
+    for step in (1.0, 2.0, 5.0):
+        if mantissa <= step:
+            return decade * step
+    return decade * 10.0
 
 
-def _bar_row(axis: int, wish: float | None, got: float | None, scale: float) -> str:
-    """Name, bars and figures of one axis, of which nothing is wished where it is free."""
-    digits = 2 if axis < 3 else 3
-    rest = None if wish is None or got is None else wish - got
-    bars = [] if wish is None else [(0.0, wish, 1, "asked")]
-    if got is not None:
-        bars.append((0.0, got, 8, "delivered"))
-    if wish is not None and got is not None and abs(wish - got) > 0.02 * scale:
-        bars.append((got, wish, 8, "missing"))
-    parts = [
-        f"<span>{AXIS_WORDS[axis]} <span class='dim'>{AXES[axis]}</span></span><div "
-        f"class='track'>{MIDDLE}"
+def _bar_row(axis: int, demanded: float | None, delivered: float | None, scale: float) -> str:
+    """Name, bars and figures of one axis [N or N m], of which nothing is demanded where it is free;
+    a bar as long as half the track stands for `scale`."""
+    missing = None if demanded is None or delivered is None else demanded - delivered
+    markup = [
+        f"<span>{AXIS_WORDS[axis]} <span class='dim'>{AXES[axis]}</span></span>"
+        f"<div class='track'>{MIDDLE}"
     ]
-    for start, end, top, word in bars:
-        low, high = sorted((min(max(start / scale, -1.0), 1.0), min(max(end / scale, -1.0), 1.0)))
-        place = f"left:{50 + 50 * low:.2f}%;width:{50 * (high - low):.2f}%;top:{top}px;height:5px"
-        parts.append(f"<i style='{place};background:var(--fl-{word})'></i>")
-    parts.append("</div>")
-    for kind, value, none in (("asked", wish, "free"), ("given", got, "–"), ("missing", rest, "–")):
-        rounded = 0.0 if value is None else round(value, digits)
-        text = f"{rounded:+.{digits}f}".replace("-", "−") if rounded else f"{0:.{digits}f}"
-        style = "dim" if kind == "missing" and not rounded else kind
-        parts.append(f"<span class='right {style}'>{none if value is None else text}</span>")
-    return "".join(parts)
+    if demanded is not None:
+        markup.append(_bar(0.0, demanded / scale, 1, "asked"))
+    if delivered is not None:
+        markup.append(_bar(0.0, delivered / scale, 8, "delivered"))
+    if missing is not None and abs(missing) > LEAST_MISSING_BAR * scale:
+        assert demanded is not None and delivered is not None
+        markup.append(_bar(delivered / scale, demanded / scale, 8, "missing"))
+    markup.append("</div>")
+    digits = 2 if axis < 3 else 3
+    markup.append(_figure("asked", demanded, digits, "free"))
+    markup.append(_figure("given", delivered, digits, "–"))
+    markup.append(_figure("missing", missing, digits, "–"))
+    return "".join(markup)
+
+
+def _bar(start: float, end: float, top: int, color: str) -> str:
+    """A bar between two shares of the scale (-1 to 1 from the left to the right of the track), so
+    far [px] below the track's upper edge."""
+    low, high = sorted((min(max(start, -1.0), 1.0), min(max(end, -1.0), 1.0)))
+    left = f"left:{50 + 50 * low:.2f}%"
+    width = f"width:{50 * (high - low):.2f}%"
+    return f"<i style='{left};{width};top:{top}px;height:5px;background:var(--fl-{color})'></i>"
+
+
+def _figure(style: str, value: float | None, digits: int, placeholder: str) -> str:
+    """A number with its sign; `placeholder` where there is none."""
+    rounded = 0.0 if value is None else round(value, digits)
+    if style == "missing" and not rounded:
+        style = "dim"
+    if value is None:
+        text = placeholder
+    elif rounded:
+        text = f"{rounded:+.{digits}f}".replace("-", "−")
+    else:
+        text = f"{0:.{digits}f}"
+    return f"<span class='right {style}'>{text}</span>"
 
 
 @cache
@@ -114,62 +166,86 @@ def swatch(index: int, is_lost: bool = False) -> str:
 
 
 def fin_table(
-    layout: Layout, damage: Damage, allocation: Allocation | None, full: Array, selected: str | None
+    layout: Layout,
+    damage: Damage,
+    allocation: Allocation | None,
+    full_thrust: Array,
+    selected: str | None,
 ) -> str:
-    """All fins with their commands; `full` is the full thrust (n,) of each [N]."""
+    """All actuators with their commands.
+
+    Args:
+        layout: the robot.
+        damage: what is wrong with its actuators.
+        allocation: the answer that is on the robot, if any.
+        full_thrust: largest force (n,) of each actuator [N].
+        selected: name of the selected actuator, whose row is marked.
+    """
     limits = None if allocation is None else saturated(allocation)
     is_damaged = damage != WHOLE
     rows = []
-    for i, fin in enumerate(layout.actuators):
+    for i, actuator in enumerate(layout.actuators):
         is_lost = allocation is not None and not np.isfinite(allocation.command[i, 0])
-        kind = " ".join(["dead"] * is_lost + ["chosen"] * (fin.name == selected))
-        words = (
-            damage_words(damage, fin.name, fin.KIND.sticks_at_angle)
-            if is_damaged and not is_lost
-            else ""
-        )
-        remark = html("<div class='missing damage'>{}</div>", words) if words else ""
+        style = " ".join(["dead"] * is_lost + ["chosen"] * (actuator.name == selected))
+        faults = ""
+        if is_damaged and not is_lost:
+            faults = damage_words(damage, actuator.name, actuator.KIND.sticks_at_angle)
+        remark = html("<div class='missing damage'>{}</div>", faults) if faults else ""
         if allocation is None or limits is None:
             cells: str = Markup("<td>–</td>") * 5
         elif is_lost:
             cells = Markup("<td colspan='5'>lost</td>")
         else:
             force = float(np.linalg.norm(allocation.forces[i]))
-            cells = _cells(fin, allocation.command[i], limits[i], force, full[i], i)
+            meter = _load_meter(force, full_thrust[i], i)
+            if isinstance(actuator, Fin):
+                cells = _fin_cells(allocation.command[i], limits[i], force, meter)
+            else:
+                cells = _plain_cells(actuator, allocation.command[i], limits[i], force, meter)
         row = "<tr class='{}'><td>{}<span class='name' title='{}'>{}</span>{}</td>{}</tr>"
-        rows.append(html(row, kind, swatch(i, is_lost), fin.name, fin.name, remark, cells))
-    header = html(HEADER if layout.fins else PLAIN_HEADER, "fin" if layout.is_of_fins else "")
+        name = actuator.name
+        rows.append(html(row, style, swatch(i, is_lost), name, name, remark, cells))
+    template = FIN_HEADER if layout.fins else PLAIN_HEADER
+    header = html(template, "fin" if layout.is_of_fins else "")
     return html("<div class='fl'><table class='fins'>{}{}</table></div>", header, rows)
 
 
-def _cells(
-    part: Actuator, command: Array, limits: NDArray[np.bool_], force: float, full: float, index: int
-) -> str:
+def _load_meter(force: float, full_thrust: float, index: int) -> Markup:
+    """How much of its full thrust [N] an actuator gives, as a bar in its colour."""
+    load = min(force / max(full_thrust, 1e-9), 1.0)
+    bar = f"width:{100 * load:.0f}%;background:{css(fin_color(index))}"
+    return Markup(f"<span class='meter'><i style='{bar}'></i></span>")
+
+
+def _fin_cells(command: Array, limits: NDArray[np.bool_], force: float, meter: Markup) -> str:
+    """Half amplitude, frequency and zero direction of a fin, its force [N] and its load; those of
+    the first two that are at a limit (2,) are marked."""
     amplitude, frequency, direction = command.tolist()
-    share = min(force / max(full, 1e-9), 1.0)
-    bar = f"width:{100 * share:.0f}%;background:{css(fin_color(index))}"
-    meter = Markup(f"<span class='meter'><i style='{bar}'></i></span>")
-    if not isinstance(part, Fin):
-        along = force if part.KIND.sticks_at_angle else command[0]
-        angle = (
-            round(math.degrees(command[part.KIND.stuck_number])) if part.KIND.sticks_at_angle else 0
-        )
-        remark = (
-            f"{part.type}, {angle:+d}°".replace("-", "−")
-            if part.KIND.sticks_at_angle
-            else part.type
-        )
-        words = html("<td colspan='3' class='words'>{}</td>", remark)
-        cell = html(
-            "<td class='{}'>{}</td>",
-            "full" if limits.any() else "",
-            f"{round(along, 2) + 0.0:.2f}".replace("-", "−"),
-        )
-        return html("{}{}<td>{}</td>", words, cell, meter)
-    first, second = np.where(limits, "full", "").tolist()
-    angles = (
-        f"<td class='{first}'>{math.degrees(amplitude):.1f}</td><td "
-        f"class='{second}'>{frequency:.2f}</td>"
+    amplitude_style = "full" if limits[0] else ""
+    frequency_style = "full" if limits[1] else ""
+    angle = f"{round(math.degrees(direction)):+d}".replace("-", "−")
+    return Markup(
+        f"<td class='{amplitude_style}'>{math.degrees(amplitude):.1f}</td>"
+        f"<td class='{frequency_style}'>{frequency:.2f}</td>"
+        f"<td>{angle}</td><td>{force:.2f}</td><td>{meter}</td>"
     )
-    turn = f"{round(math.degrees(direction)):+d}".replace("-", "−")
-    return Markup(f"{angles}<td>{turn}</td><td>{force:.2f}</td><td>{meter}</td>")
+
+
+def _plain_cells(
+    actuator: Actuator, command: Array, limits: NDArray[np.bool_], force: float, meter: Markup
+) -> str:
+    """Type of an actuator that is no fin, its angle where it has one, its force [N] and its load;
+    the force is marked where a number of its command is at a limit."""
+    along = command[0]
+    remark = actuator.type
+    if actuator.KIND.sticks_at_angle:
+        along = force
+        angle = round(math.degrees(command[actuator.KIND.stuck_number]))
+        remark = f"{actuator.type}, {angle:+d}°".replace("-", "−")
+    return html(
+        "<td colspan='3' class='words'>{}</td><td class='{}'>{}</td><td>{}</td>",
+        remark,
+        "full" if limits.any() else "",
+        f"{round(along, 2) + 0.0:.2f}".replace("-", "−"),
+        meter,
+    )

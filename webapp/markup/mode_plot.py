@@ -33,14 +33,14 @@ TRAIL = (0, 1, 2, 3, 4, 6, 8, 12, 20)
 """Steps at which the way of a sample is drawn, beside the last one."""
 
 
-def mode_plot(modes: Modes, shown: int, step: int | None, height: int) -> str:
+def mode_plot(modes: Modes, shown_mode: int, step: int | None, height: int) -> str:
     """Effort, which the network's proposals keep least, against the error: samples, after so many
     steps of refinement (None: all), are small dots with lines to where they end, modes are rings;
     `height` in px."""
-    if not modes.shown or not modes.refinement:
+    if not modes.visible or not modes.refinement:
         return ""
-    error = np.array([named.mode.err_norm for named in modes.shown])
-    effort = np.array([named.mode.effort for named in modes.shown])
+    error = np.array([named.mode.err_norm for named in modes.visible])
+    effort = np.array([named.mode.effort for named in modes.visible])
     refined = np.stack([effort, _logarithm(error)], axis=1)
     raw = np.array([[way.effort, way.err_norm] for way in modes.refinement]).swapaxes(1, 2)
     raw[..., 1] = _logarithm(raw[..., 1])
@@ -67,11 +67,11 @@ def mode_plot(modes: Modes, shown: int, step: int | None, height: int) -> str:
             html("<text x='{}' y='14' text-anchor='end'>{} dearer →</text>", WIDTH - RIGHT, beyond)
         )
     rings = [(float(x), float(y)) for x, y in zip(*plot.place(*refined.T), strict=True)]
-    parts += _rings(rings, shown)
+    parts += _rings(rings, shown_mode)
     return html("<div class='fl'>{}</div>", plot.drawn(parts, upright=True))
 
 
-def _rings(places: list[Point], shown: int) -> list[str]:
+def _rings(places: list[Point], shown_mode: int) -> list[str]:
     """A ring where each mode lies, filled where it is on the robot, with its number above it."""
     ring = (
         "<g class='pick' {}><circle cx='{:.1f}' cy='{:.1f}' r='{:g}' class='mode' stroke='{}' "
@@ -82,7 +82,7 @@ def _rings(places: list[Point], shown: int) -> list[str]:
     labels = _labels(places)
     for k, ((x, y), (u, v)) in reversed(list(enumerate(zip(places, labels, strict=True)))):
         color = css(MODE_COLORS[k])
-        fill = color if k == shown else "transparent"
+        fill = color if k == shown_mode else "transparent"
         under = [place for place in places[:k] if math.dist((x, y), place) < RING]
         radius = RING + APART * len(under)
         parts.append(

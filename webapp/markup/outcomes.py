@@ -11,7 +11,7 @@ from webapp.tasks.swimming import Swimming
 
 def pace_words(swimming: Swimming) -> str:
     """At what pace it goes, in words: what is asked for, or what the machine can do."""
-    capsized = None if swimming.swimmer is None else swimming.swimmer.shown.capsized
+    capsized = None if swimming.swimmer is None else swimming.swimmer.visible_moment.capsized
     if capsized is not None:
         return html("<span class='missing'>capsized at {:.1f} s</span>", capsized)
     if swimming.done:
@@ -27,15 +27,15 @@ def pace_words(swimming: Swimming) -> str:
     )
 
 
-def findings_words(shown: Moment) -> list[str]:
+def findings_words(moment: Moment) -> list[str]:
     """Which unannounced losses the monitor has detected, and which it has not."""
     sentences = [
         f"The monitor found {name} lost {seconds:.1f} s after it broke."
-        for name, seconds in shown.found
+        for name, seconds in moment.found
     ]
-    for name in shown.lost:
-        if name not in shown.believed_lost:
-            known = name in shown.doubted
+    for name in moment.lost:
+        if name not in moment.believed_lost:
+            known = name in moment.doubted
             rest = (
                 "the monitor takes it for torn or stuck"
                 if known
@@ -44,13 +44,13 @@ def findings_words(shown: Moment) -> list[str]:
             sentences.append(html("<span class='missing'>{} is lost, and {}.</span>", name, rest))
     sentences += [
         html("<span class='missing'>The monitor takes {} for torn or stuck.</span>", name)
-        for name in shown.doubted
-        if name not in (*shown.believed_lost, *shown.lost)
+        for name in moment.doubted
+        if name not in (*moment.believed_lost, *moment.lost)
     ]
     sentences += [
         html("<span class='missing'>{} works, but the allocator takes it for lost.</span>", name)
-        for name in shown.believed_lost
-        if name not in shown.lost
+        for name in moment.believed_lost
+        if name not in moment.lost
     ]
     return sentences
 
@@ -76,13 +76,13 @@ def swim_card(swims: bool, swimmer: Swimmer | None, moment: Moment | None) -> st
     return html("<div class='fl swim'><table>{}</table>{}</div>", rows, _warnings(swimmer, moment))
 
 
-def _warnings(swimmer: Swimmer, shown: Moment) -> str:
+def _warnings(swimmer: Swimmer, moment: Moment) -> str:
     warning = Markup()
     if swimmer.unknown_fins:
         words = unlearned_sentence(swimmer.layout, swimmer.unknown_fins)
         warning += html("<div class='missing'>{}: {}.</div>", swimmer.method, words)
-    if not shown.controllable:
-        missing = [swimmer.fins.index(name) for name in shown.believed_lost]
+    if not moment.controllable:
+        missing = [swimmer.fins.index(name) for name in moment.believed_lost]
         fins = "With these actuators"
         if missing:
             fins = f"Without {fins_words(missing, swimmer.layout)}"
@@ -92,7 +92,7 @@ def _warnings(swimmer: Swimmer, shown: Moment) -> str:
             fins,
         )
     return warning + Markup().join(
-        html("<div>{}</div>", sentence) for sentence in findings_words(shown)
+        html("<div>{}</div>", sentence) for sentence in findings_words(moment)
     )
 
 

@@ -120,7 +120,7 @@ def _rows(state: State, index: int, chosen: bool, mixed: bool) -> str:
         part.name,
         part.name,
         "" if twin is None else html("<span class='dim' title='moves with {}'>⇄</span>", twin),
-        [html("<td class='place'>{}</td>", shown) for shown in (*places, points_words(part))],
+        [html("<td class='place'>{}</td>", text) for text in (*places, points_words(part))],
     )
 
 
@@ -135,6 +135,6 @@ def points_words(part: Actuator) -> str:
     return _minus(f"{turn:.0f}") + sign
 
 
-def _minus(shown: str) -> str:
+def _minus(text: str) -> str:
     """A rounded number with a real minus sign; zero has none."""
-    return (shown if float(shown) else shown.lstrip("-")).replace("-", "−")
+    return (text if float(text) else text.lstrip("-")).replace("-", "−")

@@ -72,7 +72,7 @@ def add_damage(page: Page) -> None:
     def at_now() -> Array:
         """Where that actuator is [command]: the middle of its limits where nothing is known of
         it."""
-        now = page.shown
+        now = page.shown_allocation
         own = part()
         index = session.state.layout.index(own.name)
         known = now is not None and now.layout.names == session.state.layout.names

@@ -66,7 +66,7 @@ def add_candidates(page: Page) -> None:
 
     def choose(key: str, _held: str) -> None:
         session.show_mode(
-            placed(key, 0 if jobs.answering.searching else len(jobs.answering.modes.shown))
+            placed(key, 0 if jobs.answering.searching else len(jobs.answering.modes.visible))
         )
 
     page.presses.on("mode", choose)
@@ -109,7 +109,7 @@ def add_saving(page: Page) -> None:
     def save() -> None:
         best = page.jobs.answering.shown_answer().best
         modes = page.jobs.answering.modes
-        if best is not None and modes.shown and not page.jobs.answering.searching:
+        if best is not None and modes.visible and not page.jobs.answering.searching:
             page.designs.save_modes(best, modes)
 
     button = page.add_button(
@@ -118,7 +118,7 @@ def add_saving(page: Page) -> None:
         icon=viser.Icon.DOWNLOAD,
         hint="All candidates: error, watts, and the command and force of each actuator.",
     )
-    page.board.show(button, disabled=lambda modes: not modes.shown)
+    page.board.show(button, disabled=lambda modes: not modes.visible)
 
 
 def _temperature(state: State) -> float:
@@ -172,11 +172,11 @@ def _origin_words(method: str, best: Allocation | None, in_reach: bool) -> str:
 def mode_table(modes: Modes, mode: int) -> str:
     """Name and origin, error, power, effort and use of the limits of each mode; `mode` moves the
     fins."""
-    if not modes.shown:
+    if not modes.visible:
         return ""
-    of_fins = any(not math.isnan(way.effort) for way, _, _ in modes.shown)
+    of_fins = any(not math.isnan(way.effort) for way, _, _ in modes.visible)
     rows = []
-    for k, (way, name, badge) in enumerate(modes.shown):
+    for k, (way, name, badge) in enumerate(modes.visible):
         rows.append(
             html(
                 ROW + (EFFORT if of_fins else "") + "<td>{:.0f} %</td></tr>",
@@ -200,7 +200,7 @@ def mode_table(modes: Modes, mode: int) -> str:
         "<th title='largest share of its range that an actuator uses'>used</th></tr>",
         Markup("<th>effort</th>" * of_fins),
     )
-    left = modes.count - len(modes.shown)
+    left = modes.count - len(modes.visible)
     remark = f"{left} more are known; they come after these."
     more = html("<div class='said dim'>{}</div>", remark) if left > 0 else ""
     return html("<div class='fl'><table class='modes'>{}{}</table>{}</div>", header, rows, more)

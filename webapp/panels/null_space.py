@@ -76,9 +76,9 @@ def _about(modes: Modes) -> str:
 
 
 def _mean_words(modes: Modes) -> str:
-    if modes.null_space is None or len(modes.shown) < 3:
+    if modes.null_space is None or len(modes.visible) < 3:
         return ""
-    wrong = modes.shown[2].mode.err_norm > REACHED
+    wrong = modes.visible[2].mode.err_norm > REACHED
     return html(
         "<div class='fl {}'>{}</div>", "missing" if wrong else "dim", WRONG if wrong else RIGHT
     )

@@ -45,7 +45,7 @@ def _written(
     display: Display,
     analysis: Analysis | None,
     scale: Scale,
-    shown: Allocation | None,
+    shown_allocation: Allocation | None,
     best: Allocation | None,
     busy: bool,
     error: str | None,
@@ -59,13 +59,25 @@ def _written(
         return swim_corner(swimmer, moment, pace, scale.newtons)
     size = arrow_size(state.layout)
     set_keys = set_rows(analysis if display.drawn != "none" and task == "Design" else None, size)
-    refined = "" if step is None or shown is best else f"Step {step} of {modes.steps}"
-    way = modes.shown[mode] if shown is not best and mode < len(modes.shown) else None
+    refined = "" if step is None or shown_allocation is best else f"Step {step} of {modes.steps}"
+    way = (
+        modes.visible[mode] if shown_allocation is not best and mode < len(modes.visible) else None
+    )
     if way is not None and way.mode.err_norm > REACHED:
         refined = way.name.capitalize()
     words = legend(*scale, size, set_keys) + JETS * (state.layout.interaction is not None)
     badge = "" if way is None else way.badge
-    return corner(state, words, shown, busy, error, shown is best, in_reach, refined, badge)
+    return corner(
+        state,
+        words,
+        shown_allocation,
+        busy,
+        error,
+        shown_allocation is best,
+        in_reach,
+        refined,
+        badge,
+    )
 
 
 @lru_cache(maxsize=32)
@@ -201,28 +213,29 @@ def _figures(
     ]
 
 
-def swim_corner(first: Swimmer, shown: Moment, pace: str, newtons: float) -> str:
+def swim_corner(swimmer: Swimmer, moment: Moment, pace: str, newtons: float) -> str:
     """The same while a robot swims."""
     line = "<svg width='44' height='10'><path d='M0 5H44' stroke='{}' stroke-width='3.5'/></svg>"
-    named = (("the path", ASKED), (f"{first.method}, {first.about}", DELIVERED))
+    named = (("the path", ASKED), (f"{swimmer.method}, {swimmer.about}", DELIVERED))
     trails = [_key(html(line, css(color)), word) for word, color in named]
-    speed = float(np.linalg.norm(shown.flow))
+    speed = float(np.linalg.norm(moment.flow))
     if speed >= 5e-4:
         trails.append(_key(_arrow(css(WATER), 0.9), f"water, {speed:.3f} m/s"))
-    alive = len(first.fins) - len(shown.lost)
-    off = f"{float(shown.record[-1, ERROR]):.3f}" if len(shown.record) else "–"
-    power = "–" if shown.figures is None else f"{shown.figures.now_w:.1f}"
+    alive = len(swimmer.fins) - len(moment.lost)
+    off = f"{float(moment.record[-1, ERROR]):.3f}" if len(moment.record) else "–"
+    power = "–" if moment.figures is None else f"{moment.figures.now_w:.1f}"
     parts = [
-        html("<span>{} of {} {}</span>", alive, len(first.fins), parts_word(first.layout)),
-        html("<span><b>{:.1f}</b> s of {:.0f} s</span>", shown.time, first.duration_s),
+        html("<span>{} of {} {}</span>", alive, len(swimmer.fins), parts_word(swimmer.layout)),
+        html("<span><b>{:.1f}</b> s of {:.0f} s</span>", moment.time, swimmer.duration_s),
         html("<span><span class='dim'>off the path</span> <b>{}</b> m</span>", off),
         html("<span><span class='dim'>power</span> <b>{}</b> W</span>", power),
         html("<span>{}</span>", pace),
     ]
     scale = html(
-        "<div class='dim scales'><span>{}</span></div>", _length(newtons, arrow_size(first.layout))
+        "<div class='dim scales'><span>{}</span></div>",
+        _length(newtons, arrow_size(swimmer.layout)),
     )
-    jets = JETS * (first.layout.interaction is not None)
+    jets = JETS * (swimmer.layout.interaction is not None)
     return _cards(html("<div class='fl-legend'>{}</div>{}{}", trails, scale, jets), parts)
 
 

@@ -37,8 +37,8 @@ def add_commands(page: Page) -> None:
         lambda layout, lost: (layout.names, lost, ()),
     )
     page.add_html(
-        lambda layout, damage, able, shown, selected, flow: fin_table(
-            layout, damage, shown, full_thrust(able, flow), selected
+        lambda layout, damage, able, shown_allocation, selected, flow: fin_table(
+            layout, damage, shown_allocation, full_thrust(able, flow), selected
         )
     )
 
@@ -65,9 +65,9 @@ def add_target(page: Page) -> None:
         for value, slider, most in zip(target, sliders, ends, strict=True):
             slider.max = end = max(most, abs(value))
             slider.min = -end
-            shown = round(value, 4) + 0.0
-            if slider.value != shown:
-                slider.value = shown
+            rounded = round(value, 4) + 0.0
+            if slider.value != rounded:
+                slider.value = rounded
 
     board.act(reach)
     board.act(ask, *sliders)
@@ -77,8 +77,8 @@ def add_target(page: Page) -> None:
     def mark(ranges: Ranges | None, able: Layout, target: Any) -> Markup:
         """Show what is within reach on the sliders: the marks of all are one message."""
         del target  # it may have moved the ends
-        shown: Markup = style(ranges, able, *[slider.max for slider in sliders])
-        return shown
+        markup: Markup = style(ranges, able, *[slider.max for slider in sliders])
+        return markup
 
     def hint(ranges: Ranges | None, able: Layout, lost: tuple[str, ...], flow: Flow | None) -> None:
         """Say what the marks are; they change more often than that."""
@@ -172,12 +172,18 @@ def add_answer(page: Page) -> None:
     bars = Memoized(bars_of)
 
     def write(
-        shown: Allocation | None, state: State, busy: bool, proving: bool, step: int | None
+        shown_allocation: Allocation | None,
+        state: State,
+        busy: bool,
+        proving: bool,
+        step: int | None,
     ) -> Markup:
         """Bars and words are one message; what is proved of an answer changes the words alone."""
-        sentence = answer_sentence(state, shown, busy, proving or step is not None)
+        sentence = answer_sentence(state, shown_allocation, busy, proving or step is not None)
         words = "<div class='fl'><div class='said'>{}</div></div>"
-        return Markup(bars(shown, state.target, state.layout, busy) + html(words, sentence))
+        return Markup(
+            bars(shown_allocation, state.target, state.layout, busy) + html(words, sentence)
+        )
 
     page.add_html(write)
 

@@ -195,7 +195,7 @@ class RobotScene:
         self,
         visible_layout: Layout,
         lost: tuple[str, ...],
-        shown: Allocation | None,
+        shown_allocation: Allocation | None,
         scale: Scale,
         moment: Moment | None,
     ) -> None:
@@ -203,9 +203,9 @@ class RobotScene:
         if moment is not None:
             commands = moment.motion
             forces = moment.force
-        elif shown is not None:
-            commands = shown.command
-            forces = shown.forces
+        elif shown_allocation is not None:
+            commands = shown_allocation.command
+            forces = shown_allocation.forces
         else:
             commands = np.full((visible_layout.n, 3), np.nan)
             forces = np.zeros((visible_layout.n, 3))
@@ -226,14 +226,18 @@ class RobotScene:
         moves = np.array(self._moves)
         self._forces.command(arrows, moves[:, 0] * works, moves[:, 2])
         if visible_layout.interaction is not None or self._jets.drawn:
-            robot = shown.layout if shown is not None and moment is None else visible_layout
+            robot = (
+                shown_allocation.layout
+                if shown_allocation is not None and moment is None
+                else visible_layout
+            )
             jets = None if visible_layout.interaction is None else robot
             self._jets.refresh(jets, forces, scaled, self._arrow_size)
 
     def _flap(
         self,
         visible_layout: Layout,
-        shown: Allocation | None,
+        shown_allocation: Allocation | None,
         lost: tuple[str, ...],
         moment: Moment | None,
         display: Display,
@@ -253,7 +257,7 @@ class RobotScene:
         self,
         visible_layout: Layout,
         target: tuple[float, ...],
-        shown: Allocation | None,
+        shown_allocation: Allocation | None,
         scale: Scale,
         moment: Moment | None,
     ) -> None:
@@ -263,9 +267,9 @@ class RobotScene:
         if moment is not None:
             demanded = moment.asked * FORCES_ONLY
             delivered = moment.delivered * FORCES_ONLY
-        elif shown is not None:
-            delivered = shown.wrench
-            missing = missing_part(shown)
+        elif shown_allocation is not None:
+            delivered = shown_allocation.wrench
+            missing = missing_part(shown_allocation)
         lengths = LENGTH / scale.newtons, LENGTH / scale.torque
         self._wrench.refresh(demanded, delivered, missing, self._top, *lengths, self._arrow_size)
 
@@ -278,9 +282,11 @@ class RobotScene:
         task: str,
         visible_layout: Layout,
     ) -> None:
-        shown = analysis if display.drawn != "none" and task == "Design" else None
+        visible_analysis = analysis if display.drawn != "none" and task == "Design" else None
         better = growing if growing is not None and growing.kind == DRAWN[display.drawn] else None
-        self._attainable.refresh(shown, better, np.array(target), arrow_size(visible_layout))
+        self._attainable.refresh(
+            visible_analysis, better, np.array(target), arrow_size(visible_layout)
+        )
 
     def _offer(
         self,

@@ -68,7 +68,7 @@ class Scenery:
 
     _dark: bool | None = None
 
-    def fit(self, target: Sequence[float], shown: Allocation | None) -> Scale:
+    def fit(self, target: Sequence[float], shown_allocation: Allocation | None) -> Scale:
         """What arrows and rings stand for, given a target (6,) and what is shown of it, or in a
         swim."""
         swimmer = self._swimming.swimmer
@@ -76,10 +76,10 @@ class Scenery:
             self._swam = swim_scale(swimmer, self._swam)
             return self._swam
         self._swam = FIRST
-        if (target, shown) != self._fitted:
+        if (target, shown_allocation) != self._fitted:
             try:
-                self._scale = fitting_scale(target, shown, self._scale)
-                self._fitted = (target, shown)
+                self._scale = fitting_scale(target, shown_allocation, self._scale)
+                self._fitted = (target, shown_allocation)
             except Exception as error:
                 self._scale = FIRST
                 self._fault(error)
@@ -191,7 +191,7 @@ class SwimScene:
         self._clock = self._behind.time
         set_properties(self._reference, position=moment.reference)
         path = swimmer.path
-        flow = swimmer.shown.flow
+        flow = swimmer.visible_moment.flow
         position = np.array(
             [path[:, 0].min() - BEYOND_M, path[:, 1].max() + BEYOND_M, path[:, 2].mean()]
         )
@@ -214,7 +214,7 @@ class SwimScene:
         set_properties(
             self._floor, position=np.array([0.0, 0.0, swimmer.path[:, 2].min() - DEPTH_BELOW])
         )
-        start = swimmer.shown.pose
+        start = swimmer.visible_moment.pose
         self._pose(start)
         self._look(swimmer.path, start[:3], view_size(swimmer.layout))
         run_script(self._client.gui, f"finlabFrames.follow({start[:3].tolist()});")

@@ -49,14 +49,16 @@ class Scale(NamedTuple):
     """Torque of a ring of a radius of 0.1 m [N m]."""
 
 
-def fitting_scale(target: Sequence[float], shown: Allocation | None, now: Scale) -> Scale:
+def fitting_scale(
+    target: Sequence[float], shown_allocation: Allocation | None, now: Scale
+) -> Scale:
     """The scale for a target (6,) and what is shown of it; `now` as far as that is good enough."""
     demanded = np.array(target)
     forces = [demanded[:3]]
     torques = [demanded[3:]]
-    if shown is not None:
-        forces += [shown.wrench[:3], *shown.forces]
-        torques += [missing_part(shown)[3:], shown.wrench[3:]]
+    if shown_allocation is not None:
+        forces += [shown_allocation.wrench[:3], *shown_allocation.forces]
+        torques += [missing_part(shown_allocation)[3:], shown_allocation.wrench[3:]]
     force = float(np.sqrt((np.array(forces) ** 2).sum(axis=1).max()))
     torque = float(np.sqrt((np.array(torques) ** 2).sum(axis=1).max()))
     newtons = fitting(NEWTONS, force, now.newtons, LENGTH, ARROWS)
@@ -76,7 +78,7 @@ def fitting(
 def swim_scale(swimmer: Swimmer, before: Scale) -> Scale:
     """The scale of a swim, which only grows, so that its arrows compare; `before` is the last
     one."""
-    moment = swimmer.shown
+    moment = swimmer.visible_moment
     sizes = [
         np.linalg.norm(v, axis=-1).max()
         for v in (moment.force, moment.asked[:3], moment.delivered[:3])

@@ -32,7 +32,7 @@ class ShownAnswer(NamedTuple):
 
     best: Allocation | None
     """The answer itself."""
-    shown: Allocation | None
+    shown_allocation: Allocation | None
     """What is on the robot: the answer with the chosen mode's command, or, while that is refined,
     with what has become so far of the proposal that leads to it."""
     in_reach: bool
@@ -103,7 +103,7 @@ class Answering:
         searching = busy or search.busy
         is_proved = search.answered is not None and search.answered.reply is reply
         best = None if reply is None else reply.answer
-        shown = best
+        shown_allocation = best
         steps = 0 if searching else modes.steps
         step = session.step if steps else None
         # Sliders of the null space are followed while its modes are searched for.
@@ -113,19 +113,19 @@ class Answering:
             if step is not None and step < steps:
                 proposal = modes.proposal_of(mode)
             if step is not None and proposal is not None:
-                shown = self._variant(best, modes.refinement[step].command[proposal])
-            elif 0 < mode < len(modes.shown):
-                shown = self._variant(best, modes.shown[mode].mode.command)
+                shown_allocation = self._variant(best, modes.refinement[step].command[proposal])
+            elif 0 < mode < len(modes.visible):
+                shown_allocation = self._variant(best, modes.visible[mode].mode.command)
         return ShownAnswer(
             best=best,
-            shown=shown,
+            shown_allocation=shown_allocation,
             in_reach=reply is not None and reply.in_reach,
             busy=busy,
             error=None if busy else self.slot.error,
             modes=modes,
             searching=searching,
             proving=busy or not is_proved,
-            mode=min(mode, max(len(modes.shown) - 1, 0)),
+            mode=min(mode, max(len(modes.visible) - 1, 0)),
             step=step,
         )
 

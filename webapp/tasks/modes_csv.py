@@ -24,7 +24,7 @@ def modes_csv(answer: Allocation, modes: Modes) -> bytes:
         The table as UTF-8, with a line of columns' names.
     """
     rows = []
-    for named in modes.shown:
+    for named in modes.visible:
         mode = named.mode
         figures = (named.name, named.badge, mode.err_norm, mode.power, mode.effort)
         rows.append(_row(answer, mode.command, figures))

@@ -59,7 +59,7 @@ class NullSpaceDirections(NamedTuple):
 class Modes:
     """The modes of an answer, as the page lists them."""
 
-    shown: tuple[NamedMode, ...]
+    visible: tuple[NamedMode, ...]
     """The first `MAX_SHOWN` of them, the answer first, no two of the same name."""
     count: int
     refinement: tuple[Candidates, ...] = ()
@@ -92,13 +92,13 @@ def modes_of(
     modes = find_modes(
         candidates, force_sizes(layout, candidates.command), layout.lower, layout.upper
     )
-    shown = named_modes(modes, badge)
+    visible = named_modes(modes, badge)
     last = ways[-1].command
     signatures = mode_signature(last, force_sizes(layout, last))
     ends = np.full(len(last), -1)
-    for k in reversed(range(len(shown))):
-        ends[same_signature(shown[k].mode.signature, signatures)] = k
-    return Modes(shown, len(modes), ways, ends=tuple(ends.tolist()))
+    for k in reversed(range(len(visible))):
+        ends[same_signature(visible[k].mode.signature, signatures)] = k
+    return Modes(visible, len(modes), ways, ends=tuple(ends.tolist()))
 
 
 def named_modes(modes: Sequence[Mode], badge: str) -> tuple[NamedMode, ...]:

@@ -130,7 +130,7 @@ class Swimmer:
         self._about = {
             f.name: getattr(start, f.name) for f in fields(RunLog) if f.name != "columns"
         }
-        self.shown = self.moment()
+        self.visible_moment = self.moment()
 
     @property
     def about(self) -> str:

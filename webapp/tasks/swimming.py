@@ -53,12 +53,12 @@ class Swimming(Slot["Plan | Stretch", "Swimmer | tuple[int, Moment]"]):
     @property
     def done(self) -> bool:
         """Whether it has come to its end."""
-        return self.swimmer is not None and self.swimmer.shown.done
+        return self.swimmer is not None and self.swimmer.visible_moment.done
 
     @property
     def time(self) -> float:
         """Simulated time [s]."""
-        return self.swimmer.shown.time if self.swimmer is not None else 0.0
+        return self.swimmer.visible_moment.time if self.swimmer is not None else 0.0
 
     def start(self, plan: Plan) -> None:
         """Begin at the beginning; a swim that is under way is given up."""
@@ -75,7 +75,7 @@ class Swimming(Slot["Plan | Stretch", "Swimmer | tuple[int, Moment]"]):
         if isinstance(self.answer, Swimmer):
             self.swimmer = self.answer
         elif self.answer is not None and self.swimmer is not None:
-            done, self.swimmer.shown = self.answer
+            done, self.swimmer.visible_moment = self.answer
             self.pace.paid(done * self.swimmer.period_s, self.time)
             self.running = self.running and not self.done
             if self._acts and not self.running:
@@ -109,7 +109,7 @@ class Swimming(Slot["Plan | Stretch", "Swimmer | tuple[int, Moment]"]):
         """A fin breaks, or is mended, before the next step, announced to the allocator or not."""
         if self.swimmer is None:
             raise FinlabError("nothing swims yet; press Start")
-        lost = self.swimmer.shown.lost
+        lost = self.swimmer.visible_moment.lost
         broken = name in lost
         if not broken and len(lost) + 1 >= len(self.swimmer.fins):
             raise FinlabError(f"{name} is the last fin that works; mend another one first")

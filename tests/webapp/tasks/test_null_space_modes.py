@@ -29,10 +29,10 @@ ASKED = (1.2, 0.0, 0.0, 0.0, 0.0, 0.25)
 )
 def test_another_way_is_exact_and_dearer_and_the_mean_stands_beside_it(layout: Layout) -> None:
     answer = Solver().solve(State(layout, target=ASKED))
-    (alone,) = null_space_modes(answer, ()).shown
+    (alone,) = null_space_modes(answer, ()).visible
     assert alone.badge == "optimum" and np.array_equal(alone.mode.command, answer.command)
     modes = null_space_modes(answer, (0.0, 4.0))
-    optimum, other, mean = modes.shown
+    optimum, other, mean = modes.visible
     assert other.mode.err_norm < 1e-6 and other.mode.power > 1.01 * optimum.mode.power
     assert (mean.mode.err_norm > 1e-3) is (layout is not BLUEROV), (
         "commands of thrusters are their forces"
@@ -50,7 +50,7 @@ def test_another_way_is_exact_and_dearer_and_the_mean_stands_beside_it(layout: L
 def test_a_robot_without_another_way_says_so() -> None:
     layout = load_layout("ucat").without(["back_left", "back_right"])
     modes = null_space_modes(Allocator(layout).allocate([0.5, 0, 0, 0, 0, 0]), (1.0,))
-    assert modes.null_space is not None and modes.null_space.names == () and len(modes.shown) == 1
+    assert modes.null_space is not None and modes.null_space.names == () and len(modes.visible) == 1
 
 
 def ask(answering: Answering) -> None:
@@ -66,14 +66,18 @@ def test_sliders_move_the_robot_until_something_else_is_asked() -> None:
     answering = Answering(context_of(Direct(), session, Solver()))
     assert session.drawer == NULL_SPACE, "the network proposes for fins alone"
     ask(answering)
-    best = answering.shown_answer().shown
+    best = answering.shown_answer().shown_allocation
     session.shift(0, 5.0)
     ask(answering)
     seen = answering.shown_answer()
-    assert seen.shown is not seen.best is best and seen.shown is not None and best is not None
-    assert seen.shown.reachable and seen.shown.power > best.power
+    assert (
+        seen.shown_allocation is not seen.best is best
+        and seen.shown_allocation is not None
+        and best is not None
+    )
+    assert seen.shown_allocation.reachable and seen.shown_allocation.power > best.power
     session.show_mode(2)
-    assert not answering.shown_answer().shown.reachable  # type: ignore[union-attr]
+    assert not answering.shown_answer().shown_allocation.reachable  # type: ignore[union-attr]
     session.shift(0, 0.0)
     assert session.shifts == () and session.mode == 0
     session.shift(1, 2.0)
