@@ -10,7 +10,7 @@ from finlab.allocation.solution import Candidates
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
 from tests.webapp.stand_in import Direct, context_of, load_stand_in
-from webapp.markup.mode_plot import LABEL, LEFT, mode_plot
+from webapp.markup.mode_plot import AXIS_LEFT, LABEL_SIZE, mode_plot
 from webapp.markup.plot import WIDTH
 from webapp.markup.words import error_digits, small, three_digits
 from webapp.panels.modes_tab import mode_table, step_words
@@ -198,7 +198,7 @@ def test_dots_stand_at_their_values_and_their_numbers_beside_them(spread: float)
     scale, start = np.polyfit(effort, across, 1)
     assert scale > 0 and np.abs(scale * effort + start - across).max() < 0.2, "each at its value"
     assert np.argmax(across) == MAX_SHOWN - 1
-    width, height = LABEL
+    width, height = LABEL_SIZE
     for k, (x, y) in enumerate(numbers):
-        assert LEFT <= x <= WIDTH
+        assert AXIS_LEFT <= x <= WIDTH
         assert all(abs(x - u) >= width - 0.2 or abs(y - v) >= height - 0.2 for u, v in numbers[:k])

@@ -111,46 +111,50 @@ def _bar_row(axis: int, demanded: float | None, delivered: float | None, scale: 
     """Name, bars and figures of one axis [N or N m], of which nothing is demanded where it is free;
     a bar as long as half the track stands for `scale`."""
     missing = None if demanded is None or delivered is None else demanded - delivered
+    bars = []  # start and end [N or N m], px from the track's upper edge, colour
+    if demanded is not None:
+        bars.append((0.0, demanded, 1, "asked"))
+    if delivered is not None:
+        bars.append((0.0, delivered, 8, "delivered"))
+    if demanded is not None and delivered is not None:
+        if abs(demanded - delivered) > LEAST_MISSING_BAR * scale:
+            bars.append((delivered, demanded, 8, "missing"))
     markup = [
         f"<span>{AXIS_WORDS[axis]} <span class='dim'>{AXES[axis]}</span></span>"
         f"<div class='track'>{MIDDLE}"
     ]
-    if demanded is not None:
-        markup.append(_bar(0.0, demanded / scale, 1, "asked"))
-    if delivered is not None:
-        markup.append(_bar(0.0, delivered / scale, 8, "delivered"))
-    if missing is not None and abs(missing) > LEAST_MISSING_BAR * scale:
-        assert demanded is not None and delivered is not None
-        markup.append(_bar(delivered / scale, demanded / scale, 8, "missing"))
+    for start, end, top, color in bars:
+        start_share = min(max(start / scale, -1.0), 1.0)
+        end_share = min(max(end / scale, -1.0), 1.0)
+        left = 50 + 50 * min(start_share, end_share)
+        width = 50 * (max(start_share, end_share) - min(start_share, end_share))
+        box = f"left:{left:.2f}%;width:{width:.2f}%;top:{top}px;height:5px"
+        markup.append(f"<i style='{box};background:var(--fl-{color})'></i>")
     markup.append("</div>")
-    digits = 2 if axis < 3 else 3
-    markup.append(_figure("asked", demanded, digits, "free"))
-    markup.append(_figure("given", delivered, digits, "–"))
-    markup.append(_figure("missing", missing, digits, "–"))
+    markup.append(_figures(axis, demanded, delivered, missing))
     return "".join(markup)
 
 
-def _bar(start: float, end: float, top: int, color: str) -> str:
-    """A bar between two shares of the scale (-1 to 1 from the left to the right of the track), so
-    far [px] below the track's upper edge."""
-    low, high = sorted((min(max(start, -1.0), 1.0), min(max(end, -1.0), 1.0)))
-    left = f"left:{50 + 50 * low:.2f}%"
-    width = f"width:{50 * (high - low):.2f}%"
-    return f"<i style='{left};{width};top:{top}px;height:5px;background:var(--fl-{color})'></i>"
-
-
-def _figure(style: str, value: float | None, digits: int, placeholder: str) -> str:
-    """A number with its sign; `placeholder` where there is none."""
-    rounded = 0.0 if value is None else round(value, digits)
-    if style == "missing" and not rounded:
-        style = "dim"
-    if value is None:
-        text = placeholder
-    elif rounded:
-        text = f"{rounded:+.{digits}f}".replace("-", "−")
-    else:
-        text = f"{0:.{digits}f}"
-    return f"<span class='right {style}'>{text}</span>"
+def _figures(
+    axis: int, demanded: float | None, delivered: float | None, missing: float | None
+) -> str:
+    """The three numbers of one axis [N or N m] with their signs; a word or a dash where there is
+    none."""
+    digits = 2 if axis < 3 else 3
+    columns = (("asked", demanded, "free"), ("given", delivered, "–"), ("missing", missing, "–"))
+    cells = []
+    for style, value, placeholder in columns:
+        rounded = 0.0 if value is None else round(value, digits)
+        if value is None:
+            text = placeholder
+        elif rounded:
+            text = f"{rounded:+.{digits}f}".replace("-", "−")
+        else:
+            text = f"{0:.{digits}f}"
+        if style == "missing" and not rounded:
+            style = "dim"
+        cells.append(f"<span class='right {style}'>{text}</span>")
+    return "".join(cells)
 
 
 @cache

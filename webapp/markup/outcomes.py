@@ -1,5 +1,11 @@
 """Outcomes in a few words and figures: how a swim goes, and what a fit is worth, the verdict
-first."""
+first.
+
+`panels/swim_tab.py` and `panels/status.py` show the swim, `panels/actuator_model.py` the fit.
+"""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
@@ -7,6 +13,13 @@ from webapp.markup.words import fins_words, html, row, three_digits, unlearned_s
 from webapp.tasks.fitting import FitResult
 from webapp.tasks.swimmer import Moment, Swimmer
 from webapp.tasks.swimming import Swimming
+
+if TYPE_CHECKING:  # scipy takes its time, and comes with it
+    from finlab.fit.fin_fit import FinFit
+
+MOST_NAMED = 8
+"""Samples without a place in the fit that are named; more are an ellipsis, so that the card stays
+short."""
 
 
 def pace_words(swimming: Swimming) -> str:
@@ -34,69 +47,68 @@ def findings_words(moment: Moment) -> list[str]:
         for name, seconds in moment.found
     ]
     for name in moment.lost:
-        if name not in moment.believed_lost:
-            known = name in moment.doubted
-            rest = (
-                "the monitor takes it for torn or stuck"
-                if known
-                else "the allocator does not know yet"
-            )
-            sentences.append(html("<span class='missing'>{} is lost, and {}.</span>", name, rest))
-    sentences += [
-        html("<span class='missing'>The monitor takes {} for torn or stuck.</span>", name)
-        for name in moment.doubted
-        if name not in (*moment.believed_lost, *moment.lost)
-    ]
-    sentences += [
-        html("<span class='missing'>{} works, but the allocator takes it for lost.</span>", name)
-        for name in moment.believed_lost
-        if name not in moment.lost
-    ]
+        if name in moment.believed_lost:
+            continue
+        belief = "the allocator does not know yet"
+        if name in moment.doubted:
+            belief = "the monitor takes it for torn or stuck"
+        sentences.append(html("<span class='missing'>{} is lost, and {}.</span>", name, belief))
+    for name in moment.doubted:
+        if name not in moment.believed_lost and name not in moment.lost:
+            template = "<span class='missing'>The monitor takes {} for torn or stuck.</span>"
+            sentences.append(html(template, name))
+    for name in moment.believed_lost:
+        if name not in moment.lost:
+            template = "<span class='missing'>{} works, but the allocator takes it for lost.</span>"
+            sentences.append(html(template, name))
     return sentences
 
 
 def swim_card(swims: bool, swimmer: Swimmer | None, moment: Moment | None) -> str:
     """Distance from where the robot should be, depth error, power and energy so far, and what was
-    found."""
+    found.
+
+    Args:
+        swims: whether a swim was begun.
+        swimmer: the robot that swims; None until it is ready.
+        moment: the moment of the swim that the page shows.
+    """
     if not swims:
         return Markup("<div class='fl dim'>Start lets this robot swim, with what works.</div>")
     if swimmer is None or moment is None:
         return Markup("<div class='fl dim'>making ready …</div>")
     figures = moment.figures
-    rows = (
-        []
-        if figures is None
-        else [
+    rows = []
+    if figures is not None:
+        rows = [
             row("off the path, root mean square", f"{figures.track_m:.3f} m"),
             row("off in depth", f"{figures.depth_m:.3f} m"),
             row("mean power", f"{figures.mean_w:.2f} W"),
             row("energy so far", f"{figures.energy_wh * 1000:.1f} mWh"),
         ]
-    )
     return html("<div class='fl swim'><table>{}</table>{}</div>", rows, _warnings(swimmer, moment))
 
 
 def _warnings(swimmer: Swimmer, moment: Moment) -> str:
-    warning = Markup()
+    """What the method has not learned, axes that cannot be steered apart, and the monitor's
+    findings, a line each."""
+    lines = []
     if swimmer.unknown_fins:
         words = unlearned_sentence(swimmer.layout, swimmer.unknown_fins)
-        warning += html("<div class='missing'>{}: {}.</div>", swimmer.method, words)
+        lines.append(html("<div class='missing'>{}: {}.</div>", swimmer.method, words))
     if not moment.controllable:
         missing = [swimmer.fins.index(name) for name in moment.believed_lost]
-        fins = "With these actuators"
+        condition = "With these actuators"
         if missing:
-            fins = f"Without {fins_words(missing, swimmer.layout)}"
-        warning += html(
+            condition = f"Without {fins_words(missing, swimmer.layout)}"
+        sentence = (
             "<div class='missing'>{} surge, heave and yaw are not free of each other: expect it "
-            "to drift off.</div>",
-            fins,
+            "to drift off.</div>"
         )
-    return warning + Markup().join(
-        html("<div>{}</div>", sentence) for sentence in findings_words(moment)
-    )
-
-
-MOST_NAMED = 8
+        lines.append(html(sentence, condition))
+    for finding in findings_words(moment):
+        lines.append(html("<div>{}</div>", finding))
+    return Markup().join(lines)
 
 
 def fit_card(result: FitResult) -> str:
@@ -106,42 +118,46 @@ def fit_card(result: FitResult) -> str:
     name = result.upload.name
     fit = result.fit
     if fit is None:
-        sentence = html(
-            "<b>{} is a finished table.</b> It is on {} as it stands.",
-            name,
-            result.upload.actuator.name,
-        )
-        return html("<div class='fl said'>{}</div>", sentence)
+        sentence = "<b>{} is a finished table.</b> It is on {} as it stands."
+        text = html(sentence, name, result.upload.actuator.name)
+        return html("<div class='fl said'>{}</div>", text)
     if isinstance(fit, ThrusterFit):
-        return html(
-            "<div class='fl'>{}</div>",
-            [html("<div class='said'>{}</div>", _sentence(line)) for line in summary(fit)],
-        )
+        lines = [html("<div class='said'>{}</div>", _sentence(line)) for line in summary(fit)]
+        return html("<div class='fl'>{}</div>", lines)
+    return _fin_fit_card(fit)
+
+
+def _fin_fit_card(fit: "FinFit") -> str:
+    """A verdict, figures of the fit, samples that were left out, and notes on the file."""
     if fit.doubts:
         verdict = html("<b class='missing'>Not to be trusted: {}.</b>", "; ".join(fit.doubts))
     else:
         verdict = Markup("<b class='given'>May be trusted within what was measured.</b>")
-    rows = (
+    rows = [
         row("cross-validated error, of the largest force", f"{100.0 * fit.error():.1f} %"),
         row("noise of a sample, of the largest force", f"{100.0 * fit.noise():.1f} %"),
         row("unseen samples within the 95 % band", f"{100.0 * fit.coverage():.0f} %"),
         row(f"largest force of {len(fit.measurements)} samples", f"{three_digits(fit.largest)} N"),
-    )
-    parts = [html("<div class='said'>{}</div><table>{}</table>", verdict, rows)]
-    left = "No sample was left out."
-    count = len(fit.outliers)
-    if count:
-        named = ", ".join(fit.outliers[:MOST_NAMED]) + (" …" if count > MOST_NAMED else "")
-        left = (
-            f"{count} {'sample contradicts' if count == 1 else 'samples contradict'} the others: "
-            f"{named}."
-        )
-    parts.append(html("<div class='said'>{}</div>", left))
-    parts += [
-        html("<div class='said dim'>{}</div>", _sentence(note)) for note in fit.measurements.notes
     ]
-    return html("<div class='fl'>{}</div>", parts)
+    markup = [html("<div class='said'>{}</div><table>{}</table>", verdict, rows)]
+    markup.append(html("<div class='said'>{}</div>", _outliers_sentence(fit.outliers)))
+    for note in fit.measurements.notes:
+        markup.append(html("<div class='said dim'>{}</div>", _sentence(note)))
+    return html("<div class='fl'>{}</div>", markup)
+
+
+def _outliers_sentence(outliers: Sequence[str]) -> str:
+    """Which samples contradict the others, so that the fit leaves them out."""
+    count = len(outliers)
+    if count == 0:
+        return "No sample was left out."
+    names = ", ".join(outliers[:MOST_NAMED])
+    if count > MOST_NAMED:
+        names += " …"
+    verb = "sample contradicts" if count == 1 else "samples contradict"
+    return f"{count} {verb} the others: {names}."
 
 
 def _sentence(note: str) -> str:
+    """A note of the library with a capital letter and a full stop."""
     return f"{note[:1].upper() + note[1:]}."
