@@ -116,9 +116,9 @@ def _bar_row(axis: int, demanded: float | None, delivered: float | None, scale: 
         bars.append((0.0, demanded, 1, "asked"))
     if delivered is not None:
         bars.append((0.0, delivered, 8, "delivered"))
-    if demanded is not None and delivered is not None:
-        if abs(demanded - delivered) > LEAST_MISSING_BAR * scale:
-            bars.append((delivered, demanded, 8, "missing"))
+    is_missing = missing is not None and abs(missing) > LEAST_MISSING_BAR * scale
+    if demanded is not None and delivered is not None and is_missing:
+        bars.append((delivered, demanded, 8, "missing"))
     markup = [
         f"<span>{AXIS_WORDS[axis]} <span class='dim'>{AXES[axis]}</span></span>"
         f"<div class='track'>{MIDDLE}"

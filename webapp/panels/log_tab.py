@@ -1,6 +1,7 @@
 """A log: what the robot could not, when, and what would have held it; each moment can be put on the
 robot."""
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,17 +21,19 @@ from webapp.theme import ASKED, DELIVERED, fin_color
 if TYPE_CHECKING:
     from finlab.log import Judgement
 
-ACROSS = 4
-"""Plots that stand beside each other."""
-FIRST = (
+PLOTS_A_ROW = 4
+"""Plots that stand beside each other in a window of usual width."""
+INVITATION = (
     "Drop a log on the page: PX4 (.ulg), ArduSub (.bin), or a bag of ROS (.mcap, .db3, .bag). It "
-    "is told "
-    "when and on which axis the robot could not, and what would have held it."
+    "is told when and on which axis the robot could not, and what would have held it."
 )
+"""What the tab says while there is no log."""
+ASKED_SHARE = 1e-3
+"""Share of the largest impulse above which that of an axis counts as demanded, and is plotted."""
 
 
 def add_log(page: Page) -> None:
-    """The file, by whose laws it is judged, and what is said of it."""
+    """The file, by whose laws it is judged, and what came of it."""
     log = page.jobs.log
     gui = page.gui
     page.opening.add(SUFFIXES, log.open)
@@ -38,23 +41,23 @@ def add_log(page: Page) -> None:
     page.add_upload(
         "Open a log", page.opening.open, icon=viser.Icon.FOLDER_OPEN, mime_type=SUFFIXES
     )
-    about = (
+    hint = (
         "Judge it by the robot of this page; else by the one that the log's own parameters "
         "describe."
     )
-    page.bind(
-        gui.add_checkbox("This robot", False, hint=about), log.choose_robot, lambda by_page: by_page
-    )
+    by_page = gui.add_checkbox("This robot", False, hint=hint)
+    page.bind(by_page, log.choose_robot, lambda by_page: by_page)
     page.add_html(_summary)
-    better = page.add_button(
-        "Open the improved robot", lambda: _improve(page), icon=viser.Icon.SPARKLES
+    button = page.add_button(
+        "Open the improved robot", partial(_open_improved, page), icon=viser.Icon.SPARKLES
     )
     page.board.show(
-        better, visible=lambda judgement: judgement is not None and judgement.improved is not None
+        button, visible=lambda judgement: judgement is not None and judgement.improved is not None
     )
 
 
-def _improve(page: Page) -> None:
+def _open_improved(page: Page) -> None:
+    """The robot that would have held what the log's could not."""
     judgement = page.jobs.log.answer
     if judgement is not None and judgement.improved is not None:
         page.jobs.log.use(judgement.improved, f"Robot for {judgement.source}")
@@ -63,19 +66,17 @@ def _improve(page: Page) -> None:
 def _summary(
     judgement: "Judgement | None", judgement_progress: str | None, judgement_error: str | None
 ) -> str:
+    """The judgement in a sentence, with its notes; why there is none, or how far it is."""
     if judgement_progress is not None:
         return html("<div class='fl dim'>{} …</div>", judgement_progress.capitalize())
     if judgement is None:
-        sentence = (
-            html("<div class='missing'>{}</div>", in_app(judgement_error))
-            if judgement_error
-            else FIRST
-        )
+        sentence = INVITATION
+        if judgement_error:
+            sentence = html("<div class='missing'>{}</div>", in_app(judgement_error))
         return html("<div class='fl'>{}</div>", sentence)
-    notes = [
-        html("<div class='said dim'>{}</div>", in_app(note))
-        for note in (*judgement.asks, *judgement.notes)
-    ]
+    notes = []
+    for note in (*judgement.asks, *judgement.notes):
+        notes.append(html("<div class='said dim'>{}</div>", in_app(note)))
     return html(
         "<div class='fl'><b>{}</b><div class='said'>{}</div>{}</div>",
         judgement.source,
@@ -87,7 +88,7 @@ def _summary(
 def add_losses(page: Page) -> None:
     """What was lost on each axis, and when; a spell that is pressed is put on the robot."""
 
-    def jump(key: str, _held: str) -> None:
+    def jump(key: str, _modifier: str) -> None:
         judgement = page.jobs.log.answer
         spells = () if judgement is None else judgement.spells
         page.jobs.log.jump(spells[placed(key, len(spells))].start)
@@ -98,90 +99,108 @@ def add_losses(page: Page) -> None:
     )
     page.on_change(slider, page.jobs.log.jump)
 
-    def place(judgement: "Judgement | None", log_moment: float | None) -> None:
+    def set_range(judgement: "Judgement | None", log_moment: float | None) -> None:
         set_properties(slider, visible=judgement is not None)
-        if judgement is not None:
-            first, last = judgement.timeline.time[[0, -1]].tolist()
-            set_properties(
-                slider,
-                max=max(last, first + 0.1),
-                min=first,
-                value=first if log_moment is None else log_moment,
-            )
+        if judgement is None:
+            return
+        start, end = judgement.timeline.time[[0, -1]].tolist()
+        value = start if log_moment is None else log_moment
+        set_properties(slider, max=max(end, start + 0.1), min=start, value=value)
 
-    page.board.act(place, slider)
+    page.board.act(set_range, slider)
     page.add_html(_losses)
 
 
 def _losses(judgement: "Judgement | None", log_moment: float | None) -> str:
+    """Impulses of each axis, and the spells in which something was lost; that of the moment on the
+    robot is marked."""
     if judgement is None:
         return html(
             "<div class='fl dim'>{}</div>", "What was lost on each axis, and when, is listed here."
         )
-    each = zip(
-        MOTIONS, AXIS_UNITS, judgement.asked, judgement.missing, judgement.lost_s, strict=True
-    )
-    rows = [
-        row(
-            html("{} <span class='dim'>{} s</span>", motion, unit),
-            *map(three_digits, (asked, missing, lost)),
+    tables = []
+    impulses = _impulse_rows(judgement)
+    if impulses:
+        head = Markup("<tr><th>impulse</th><th>asked</th><th>missing</th><th>lost [s]</th></tr>")
+        tables.append(html("<table>{}{}</table>", head, impulses))
+    spells = _spell_rows(judgement, log_moment)
+    if spells:
+        head = Markup(
+            "<tr><th>when [s]</th><th class='words'>lost</th><th class='words'>at a limit</th></tr>"
         )
-        for motion, unit, asked, missing, lost in each
-        if asked > 0.0
-    ]
-    head = Markup("<tr><th>impulse</th><th>asked</th><th>missing</th><th>lost [s]</th></tr>")
-    spells = [
-        html(
-            "<tr class='pick {}' tabindex='0' {}><td>{:.1f} … {:.1f}</td><td class='words'>{}</td>"
-            "<td class='words dim'>{}</td></tr>",
-            "chosen" if log_moment is not None and spell.start <= log_moment <= spell.end else "",
-            press("spell", str(k)),
-            spell.start,
-            spell.end,
-            ", ".join(spell.axes),
-            ", ".join(spell.limits),
-        )
-        for k, spell in enumerate(judgement.spells)
-    ]
-    when = Markup(
-        "<tr><th>when [s]</th><th class='words'>lost</th><th class='words'>at a limit</th></tr>"
-    )
-    tables = [
-        html("<table>{}{}</table>", *each) for each in ((head, rows), (when, spells)) if each[1]
-    ]
+        tables.append(html("<table>{}{}</table>", head, spells))
     return html("<div class='fl'>{}</div>", tables)
 
 
+def _impulse_rows(judgement: "Judgement") -> list[str]:
+    """What each axis was asked for, what was missing of that [N s, N m s], and for how long [s]."""
+    rows = []
+    for k, (motion, unit) in enumerate(zip(MOTIONS, AXIS_UNITS, strict=True)):
+        asked = judgement.asked[k]
+        if asked > 0.0:
+            impulse = three_digits(asked), three_digits(judgement.missing[k])
+            name = html("{} <span class='dim'>{} s</span>", motion, unit)
+            rows.append(row(name, *impulse, three_digits(judgement.lost_s[k])))
+    return rows
+
+
+def _spell_rows(judgement: "Judgement", log_moment: float | None) -> list[str]:
+    """A row for each time in which something was lost, which can be pressed."""
+    template = (
+        "<tr class='pick {}' tabindex='0' {}>"
+        "<td>{:.1f} … {:.1f}</td>"
+        "<td class='words'>{}</td>"
+        "<td class='words dim'>{}</td></tr>"
+    )
+    rows = []
+    for k, spell in enumerate(judgement.spells):
+        is_chosen = log_moment is not None and spell.start <= log_moment <= spell.end
+        style = "chosen" if is_chosen else ""
+        axes = ", ".join(spell.axes)
+        limits = ", ".join(spell.limits)
+        target = press("spell", str(k))
+        rows.append(html(template, style, target, spell.start, spell.end, axes, limits))
+    return rows
+
+
 def _asked_axes(judgement: "Judgement") -> list[int]:
-    return np.flatnonzero(np.array(judgement.asked) > 1e-3 * max(judgement.asked)).tolist()
+    """Axes that were asked for in earnest."""
+    return np.flatnonzero(np.array(judgement.asked) > ASKED_SHARE * max(judgement.asked)).tolist()
 
 
 def plot_rows(judgement: "Judgement") -> int:
     """Rows that the plots of a log take, in a window of usual width."""
-    return 1 if len(_asked_axes(judgement)) < ACROSS else 2
+    return 1 if len(_asked_axes(judgement)) < PLOTS_A_ROW else 2
 
 
 def log_plots(judgement: "Judgement | None", log_moment: float | None) -> str:
-    """Demand and what was given over time, of each axis that was asked for, and actuators at their
-    limits."""
+    """Demand and what was delivered over time, of each axis that was asked for, and actuators at
+    their limits.
+
+    Args:
+        judgement: of the log; None while there is none.
+        log_moment: the moment that is on the robot [s], at which an upright line stands.
+    """
     if judgement is None:
         return html(
             "<div class='fl dim fl-timeline'>{}</div>", "The log is plotted here over time."
         )
-    line = judgement.timeline
-    parts = []
-    ends: Any = np.append(line.time, line.time[-1] + judgement.seconds / len(line.time))
-    across = exact_axis("time [s]", ends)
+    timeline = judgement.timeline
+    step = judgement.seconds / len(timeline.time)
+    times: Any = np.append(timeline.time, timeline.time[-1] + step)
+    across = exact_axis("time [s]", times)
+    plots = []
     for k in _asked_axes(judgement):
-        both = [line.demand[:, k], line.given[:, k]]
-        up = cost_axis(f"{MOTIONS[k]} [{AXIS_UNITS[k]}]", np.append((-1e-3, 1e-3), both), 4)
+        curves = [timeline.demand[:, k], timeline.given[:, k]]
+        up = cost_axis(f"{MOTIONS[k]} [{AXIS_UNITS[k]}]", np.append((-1e-3, 1e-3), curves), 4)
+        colors = (ASKED, DELIVERED)
         words = ("asked", "given")
-        parts.append(over_time(across, line.time, up, both, (ASKED, DELIVERED), words, log_moment))
-    shares = list(100.0 * line.limits.T)
+        plots.append(over_time(across, timeline.time, up, curves, colors, words, log_moment))
+    shares = list(100.0 * timeline.limits.T)
     up = cost_axis("at a limit [%]", np.array((0.0, 100.0)), 4)
-    colors = [fin_color(k) for k in range(judgement.robot.n)]
-    parts.append(over_time(across, line.time, up, shares, colors, (), log_moment))
-    return html("<div class='fl fl-timeline'>{}</div>", parts)
+    fin_colors = [fin_color(k) for k in range(judgement.robot.n)]
+    plots.append(over_time(across, timeline.time, up, shares, fin_colors, (), log_moment))
+    return html("<div class='fl fl-timeline'>{}</div>", plots)
 
 
 def replays_table(judgement: "Judgement | None") -> str:
@@ -192,28 +211,29 @@ def replays_table(judgement: "Judgement | None") -> str:
             "<div class='fl dim'>{}</div>",
             "Other methods and policies are asked the log's demands here.",
         )
-    lost = AXES.index(judgement.axis) if judgement.axis else int(np.argmax(judgement.asked))
-    rows = [
-        html(
-            "<tr><td>{}</td><td class='words'>{}</td><td "
-            "class='{}'>{}</td><td>{}</td><td>{}</td></tr>",
-            each.robot if each.lost is None else f"without {each.lost}",
-            each.name,
-            "given" if each == judgement.held_by else "",
-            three_digits(each.missing[lost]),
-            three_digits(each.watts),
-            three_digits(each.saturated_s),
-        )
-        for each in judgement.replays
-    ]
-    head = html(
-        "<tr><th>robot</th><th class='words'>method</th><th>{} missing [{} s]</th><th>power "
-        "[W]</th>"
-        "<th>short [s]</th></tr>",
-        MOTIONS[lost],
-        AXIS_UNITS[lost],
+    # The axis that was lost; where none was, the one that was asked for most.
+    axis = AXES.index(judgement.axis) if judgement.axis else int(np.argmax(judgement.asked))
+    template = (
+        "<tr><td>{}</td><td class='words'>{}</td><td class='{}'>{}</td><td>{}</td><td>{}</td></tr>"
     )
-    sentence = Markup(
+    rows = []
+    for replay in judgement.replays:
+        robot = replay.robot if replay.lost is None else f"without {replay.lost}"
+        style = "given" if replay == judgement.held_by else ""
+        missing = three_digits(replay.missing[axis])
+        watts = three_digits(replay.watts)
+        saturated = three_digits(replay.saturated_s)
+        rows.append(html(template, robot, replay.name, style, missing, watts, saturated))
+    head = html(
+        "<tr><th>robot</th>"
+        "<th class='words'>method</th>"
+        "<th>{} missing [{} s]</th>"
+        "<th>power [W]</th>"
+        "<th>short [s]</th></tr>",
+        MOTIONS[axis],
+        AXIS_UNITS[axis],
+    )
+    legend = Markup(
         "<div class='said'><span class='given'>Green</span>: holds what was lost, at least "
         "power.</div>"
     )
@@ -221,5 +241,5 @@ def replays_table(judgement: "Judgement | None") -> str:
         "<div class='fl fl-timeline'><table class='methods'>{}{}</table>{}</div>",
         head,
         rows,
-        sentence if judgement.held_by else "",
+        legend if judgement.held_by else "",
     )
