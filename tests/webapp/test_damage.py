@@ -106,7 +106,7 @@ def test_a_thruster_hangs_at_a_force_in_newtons() -> None:
     session.damage(second, "running", (7.5,))
     words = command_line(session.state)
     assert f"--stuck {first}=-12 " in words + " " and f"--running {second}=7.5 " in words + " "
-    assert damage_words(session.state.damage, first, turns=False) == "hangs at −12 N"
+    assert damage_words(session.state.damage, first, sticks_at_angle=False) == "hangs at −12 N"
     for wrong in (math.nan, "much", True, 1e4):
         with pytest.raises(FinlabError):
             session.damage(first, "stuck", wrong)

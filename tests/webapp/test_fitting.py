@@ -237,7 +237,7 @@ def test_doubts_come_first(tmp_path: Path, worker: Pool) -> None:
         "<div class='fl'><div class='said'><b class='missing'>Not to be trusted: "
     )
     fin = opened.session.state.layout.fins[2]
-    assert DOUBT in model_card(fin) and DOUBT not in model_card(fin, doubts=False)
+    assert DOUBT in model_card(fin) and DOUBT not in model_card(fin, has_doubts=False)
 
 
 def robot(tmp_path: Path, cache: Path) -> Layout:

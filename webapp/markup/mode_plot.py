@@ -92,7 +92,7 @@ def mode_plot(modes: Modes, shown_mode: int, step: int | None, height: int) -> s
         layers.append(html(note, WIDTH - RIGHT, samples.hidden))
     rings = [(float(x), float(y)) for x, y in zip(*plot.place(*refined.T), strict=True)]
     layers += _rings(rings, shown_mode)
-    return html("<div class='fl'>{}</div>", plot.drawn(layers, upright=True))
+    return html("<div class='fl'>{}</div>", plot.svg(layers, upright=True))
 
 
 def _samples(modes: Modes, effort: Array) -> Samples:

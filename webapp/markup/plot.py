@@ -24,9 +24,20 @@ from webapp.theme import Rgb, css
 
 WIDTH = 388
 """Width of a plot [px]."""
-RIGHT, TOP, BOTTOM = 8, 24, 34
-"""Margins of a plot [px]."""
+RIGHT = 8
+"""Margin at the right of a plot [px]."""
+TOP = 24
+"""Margin above a plot, with room for what its colours mean [px]."""
+BOTTOM = 34
+"""Margin below a plot, with room for the ticks and the word of the axis [px]."""
 MOST_TICKS = 6
+"""Ticks of an axis at most: their labels are not to touch."""
+NARROW_WIDTH = 250
+"""Width of a plot that stands beside others [px]."""
+NARROW_HEIGHT = 128
+"""Height of a plot that stands beside others [px]."""
+NARROW_LEFT = 46
+"""Where the axis that goes up stands in such a plot [px]."""
 EXACT = 1e-6
 """Error below which all answers are drawn as equally exact."""
 Point = tuple[float, float]
@@ -37,36 +48,45 @@ class Axis(NamedTuple):
     """One axis of a plot."""
 
     word: str
+    """What it shows, with its unit."""
     low: float
     high: float
     ticks: tuple[tuple[float, str], ...]
+    """Values and labels."""
 
-    def share(self, value: Any) -> Any:
+    def fraction(self, value: Any) -> Any:
         """How far along it a value lies, or each of an array, 0 to 1."""
         return (value - self.low) / (self.high - self.low)
 
 
-def cost_axis(word: str, values: Array, most: int = MOST_TICKS) -> Axis:
-    """An axis that shows all of some values (N,), in the unit that `word` names, with round ticks,
-    `most` at most."""
-    low = float(values.min())
-    high = float(values.max())
-    margin = max(0.08 * (high - low), 0.02 * high, 1e-6)
-    low = low - margin
-    high = high + margin
-    decade = 10.0 ** math.floor(math.log10((high - low) / most))
-    step = next(s * decade for s in (1.0, 2.0, 5.0, 10.0) if (high - low) / (s * decade) <= most)
-    places = range(math.ceil(low / step), math.floor(high / step) + 1)
-    return Axis(
-        word,
-        low,
-        high,
-        tuple((k * step, f"{k * step + 0.0:.4g}".replace("-", "−")) for k in places),
-    )
+def cost_axis(word: str, values: Array, max_ticks: int = MOST_TICKS) -> Axis:
+    """An axis that shows all of some values, with a margin and round ticks.
+
+    Args:
+        word: what it shows, with its unit.
+        values: array (N,) in that unit.
+        max_ticks: ticks at most.
+    """
+    lowest = float(values.min())
+    highest = float(values.max())
+    margin = max(0.08 * (highest - lowest), 0.02 * highest, 1e-6)
+    low = lowest - margin
+    high = highest + margin
+    # The smallest of 1, 2, 5 and 10 times a power of ten with so few ticks.
+    decade = 10.0 ** math.floor(math.log10((high - low) / max_ticks))
+    step = 10.0 * decade
+    for factor in (1.0, 2.0, 5.0, 10.0):
+        step = factor * decade
+        if (high - low) / step <= max_ticks:
+            break
+    ticks = []
+    for k in range(math.ceil(low / step), math.floor(high / step) + 1):
+        ticks.append((k * step, f"{k * step + 0.0:.4g}".replace("-", "−")))
+    return Axis(word, low, high, tuple(ticks))
 
 
 def error_axis(logs: Array) -> Axis:
-    """The same for logarithms (N,) of errors, to base ten, in powers of ten."""
+    """An axis that shows logarithms (N,) of errors to base ten, with ticks at powers of ten."""
     low = math.floor(logs.min())
     high = max(math.ceil(logs.max()), low + 1)
     ticks = []
@@ -98,102 +118,107 @@ class Plot(NamedTuple):
 
     def place(self, x: Any, y: Any) -> tuple[Any, Any]:
         """Where a pair of values stands, or each of two arrays [px]."""
-        right = self.left + self.across.share(x) * (self.width - self.left - RIGHT)
-        return right, self.floor - self.up.share(y) * (self.floor - TOP)
+        right = self.left + self.across.fraction(x) * (self.width - self.left - RIGHT)
+        return right, self.floor - self.up.fraction(y) * (self.floor - TOP)
 
     def points(self, x: Array, y: Array) -> str:
-        """Some places, x and y (N,) in the units of the axes, as lines take them [px]."""
-        places = zip(*self.place(x, y), strict=True)
-        return " ".join([f"{right:.1f},{down:.1f}" for right, down in places])
+        """Some points, x and y (N,) in the units of the axes, as lines take them [px]."""
+        points = zip(*self.place(x, y), strict=True)
+        return " ".join([f"{right:.1f},{down:.1f}" for right, down in points])
 
     def curve(self, x: Array, y: Array, color: Rgb) -> str:
-        """A line through some places, x and y (N,) in the units of the axes."""
+        """A line through some points, x and y (N,) in the units of the axes."""
         line = "<polyline points='{}' fill='none' stroke='{}' stroke-width='2'/>"
         return html(line, self.points(x, y), css(color))
 
     def key(self, right: int, color: Rgb, words: str) -> str:
         """What a colour means, above the plot, so far [px] from the axis that goes up."""
         sign = (
-            "<rect x='{}' y='7' width='14' height='5' rx='2' fill='{}'/><text x='{}' "
-            "y='14'>{}</text>"
+            "<rect x='{}' y='7' width='14' height='5' rx='2' fill='{}'/>"
+            "<text x='{}' y='14'>{}</text>"
         )
         return html(sign, self.left + right, css(color), self.left + right + 19, words)
 
     def grid(self, upright: bool) -> str:
-        """Lines and labels; upright lines or none."""
+        """Lines and labels of both axes; `upright` says whether there are upright lines as well."""
         floor = self.floor
         left = self.left
-        end = self.width - RIGHT
-        across = np.array([value for value, _ in self.across.ticks])
-        up = np.array([value for value, _ in self.up.ticks])
-        right = self.place(across, 0.0)[0]
-        down = self.place(0.0, up)[1]
-        parts = []
+        right = self.width - RIGHT
+        columns = self.place(np.array([value for value, _ in self.across.ticks]), 0.0)[0].tolist()
+        levels = self.place(0.0, np.array([value for value, _ in self.up.ticks]))[1].tolist()
+        markup = []
         # Labels of ticks are rounded numbers, or markup of ours: they need no escaping.
-        for at, (_, label) in zip(down.tolist(), self.up.ticks, strict=True):
-            parts.append(f"<path d='M{left} {at:.1f}H{end}' class='grid'/>")
-            parts.append(f"<text x='{left - 5}' y='{at + 4:.1f}' text-anchor='end'>{label}</text>")
-        for at, (_, label) in zip(right.tolist(), self.across.ticks, strict=True):
+        for y, (_, label) in zip(levels, self.up.ticks, strict=True):
+            markup.append(f"<path d='M{left} {y:.1f}H{right}' class='grid'/>")
+            markup.append(f"<text x='{left - 5}' y='{y + 4:.1f}' text-anchor='end'>{label}</text>")
+        for x, (_, label) in zip(columns, self.across.ticks, strict=True):
             if upright:
-                parts.append(f"<path d='M{at:.1f} {TOP}V{floor}' class='grid'/>")
-            parts.append(f"<text x='{at:.1f}' y='{floor + 14}' text-anchor='middle'>{label}</text>")
-        middle = (left + self.width) / 2
-        word = "<text x='{:.1f}' y='{}' text-anchor='middle'>{}</text>"
-        turned = (
-            f"<text transform='translate(10 {(TOP + floor) / 2}) rotate(-90)' text-anchor='middle'>"
-        )
+                markup.append(f"<path d='M{x:.1f} {TOP}V{floor}' class='grid'/>")
+            markup.append(f"<text x='{x:.1f}' y='{floor + 14}' text-anchor='middle'>{label}</text>")
         words = html(
-            word + turned + "{}</text>", middle, self.height - 5, self.across.word, self.up.word
+            "<text x='{:.1f}' y='{}' text-anchor='middle'>{}</text>"
+            "<text transform='translate(10 {}) rotate(-90)' text-anchor='middle'>{}</text>",
+            (left + self.width) / 2,
+            self.height - 5,
+            self.across.word,
+            (TOP + floor) / 2,
+            self.up.word,
         )
-        return Markup("".join(parts)) + words
+        return Markup("".join(markup)) + words
 
-    def drawn(self, parts: Iterable[str], upright: bool = False) -> str:
-        """The whole plot, `parts` over its grid."""
+    def svg(self, layers: Iterable[str], upright: bool = False) -> str:
+        """The whole plot: markup in `layers` over its grid, see `grid`."""
         frame = "<svg class='plot' viewBox='0 0 {} {}'>{}{}</svg>"
-        return html(frame, self.width, self.height, self.grid(upright), parts)
+        return html(frame, self.width, self.height, self.grid(upright), layers)
 
 
-def positive(word: str, values: Array, most: int = MOST_TICKS) -> Axis:
-    """An axis from 0, or the least of some values (N,), that shows all of them."""
-    least = min(0.0, float(values.min()))
-    return cost_axis(word, np.append(values, least), most)._replace(low=least)
+def positive_axis(word: str, values: Array, max_ticks: int = MOST_TICKS) -> Axis:
+    """An axis from 0, or the least of some values, that shows all of them; see `cost_axis`.
+
+    Args:
+        word: what it shows, with its unit.
+        values: array (N,) in that unit.
+        max_ticks: ticks at most.
+    """
+    low = min(0.0, float(values.min()))
+    return cost_axis(word, np.append(values, low), max_ticks)._replace(low=low)
 
 
 def exact_axis(word: str, values: Array) -> Axis:
-    """An axis from the first of some values (N,) to the last."""
+    """An axis from the first of some values (N,) to the last, in the unit that `word` names."""
     axis = cost_axis(word, values)._replace(low=float(values[0]), high=float(values[-1]))
-    return axis._replace(
-        ticks=tuple(tick for tick in axis.ticks if axis.low <= tick[0] <= axis.high)
-    )
-
-
-NARROW, LOW, INDENT = 250, 128, 46
-"""Of a plot that stands beside others, and where its vertical axis stands [px]."""
+    ticks = [tick for tick in axis.ticks if axis.low <= tick[0] <= axis.high]
+    return axis._replace(ticks=tuple(ticks))
 
 
 def over_time(
     across: Axis,
     seconds: Array,
     up: Axis,
-    lines: Sequence[Array],
+    curves: Sequence[Array],
     colors: Sequence[Rgb],
     words: Sequence[str] = (),
     moment: float | None = None,
 ) -> str:
-    """Curves (T,), in the unit of `up`, over the same times (T,) [s], of as many colours, the first
-    of which have words; with an upright line at a moment [s]."""
-    drawing = Plot(across, up._replace(word=""), LOW, INDENT, NARROW)
-    parts = [html("<text x='2' y='14'>{}</text>", up.word)]
-    parts += [
-        drawing.curve(seconds, line, color) for line, color in zip(lines, colors, strict=False)
-    ]
-    parts += [
-        drawing.key(34 + 68 * k, color, word)
-        for k, (word, color) in enumerate(zip(words, colors, strict=False))
-    ]
+    """Curves over the same times.
+
+    Args:
+        across: the axis of time [s].
+        seconds: times (T,) [s].
+        up: the axis of the values.
+        curves: values (T,) of each curve, in the unit of `up`.
+        colors: of the curves.
+        words: what the first colours mean.
+        moment: time at which an upright line stands [s], if any.
+    """
+    plot = Plot(across, up._replace(word=""), NARROW_HEIGHT, NARROW_LEFT, NARROW_WIDTH)
+    layers = [html("<text x='2' y='14'>{}</text>", up.word)]
+    for curve, color in zip(curves, colors, strict=False):
+        layers.append(plot.curve(seconds, curve, color))
+    for k, (word, color) in enumerate(zip(words, colors, strict=False)):
+        layers.append(plot.key(34 + 68 * k, color, word))
     if moment is not None:
-        at = drawing.place(moment, 0.0)[0]
-        parts.append(
-            html("<path d='M{:.1f} {}V{}' stroke='currentColor'/>", at, TOP, drawing.floor)
-        )
-    return drawing.drawn(parts)
+        x = plot.place(moment, 0.0)[0]
+        line = "<path d='M{:.1f} {}V{}' stroke='currentColor'/>"
+        layers.append(html(line, x, TOP, plot.floor))
+    return plot.svg(layers)

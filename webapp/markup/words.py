@@ -1,8 +1,12 @@
 """Sentences and numbers as people read them: fixed width, a real minus sign, three significant
-digits."""
+digits.
+
+All panels write their markup with `html` and `row`, and their numbers with the functions here, so
+that a quantity looks the same wherever it stands.
+"""
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -21,12 +25,20 @@ from finlab.swim.vehicle.vehicle import Vehicle
 from webapp.session.state import AXIS_WORDS
 
 SAFE = (Markup, int, float, np.float64)
+"""Types of values that `html` takes as they are: none of them can hold a sign of markup."""
 ESCAPES = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", "'": "&#39;", '"': "&#34;"})
+"""Signs of markup -> what a text has in place of them."""
 
 
 def html(template: str, *values: object) -> str:
-    """Markup, a text that is marked as such, with values in the place of `{}`, which may have
-    formats, as `str.format` has them. Of several things in one, all stand one after the other."""
+    """Markup: a text that is marked as such.
+
+    Args:
+        template: markup with `{}` where values go, which may have formats, as `str.format` has
+            them.
+        values: texts, which are escaped unless they are marked as markup, numbers, or iterables of
+            such, whose items stand one after the other.
+    """
     # Much faster than the format of `Markup`, which looks at each value through a formatter of its
     # own.
     safe: list[Any] = []
@@ -36,8 +48,8 @@ def html(template: str, *values: object) -> str:
         elif isinstance(value, str) or not isinstance(value, Iterable):
             safe.append(str(value).translate(ESCAPES))
         else:
-            parts = value if isinstance(value, (list, tuple)) else tuple(value)
-            safe.append(html("{}" * len(parts), *parts))
+            items = value if isinstance(value, (list, tuple)) else tuple(value)
+            safe.append(html("{}" * len(items), *items))
     return str.__new__(Markup, template.format(*safe))
 
 
@@ -52,27 +64,28 @@ def marker(name: str) -> str:
     return html("<i class='{}'></i>", name)
 
 
-def button_colors(name: str, colors: list[tuple[str, str]]) -> str:
-    """A style that paints the buttons of the group behind the marker: background and text colour of
-    each."""
-    rules = [
-        html(
-            "[data-fl~={}] + div button:nth-of-type({}) {{ background: {}; color: {}; "
-            "border-color: {}; }}",
-            name.removeprefix("fl-"),
-            k + 1,
-            back,
-            text,
-            back,
-        )
-        for k, (back, text) in enumerate(colors)
-    ]
+def button_colors(name: str, colors: Sequence[tuple[str, str]]) -> str:
+    """A style that paints a group of buttons.
+
+    Args:
+        name: of the marker before the group.
+        colors: background and text colour of each button, as in CSS.
+    """
+    template = (
+        "[data-fl~={}] + div button:nth-of-type({}) "
+        "{{ background: {}; color: {}; border-color: {}; }}"
+    )
+    holder = name.removeprefix("fl-")
+    rules = []
+    for k, (background, text) in enumerate(colors):
+        rules.append(html(template, holder, k + 1, background, text, background))
     return html("<style>{}</style>{}", rules, marker(name))
 
 
 SPEED = "Speed through the water [m/s]"
 """Label of the control that tells how the robot moves."""
 CONVERT = "finlab layout convert"
+"""The command line's verb that has options without a control on the page."""
 CONTROLS = {
     "(--flow)": f"({SPEED[:-6]})",
     "(flow)": f"({SPEED[:-6]})",
@@ -92,8 +105,10 @@ CONTROLS = {
 SMALL = 3e-4
 """Share of what the robot can push that is too small to draw, on one axis; an exact answer lacks no
 more."""
-OWN = "the answer"
+ANSWER_SOURCE = "the answer"
 """Source of a mode that is the answer of a method without candidates."""
+COMPONENT = "component "
+"""How the source of a candidate begins that comes from a component of a mixture."""
 MOST_LISTED = 2
 """Components of a mixture that are named; of more their number is told."""
 ROUNDING = 1e-9
@@ -104,8 +119,9 @@ AT_LIMIT = 0.995
 
 def listed(items: Sequence[str]) -> str:
     """`a`, `a and b`, `a, b and c`."""
-    items = list(items)
-    return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"
+    if len(items) == 1:
+        return items[0]
+    return f"{', '.join(items[:-1])} and {items[-1]}"
 
 
 def fins_words(numbers: Sequence[int], layout: Layout | None = None) -> str:
@@ -145,18 +161,21 @@ def three_digits(value: float | None) -> str:
 
 def source_words(sources: Sequence[str]) -> str:
     """Where a mode comes from: the components of a mixture, or where the search began."""
-    if OWN in sources:
-        return OWN
-    numbers = [s.removeprefix("component ") for s in sources if s.startswith("component ")]
+    if ANSWER_SOURCE in sources:
+        return ANSWER_SOURCE
+    numbers = [source.removeprefix(COMPONENT) for source in sources if source.startswith(COMPONENT)]
     if len(numbers) > MOST_LISTED:
         numbers = [*numbers[:MOST_LISTED], f"{len(numbers) - MOST_LISTED} more"]
     if numbers:
         return f"component{'s' if len(numbers) > 1 else ''} {listed(numbers)}"
     if not sources:
         return ""
-    first = sources[0]
-    words = {"all fins": "found with all fins", "refined": "a refined sample"}
-    return words.get(first, f"found {first}" if first.startswith("without ") else f"from {first}")
+    source = sources[0]
+    if source == "all fins":
+        return "found with all fins"
+    if source == "refined":
+        return "a refined sample"
+    return f"found {source}" if source.startswith("without ") else f"from {source}"
 
 
 def in_app(text: str) -> str:
@@ -169,31 +188,36 @@ def in_app(text: str) -> str:
 
 def missing_part(allocation: Allocation) -> Array:
     """The unallocated wrench (6,) [N, N m] without what is too small to matter."""
-    rest = allocation.unallocated
-    return np.where(np.abs(rest / allocation.scale) > SMALL, rest, 0.0)
+    unallocated = allocation.unallocated
+    return np.where(np.abs(unallocated / allocation.scale) > SMALL, unallocated, 0.0)
 
 
 def unlearned_sentence(layout: Layout, fins: Sequence[str]) -> str:
     """Which fins the method's networks have not learned, so that its commands for them are
     wrong."""
-    return (
-        f"Not learned: {fins_words([layout.index(name) for name in fins])}. Choose another method"
-    )
+    words = fins_words([layout.index(name) for name in fins])
+    return f"Not learned: {words}. Choose another method"
 
 
 def authority_sentence(layout: Layout, lost: tuple[str, ...], reach: Array) -> str | None:
-    """Which axes the working fins cannot act on at all, given their reach (6,) [N, N m]; None for
-    none."""
+    """Which axes the working fins cannot act on at all.
+
+    Args:
+        layout: the robot.
+        lost: names of its lost actuators.
+        reach: what the others give at most along each axis (6,) [N, N m].
+
+    Returns:
+        A sentence; None where they can act on all axes.
+    """
     is_blind = reach < 1e-6
     if not is_blind.any():
         return None
     blind = [AXIS_WORDS[k] for k in range(6) if is_blind[k]]
-    without = (
-        f"Without {fins_words([layout.index(name) for name in lost], layout)} this"
-        if lost
-        else "This"
-    )
-    return f"{without} robot cannot {listed(blind)}."
+    subject = "This"
+    if lost:
+        subject = f"Without {fins_words([layout.index(name) for name in lost], layout)} this"
+    return f"{subject} robot cannot {listed(blind)}."
 
 
 def righting_sentences(layout: Layout) -> tuple[str, ...]:
@@ -206,17 +230,22 @@ def trim_sentence(layout: Layout, reach: Array) -> str | None:
     """What keeping its depth takes of the working fins, given their reach (6,) [N, N m]; None if
     little."""
     vehicle = Vehicle(complete_body(layout))
-    over = vehicle.buoyancy - vehicle.weight
-    if abs(over) < max(0.5 * float(reach[2]), 1e-3 * vehicle.weight):
+    # B - W [N]: positive where the robot rises by itself.
+    lift = vehicle.buoyancy - vehicle.weight
+    heave_reach = float(reach[2])
+    if abs(lift) < max(0.5 * heave_reach, 1e-3 * vehicle.weight):
         return None
-    goes, way = ("rises", "down") if over > 0.0 else ("sinks", "up")
-    sentence = f"By its mass and buoyancy this robot {goes} with {three_digits(abs(over))} N"
-    most = f"{three_digits(float(reach[2]))} N" if reach[2] >= 1e-6 else "nothing"
-    if abs(over) < reach[2]:
-        return f"{sentence}; of the {most} that its working fins can push {way}, that is most."
+    motion = "rises" if lift > 0.0 else "sinks"
+    direction = "down" if lift > 0.0 else "up"
+    sentence = f"By its mass and buoyancy this robot {motion} with {three_digits(abs(lift))} N"
+    limit = f"{three_digits(heave_reach)} N" if heave_reach >= 1e-6 else "nothing"
+    if abs(lift) < heave_reach:
+        return (
+            f"{sentence}; of the {limit} that its working fins can push {direction}, that is most."
+        )
     return (
-        f"{sentence}, and its working fins can push {way} with {most} at most: it cannot keep its "
-        "depth."
+        f"{sentence}, and its working fins can push {direction} with {limit} at most: it cannot "
+        "keep its depth."
     )
 
 
@@ -234,6 +263,7 @@ def saturated(allocation: Allocation) -> NDArray[np.bool_]:
 
 @lru_cache(maxsize=8)
 def _turning(layout: Layout) -> NDArray[np.bool_]:
+    """Which numbers of the commands (n, 3) are free angles, without limits."""
     return free_angles(layout.actuators)
 
 
@@ -242,16 +272,29 @@ def parts_word(layout: Layout) -> str:
     return "fins" if layout.is_of_fins else "actuators"
 
 
-def damage_words(damage: Damage, name: str, turns: bool = True) -> str:
-    """What is wrong with an actuator that still works: `weak 50 %, stuck at 30°`; nothing for a
-    whole one. `turns` says whether what sticks is an angle, else a force."""
-    words_of: dict[str, Callable[[Any], str]] = {
-        "weak": lambda share: f"weak {100 * share:.0f} %",
-        "torn": lambda share: f"torn, {100 * share:.0f} % left",
-        "stuck": lambda at: (
-            f"stuck at {math.degrees(at):.0f}°" if turns else f"hangs at {at:.3g} N"
-        ),
-        "running": lambda command: "runs on",
-    }
-    known = {} if damage == WHOLE else damage.of(name)
-    return ", ".join(words_of[kind](value) for kind, value in known.items()).replace("-", "−")
+def damage_words(damage: Damage, name: str, sticks_at_angle: bool = True) -> str:
+    """What is wrong with an actuator that still works: `weak 50 %, stuck at 30°`.
+
+    Args:
+        damage: of the robot.
+        name: of the actuator.
+        sticks_at_angle: whether what sticks is an angle [rad], else a force [N].
+
+    Returns:
+        Words; nothing for a whole actuator.
+    """
+    if damage == WHOLE:
+        return ""
+    faults = []
+    for kind, value in damage.of(name).items():
+        if kind == "weak":
+            faults.append(f"weak {100 * value:.0f} %")
+        elif kind == "torn":
+            faults.append(f"torn, {100 * value:.0f} % left")
+        elif kind == "running":
+            faults.append("runs on")
+        elif kind == "stuck" and sticks_at_angle:
+            faults.append(f"stuck at {math.degrees(value):.0f}°")
+        elif kind == "stuck":
+            faults.append(f"hangs at {value:.3g} N")
+    return ", ".join(faults).replace("-", "−")

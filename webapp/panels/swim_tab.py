@@ -14,7 +14,7 @@ from finlab.layout import Layout
 from finlab.layout.layout import MAX_ACTUATORS
 from webapp.handles import add_html, set_properties
 from webapp.markup.outcomes import swim_card
-from webapp.markup.plot import cost_axis, exact_axis, over_time, positive
+from webapp.markup.plot import cost_axis, exact_axis, over_time, positive_axis
 from webapp.markup.words import html, marker, righting_sentences, trim_sentence
 from webapp.page import Page
 from webapp.panels.damage import Row, add_fin_buttons
@@ -176,7 +176,7 @@ def timeline(record: Array, n: int, duration_s: float) -> list[str]:
     plot = partial(over_time, across, seconds)
 
     def sizes(word: str, lines: Sequence[Array], colors: Sequence[Rgb] = (DELIVERED,)) -> str:
-        return plot(positive(word, np.append(SMALL, lines), TICKS), lines, colors)
+        return plot(positive_axis(word, np.append(SMALL, lines), TICKS), lines, colors)
 
     surge = list(rows[:, SURGE : SURGE + 2].T)
     ends = cost_axis("surge [N]", np.append((-SMALL, SMALL), surge), TICKS)

@@ -21,7 +21,7 @@ from finlab.physics import plant_of
 from finlab.research.networks.checkpoint import network_features, resolve_checkpoint
 from finlab.research.paper.network import NetworkConfig
 from webapp.markup.verdict import is_proved
-from webapp.markup.words import OWN, fins_words
+from webapp.markup.words import ANSWER_SOURCE, fins_words
 from webapp.session.state import DRAWING, State, one_of
 from webapp.tasks.modes import Mode, find_modes, force_sizes, mode_signature, same_signature
 from webapp.theme import MODE_COLORS
@@ -268,7 +268,9 @@ class Solver:
         else:
             costs = np.array([answer.effort]), np.array([answer.power])
             error = np.array([answer.err_norm])
-            own = Candidates(answer.command[None], answer.wrench[None], error, *costs, (OWN,))
+            own = Candidates(
+                answer.command[None], answer.wrench[None], error, *costs, (ANSWER_SOURCE,)
+            )
             badge = "optimum" if is_proved(answer) else state.method
         ways = self.allocator(replace(state, method="mdn")).refinement(answer)
         return modes_of(answer, own.followed_by(ways[-1].exact(ALTERNATIVE_ERROR)), badge, ways)
