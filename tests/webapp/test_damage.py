@@ -256,7 +256,7 @@ def test_a_hull_that_contradicts_the_body_can_be_estimated_anew() -> None:
     hulled.estimate()
     layout = hulled.state.layout
     assert layout.body is not None and layout.body.mass_kg == 19.0 and not contradicts(layout)
-    hulled.estimate(anew=True)
+    hulled.estimate(with_mass=True)
     layout = hulled.state.layout
     assert layout.body is not None and layout.body.mass_kg == pytest.approx(water, rel=0.001)
     assert layout.body.center_of_buoyancy_m is not None and not contradicts(layout)

@@ -37,7 +37,9 @@ proved of the answer takes 85 of them, and the candidates of a network 700."""
 MOST_OF_APP = {"Candidates": 480, "folded": 240}
 """Calls of the app's functions among them."""
 MOST_FILES = 64
-"""Files in which the called functions are."""
+"""Files in which the called functions are: what has to be read to follow one step. A step runs
+through the page, the session, the task, the library's allocator and plant, and the panels that are
+visible, with a few files each; a file more is a detour."""
 MOST_WRITTEN = 2
 """Times that the page is written: with the answer, and with what is found beside it."""
 MOST_MESSAGES = 12
@@ -46,14 +48,14 @@ MOST_BYTES = 6000
 """Size of these messages [bytes]."""
 
 
-class Count:
+class CallCount:
     """Calls of own code by function, and between files, in all threads that begin after it was
-    made."""
+    made; a profiler, see `threading.setprofile`."""
 
     def __init__(self) -> None:
         self.is_on = False
-        self.of: Counter[CodeType] = Counter()
-        self.between: Counter[tuple[str, str]] = Counter()
+        self.calls_by_code: Counter[CodeType] = Counter()
+        self.calls_between_files: Counter[tuple[str, str]] = Counter()
 
     def __call__(self, frame: FrameType, event: str, _argument: Any) -> None:
         if not self.is_on or event != "call":
@@ -61,58 +63,58 @@ class Count:
         file = frame.f_code.co_filename
         if not file.startswith(OURS):
             return
-        self.of[frame.f_code] += 1
+        self.calls_by_code[frame.f_code] += 1
         caller = frame.f_back
         while caller is not None and not caller.f_code.co_filename.startswith(OURS):
             caller = caller.f_back
         if caller is not None:
-            self.between[caller.f_code.co_filename, file] += 1
+            self.calls_between_files[caller.f_code.co_filename, file] += 1
 
     def start(self) -> None:
         """Count anew."""
-        self.of.clear()
-        self.between.clear()
+        self.calls_by_code.clear()
+        self.calls_between_files.clear()
         self.is_on = True
 
     @property
     def calls(self) -> int:
-        """All of them."""
-        return sum(self.of.values())
+        """Calls of all functions."""
+        return sum(self.calls_by_code.values())
 
     @property
     def calls_of_app(self) -> int:
         """Those of the app's own functions."""
-        return sum(count for code, count in self.of.items() if code.co_filename.startswith(APP))
+        return sum(
+            count for code, count in self.calls_by_code.items() if code.co_filename.startswith(APP)
+        )
 
     @property
     def files(self) -> set[str]:
-        """In which the functions are."""
-        return {code.co_filename for code in self.of}
+        """Files in which the called functions are."""
+        return {code.co_filename for code in self.calls_by_code}
 
     @property
     def pairs(self) -> set[tuple[str, str]]:
         """Files of the app that call each other."""
-        return {
-            (one.removeprefix(APP), other.removeprefix(APP))
-            for one, other in self.between
-            if one < other
-            and (other, one) in self.between
-            and one.startswith(APP)
-            and other.startswith(APP)
-        }
+        pairs = set()
+        for caller, called in self.calls_between_files:
+            in_app = caller.startswith(APP) and called.startswith(APP)
+            if in_app and caller < called and (called, caller) in self.calls_between_files:
+                pairs.add((caller.removeprefix(APP), called.removeprefix(APP)))
+        return pairs
 
 
 @pytest.fixture(scope="module")
-def count() -> Iterator[Count]:
-    before = threading.getprofile()
-    count = Count()
+def count() -> Iterator[CallCount]:
+    old_profiler = threading.getprofile()
+    count = CallCount()
     threading.setprofile(count)
     yield count
-    threading.setprofile(before)
+    threading.setprofile(old_profiler)
 
 
 @pytest.fixture(scope="module")
-def tab(count: Count) -> Iterator[Tab]:
+def tab(count: CallCount) -> Iterator[Tab]:
     pools = Pools()
     tab = Tab(pools, load_layout("ucat"), Solver())
     tab.on_loop(lambda: tab.view.do(lambda: tab.view.session.set_display("drawn", "none")))
@@ -127,7 +129,7 @@ def tab(count: Count) -> Iterator[Tab]:
 )
 @pytest.mark.parametrize("drawer", ["Candidates", "folded"])
 def test_a_step_is_cheap(
-    tab: Tab, count: Count, drawer: str, monkeypatch: pytest.MonkeyPatch
+    tab: Tab, count: CallCount, drawer: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     session = tab.view.session
     write = View._write_words
@@ -167,7 +169,7 @@ def test_a_step_is_cheap(
     words = "own calls, those of the app, files, times that the page is written, messages, bytes"
     print(f"{drawer}: {steps[1:]} {words} in a step")
     if os.environ.get("FINLAB_CALLS"):
-        for code, calls in count.of.most_common():
+        for code, calls in count.calls_by_code.most_common():
             print(f"{calls:6} {'/'.join(code.co_filename.split('/')[-3:])} {code.co_name}")
     calls, of_app, files, _, _, size = map(max, zip(*steps[1:], strict=True))
     # On a busy machine an answer may be later than the page waits, and the page is written once

@@ -68,16 +68,16 @@ class Core:
         self, name: str, state: State, merge_key: str | None = None, timed: bool = True
     ) -> None:
         """Another state; a step of undo where the robot is another one."""
-        before = self.state
-        if state == before:
+        old_state = self.state
+        if state == old_state:
             return
-        if state.asking(before) == before:  # about the same robot
+        if state.asking(old_state) == old_state:  # about the same robot
             self.history.replace(state)
         else:
             self.history.commit(name, state, merge_key, timed)
-        self.settle(before)
+        self.settle(old_state)
 
-    def settle(self, before: State) -> None:
+    def settle(self, old_state: State) -> None:
         """After any change of the state: a choice of mode is void, an actuator that is gone is not
         selected; one that is called otherwise now stays so."""
         self.revision += 1
@@ -86,7 +86,7 @@ class Core:
         self.shifts = ()
         if not self.selection_order:
             return
-        old = before.layout.names
+        old = old_state.layout.names
         names = self.state.layout.names
         called = dict(zip(old, names, strict=True)) if len(old) == len(names) else {}
         now = (name if name in names else called.get(name) for name in self.selection_order)
@@ -103,11 +103,11 @@ class Core:
     def _step(self, verb: str, source: Steps, sink: Steps) -> str:
         if not source:
             raise FinlabError(f"there is nothing to {verb}")
-        before = self.state
+        old_state = self.state
         name, state = source.pop()
-        sink.append((name, before))
-        self.history.replace(state.asking(before))
-        self.settle(before)
+        sink.append((name, old_state))
+        self.history.replace(state.asking(old_state))
+        self.settle(old_state)
         return name
 
     # The selection.

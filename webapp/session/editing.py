@@ -1,5 +1,7 @@
-"""Changes of a session's layout: place, turn, copy, remove and describe actuators, shape the
-hull."""
+"""Changes of a session's layout: place, turn, copy, remove and describe actuators, shape the hull.
+
+Panels and the view call these intents; the changes themselves are functions in `layout_edits.py`.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -16,12 +18,13 @@ from finlab.swim.hull import estimated
 from webapp.session import layout_edits
 from webapp.session.core import Core
 from webapp.session.key_words import key_words
-from webapp.session.layout_edits import followed, partner, unlinked
+from webapp.session.layout_edits import partner, unlinked, with_twin
 from webapp.session.lessons import Guide
 from webapp.session.looking import Display
 from webapp.session.state import method_for
 
 UNITS = ("kg", "kgm2", "m", "n")
+"""Ends of the names of a body's fields that say a unit, and are no part of what undo calls them."""
 
 
 class Session(Core):
@@ -42,11 +45,16 @@ class Session(Core):
     # Robots.
 
     def open_layout(self, layout: Layout, step: str = "", lost: tuple[str, ...] = ()) -> None:
-        """Another layout, of which some may be lost; the target stays, damage and links are
-        forgotten. `step` is what undo calls it."""
+        """Another layout; the target stays, damage and links are forgotten.
+
+        Args:
+            layout: the robot.
+            step: what undo calls it; "Open" and its name where there is none.
+            lost: names of its lost actuators.
+        """
         method = method_for(layout, self.state.method)
-        anew = replace(self.state, layout=layout, damage=Damage(lost), links=(), method=method)
-        self._commit(step or f"Open {layout.name}", anew)
+        state = replace(self.state, layout=layout, damage=Damage(lost), links=(), method=method)
+        self._commit(step or f"Open {layout.name}", state)
         self.saved = layout
 
     def new_layout(self, kind: str) -> None:
@@ -58,9 +66,9 @@ class Session(Core):
         """A better layout that was found for this one."""
         self._edit("Improve the layout", layout)
 
-    def rename_robot(self, wanted: str) -> None:
+    def rename_robot(self, new_name: str) -> None:
         """Another name of the robot."""
-        named = replace(self.state.layout, name=wanted.strip())
+        named = replace(self.state.layout, name=new_name.strip())
         self._edit(f"Rename the robot to {named.name}", named)
 
     def describe_robot(self, text: str) -> None:
@@ -86,7 +94,8 @@ class Session(Core):
     def set_dynamics(self, key: str, value: Any) -> None:
         """Another field of the body, one of `DYNAMICS`; None forgets it."""
         changed = layout_edits.with_dynamics(self.state.layout, **{key: value})
-        word = key_words(key.rsplit("_", 1)[0] if key.rsplit("_", 1)[-1] in UNITS else key)
+        stem, _, unit = key.rpartition("_")
+        word = key_words(stem if unit in UNITS else key)
         self._edit(f"{word} of the robot", changed)
 
     def forget_dynamics(self) -> None:
@@ -96,20 +105,21 @@ class Session(Core):
             "Forget mass and damping", layout_edits.with_dynamics(self.state.layout, **nothing)
         )
 
-    def estimate(self, anew: bool = False) -> None:
-        """What the hull says of the body; a mass that is known stays, unless all is estimated
-        `anew`."""
+    def estimate(self, with_mass: bool = False) -> None:
+        """What the hull says of the body; a mass that is known stays, unless it is estimated as
+        well."""
         layout = self.state.layout
-        known = layout_edits.with_dynamics(layout, mass_kg=None) if anew else layout
-        self._edit("Estimate mass and damping from the hull", estimated(known))
+        if with_mass:
+            layout = layout_edits.with_dynamics(layout, mass_kg=None)
+        self._edit("Estimate mass and damping from the hull", estimated(layout))
 
     def set_jets(self, on: Any) -> None:
         """Whether jets count: by the robot's own interaction where it was opened or saved with one,
         else by the usual constants."""
         layout = self.state.layout
         saved = self.saved
-        own = saved.interaction if saved.names == layout.names else None
-        interaction = (layout.interaction or own or Jets()) if on else None
+        saved_interaction = saved.interaction if saved.names == layout.names else None
+        interaction = (layout.interaction or saved_interaction or Jets()) if on else None
         changed = self.state.with_layout(replace(layout, interaction=interaction))
         self._commit("Count jets" if on else "Leave jets out", changed)
 
@@ -133,17 +143,17 @@ class Session(Core):
         layout = layout_edits.pointed(self.state.layout, name, direction)
         self._follow(f"Point {name}", name, layout, f"point {name}", timed=not held)
 
-    def rename(self, name: str, wanted: str) -> None:
-        """An actuator with another name; whatever is known of it goes on under that."""
-        wanted = wanted.strip()
+    def rename(self, name: str, new_name: str) -> None:
+        """An actuator with another name; its damage, and its link, go on under that."""
+        new_name = new_name.strip()
+        if new_name == name:
+            return
         layout = self.state.layout
-        if wanted != name:
-            if wanted in layout.names:
-                raise FinlabError(f"there is an actuator {wanted!r:.70} already; give another name")
-            renamed = layout.replace_actuator(name, name=wanted)
-            self._commit(
-                f"Rename {name} to {wanted}", self.state.with_layout(renamed, {name: wanted})
-            )
+        if new_name in layout.names:
+            raise FinlabError(f"there is an actuator {new_name!r:.70} already; give another name")
+        renamed = layout.replace_actuator(name, name=new_name)
+        state = self.state.with_layout(renamed, {name: new_name})
+        self._commit(f"Rename {name} to {new_name}", state)
 
     def add(self, kind: str) -> None:
         """One more actuator of a type; it is selected."""
@@ -190,31 +200,37 @@ class Session(Core):
         self._edit(f"Delete {_words(names)}", layout_edits.deleted(self.state.layout, names))
 
     def place_selected(self, position: Vector3) -> None:
-        """The selected actuator at another place [m]; others that are selected take what has
-        changed."""
+        """The selected actuator at another position [m]; others that are selected take the
+        coordinates that have changed."""
         names = self._chosen()
-        before = self.state.layout.part(names[-1]).position
-        changed = [
+        old_position = self.state.layout.part(names[-1]).position
+        has_changed = [
             abs(new - old) > layout_edits.UNTOUCHED
-            for new, old in zip(position, before, strict=True)
+            for new, old in zip(position, old_position, strict=True)
         ]
 
         def placed(layout: Layout, name: str) -> Layout:
-            own = layout.part(name).position
-            x, y, z = (
-                new if c else old for new, old, c in zip(position, own, changed, strict=True)
-            )
+            coordinates = list(layout.part(name).position)
+            for axis in range(3):
+                if has_changed[axis]:
+                    coordinates[axis] = position[axis]
+            x, y, z = coordinates
             return layout_edits.moved(layout, name, (x, y, z))
 
         self._for_each("Move", names, placed, f"move {names}")
 
     def turn_selected(self, angle: float) -> None:
         """All selected fins with one mounting angle [rad]; actuators without one stay."""
-        parts = [self.state.layout.part(name) for name in self._chosen()]
+        layout = self.state.layout
         names = tuple(
-            part.name for part in parts if getattr(part, "mounting_angle", None) is not None
+            [
+                name
+                for name in self._chosen()
+                if getattr(layout.part(name), "mounting_angle", None) is not None
+            ]
         )
-        self._for_each("Turn", names, partial(layout_edits.turned, angle=angle), f"turn {names}")
+        turned = partial(layout_edits.with_mounting_angle, angle=angle)
+        self._for_each("Turn", names, turned, f"turn {names}")
 
     def point_selected(self, direction: Vector3) -> None:
         """All selected actuators along one direction of any length, see `point`."""
@@ -225,17 +241,17 @@ class Session(Core):
     def turn_about(self, direction: Vector3) -> None:
         """Another second axis of all selected actuators that have one, see
         `Actuator.turned_about`."""
-        self._change("Turn", lambda part: part.turned_about(direction))
+        self._change("Turn", lambda actuator: actuator.turned_about(direction))
 
     def set_value(self, key: str, value: Any) -> None:
         """A field of all selected actuators that have it, see `with_value`, in SI units and
         radians."""
-        what = f"{key_words(key)} of"
-        self._change(what, lambda part: part.with_value(key, value))
+        verb = f"{key_words(key)} of"
+        self._change(verb, lambda actuator: actuator.with_value(key, value))
 
     def choose_model(self, kind: str) -> None:
         """Another kind of model for all selected actuators that may have it."""
-        self._change(f"Model {kind} for", lambda part: layout_edits.modelled(part, kind))
+        self._change(f"Model {kind} for", lambda actuator: layout_edits.modelled(actuator, kind))
 
     def set_model(self, names: Sequence[str], **fields: Any) -> None:
         """Another model for some actuators, and other fields that came with it."""
@@ -255,39 +271,49 @@ class Session(Core):
     def _edit(
         self, name: str, layout: Layout, merge_key: str | None = None, timed: bool = True
     ) -> None:
+        """Another layout, with the hull that was drawn before; arguments as `_commit` has them."""
         layout = layout_edits.keeping_hull(self.state.layout, layout)
         self._commit(name, self.state.with_layout(layout), merge_key, timed)
 
     def _follow(self, step: str, name: str, layout: Layout, merge_key: str, timed: bool) -> None:
         """A layout in which one actuator has moved; its twin moves along."""
-        self._edit(
-            step, followed(self.state.layout, layout, self.state.links, name), merge_key, timed
-        )
+        layout = with_twin(self.state.layout, layout, self.state.links, name)
+        self._edit(step, layout, merge_key, timed)
 
-    def _change(self, what: str, change: Callable[[Actuator], Actuator]) -> None:
+    def _change(self, verb: str, change: Callable[[Actuator], Actuator]) -> None:
+        """One step that changes all selected actuators alike; twins follow."""
+
         def changed(layout: Layout, name: str) -> Layout:
             return layout.with_part(change(layout.part(name)))
 
-        self._for_each(what, self._chosen(), changed)
+        self._for_each(verb, self._chosen(), changed)
 
     def _for_each(
         self,
-        what: str,
+        verb: str,
         names: tuple[str, ...],
         change: Callable[[Layout, str], Layout],
         merge_key: str | None = None,
     ) -> None:
-        """One step for several actuators; twins follow unless they are among them already."""
-        before = self.state.layout
+        """One step for several actuators; twins follow unless they are among them already.
+
+        Args:
+            verb: what undo calls the step, before the names.
+            names: of the actuators, the one that was chosen last at the end: it leads its twin.
+            change: makes the layout with one of them changed.
+            merge_key: steps with the same one soon after each other are one step of undo.
+        """
+        old_layout = self.state.layout
         links = self.state.links
-        layout = before
+        layout = old_layout
         done = set[str]()
-        for name in reversed(names):  # the one that was chosen last leads its twin
+        for name in reversed(names):
             if partner(links, name) not in done:
-                layout = followed(before, change(layout, name), links, name)
+                layout = with_twin(old_layout, change(layout, name), links, name)
                 done.add(name)
-        self._edit(f"{what} {_words(names)}", layout, merge_key)
+        self._edit(f"{verb} {_words(names)}", layout, merge_key)
 
 
 def _words(names: Sequence[str]) -> str:
+    """The name of a single actuator, else how many there are."""
     return names[0] if len(names) == 1 else f"{len(names)} actuators"

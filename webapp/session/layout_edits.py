@@ -1,5 +1,8 @@
-"""Changes of a layout that a designer makes by hand. Each takes a layout and returns another
-one."""
+"""Changes of a layout that a designer makes by hand. Each takes a layout and returns another one.
+
+The intents of a session (`editing.py`) call them; what undo calls a change, and what is selected
+after it, is decided there.
+"""
 
 import math
 from collections.abc import Sequence
@@ -26,129 +29,159 @@ MAX_COORDINATE = 10.0
 """How far out an actuator may be placed in the browser [m]."""
 CLOSE = 0.005
 """How far [m, rad] an actuator may be from another one's mirror image to count as it."""
-CLEAR, STEP_UP = 0.12, 0.05
-"""How far a new fin, and a copy, stands from all others if there is room [m]."""
-ROUND = (180, 150, -150, 120, -120, 90, -90, 60, -60, 30, -30, 0)
+CLEARANCE = 0.12
+"""How far a new actuator stands from all others if there is room [m]."""
+STEP_UP = 0.05
+"""How far above an actuator its copy stands if there is room [m]."""
+AZIMUTHS = (180, 150, -150, 120, -120, 90, -90, 60, -60, 30, -30, 0)
 """Directions [deg] in which a new fin is put, the stern first."""
 STAND_OFF = 0.02
 """Distance of a new actuator from the hull: room for the servo [m]."""
 
 DYNAMICS = tuple(field.name for field in fields(Body) if field.name != "hull")
+"""Fields of a body that say how it moves."""
 
 
 def moved(layout: Layout, name: str, position: Vector3) -> Layout:
-    """An actuator at another place [m]."""
-    place = numbers(position, f"of {name} [m]", -MAX_COORDINATE, MAX_COORDINATE)
-    return layout.replace_actuator(name, position=place)
+    """The layout with an actuator at another position [m] in the body frame."""
+    checked = numbers(position, f"of {name} [m]", -MAX_COORDINATE, MAX_COORDINATE)
+    return layout.replace_actuator(name, position=checked)
 
 
-def turned(layout: Layout, name: str, angle: float) -> Layout:
-    """A fin with a horizontal shaft, with another mounting angle [rad]."""
+def with_mounting_angle(layout: Layout, name: str, angle: float) -> Layout:
+    """The layout with a fin whose shaft is horizontal at another mounting angle [rad]."""
     checked = number(angle, f"mounting angle of {name} [rad]", -100.0, 100.0)
-    part = layout.part(name)
-    if not isinstance(part, Fin) or part.mounting_angle is None:
+    actuator = layout.part(name)
+    if not isinstance(actuator, Fin) or actuator.mounting_angle is None:
         raise FinlabError(f"{name} has no mounting angle; give a direction")
-    same = abs(math.remainder(checked - part.mounting_angle, math.tau)) <= UNTOUCHED
-    return layout if same else layout.replace_actuator(name, mounting_angle=float(wrapped(checked)))
+    change = math.remainder(checked - actuator.mounting_angle, math.tau)
+    if abs(change) <= UNTOUCHED:
+        return layout
+    return layout.replace_actuator(name, mounting_angle=float(wrapped(checked)))
 
 
 def pointed(layout: Layout, name: str, direction: Vector3) -> Layout:
-    """An actuator along a direction of any length, see `Actuator.facing`."""
-    x, y, z = (number(v, f"direction of {name}", -1e6, 1e6) for v in direction)
+    """The layout with an actuator along a direction of any length, see `Actuator.facing`."""
+    x, y, z = (number(value, f"direction of {name}", -1e6, 1e6) for value in direction)
     return layout.with_part(layout.part(name).facing((x, y, z)))
 
 
-def keeping_hull(before: Layout, after: Layout) -> Layout:
+def keeping_hull(old_layout: Layout, layout: Layout) -> Layout:
     """A layout after an edit, with the hull that was drawn before where none is described: one that
-    is made to fit the fins would stretch with each of them."""
-    if any(layout.body is not None and layout.body.hull is not None for layout in (after, before)):
-        return after
-    return with_hull(after, _drawn_hull(before))
+    is made to fit the actuators would stretch with each of them.
+
+    Args:
+        old_layout: before the edit.
+        layout: after it.
+    """
+    if _describes_hull(layout) or _describes_hull(old_layout):
+        return layout
+    return with_hull(layout, _drawn_hull(old_layout))
+
+
+def _describes_hull(layout: Layout) -> bool:
+    return layout.body is not None and layout.body.hull is not None
 
 
 def mirrored(layout: Layout, name: str) -> tuple[Layout, str]:
     """The layout with an actuator's image on the other side of the robot, and the image's name. One
     that already stands there is taken for the image, and nothing is added."""
-    part = layout.part(name)
-    if abs(part.position[1]) < 1e-3:
+    actuator = layout.part(name)
+    if abs(actuator.position[1]) < 1e-3:
         raise FinlabError(f"{name} sits on the mirror plane (y = 0), so its mirror image is itself")
-    others = (other for other in layout.actuators if other.name != name)
-    there = next((other.name for other in others if is_mirrored(part, other, CLOSE)), None)
-    return (
-        (layout, there) if there is not None else _added(layout, part.image(), _mirror_name(name))
-    )
+    for other in layout.actuators:
+        if other.name != name and is_mirrored(actuator, other, CLOSE):
+            return layout, other.name
+    return _added(layout, actuator.image(), _mirror_name(name))
 
 
 def ring(layout: Layout, name: str, count: int, around: str) -> Layout:
-    """The layout with copies of an actuator, so that `count` of them stand evenly around a body
-    axis. FinlabError: the actuator stands on the axis, or there is no such axis."""
-    part = layout.part(name)
+    """The layout with copies of an actuator that stand evenly around a body axis.
+
+    Args:
+        layout: the robot.
+        name: of the actuator.
+        count: how many stand around the axis then, the actuator itself among them.
+        around: the axis, "x", "y" or "z".
+
+    Raises:
+        FinlabError: the actuator stands on the axis, or there is no such axis.
+    """
+    actuator = layout.part(name)
     axis = np.eye(3)["xyz".index(one_of(around, "axis", tuple("xyz")))]
-    if np.linalg.norm(np.cross(axis, part.position)) < 1e-3:
+    if np.linalg.norm(np.cross(axis, actuator.position)) < 1e-3:
         raise FinlabError(
             f"{name} stands on the {around} axis, so its copies would all be in one place"
         )
-    all_of_them = round(number(count, "copies around the axis", 2, MAX_ACTUATORS))
-    for k in range(1, all_of_them):
-        layout, _ = _added(layout, _rotated(part, axis, math.tau * k / all_of_them), name)
+    checked = round(number(count, "copies around the axis", 2, MAX_ACTUATORS))
+    for k in range(1, checked):
+        layout, _ = _added(layout, _rotated(actuator, axis, math.tau * k / checked), name)
     return layout
 
 
-def _rotated(part: Actuator, axis: Array, angle: float) -> Actuator:
+def _rotated(actuator: Actuator, axis: Array, angle: float) -> Actuator:
     """The actuator turned about an axis (3,) of the body by an angle [rad], place and own axes
     alike."""
     turn = rotation(axis, angle)
-    return part.turned(np.array(part.frame) @ turn.T, turn @ np.array(part.position))
+    return actuator.turned(np.array(actuator.frame) @ turn.T, turn @ np.array(actuator.position))
 
 
 def duplicated(layout: Layout, name: str) -> tuple[Layout, str]:
-    """The layout with a copy of an actuator above it, 5 cm or the first place that is free, and its
-    name."""
-    part = layout.part(name)
-    x, y, z = part.position
-    places = ((x, y, round(z + STEP_UP * k, 9)) for k in range(1, MAX_ACTUATORS + 1))
-    return _added(
-        layout,
-        replace(part, position=next(p for p in places if _is_free(layout, p, STEP_UP))),
-        name,
-    )
+    """The layout with a copy of an actuator above it, `STEP_UP` or the first position that is free,
+    and the copy's name."""
+    actuator = layout.part(name)
+    x, y, z = actuator.position
+    for k in range(1, MAX_ACTUATORS + 1):
+        position = (x, y, round(z + STEP_UP * k, 9))
+        if _is_free(layout, position, STEP_UP):
+            return _added(layout, replace(actuator, position=position), name)
+    raise AssertionError("no position is free")
 
 
 def added(layout: Layout, kind: str) -> tuple[Layout, str]:
     """The layout with one more actuator on the hull, and its name: at the stern, or where there is
-    room. A fin's shaft points away from the hull; the others push or steer ahead."""
-    part: Actuator = KINDS[one_of(kind, "actuator", KINDS)].sample()
+    room. A fin's shaft points away from the hull; the others push or steer ahead.
+
+    Args:
+        layout: the robot.
+        kind: type of the actuator, a key of `KINDS`.
+    """
+    actuator: Actuator = KINDS[one_of(kind, "actuator", KINDS)].sample()
     hull = hull_of(layout)
-    far = 4.0 * max(hull.half)
-    for clear in (CLEAR, STEP_UP, 0.0):
-        for degrees in ROUND:
-            way = np.array([math.cos(math.radians(degrees)), math.sin(math.radians(degrees)), 0.0])
-            point, normal = hull.nearest(np.array(hull.center) + far * way)
-            x, y, z = (round(float(v), 4) + 0.0 for v in point + STAND_OFF * normal)
-            if _is_free(layout, (x, y, z), clear):
-                out = normal if math.hypot(*normal[:2]) > 0.2 else way
-                placed = replace(part, position=(x, y, z))
-                if isinstance(placed, Fin):
-                    placed = replace(placed, mounting_angle=math.atan2(out[1], out[0]))
-                return _added(layout, placed, kind)
-    raise AssertionError("no place is free")
+    for clearance in (CLEARANCE, STEP_UP, 0.0):
+        for azimuth in AZIMUTHS:
+            angle = math.radians(azimuth)
+            direction = np.array([math.cos(angle), math.sin(angle), 0.0])
+            outside = np.array(hull.center) + 4.0 * max(hull.half) * direction
+            point, normal = hull.nearest(outside)
+            x, y, z = (round(float(value), 4) + 0.0 for value in point + STAND_OFF * normal)
+            if not _is_free(layout, (x, y, z), clearance):
+                continue
+            placed = replace(actuator, position=(x, y, z))
+            if isinstance(placed, Fin):
+                # On a deck or keel the normal has no azimuth to speak of.
+                outward = normal if math.hypot(*normal[:2]) > 0.2 else direction
+                placed = replace(placed, mounting_angle=math.atan2(outward[1], outward[0]))
+            return _added(layout, placed, kind)
+    raise AssertionError("no position is free")
 
 
 def blank(kind: str) -> Layout:
     """A robot to begin with: a round hull, and one actuator of a type on its left."""
-    part = replace(
-        KINDS[one_of(kind, "actuator", KINDS)].sample(), name="left", position=(0.0, 0.17, 0.0)
-    )
-    if isinstance(part, Fin):
-        part = replace(part, mounting_angle=math.pi / 2)
-    return Layout(
-        "New robot", (part,), body=Body(hull=Hull(shape="ellipsoid", size_m=(0.5, 0.3, 0.2)))
-    )
+    sample = KINDS[one_of(kind, "actuator", KINDS)].sample()
+    actuator = replace(sample, name="left", position=(0.0, 0.17, 0.0))
+    if isinstance(actuator, Fin):
+        actuator = replace(actuator, mounting_angle=math.pi / 2)
+    hull = Hull(shape="ellipsoid", size_m=(0.5, 0.3, 0.2))
+    return Layout("New robot", (actuator,), body=Body(hull=hull))
 
 
-def _is_free(layout: Layout, position: Vector3, clear: float) -> bool:
-    """Whether all actuators are at least so far [m] from a place."""
-    return all(math.dist(part.position, position) >= clear - 1e-9 for part in layout.actuators)
+def _is_free(layout: Layout, position: Vector3, clearance: float) -> bool:
+    """Whether all actuators are at least so far [m] from a position [m]."""
+    for actuator in layout.actuators:
+        if math.dist(actuator.position, position) < clearance - 1e-9:
+            return False
+    return True
 
 
 def deleted(layout: Layout, names: Sequence[str]) -> Layout:
@@ -160,23 +193,29 @@ def deleted(layout: Layout, names: Sequence[str]) -> Layout:
     return layout.without(names)
 
 
-def _added(layout: Layout, part: Actuator, wanted: str) -> tuple[Layout, str]:
+def _added(layout: Layout, actuator: Actuator, stem: str) -> tuple[Layout, str]:
+    """The layout with one more actuator, and the name that it gets: `stem`, with a number where
+    there is one of that name."""
     if layout.n >= MAX_ACTUATORS:
         raise FinlabError(
             f"the layout has {layout.n} actuators already; expected at most {MAX_ACTUATORS}"
         )
-    stem = wanted[:56]
-    names = (stem, *(f"{stem}_{k}" for k in range(2, MAX_ACTUATORS + 2)))
-    name = next(name for name in names if name not in layout.names)
-    return replace(layout, actuators=(*layout.actuators, replace(part, name=name))), name
+    short = stem[:56]  # leaves room for the number
+    name = short
+    number = 2
+    while name in layout.names:
+        name = f"{short}_{number}"
+        number += 1
+    return replace(layout, actuators=(*layout.actuators, replace(actuator, name=name))), name
 
 
 def _mirror_name(name: str) -> str:
-    for left, right in (("left", "right"), ("port", "starboard")):
-        if left in name:
-            return name.replace(left, right)
-        if right in name:
-            return name.replace(right, left)
+    """What the image of an actuator is called."""
+    for one_side, other_side in (("left", "right"), ("port", "starboard")):
+        if one_side in name:
+            return name.replace(one_side, other_side)
+        if other_side in name:
+            return name.replace(other_side, one_side)
     return f"{name}_mirror"
 
 
@@ -194,8 +233,9 @@ def with_hull(layout: Layout, hull: Hull) -> Layout:
 
 def _drawn_hull(layout: Layout) -> Hull:
     """The hull that is drawn where none is described."""
-    drawn = hull_of(layout)
-    return Hull(shape=drawn.shape, size_m=tuple(2 * v for v in drawn.half), center_m=drawn.center)
+    hull = hull_of(layout)
+    size = tuple([2 * half for half in hull.half])
+    return Hull(shape=hull.shape, size_m=size, center_m=hull.center)
 
 
 def center_of_gravity(layout: Layout) -> Vector3:
@@ -210,17 +250,19 @@ def balanced(layout: Layout, center: Vector3) -> Layout:
     checked = numbers(center, "of the centre of gravity [m]", -2.0, 2.0)
     x, y, z = np.subtract(center_of_gravity(layout), checked).tolist()
 
-    def moved(point: tuple[float, ...]) -> Vector3:
+    def shifted(point: tuple[float, ...]) -> Vector3:
         return point[0] + x, point[1] + y, point[2] + z
 
     body = layout.body or Body()
-    hull = replace(body.hull or _drawn_hull(layout), center_m=moved(hull_of(layout).center))
+    hull = replace(body.hull or _drawn_hull(layout), center_m=shifted(hull_of(layout).center))
     buoyancy = body.center_of_buoyancy_m
-    body = replace(
-        body, hull=hull, center_of_buoyancy_m=None if buoyancy is None else moved(buoyancy)
-    )
-    parts = tuple(replace(part, position=moved(part.position)) for part in layout.actuators)
-    return replace(layout, actuators=parts, body=body)
+    if buoyancy is not None:
+        buoyancy = shifted(buoyancy)
+    body = replace(body, hull=hull, center_of_buoyancy_m=buoyancy)
+    actuators = [
+        replace(actuator, position=shifted(actuator.position)) for actuator in layout.actuators
+    ]
+    return replace(layout, actuators=tuple(actuators), body=body)
 
 
 def with_dynamics(layout: Layout, **values: Any) -> Layout:
@@ -230,38 +272,56 @@ def with_dynamics(layout: Layout, **values: Any) -> Layout:
     return replace(layout, body=replace(layout.body or Body(), **values))
 
 
-def modelled(part: Actuator, kind: str) -> Actuator:
-    """The actuator with another kind of model, see `Actuator.with_model`; as it is where its kind
-    has no such one. FinlabError: there is no such model, or it needs a file."""
-    if not part.KIND.models or kind == part.model_type:
-        return part
-    if kind == "table":
+def modelled(actuator: Actuator, model: str) -> Actuator:
+    """The actuator with another kind of model, see `Actuator.with_model`; as it is where its type
+    has no such one.
+
+    Raises:
+        FinlabError: there is no such model, or it needs a file.
+    """
+    if not actuator.KIND.models or model == actuator.model_type:
+        return actuator
+    if model == "table":
         raise FinlabError(
-            f"a table for {part.name} comes from a file; drop its CSV, or fit measurements"
+            f"a table for {actuator.name} comes from a file; drop its CSV, or fit measurements"
         )
-    one_of(kind, "model", [model for own in KINDS.values() for model in own.KIND.models])
-    return part.with_model(kind) if kind in part.KIND.models else part
+    models: list[str] = []
+    for actuator_type in KINDS.values():
+        models.extend(actuator_type.KIND.models)
+    one_of(model, "model", models)
+    return actuator.with_model(model) if model in actuator.KIND.models else actuator
 
 
 def partner(links: Links, name: str) -> str | None:
     """The actuator that `name` is linked to, if any."""
-    return next((pair[1 - pair.index(name)] for pair in links if name in pair), None)
+    for pair in links:
+        if name in pair:
+            return pair[1 - pair.index(name)]
+    return None
 
 
 def unlinked(links: Links, name: str) -> Links:
     """The links without the pair of an actuator."""
-    return tuple(pair for pair in links if name not in pair)
+    return tuple([pair for pair in links if name not in pair])
 
 
-def followed(before: Layout, layout: Layout, links: Links, name: str) -> Layout:
-    """The layout after the twin of `name`, if any, took its mirrored place; axes that pointed the
-    other way than the image's `before` stay so."""
-    twin = partner(links, name)
-    if twin is None or twin not in layout.names:
+def with_twin(old_layout: Layout, layout: Layout, links: Links, name: str) -> Layout:
+    """The layout after the twin of an actuator, if any, took its mirrored place.
+
+    Args:
+        old_layout: before the edit: axes of the twin that pointed the other way than those of the
+            image do so again.
+        layout: after the edit.
+        links: pairs of actuators that move together.
+        name: of the actuator that was edited.
+    """
+    twin_name = partner(links, name)
+    if twin_name is None or twin_name not in layout.names:
         return layout
-    wanted = layout.part(name).image()
-    old = layout.part(twin)
-    count = len(old.KIND.axes)
-    past = np.sum(np.array(before.part(name).image().frame) * before.part(twin).frame, axis=1)
-    frame = np.array(wanted.frame) * np.where(past < 0.0, -1.0, 1.0)[:, None]
-    return layout.with_part(old.turned(frame[:count], wanted.position))
+    image = layout.part(name).image()
+    twin = layout.part(twin_name)
+    old_image = np.array(old_layout.part(name).image().frame)
+    # Row by row the cosine between each axis of the old image and of the old twin.
+    cosines = np.sum(old_image * old_layout.part(twin_name).frame, axis=1)
+    frame = np.array(image.frame) * np.where(cosines < 0.0, -1.0, 1.0)[:, None]
+    return layout.with_part(twin.turned(frame[: len(twin.KIND.axes)], image.position))
