@@ -135,8 +135,8 @@ def test_the_page_may_send_anything(session: Session) -> None:
     draft = session.draft
     for change in (
         lambda: draft.with_goal("<b>"),
-        lambda: draft.with_way((math.nan, 0.0, 0.0, 0.0)),
-        lambda: draft.with_way((0.0, 0.0, 0.0, 900.0)),
+        lambda: draft.with_move_range((math.nan, 0.0, 0.0, 0.0)),
+        lambda: draft.with_move_range((0.0, 0.0, 0.0, 900.0)),
     ):
         with pytest.raises(FinlabError):
             change()

@@ -49,17 +49,17 @@ def test_bad_searches_are_refused() -> None:
     with pytest.raises(FinlabError, match="goal"):
         request.with_goal("gold")
     with pytest.raises(FinlabError, match="nothing may move"):
-        replace(request, held=NO_YAW.names).bounds(NO_YAW)
-    for way in ((float("nan"), 0.05, 0.05, 90.0), (0.05, 0.05, 0.05, 720.0)):
+        replace(request, fixed=NO_YAW.names).bounds(NO_YAW)
+    for move_range in ((float("nan"), 0.05, 0.05, 90.0), (0.05, 0.05, 0.05, 720.0)):
         with pytest.raises(FinlabError):
-            request.with_way(way)
+            request.with_move_range(move_range)
 
 
 def test_fins_move_within_bounds_for_the_power_of_a_mission(worker: Pool) -> None:
     improver = Improver(context_of(worker))
     first, second = NO_YAW.names[:2]
-    request = replace(SearchRequest("power for a mission"), held=NO_YAW.names[2:])
-    request = request.with_way((0.04, 0.01, 0.0, 0.0))
+    request = replace(SearchRequest("power for a mission"), fixed=NO_YAW.names[2:])
+    request = request.with_move_range((0.04, 0.01, 0.0, 0.0))
     bounds = request.bounds(NO_YAW)
     x = NO_YAW.fins[1].position[0]
     assert bounds[second].x == pytest.approx((x - 0.04, x + 0.04))
@@ -106,7 +106,7 @@ def test_what_is_proposed_can_be_built(worker: Pool) -> None:
     room = Room(stuck, 0.02)
     assert room.broken(stuck.position[None], stuck.frames[None])[0] > 0.0
     improver = Improver(context_of(worker))
-    request = SearchRequest().with_way((0.15, 0.05, 0.05, 60.0))
+    request = SearchRequest().with_move_range((0.15, 0.05, 0.05, 60.0))
     improver.start(State(stuck), request)
     until(lambda: improver.answer is not None)
     found = improver.answer

@@ -76,7 +76,7 @@ def actuator_list(state: State, selection: tuple[str, ...]) -> str:
     ones."""
     heads = Markup().join(html("<th class='place'>{}</th>", axis) for axis in ("x", "y", "z"))
     names = state.layout.names
-    kinds = sorted({part.type for part in state.layout.actuators})
+    kinds = sorted({actuator.type for actuator in state.layout.actuators})
     robot = html(
         "<tr class='{}' {}><td colspan='5'>{}<span class='name whole'>{}</span></td></tr>",
         "" if selection else "chosen",
@@ -100,33 +100,39 @@ def actuator_list(state: State, selection: tuple[str, ...]) -> str:
     )
 
 
-def _rows(state: State, index: int, chosen: bool, mixed: bool) -> str:
-    """A row; in a `mixed` list the first of several of a kind has that above it."""
-    parts = state.layout.actuators
-    part = parts[index]
-    before = parts[index - 1] if index else None
-    head = mixed and (before is None or before.type != part.type)
-    places = [_minus(f"{value:.3f}") for value in part.position]
-    twin = partner(state.links, part.name)
+def _rows(state: State, index: int, is_selected: bool, is_mixed: bool) -> str:
+    """The row of an actuator; in a mixed list the first of several of a type has that above it."""
+    actuators = state.layout.actuators
+    actuator = actuators[index]
+    name = actuator.name
+    head = ""
+    if is_mixed and (index == 0 or actuators[index - 1].type != actuator.type):
+        head = html("<tr><th colspan='5'>{}</th></tr>", actuator.type)
+    link = ""
+    twin = partner(state.links, name)
+    if twin is not None:
+        link = html("<span class='dim' title='moves with {}'>⇄</span>", twin)
+    columns = [_minus(f"{value:.3f}") for value in actuator.position]
+    columns.append(points_words(actuator))
     return html(
-        "{}<tr class='{}' data-fin='{}' {}><td>{}<span class='name {}' "
-        "title='{}'>{}</span>{}</td>{}</tr>",
-        html("<tr><th colspan='5'>{}</th></tr>", part.type) if head else "",
-        "chosen" if chosen else "",
-        part.name,
+        "{}<tr class='{}' data-fin='{}' {}>"
+        "<td>{}<span class='name {}' title='{}'>{}</span>{}</td>{}</tr>",
+        head,
+        "chosen" if is_selected else "",
+        name,
         press("fin", str(index)),
-        swatch(index, part.name in state.lost),
+        swatch(index, name in state.lost),
         "" if twin is None else "paired",
-        part.name,
-        part.name,
-        "" if twin is None else html("<span class='dim' title='moves with {}'>⇄</span>", twin),
-        [html("<td class='place'>{}</td>", text) for text in (*places, points_words(part))],
+        name,
+        name,
+        link,
+        [html("<td class='place'>{}</td>", text) for text in columns],
     )
 
 
-def points_words(part: Actuator) -> str:
+def points_words(actuator: Actuator) -> str:
     """Where an actuator points, in degrees: `60`, `60 ↑30`, `up`."""
-    x, y, z = part.direction
+    x, y, z = actuator.direction
     turn = math.degrees(math.atan2(y, x))
     rise = math.degrees(math.atan2(z, math.hypot(x, y)))
     if abs(rise) > 90.0 - LEVEL:

@@ -80,20 +80,20 @@ def guide_card(stop: Stop | None, solved: bool) -> str:
     last = len(course)
     kind = "tour"
     title = f"{place} of {last} · {stop.title}"
-    parts = [html("<p>{}</p>", stop.text)]
+    markup = [html("<p>{}</p>", stop.text)]
     if stop.exercise:
         kind = f"fl-lesson {'done' if solved else 'open'}"
         title = f"Lesson {title}"
         exercise = "<p class='exercise'><span class='mark'>{}</span>{}</p>"
-        parts.append(html(exercise, "✓" if solved else "○", stop.exercise))
+        markup.append(html(exercise, "✓" if solved else "○", stop.exercise))
         if solved:
-            parts.append(html("<p role='status'>{}</p>", stop.praise))
+            markup.append(html("<p role='status'>{}</p>", stop.praise))
     primary = Markup("class='primary'") * (solved or not stop.exercise)
     ways = [button("Back", "back")] if place > 1 else []
     ways.append(button("Finish" if place == last else "Next", "on", attributes=primary))
     ways += [] if place == last else [button("Close", "end")]
     text = "<div class='fl fl-tour {}'><b>{}</b>{}<div class='row'>{}</div></div>"
-    return html(text, kind, title, parts, ways)
+    return html(text, kind, title, markup, ways)
 
 
 def add_switches(page: Page) -> None:

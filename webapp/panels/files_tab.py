@@ -90,10 +90,10 @@ def command_line(state: State) -> str:
         turns = layout.part(name).KIND.sticks_at_angle
         words += ["--stuck", f"{name}={math.degrees(held) if turns else held:g}"]
     for name, command in damage.running.items():
-        part = layout.part(name)
+        actuator = layout.part(name)
         numbers = list(command)
-        if part.KIND.sticks_at_angle:
-            numbers[part.KIND.stuck_number] = math.degrees(numbers[part.KIND.stuck_number])
+        if actuator.KIND.sticks_at_angle:
+            numbers[actuator.KIND.stuck_number] = math.degrees(numbers[actuator.KIND.stuck_number])
         words += ["--running", f"{name}=" + ",".join(f"{number:g}" for number in numbers)]
     if state.flow is not None:
         words += ["--flow", *(f"{value:g}" for value in state.flow)]

@@ -14,7 +14,7 @@ from webapp.markup.score_card import score_table
 from webapp.markup.words import fins_words, html, listed, marker, three_digits
 from webapp.page import Page
 from webapp.panels.damage import add_fin_buttons
-from webapp.session.looking import DRAWN, GOAL_UNITS, GOAL_WORDS, WAY, SearchRequest
+from webapp.session.looking import DRAWN, GOAL_UNITS, GOAL_WORDS, MOVE_RANGE, SearchRequest
 from webapp.tasks.analysing import Analysis
 
 
@@ -57,8 +57,8 @@ def add_improving(page: Page) -> None:
     def change(how: Callable[..., SearchRequest], *values: Any) -> None:
         session.draft = how(session.draft, *values)
 
-    def bound(way: tuple[float, ...]) -> None:
-        change(SearchRequest.with_way, way)
+    def bound(move_range: tuple[float, ...]) -> None:
+        change(SearchRequest.with_move_range, move_range)
 
     def accept() -> None:
         result = improver.answer
@@ -73,19 +73,19 @@ def add_improving(page: Page) -> None:
         "May move",
         "Press a number to hold one, or to let it move. Pairs stay pairs.",
         "fl-movers",
-        partial(change, SearchRequest.with_held_toggled),
-        lambda layout, draft, lost: (layout.names, lost, draft.held),
+        partial(change, SearchRequest.with_fixed_toggled),
+        lambda layout, draft, lost: (layout.names, lost, draft.fixed),
     )
     page.bind_number(
-        gui.add_vector3("Reach ± [m]", WAY[:3], step=0.01, hint="Along x, y and z."),
-        lambda reach: bound((*reach, session.draft.way[3])),
-        lambda draft: draft.way[:3],
+        gui.add_vector3("Reach ± [m]", MOVE_RANGE[:3], step=0.01, hint="Along x, y and z."),
+        lambda reach: bound((*reach, session.draft.move_range[3])),
+        lambda draft: draft.move_range[:3],
     )
     hint = "How far each may turn either way; what is not kept level rises and falls, too."
     page.bind_number(
-        gui.add_slider("Turn ± [°]", 0.0, 180.0, 5.0, WAY[3], hint=hint),
-        lambda turn: bound((*session.draft.way[:3], turn)),
-        lambda draft: draft.way[3],
+        gui.add_slider("Turn ± [°]", 0.0, 180.0, 5.0, MOVE_RANGE[3], hint=hint),
+        lambda turn: bound((*session.draft.move_range[:3], turn)),
+        lambda draft: draft.move_range[3],
         digits=2,
     )
     add_html(gui, marker("fl-primary"))

@@ -163,15 +163,17 @@ def corner(
     the step of its refinement, nothing at its end."""
     count = state.layout.n
     fins = f"{count - len(state.lost)} of {count} {parts_word(state.layout)}"
-    parts = [html("<span class='aside'>{}</span>", fins)]
+    markup = [html("<span class='aside'>{}</span>", fins)]
     if error is not None:
-        parts.append(html("<span class='missing'>{}</span>", error))
+        markup.append(html("<span class='missing'>{}</span>", error))
     elif busy or allocation is None:  # an old verdict would be taken for that of the new question
-        parts.append(html("<span class='aside'><span class='dim'>{}</span></span>", state.method))
-        parts.append(html("<span class='pill' style='background:{}'>{}</span>", css(DEAD), WORKING))
+        markup.append(html("<span class='aside'><span class='dim'>{}</span></span>", state.method))
+        markup.append(
+            html("<span class='pill' style='background:{}'>{}</span>", css(DEAD), WORKING)
+        )
     else:
-        parts += _figures(allocation, least, in_reach, refined, badge)
-    return _cards(legend, parts)
+        markup += _figures(allocation, least, in_reach, refined, badge)
+    return _cards(legend, markup)
 
 
 def _figures(
@@ -224,7 +226,7 @@ def swim_corner(swimmer: Swimmer, moment: Moment, pace: str, newtons: float) -> 
     alive = len(swimmer.fins) - len(moment.lost)
     off = f"{float(moment.record[-1, ERROR]):.3f}" if len(moment.record) else "–"
     power = "–" if moment.figures is None else f"{moment.figures.now_w:.1f}"
-    parts = [
+    markup = [
         html("<span>{} of {} {}</span>", alive, len(swimmer.fins), parts_word(swimmer.layout)),
         html("<span><b>{:.1f}</b> s of {:.0f} s</span>", moment.time, swimmer.duration_s),
         html("<span><span class='dim'>off the path</span> <b>{}</b> m</span>", off),
@@ -236,7 +238,7 @@ def swim_corner(swimmer: Swimmer, moment: Moment, pace: str, newtons: float) -> 
         _length(newtons, arrow_size(swimmer.layout)),
     )
     jets = JETS * (swimmer.layout.interaction is not None)
-    return _cards(html("<div class='fl-legend'>{}</div>{}{}", trails, scale, jets), parts)
+    return _cards(html("<div class='fl-legend'>{}</div>{}{}", trails, scale, jets), markup)
 
 
 def _cards(legend: str, status: list[str]) -> str:

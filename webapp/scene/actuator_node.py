@@ -44,21 +44,23 @@ class Motion(NamedTuple):
     """Own axis of the propeller: 0 or 1."""
 
 
-def motion(part: Actuator, command: Array | None) -> Motion:
+def motion(actuator: Actuator, command: Array | None) -> Motion:
     """How an actuator moves with a command (3,), and how it hangs where that is None."""
-    along = int(part.KIND.drawn_as == "pod")
+    along = int(actuator.KIND.drawn_as == "pod")
     if command is None:
-        _, across, third = part.frame
-        limp = math.atan2(third[2], across[2]) if part.KIND.drawn_as == "fin" else 0.0
+        _, across, third = actuator.frame
+        limp = math.atan2(third[2], across[2]) if actuator.KIND.drawn_as == "fin" else 0.0
         return Motion(angle=limp, along=along)  # the blade hangs as far down as it can
-    if part.KIND.drawn_as == "fin":
+    if actuator.KIND.drawn_as == "fin":
         return Motion(*command.tolist())
-    angle = float(command[part.KIND.stuck_number]) if part.KIND.sticks_at_angle else 0.0
-    if part.KIND.force_number is None:
+    angle = float(command[actuator.KIND.stuck_number]) if actuator.KIND.sticks_at_angle else 0.0
+    if actuator.KIND.force_number is None:
         return Motion(angle=angle)
-    force = float(command[part.KIND.force_number])
+    force = float(command[actuator.KIND.force_number])
     most = (
-        part.upper[part.KIND.force_number] if force >= 0.0 else -part.lower[part.KIND.force_number]
+        actuator.upper[actuator.KIND.force_number]
+        if force >= 0.0
+        else -actuator.lower[actuator.KIND.force_number]
     )
     # Thrust grows with the square of the speed.
     turns = (
@@ -87,11 +89,11 @@ def _propeller(along: int) -> Mesh:
     return NOTHING if along < 0 else shapes.propeller(along)
 
 
-def shape_of(part: Actuator, size: float) -> tuple[float, float]:
+def shape_of(actuator: Actuator, size: float) -> tuple[float, float]:
     """Slenderness of a foil, and how large an actuator is drawn; a foil by its area."""
     ratio, area = (
-        (part.value("aspect_ratio"), part.value("area"))
-        if part.KIND.drawn_as == "foil"
+        (actuator.value("aspect_ratio"), actuator.value("area"))
+        if actuator.KIND.drawn_as == "foil"
         else (None, None)
     )
     if ratio is None or area is None:
@@ -152,7 +154,7 @@ class ActuatorNode:
 
     def place(
         self,
-        part: Actuator,
+        actuator: Actuator,
         hull: Surface,
         sizes: tuple[float, float],
         moved: bool,
@@ -163,17 +165,17 @@ class ActuatorNode:
         """Show an actuator with its strut to the hull; `sizes` are of actuators and of arrows,
         `moved` shows its gizmo, whose pose is left alone while `owned_by_user`, `stuck` a pin that
         holds it."""
-        frame = np.array(part.frame)
-        position = np.array(part.position)
+        frame = np.array(actuator.frame)
+        position = np.array(actuator.position)
         size, arrows = sizes
-        slenderness, scale = shape_of(part, size)
-        is_fin = part.KIND.drawn_as == "fin"
-        is_pod = part.KIND.drawn_as == "pod"
+        slenderness, scale = shape_of(actuator, size)
+        is_fin = actuator.KIND.drawn_as == "fin"
+        is_pod = actuator.KIND.drawn_as == "pod"
         inward = hull.anchor(position) - position
-        self._moving.show(_moving, part.KIND.drawn_as, slenderness)
-        self._mount.show(_mount, part.KIND.drawn_as, bool(inward @ frame[0] >= 0.0))
+        self._moving.show(_moving, actuator.KIND.drawn_as, slenderness)
+        self._mount.show(_mount, actuator.KIND.drawn_as, bool(inward @ frame[0] >= 0.0))
         self._spinning.show(
-            _propeller, int(is_pod) if is_pod or part.KIND.drawn_as == "thruster" else -1
+            _propeller, int(is_pod) if is_pod or actuator.KIND.drawn_as == "thruster" else -1
         )
         for shape in (self._moving, self._spinning, self._mount):
             set_properties(shape.node, scale=scale)
@@ -207,15 +209,18 @@ def _strut(end: Array, hull: Surface, radius: float) -> Mesh:
     return tube(np.array([end, anchor]), radius, 12)
 
 
-def moved_parts(parts: tuple[Actuator, ...], size: float) -> Mesh:
+def moved_parts(actuators: tuple[Actuator, ...], size: float) -> Mesh:
     """Several actuators in the body frame as one mesh, at rest."""
     meshes = []
-    for part in parts:
-        slenderness, scale = shape_of(part, size)
-        for mesh in (_moving(part.KIND.drawn_as, slenderness), _mount(part.KIND.drawn_as, True)):
+    for actuator in actuators:
+        slenderness, scale = shape_of(actuator, size)
+        for mesh in (
+            _moving(actuator.KIND.drawn_as, slenderness),
+            _mount(actuator.KIND.drawn_as, True),
+        ):
             meshes.append(
                 Mesh(
-                    scale * mesh.vertices @ np.array(part.frame) + np.array(part.position),
+                    scale * mesh.vertices @ np.array(actuator.frame) + np.array(actuator.position),
                     mesh.faces,
                 )
             )

@@ -169,27 +169,29 @@ class RobotScene:
             node.hide()
         edited = selected if task == "Design" and not swims else None
         stuck = () if swims else damage.stuck
-        for i, part in enumerate(visible_layout.actuators):
+        for i, actuator in enumerate(visible_layout.actuators):
             remark = (
                 ""
-                if swims or part.name in lost
-                else damage_words(damage, part.name, part.KIND.sticks_at_angle)
+                if swims or actuator.name in lost
+                else damage_words(damage, actuator.name, actuator.KIND.sticks_at_angle)
             )
-            named = part.name if swims else _named(part)  # one that swims is elsewhere
-            words = (str(i + 1), named if part.name in selection else "", remark)
+            named = actuator.name if swims else _named(actuator)  # one that swims is elsewhere
+            words = (str(i + 1), named if actuator.name in selection else "", remark)
             label = " ".join([word for word in words if word])
-            moved = part.name == edited
-            pinned = part.name in stuck
-            self._fins[i].place(part, hull, sizes, moved, label, pinned, i == dragged)
+            moved = actuator.name == edited
+            pinned = actuator.name in stuck
+            self._fins[i].place(actuator, hull, sizes, moved, label, pinned, i == dragged)
         self._forces.place(visible_layout, sizes)
         self._works = []
         if edited is None:
             self._direction.show(None, np.zeros(3), 1.0, LIGHT.line)
         else:
             index = visible_layout.index(edited)
-            part = visible_layout.actuators[index]
+            actuator = visible_layout.actuators[index]
             color = fin_color(index)
-            self._direction.show(np.array(part.position), np.array(part.direction), sizes[1], color)
+            self._direction.show(
+                np.array(actuator.position), np.array(actuator.direction), sizes[1], color
+            )
 
     def _push(
         self,
@@ -211,12 +213,12 @@ class RobotScene:
             forces = np.zeros((visible_layout.n, 3))
         scaled = LENGTH / scale.newtons
         works = [
-            part.name not in idle and math.isfinite(commands[i, 0])
-            for i, part in enumerate(visible_layout.actuators)
+            actuator.name not in idle and math.isfinite(commands[i, 0])
+            for i, actuator in enumerate(visible_layout.actuators)
         ]
         self._moves = [
-            motion(part, commands[i] if works[i] else None)
-            for i, part in enumerate(visible_layout.actuators)
+            motion(actuator, commands[i] if works[i] else None)
+            for i, actuator in enumerate(visible_layout.actuators)
         ]
         if works != self._works:
             self._works = works
@@ -298,13 +300,17 @@ class RobotScene:
         """The actuators that a search would put elsewhere, where it would put them so far."""
         is_improved = improvement is not None and improvement.improved
         offer = improvement if is_improved else progress
-        other = None if offer is None or swims else offer.layout
-        now = {part.name: (part.position, part.frame) for part in layout.actuators}
-        parts = () if other is None or other.name != layout.name else other.actuators
-        moved = tuple(part for part in parts if now.get(part.name) != (part.position, part.frame))
+        moved: list[Actuator] = []
+        if offer is not None and not swims and offer.layout.name == layout.name:
+            present = {
+                actuator.name: (actuator.position, actuator.frame) for actuator in layout.actuators
+            }
+            for actuator in offer.layout.actuators:
+                if present.get(actuator.name) != (actuator.position, actuator.frame):
+                    moved.append(actuator)
         set_properties(self._offered.node, visible=bool(moved))
         if moved:
-            self._offered.show(moved_parts, moved, part_size(layout))
+            self._offered.show(moved_parts, tuple(moved), part_size(layout))
 
     def _clicked(self, index: int, also: bool) -> None:
         self._do(partial(self._select, index, also))
@@ -341,7 +347,6 @@ class RobotScene:
             session.history.end_merge()
 
 
-def _named(part: Actuator) -> str:
-    return f"{part.name}, {', '.join(f'{value:.3f}' for value in part.position)} m".replace(
-        "-", "−"
-    )
+def _named(actuator: Actuator) -> str:
+    position = ", ".join([f"{value:.3f}" for value in actuator.position])
+    return f"{actuator.name}, {position} m".replace("-", "−")

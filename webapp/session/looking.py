@@ -81,11 +81,11 @@ GOAL_WORDS = {
 GOAL_UNITS = {
     words: " W" if name == "mission_power" else " N" for words, name in GOAL_WORDS.items()
 }
-WAY = (0.05, 0.05, 0.05, 180.0)
+MOVE_RANGE = (0.05, 0.05, 0.05, 180.0)
 """How far an actuator may go along x, y and z [m] and turn either way [deg] unless it is said
 otherwise."""
 
-Way = tuple[float, float, float, float]
+MoveRange = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True)
@@ -93,40 +93,40 @@ class SearchRequest:
     """What the user has asked for so far; it may name actuators that are gone by now."""
 
     goal: str = next(iter(GOAL_WORDS))
-    held: tuple[str, ...] = ()
-    way: Way = WAY
+    fixed: tuple[str, ...] = ()
+    move_range: MoveRange = MOVE_RANGE
     """How far they may go along x, y, z [m] and turn [deg]."""
 
     def with_goal(self, goal: Any) -> "SearchRequest":
         """Another goal."""
         return replace(self, goal=one_of(goal, "goal", GOAL_WORDS))
 
-    def with_held_toggled(self, name: str) -> "SearchRequest":
+    def with_fixed_toggled(self, name: str) -> "SearchRequest":
         """An actuator held, or free to move again."""
-        held = tuple(other for other in self.held if other != name)
-        return replace(self, held=held if name in self.held else (*held, name))
+        fixed = tuple(other for other in self.fixed if other != name)
+        return replace(self, fixed=fixed if name in self.fixed else (*fixed, name))
 
-    def with_way(self, way: tuple[Any, ...]) -> "SearchRequest":
+    def with_move_range(self, move_range: tuple[Any, ...]) -> "SearchRequest":
         """Other bounds of all."""
         x, y, z = (
             number(v, f"reach along {axis} [m]", 0.0, 0.5)
-            for v, axis in zip(way, "xyz", strict=False)
+            for v, axis in zip(move_range, "xyz", strict=False)
         )
-        return replace(self, way=(x, y, z, number(way[3], "turn [°]", 0.0, 180.0)))
+        return replace(self, move_range=(x, y, z, number(move_range[3], "turn [°]", 0.0, 180.0)))
 
     def bounds(self, layout: Layout) -> dict[str, Bounds]:
         """Where each that may move may go from where it is. FinlabError: none may."""
         bounds = {}
-        for part in layout.actuators:
-            if part.name not in self.held:
-                *reach, turn = self.way
-                around = Bounds.around(part, reach, math.radians(turn))
-                if is_mirrored(part, part):  # it stays in the mirror plane
-                    y = part.position[1]
-                    angle = azimuth(part)
-                    tilt = around.tilt if abs(part.frame[0][1]) < 0.5 else (0.0, 0.0)
+        for actuator in layout.actuators:
+            if actuator.name not in self.fixed:
+                *reach, turn = self.move_range
+                around = Bounds.around(actuator, reach, math.radians(turn))
+                if is_mirrored(actuator, actuator):  # it stays in the mirror plane
+                    y = actuator.position[1]
+                    angle = azimuth(actuator)
+                    tilt = around.tilt if abs(actuator.frame[0][1]) < 0.5 else (0.0, 0.0)
                     around = replace(around, y=(y, y), mounting_angle=(angle, angle), tilt=tilt)
-                bounds[part.name] = around
+                bounds[actuator.name] = around
         if not bounds:
             raise FinlabError("nothing may move; press the numbers of what may")
         return bounds

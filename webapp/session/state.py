@@ -106,9 +106,9 @@ class State:
     def with_fault(self, name: str, kind: str, value: Any) -> "State":
         """An actuator with a fault of its type, see `Kind.faults`; None, and a share of 1, mend
         that."""
-        part = self.layout.part(name)
-        one_of(kind, f"fault of {name}, a {part.type}", part.KIND.faults)
-        checked = None if value is None else _checked_fault(part, kind, value)
+        actuator = self.layout.part(name)
+        one_of(kind, f"fault of {name}, a {actuator.type}", actuator.KIND.faults)
+        checked = None if value is None else _checked_fault(actuator, kind, value)
         return self._with_damage(self.damage.with_fault(name, kind, checked))
 
     def _with_damage(self, damage: Damage) -> "State":
@@ -142,16 +142,16 @@ class State:
         return replace(self, temperature=replace(settings, temperature=value).temperature)
 
 
-def _checked_fault(part: Actuator, kind: str, value: Any) -> Any:
-    name = part.name
+def _checked_fault(actuator: Actuator, kind: str, value: Any) -> Any:
+    name = actuator.name
     if kind in ("weak", "torn"):
         share = number(value, f"share left of {name}", *STRENGTH_RANGE)
         return None if share == 1.0 else share
-    if kind == "stuck" and not part.KIND.sticks_at_angle:
+    if kind == "stuck" and not actuator.KIND.sticks_at_angle:
         return number(value, f"force of {name}, stuck [N]", -math.inf, math.inf)
     if kind == "stuck":
         return _angle(value, f"angle of {name}, stuck [°]", -math.pi, math.pi)
-    if not isinstance(part, Fin):  # the robot's own checks say what else is wrong
+    if not isinstance(actuator, Fin):  # the robot's own checks say what else is wrong
         return tuple(
             number(one, f"command that {name} keeps", -math.inf, math.inf) for one in value
         )

@@ -126,6 +126,6 @@ def improve(search: Search, work: Work[Search]) -> Improvement:
         progress=report,
         cancelled=work.cancelled.is_set,
     )
-    for part in improvement.layout.actuators:
-        layout = layout.with_part(part)
+    for actuator in improvement.layout.actuators:
+        layout = layout.with_part(actuator)
     return replace(improvement, layout=layout)

@@ -120,12 +120,12 @@ def _resting_words(mode: Mode) -> str:
     weak: list[int] = []
     for fin in mode.resting:
         (still if fin in mode.still else weak).append(fin)
-    parts = []
+    phrases = []
     if still:
-        parts.append(f"{fins_words(still)} {'rest' if len(still) > 1 else 'rests'}")
+        phrases.append(f"{fins_words(still)} {'rest' if len(still) > 1 else 'rests'}")
     if weak:
-        parts.append(f"{fins_words(weak)} hardly {'push' if len(weak) > 1 else 'pushes'}")
-    return ", ".join(parts) or "all fins push"
+        phrases.append(f"{fins_words(weak)} hardly {'push' if len(weak) > 1 else 'pushes'}")
+    return ", ".join(phrases) or "all fins push"
 
 
 Load = Callable[..., MethodChoice]
