@@ -13,7 +13,7 @@ from finlab.layout import load_layout
 from webapp.app import App
 from webapp.guard import Guard
 from webapp.session.state import State
-from webapp.session.targets import FIRST
+from webapp.session.targets import FIRST_TARGET
 from webapp.tasks.solver import Solver
 from webapp.viser_internals import start_server, stop_server
 
@@ -35,7 +35,7 @@ def serve(
     solver = Solver(checkpoint)
     # A missing checkpoint is reported now, not in the browser; and the first page finds a warm
     # solver.
-    solver.solve(State(first, target=FIRST))
+    solver.solve(State(first, target=FIRST_TARGET))
     guard = Guard.of(host)
     server = start_server(guard, port)
     app = App(server, solver, first)

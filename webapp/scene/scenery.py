@@ -27,7 +27,7 @@ from webapp.tasks.swimming import Swimming
 from webapp.theme import ASKED, BRAND, DELIVERED, WATER
 from webapp.viser_internals import run_script
 
-FIRST = Scale(1.0, 1.0)
+INITIAL_SCALE = Scale(1.0, 1.0)
 
 
 class Scenery:
@@ -49,7 +49,7 @@ class Scenery:
         self._camera = (np.zeros(3), np.zeros(3))
         """Where the camera stood before the tour or lesson, and looked at."""
         self._fault = intents.fault
-        self._scale = self._swam = FIRST
+        self._scale = self._swam = INITIAL_SCALE
         self._fitted: tuple[Sequence[float], Allocation | None] | None = None
         board.group(self._fail, is_view=True)
         board.act(self._show)
@@ -75,13 +75,13 @@ class Scenery:
         if swimmer is not None:
             self._swam = swim_scale(swimmer, self._swam)
             return self._swam
-        self._swam = FIRST
+        self._swam = INITIAL_SCALE
         if (target, shown_allocation) != self._fitted:
             try:
                 self._scale = fitting_scale(target, shown_allocation, self._scale)
                 self._fitted = (target, shown_allocation)
             except Exception as error:
-                self._scale = FIRST
+                self._scale = INITIAL_SCALE
                 self._fault(error)
         return self._scale
 

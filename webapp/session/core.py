@@ -1,5 +1,5 @@
-"""State with undo, selection, question and looks of a session; what is special about a layout is
-not here."""
+"""State with undo, selection, question and looks of a session; changes of its layout are in
+`editing.py`, whose `Session` is what the panels know."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -25,9 +25,10 @@ from webapp.session.looking import (
 )
 from webapp.session.state import LEAST, MAX_SPEED, MAX_TARGET, History, State, Steps, number, one_of
 from webapp.session.swim_plan import SwimSettings
-from webapp.session.targets import FIRST, PRESETS
+from webapp.session.targets import FIRST_TARGET, PRESETS
 
 FAULT_VERBS = {"weak": "Weaken", "torn": "Tear", "stuck": "Jam", "running": "Let run"}
+"""Kind of fault -> what undo calls the step that brings it about."""
 
 
 class Core:
@@ -36,7 +37,7 @@ class Core:
 
     def __init__(self, layout: Layout, display: Display | None = None) -> None:
         """Start with a layout, no damage, and a gentle wrench forward and to the left."""
-        self._first = State(layout, target=FIRST)
+        self._first = State(layout, target=FIRST_TARGET)
         self.history = History(self._first)
         self.display = display or Display()
         self.desk = Desk()
@@ -67,7 +68,14 @@ class Core:
     def _commit(
         self, name: str, state: State, merge_key: str | None = None, timed: bool = True
     ) -> None:
-        """Another state; a step of undo where the robot is another one."""
+        """Another state; a step of undo where the robot is another one.
+
+        Args:
+            name: what undo calls the step.
+            state: the other state.
+            merge_key: steps with the same one soon after each other are one step of undo.
+            timed: whether such steps are apart after a while; without it, after `end_merge`.
+        """
         old_state = self.state
         if state == old_state:
             return
@@ -86,11 +94,17 @@ class Core:
         self.shifts = ()
         if not self.selection_order:
             return
-        old = old_state.layout.names
+        old_names = old_state.layout.names
         names = self.state.layout.names
-        called = dict(zip(old, names, strict=True)) if len(old) == len(names) else {}
-        now = (name if name in names else called.get(name) for name in self.selection_order)
-        self.selection_order = tuple(name for name in now if name is not None)
+        new_names: dict[str, str] = {}
+        if len(old_names) == len(names):
+            new_names = dict(zip(old_names, names, strict=True))
+        selection = []
+        for name in self.selection_order:
+            new_name = name if name in names else new_names.get(name)
+            if new_name is not None:
+                selection.append(new_name)
+        self.selection_order = tuple(selection)
 
     def undo(self) -> str:
         """Take back the last step; returns its name."""
@@ -134,16 +148,15 @@ class Core:
     def select_also(self, name: str) -> None:
         """One more actuator beside those that are selected; one of them is let go."""
         self.state.layout.index(name)
-        others = tuple(other for other in self.selection_order if other != name)
+        others = tuple([selected for selected in self.selection_order if selected != name])
         self.selection_order = others if name in self.selection_order else (*others, name)
         self.history.end_merge()
 
     def select_next(self) -> None:
         """Select the actuator after the selected one."""
         names = self.state.layout.names
-        self.select(
-            names[(names.index(self.selected) + 1) % len(names)] if self.selected else names[0]
-        )
+        index = (names.index(self.selected) + 1) % len(names) if self.selected else 0
+        self.select(names[index])
 
     # The question: wrench, settings, damage.
 
@@ -205,7 +218,9 @@ class Core:
         state = self.state
         for kind in state.layout.part(name).KIND.faults:
             state = state.with_fault(name, kind, None)
-        self._commit(f"Mend {name}", state.with_loss_toggled(name) if name in state.lost else state)
+        if name in state.lost:
+            state = state.with_loss_toggled(name)
+        self._commit(f"Mend {name}", state)
 
     def mend_all(self) -> None:
         """All actuators are whole again."""
@@ -234,7 +249,7 @@ class Core:
         """Open the drawer at one of its tabs, and the task to which it belongs."""
         task = next((task for task, names in DRAWERS.items() if name in names), self.desk.task)
         one_of(name, "drawer", DRAWERS[task])
-        others = tuple(pair for pair in self.desk.drawers if pair[0] != task)
+        others = tuple([drawer for drawer in self.desk.drawers if drawer[0] != task])
         if name in MODE_DRAWERS and name != self.desk.opened[task]:
             self.mode = 0  # the modes of one drawer are not those of the other
         self.desk = Desk(task, (*others, (task, name)))

@@ -16,7 +16,7 @@ from webapp.session.core import Core
 from webapp.session.files import shipped
 from webapp.session.looking import Desk
 from webapp.session.state import History, State, least_of, one_of
-from webapp.session.targets import FIRST
+from webapp.session.targets import FIRST_TARGET
 
 ALIGNED = 0.999
 """Cosine from which what is delivered points where it was asked."""
@@ -29,7 +29,7 @@ class Stop(Struct, frozen=True, forbid_unknown_fields=True):
     title: str
     text: str
     layout: str = "ucat"
-    target: tuple[float, float, float, float, float, float] = FIRST
+    target: tuple[float, float, float, float, float, float] = FIRST_TARGET
     """Wrench that is asked for [N, N m]."""
     mode: int = 0
     method: str = "dual"

@@ -62,12 +62,12 @@ class Display:
 
     def with_value(self, key: str, value: Any) -> "Display":
         """One field changed. FinlabError: there is no such field, or not with this value."""
-        now = getattr(self, key, None)
-        if now is None:
+        value_now = getattr(self, key, None)
+        if value_now is None:
             raise FinlabError(f"there is no switch {key!r:.40}")
         if key == "drawn":
             one_of(value, key, DRAWN)
-        if isinstance(now, bool) and not isinstance(value, bool):
+        if isinstance(value_now, bool) and not isinstance(value, bool):
             raise FinlabError(f"{key}: expected on or off, got {value!r:.40}")
         return replace(self, **{key: value})
 
@@ -81,11 +81,11 @@ GOAL_WORDS = {
 GOAL_UNITS = {
     words: " W" if name == "mission_power" else " N" for words, name in GOAL_WORDS.items()
 }
-MOVE_RANGE = (0.05, 0.05, 0.05, 180.0)
-"""How far an actuator may go along x, y and z [m] and turn either way [deg] unless it is said
-otherwise."""
-
+"""Units of what may be improved, with a space before them."""
 MoveRange = tuple[float, float, float, float]
+"""How far an actuator may go along x, y and z [m] and turn [deg], either way."""
+MOVE_RANGE: MoveRange = (0.05, 0.05, 0.05, 180.0)
+"""The range that a search begins with."""
 
 
 @dataclass(frozen=True)
@@ -93,40 +93,48 @@ class SearchRequest:
     """What the user has asked for so far; it may name actuators that are gone by now."""
 
     goal: str = next(iter(GOAL_WORDS))
+    """Key of `GOAL_WORDS`."""
     fixed: tuple[str, ...] = ()
+    """Names of actuators that stay where they are."""
     move_range: MoveRange = MOVE_RANGE
-    """How far they may go along x, y, z [m] and turn [deg]."""
+    """How far each of the others may go."""
 
     def with_goal(self, goal: Any) -> "SearchRequest":
         """Another goal."""
         return replace(self, goal=one_of(goal, "goal", GOAL_WORDS))
 
     def with_fixed_toggled(self, name: str) -> "SearchRequest":
-        """An actuator held, or free to move again."""
-        fixed = tuple(other for other in self.fixed if other != name)
-        return replace(self, fixed=fixed if name in self.fixed else (*fixed, name))
+        """An actuator fixed, or free to move again."""
+        others = tuple([fixed for fixed in self.fixed if fixed != name])
+        return replace(self, fixed=others if name in self.fixed else (*others, name))
 
     def with_move_range(self, move_range: tuple[Any, ...]) -> "SearchRequest":
-        """Other bounds of all."""
+        """Another range of all: along x, y and z [m], and turn [deg]."""
         x, y, z = (
-            number(v, f"reach along {axis} [m]", 0.0, 0.5)
-            for v, axis in zip(move_range, "xyz", strict=False)
+            number(value, f"reach along {axis} [m]", 0.0, 0.5)
+            for value, axis in zip(move_range, "xyz", strict=False)
         )
-        return replace(self, move_range=(x, y, z, number(move_range[3], "turn [°]", 0.0, 180.0)))
+        turn = number(move_range[3], "turn [°]", 0.0, 180.0)
+        return replace(self, move_range=(x, y, z, turn))
 
     def bounds(self, layout: Layout) -> dict[str, Bounds]:
-        """Where each that may move may go from where it is. FinlabError: none may."""
+        """Where each actuator that may move may go from where it is.
+
+        Raises:
+            FinlabError: none may.
+        """
         bounds = {}
+        *reach, turn = self.move_range
         for actuator in layout.actuators:
-            if actuator.name not in self.fixed:
-                *reach, turn = self.move_range
-                around = Bounds.around(actuator, reach, math.radians(turn))
-                if is_mirrored(actuator, actuator):  # it stays in the mirror plane
-                    y = actuator.position[1]
-                    angle = azimuth(actuator)
-                    tilt = around.tilt if abs(actuator.frame[0][1]) < 0.5 else (0.0, 0.0)
-                    around = replace(around, y=(y, y), mounting_angle=(angle, angle), tilt=tilt)
-                bounds[actuator.name] = around
+            if actuator.name in self.fixed:
+                continue
+            limits = Bounds.around(actuator, reach, math.radians(turn))
+            if is_mirrored(actuator, actuator):  # it stays in the mirror plane
+                y = actuator.position[1]
+                angle = azimuth(actuator)
+                tilt = limits.tilt if abs(actuator.frame[0][1]) < 0.5 else (0.0, 0.0)
+                limits = replace(limits, y=(y, y), mounting_angle=(angle, angle), tilt=tilt)
+            bounds[actuator.name] = limits
         if not bounds:
             raise FinlabError("nothing may move; press the numbers of what may")
         return bounds

@@ -153,7 +153,8 @@ def _checked_fault(actuator: Actuator, kind: str, value: Any) -> Any:
         return _angle(value, f"angle of {name}, stuck [°]", -math.pi, math.pi)
     if not isinstance(actuator, Fin):  # the robot's own checks say what else is wrong
         return tuple(
-            number(one, f"command that {name} keeps", -math.inf, math.inf) for one in value
+            number(component, f"command that {name} keeps", -math.inf, math.inf)
+            for component in value
         )
     amplitude, frequency, angle = value
     return (
@@ -166,7 +167,9 @@ def _checked_fault(actuator: Actuator, kind: str, value: Any) -> Any:
 def _angle(value: Any, name: str, low: float, high: float) -> float:
     """An angle [rad] within bounds [rad]; people read of it in degrees."""
     if not isinstance(value, bool) and isinstance(value, (int, float)):
-        number(math.degrees(value), name, *(math.degrees(end) for end in (low - 1e-6, high + 1e-6)))
+        low_deg = math.degrees(low - 1e-6)  # a page's own rounding
+        high_deg = math.degrees(high + 1e-6)
+        number(math.degrees(value), name, low_deg, high_deg)
     return number(value, name, -math.inf, math.inf)
 
 
@@ -195,7 +198,17 @@ def one_of(value: Any, name: str, choices: Iterable[str]) -> Any:
 
 
 def number(value: Any, name: str, low: float, high: float) -> float:
-    """A finite number within limits. FinlabError: `value` is not such a number."""
+    """A finite number within limits.
+
+    Args:
+        value: what a page sent.
+        name: what it is called in a sentence, with its unit.
+        low: least number that is taken.
+        high: largest one.
+
+    Raises:
+        FinlabError: `value` is not such a number.
+    """
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise FinlabError(f"{name}: expected a number, got {value!r:.60}")
     if not low <= value <= high:  # a NaN compares false as well
@@ -204,19 +217,34 @@ def number(value: Any, name: str, low: float, high: float) -> float:
 
 
 def numbers(
-    values: Sequence[Any], of: str, low: float, high: float, words: Sequence[str] = "xyz"
+    values: Sequence[Any], subject: str, low: float, high: float, words: Sequence[str] = "xyz"
 ) -> tuple[float, ...]:
-    """Some numbers within limits, by the words that they are called in a sentence."""
+    """Some finite numbers within limits.
+
+    Args:
+        values: what a page sent.
+        subject: what they are numbers of, with their unit: `of front_left [m]`.
+        low: least number that is taken.
+        high: largest one.
+        words: what each is called in a sentence.
+
+    Raises:
+        FinlabError: one is not such a number.
+    """
     return tuple(
-        number(v, f"{word} {of}", low, high) for v, word in zip(values, words, strict=True)
+        [
+            number(value, f"{word} {subject}", low, high)
+            for value, word in zip(values, words, strict=True)
+        ]
     )
 
 
 MERGE_WINDOW_S = 1.0
 """Changes of the same kind that follow each other faster than this are one step of undo."""
 MAX_STEPS = 200
-
+"""Steps that can be undone; older ones are forgotten, so that a long session stays small."""
 Steps = list[tuple[str, State]]
+"""Names of steps, and a state of each."""
 
 
 class History:
@@ -235,12 +263,18 @@ class History:
         self._merge_time = 0.0
 
     def commit(self, name: str, state: State, merge_key: str | None, timed: bool) -> None:
-        """Make `state` the present one by a step called `name`. Changes with the same `merge_key`
-        in quick succession share a step; those that are not `timed` however slow they are, until
-        `end_merge`."""
+        """Make another state the present one by a step.
+
+        Args:
+            name: what undo calls the step.
+            state: the other state.
+            merge_key: changes with the same one in quick succession share a step.
+            timed: without it they share a step however slow they are, until `end_merge`.
+        """
         now = self._clock()
-        same = merge_key is not None and merge_key == self.merge_key
-        if not (same and self.past and (not timed or now - self._merge_time < MERGE_WINDOW_S)):
+        is_same_change = merge_key is not None and merge_key == self.merge_key
+        is_quick = not timed or now - self._merge_time < MERGE_WINDOW_S
+        if not (is_same_change and self.past and is_quick):
             self.past.append((name, self.state))
             self.past = self.past[-MAX_STEPS:]
             self.future = []

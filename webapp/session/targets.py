@@ -18,7 +18,7 @@ PRESETS: dict[str, tuple[float, float, float, float, float, float]] = {
 }
 """Wrenches by name [N, N m]."""
 
-FIRST = PRESETS["Turn"]
+FIRST_TARGET = PRESETS["Turn"]
 """What a new session asks for: gently forward, turning left."""
 
 
@@ -50,8 +50,9 @@ def _extents(layout: Layout, flow: Flow | None) -> tuple[Array, Array]:
     plant = plant_of(layout)
     force = plant.force(plant.grid(STEPS), flow=None if flow is None else np.array(flow))
     wrench = np.einsum("kni,niw->knw", force, plant.effectiveness)
-    both = np.stack([wrench.max(axis=0), -wrench.min(axis=0)])
-    return np.linalg.norm(force, axis=-1).max(axis=0), np.maximum(both, 0.0)
+    largest_force = np.linalg.norm(force, axis=-1).max(axis=0)
+    extents = np.stack([wrench.max(axis=0), -wrench.min(axis=0)])
+    return largest_force, np.maximum(extents, 0.0)
 
 
 def slider_end(reach: float) -> float:
