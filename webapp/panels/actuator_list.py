@@ -31,13 +31,13 @@ def add_actuator_list(page: Page) -> None:
     """A table, and below it what can be done with what is selected in it."""
     session = page.session
 
-    def select(key: str, held: str) -> None:
+    def select(key: str, modifier: str) -> None:
         names = session.state.layout.names
-        (session.select_also if held else session.select)(names[placed(key, len(names))])
+        (session.select_also if modifier else session.select)(names[placed(key, len(names))])
 
     page.add_html(actuator_list)
     page.presses.on("fin", select)
-    page.presses.on("robot", lambda _key, _held: session.select(None))
+    page.presses.on("robot", lambda _key, _modifier: session.select(None))
     adds = {kind.capitalize(): partial(session.add, kind) for kind in KINDS}
     page.add_buttons("Add", adds, hint=f"On the hull; up to {MAX_ACTUATORS} actuators.")
     edits: dict[str, Callable[[], object]] = {
@@ -63,10 +63,8 @@ def add_actuator_list(page: Page) -> None:
     def ring(count: int) -> None:
         session.ring(count, AXES[axis.value])
 
-    about = (
-        "Copies of the selected one, so that so many stand evenly around the axis, turned along."
-    )
-    rings = page.add_buttons("Copies", {str(k): partial(ring, k) for k in RING_SIZES}, hint=about)
+    hint = "Copies of the selected one, so that so many stand evenly around the axis, turned along."
+    rings = page.add_buttons("Copies", {str(k): partial(ring, k) for k in RING_SIZES}, hint=hint)
     for handle in (buttons, axis, rings):
         page.board.show(handle, visible=lambda selected: selected is not None)
 

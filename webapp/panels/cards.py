@@ -164,11 +164,11 @@ def add_answering(page: Page) -> None:
     """Who answers, what is kept least, and where help is found."""
     session = page.session
     gui = page.gui
-    about = (
+    hint = (
         "Watts, proved least by method dual; or the paper's effort, by the network of method mdn."
     )
     least = page.bind(
-        gui.add_dropdown("Least", tuple(LEAST), hint=about), session.keep_least, least_of
+        gui.add_dropdown("Least", tuple(LEAST), hint=hint), session.keep_least, least_of
     )
     page.board.show(least, visible=lambda layout: layout.is_of_fins)
     add_html(gui, marker("fl-method"))
@@ -195,7 +195,7 @@ def _menu(course: tuple[Stop, ...]) -> str:
         LESSONS: ("Lessons", "Each has a task"),
         TOUR: ("Tour", f"The app in {len(TOUR)} stops"),
     }
-    word, about = words[course]
+    word, hint = words[course]
     hide = html("popovertarget='fl-{}' popovertargetaction='hide'", word)
     items = [
         button(f"{k}. {stop.title}", "stop", stop.name, hide) for k, stop in enumerate(course, 1)
@@ -205,4 +205,4 @@ def _menu(course: tuple[Stop, ...]) -> str:
         "fl-menu'><b>{}</b>"
         "<p>{}. Your own work comes back when you close them.</p>{}</div>"
     )
-    return html(menu, word, word, word, word, about, items)
+    return html(menu, word, word, word, word, hint, items)

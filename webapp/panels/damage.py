@@ -162,9 +162,11 @@ class _Faults:
 
 def _add_shares(page: Page, faults: _Faults) -> None:
     """Sliders of what is left of an actuator [%]."""
-    least = 100 * STRENGTH_RANGE[0]
+    lowest_percent = 100 * STRENGTH_RANGE[0]
     for kind, (label, hint) in SHARES.items():
-        slider = page.gui.add_slider(label, least, 100.0, 5.0, 100.0, hint=hint, visible=False)
+        slider = page.gui.add_slider(
+            label, lowest_percent, 100.0, 5.0, 100.0, hint=hint, visible=False
+        )
         page.bind_number(slider, partial(faults.leave, kind), _fault(kind, 1.0, 100.0), digits=1)
         page.board.show(slider, visible=_may_have(kind))
 

@@ -20,10 +20,10 @@ from webapp.tasks.analysing import Analysis
 
 def add_reach(page: Page) -> None:
     """What is drawn, and the card."""
-    about = (
+    hint = (
         "Forces that it can give without torque, or torques without force, as a body in the view."
     )
-    sets = page.gui.add_dropdown("Draw the set of", tuple(DRAWN), hint=about)
+    sets = page.gui.add_dropdown("Draw the set of", tuple(DRAWN), hint=hint)
     page.bind(sets, partial(page.session.set_display, "drawn"), lambda display: display.drawn)
     page.add_html(_analysis_card)
 
@@ -130,15 +130,15 @@ def _searched(
         text = _before_and_after(improvement)
     elif progress is not None:
         unit = GOAL_UNITS[draft.goal]
-        best, before = (three_digits(abs(v)) + unit for v in (progress.best, progress.before))
-        text = html("Best so far <b>{}</b>, {} before, round {}.", best, before, progress.round)
+        best, old = (three_digits(abs(v)) + unit for v in (progress.best, progress.before))
+        text = html("Best so far <b>{}</b>, {} before, round {}.", best, old, progress.round)
     return html("<div class='fl'>{}</div>", text)
 
 
 def _before_and_after(result: Improvement) -> str:
     if not result.improved:
         return "Nothing better was found within reach."
-    before, after = (three_digits(abs(v)) for v in (result.value_before, result.value_after))
+    old, new = (three_digits(abs(v)) for v in (result.value_before, result.value_after))
     goal = next(words for words, name in GOAL_WORDS.items() if name == result.goal)
     stopped = " The search was stopped early." if result.cancelled else ""
     unit = GOAL_UNITS[goal]
@@ -148,9 +148,9 @@ def _before_and_after(result: Improvement) -> str:
         "<b>{}{}: {}{} before, {}{} after.</b>{}",
         goal.capitalize(),
         of,
-        before,
+        old,
         unit,
-        after,
+        new,
         unit,
         stopped,
     )

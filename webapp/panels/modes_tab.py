@@ -64,14 +64,14 @@ def add_candidates(page: Page) -> None:
     board = page.board
     page.add_html(lambda modes, mode, step: mode_plot(modes, mode, step, PLOT_PX))
 
-    def choose(key: str, _held: str) -> None:
+    def choose(key: str, _modifier: str) -> None:
         session.show_mode(
             placed(key, 0 if jobs.answering.searching else len(jobs.answering.modes.visible))
         )
 
     page.presses.on("mode", choose)
-    page.presses.on("play", lambda _key, _held: jobs.refining.toggle())
-    page.presses.on("loop", lambda _key, _held: session.set_loop(not session.loops))
+    page.presses.on("play", lambda _key, _modifier: jobs.refining.toggle())
+    page.presses.on("loop", lambda _key, _modifier: session.set_loop(not session.loops))
     page.add_html(_player)
     hint = "How many steps of refinement the samples have had, in the plot and on the robot."
     slider = gui.add_slider("Step", 0, TRACE_STEPS.steps, 1, TRACE_STEPS.steps, hint=hint)
@@ -122,8 +122,8 @@ def add_saving(page: Page) -> None:
 
 
 def _temperature(state: State) -> float:
-    own = DRAWING.get(state.method, DRAWING["mdn"]).temperature
-    return own if state.temperature is None else state.temperature
+    default_temperature = DRAWING.get(state.method, DRAWING["mdn"]).temperature
+    return default_temperature if state.temperature is None else state.temperature
 
 
 def _player(modes: Modes, step: int | None, playing: bool, loops: bool) -> str:
@@ -149,11 +149,11 @@ def _player(modes: Modes, step: int | None, playing: bool, loops: bool) -> str:
 def step_words(modes: Modes, step: int | None) -> str:
     """What is done in a step of the refinement, and the error that is left then, half of the
     samples having less."""
-    at = modes.steps if step is None else step
-    words = "descent in forces" if at <= TRACE_STEPS.descent else "made exact"
-    words = "samples of the network" if at == 0 else words
-    left = float(np.median(modes.refinement[at].err_norm))
-    return html("{} <span class='dim'>· median error</span> {}", words, error_digits(left))
+    step_shown = modes.steps if step is None else step
+    words = "descent in forces" if step_shown <= TRACE_STEPS.descent else "made exact"
+    words = "samples of the network" if step_shown == 0 else words
+    remaining = float(np.median(modes.refinement[step_shown].err_norm))
+    return html("{} <span class='dim'>· median error</span> {}", words, error_digits(remaining))
 
 
 def _origin_words(method: str, best: Allocation | None, in_reach: bool) -> str:
@@ -174,9 +174,9 @@ def mode_table(modes: Modes, mode: int) -> str:
     fins."""
     if not modes.visible:
         return ""
-    of_fins = any(not math.isnan(way.effort) for way, _, _ in modes.visible)
+    of_fins = any(not math.isnan(named.mode.effort) for named in modes.visible)
     rows = []
-    for k, (way, name, badge) in enumerate(modes.visible):
+    for k, (candidate, name, badge) in enumerate(modes.visible):
         rows.append(
             html(
                 ROW + (EFFORT if of_fins else "") + "<td>{:.0f} %</td></tr>",
@@ -187,12 +187,12 @@ def mode_table(modes: Modes, mode: int) -> str:
                 name,
                 badge,
                 badge,
-                source_words(way.sources),
-                "missing" if way.err_norm > REACHED else "",
-                error_digits(way.err_norm),
-                three_digits(way.power),
-                *([three_digits(way.effort)] if of_fins else []),
-                100 * way.saturation,
+                source_words(candidate.sources),
+                "missing" if candidate.err_norm > REACHED else "",
+                error_digits(candidate.err_norm),
+                three_digits(candidate.power),
+                *([three_digits(candidate.effort)] if of_fins else []),
+                100 * candidate.saturation,
             )
         )
     header = html(
@@ -200,10 +200,12 @@ def mode_table(modes: Modes, mode: int) -> str:
         "<th title='largest share of its range that an actuator uses'>used</th></tr>",
         Markup("<th>effort</th>" * of_fins),
     )
-    left = modes.count - len(modes.visible)
-    remark = f"{left} more are known; they come after these."
-    more = html("<div class='said dim'>{}</div>", remark) if left > 0 else ""
-    return html("<div class='fl'><table class='modes'>{}{}</table>{}</div>", header, rows, more)
+    remaining = modes.count - len(modes.visible)
+    remark = f"{remaining} more are known; they come after these."
+    remark_html = html("<div class='said dim'>{}</div>", remark) if remaining > 0 else ""
+    return html(
+        "<div class='fl'><table class='modes'>{}{}</table>{}</div>", header, rows, remark_html
+    )
 
 
 KINDS = {Verdict.EXACT: "given", Verdict.APPROXIMATE: "near", Verdict.OUT_OF_REACH: "missing"}

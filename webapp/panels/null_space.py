@@ -25,18 +25,18 @@ RIGHT = "The average gives the wrench, too: these commands are in proportion to 
 
 def add_null_space(page: Page) -> None:
     """Sliders, and a table of the ways."""
-    page.add_html(_about)
+    page.add_html(_sentence)
     add_html(page.gui, marker("fl-reach"))
     sliders = [_add_slider(page, k) for k in range(MOST)]
 
-    def place(modes: Modes, shifts: tuple[float, ...]) -> None:
-        known = modes.null_space
+    def set_ranges(modes: Modes, shifts: tuple[float, ...]) -> None:
+        space = modes.null_space
         for k, slider in enumerate(sliders):
-            there = known is not None and k < len(known.names)
-            set_properties(slider, visible=there)
-            if known is None or not there:
+            is_listed = space is not None and k < len(space.names)
+            set_properties(slider, visible=is_listed)
+            if space is None or not is_listed:
                 continue
-            low, high = known.ranges[k]
+            low, high = space.ranges[k]
             step = 10.0 ** math.floor(math.log10(max(high - low, 1e-3)) - 2.5)
             low = math.ceil(low / step) * step
             high = math.floor(high / step) * step
@@ -44,14 +44,14 @@ def add_null_space(page: Page) -> None:
             ends = {"max": max(high, value, step), "min": min(low, value, -step)}
             set_properties(
                 slider,
-                label=f"{known.names[k]} [N]",
-                hint=f"Shares: {known.about[k]}.",
+                label=f"{space.names[k]} [N]",
+                hint=f"Shares: {space.about[k]}.",
                 step=step,
                 **ends,
             )
             set_properties(slider, value=round(value, 6))
 
-    page.board.act(place, *sliders)
+    page.board.act(set_ranges, *sliders)
     add_html(page.gui, marker("fl-column"))
     page.add_html(mode_table)
     page.add_html(_mean_words)
@@ -67,12 +67,12 @@ def _add_slider(page: Page, direction: int) -> viser.GuiSliderHandle[float]:
     return slider
 
 
-def _about(modes: Modes) -> str:
-    known = modes.null_space
-    if known is None:
+def _sentence(modes: Modes) -> str:
+    space = modes.null_space
+    if space is None:
         return ""
-    sentence = f"{ABOUT} {known.more} more directions are not shown." if known.more else ABOUT
-    return html("<div class='fl dim'>{}</div>", sentence if known.names else ALONE)
+    sentence = f"{ABOUT} {space.more} more directions are not shown." if space.more else ABOUT
+    return html("<div class='fl dim'>{}</div>", sentence if space.names else ALONE)
 
 
 def _mean_words(modes: Modes) -> str:

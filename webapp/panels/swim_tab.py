@@ -37,7 +37,7 @@ def add_scenario(page: Page) -> None:
     )
     days = gui.add_dropdown("Scenario", tuple(SCENARIOS), hint=day)
     _bind(page, "scenario", days)
-    page.add_html(_about)
+    page.add_html(_swim_words)
     _bind(page, "path", gui.add_dropdown("Path", CHOICES["path"], hint="Where to swim."))
     laws = (
         "The paper's two beside ours: towards a waypoint; speed and depth by PID, which keeps no "
@@ -46,7 +46,7 @@ def add_scenario(page: Page) -> None:
     _bind(page, "controller", gui.add_dropdown("Controller", CHOICES["controller"], hint=laws))
 
 
-def _about(swim: SwimSettings, method: str) -> str:
+def _swim_words(swim: SwimSettings, method: str) -> str:
     """The day, and who allocates ten times a second."""
     about = swim.day.about
     return html("<div class='fl'>{} Method {}, as in the bar, allocates.</div>", about, method)
@@ -119,7 +119,7 @@ EVERY_S = 0.2
 SMALL = 0.01
 """What a vertical axis shows at least, in its unit."""
 TICKS = 3
-MOST = 2000
+MAX_POINTS = 2000
 """About how many forces are drawn; a longer record, or one of more actuators, is thinned out."""
 FIRST_S = 8.0
 """Least end of the axes of time [s]; it doubles as time goes on."""
@@ -135,11 +135,11 @@ UNSWUM = (
 def add_timeline(page: Page) -> None:
     """What is said before a swim, and six plots over time."""
     content = add_html(page.gui, "")
-    drawn = 0.0
+    drawn_at = 0.0
 
     def draw(swimmer: Swimmer | None, moment: Moment | None, paused: bool) -> None:
         """No more often than an eye can follow."""
-        nonlocal drawn
+        nonlocal drawn_at
         now = time.monotonic()
         if swimmer is None:
             set_properties(
@@ -147,8 +147,8 @@ def add_timeline(page: Page) -> None:
             )
         elif moment is None or not len(moment.record):
             return
-        elif paused or moment.done or now - drawn >= EVERY_S:
-            drawn = now
+        elif paused or moment.done or now - drawn_at >= EVERY_S:
+            drawn_at = now
             plots = timeline(moment.record, len(swimmer.fins), swimmer.duration_s)
             set_properties(content, content=html("<div class='fl fl-timeline'>{}</div>", plots))
 
@@ -163,7 +163,7 @@ def timeline(record: Array, n: int, duration_s: float) -> list[str]:
         n: number of actuators.
         duration_s: of the whole swim [s].
     """
-    rows = np.nan_to_num(record[:: 1 + len(record) * n // MOST])
+    rows = np.nan_to_num(record[:: 1 + len(record) * n // MAX_POINTS])
     seconds = rows[:, TIME]
     power = rows[:, POWER]
     if len(rows) > 1:

@@ -27,11 +27,11 @@ from webapp.tasks.solver import JetComparison
 
 def add_commands(page: Page) -> None:
     """What each actuator does, and which are lost."""
-    about = "Press a number to fail or repair it; X does it to the selected one."
+    hint = "Press a number to fail or repair it; X does it to the selected one."
     add_fin_buttons(
         page,
         "Fail",
-        about,
+        hint,
         "fl-losses",
         page.session.toggle_loss,
         lambda layout, lost: (layout.names, lost, ()),
@@ -51,7 +51,7 @@ def add_target(page: Page) -> None:
     presets = gui.add_button_group("Preset", tuple(PRESETS), hint="Target wrenches to start from.")
     page.on_change(presets, session.set_preset)
     add_html(gui, marker("fl-reach"))
-    page.presses.on("axis", lambda key, _held: session.toggle_axis(placed(key, 6)))
+    page.presses.on("axis", lambda key, _modifier: session.toggle_axis(placed(key, 6)))
     sliders: list[Any] = [_add_slider(page, k) for k in range(6)]
     ends = [1.0] * 6
 
@@ -62,9 +62,10 @@ def add_target(page: Page) -> None:
         target: tuple[float, ...], able: Layout, lost: tuple[str, ...], flow: Flow | None
     ) -> None:
         """Show the target; first the ends: a value beyond them would not be shown."""
-        for value, slider, most in zip(target, sliders, ends, strict=True):
-            slider.max = end = max(most, abs(value))
-            slider.min = -end
+        for value, slider, end in zip(target, sliders, ends, strict=True):
+            limit = max(end, abs(value))
+            slider.max = limit
+            slider.min = -limit
             rounded = round(value, 4) + 0.0
             if slider.value != rounded:
                 slider.value = rounded
@@ -88,10 +89,10 @@ def add_target(page: Page) -> None:
         hints = able, lost, flow, np.isfinite(ranges.low).tolist()
         if hints == hinted:
             return
-        most = axis_reach(able, lost, flow)  # with the others free
+        axis_reaches = axis_reach(able, lost, flow)  # with the others free
         for k, slider in enumerate(sliders):
             if able.commanded[k]:
-                slider.hint = _hint(k, ranges.low[k], most[k])
+                slider.hint = _hint(k, ranges.low[k], axis_reaches[k])
             else:
                 slider.hint = AXIS_WORDS[k].capitalize()
         hinted = hints
@@ -106,8 +107,8 @@ def add_target(page: Page) -> None:
 
 def add_speed(page: Page) -> None:
     """How fast the robot moves, and what gives nothing at rest."""
-    about = "How fast the robot moves ahead through the water, on which rudders depend."
-    speed = page.gui.add_slider(SPEED, 0.0, MAX_SPEED, 0.05, 0.0, hint=about)
+    hint = "How fast the robot moves ahead through the water, on which rudders depend."
+    speed = page.gui.add_slider(SPEED, 0.0, MAX_SPEED, 0.05, 0.0, hint=hint)
     page.bind_number(speed, page.session.set_speed, lambda state: state.speed, digits=2)
     page.add_html(_at_rest)
 
@@ -196,10 +197,8 @@ JETS_HEADER = Markup(
 
 def add_jets(page: Page) -> None:
     """The switch that lets jets count, and the answer beside that which leaves them out."""
-    about = (
-        "What the jets of thrusters and fins take from each other, and where they meet the hull."
-    )
-    switch = page.gui.add_checkbox("Count jets", False, hint=about)
+    hint = "What the jets of thrusters and fins take from each other, and where they meet the hull."
+    switch = page.gui.add_checkbox("Count jets", False, hint=hint)
     page.bind(switch, page.session.set_jets, lambda layout: layout.interaction is not None)
     page.add_html(jets_table)
 

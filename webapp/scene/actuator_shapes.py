@@ -37,8 +37,8 @@ def tube(path: Array, radius: Array | float, sides: int = 16, across: Array | No
     tangent = np.gradient(path, axis=0)
     # Where the path stands still (a step of the radius) the direction of travel is taken from its
     # whole.
-    still = np.linalg.norm(tangent, axis=1) < 1e-12
-    tangent[still] = path[-1] - path[0]
+    is_degenerate = np.linalg.norm(tangent, axis=1) < 1e-12
+    tangent[is_degenerate] = path[-1] - path[0]
     tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
     if across is None:
         across = np.eye(3)[np.argmin(np.abs(tangent).max(axis=0))]
@@ -63,21 +63,21 @@ def _tube_faces(rows: int, sides: int) -> NDArray[np.int32]:
     last."""
     k = np.arange(sides)
     n = np.roll(k, -1)
-    last = (rows - 1) * sides
+    last_ring = (rows - 1) * sides
     start = np.full(sides, rows * sides)
-    end = np.full(sides, rows * sides + 1)
+    tips = np.full(sides, rows * sides + 1)
     return np.concatenate(
-        [grid_faces(rows, sides), triangles(start, n, k, end, last + k, last + n)]
+        [grid_faces(rows, sides), triangles(start, n, k, tips, last_ring + k, last_ring + n)]
     )
 
 
-def force_arrow(way: Array, start: Array, thickness: float) -> Mesh:
+def force_arrow(direction: Array, start: Array, thickness: float) -> Mesh:
     """A straight arrow from `start` (3,) along `way` (3,) [m]: a force times the scale of the
     arrows."""
-    length = float(np.linalg.norm(way))
+    length = float(np.linalg.norm(direction))
     if length < SHORTEST:
         return NOTHING
-    direction = np.asarray(way) / length
+    direction = np.asarray(direction) / length
     head = min(5.0 * thickness, 0.6 * length)
     stations = np.array([0.0, length - head, length - head, length])
     radii = thickness * np.array([1.0, 1.0, 2.6, 0.02])
@@ -100,9 +100,9 @@ def unit_ring(thickness: float) -> Mesh:
     head = 5.0 * thickness
     body = np.linspace(0.0, TURN - head, 48)
     tip = np.linspace(TURN - head, TURN, 8)
-    way = np.concatenate([body, tip])
+    angles = np.concatenate([body, tip])
     radii = thickness * np.concatenate([np.ones(48), np.linspace(2.6, 0.02, 8)])
-    circle = np.stack([np.cos(way), np.sin(way), np.zeros(len(way))], axis=1)
+    circle = np.stack([np.cos(angles), np.sin(angles), np.zeros(len(angles))], axis=1)
     return tube(circle, radii, 14, across=np.array([0.0, 0.0, 1.0]))
 
 
@@ -166,10 +166,10 @@ def stock() -> Mesh:
 
 def pin(size: float) -> Mesh:
     """A nail through what is stuck."""
-    way = size * np.array(
+    path = size * np.array(
         [[0.0, 0.0, -0.04], [0.0, 0.0, 0.06], [0.0, 0.0, 0.06], [0.0, 0.0, 0.066]]
     )
-    return tube(way, size * np.array([0.004, 0.004, 0.016, 0.016]), 14)
+    return tube(path, size * np.array([0.004, 0.004, 0.016, 0.016]), 14)
 
 
 RADIUS = 0.046
@@ -207,12 +207,12 @@ def duct(along: int) -> Mesh:
 def propeller(along: int) -> Mesh:
     """Three twisted blades, ahead of the struts; a node shows both their sides."""
     radius = np.linspace(0.2, 0.9, 9)
-    share = np.linspace(-0.5, 0.5, 5)
+    fraction = np.linspace(-0.5, 0.5, 5)
     pitch = np.arctan(0.42 / radius)[:, None]
     chord = (0.42 * np.sqrt(np.clip(1.0 - ((radius - 0.55) / 0.62) ** 2, 0.0, 1.0)))[
         :, None
-    ] * share
-    place = np.stack(
+    ] * fraction
+    vertices = np.stack(
         [0.1 + chord * np.sin(pitch), radius[:, None] + 0 * chord, chord * np.cos(pitch)], -1
     )
     k, n = (v.ravel() for v in np.meshgrid(np.arange(8), np.arange(4), indexing="ij"))
@@ -223,7 +223,7 @@ def propeller(along: int) -> Mesh:
         c = np.cos(turn)
         s = np.sin(turn)
         blades.append(
-            Mesh(place.reshape(-1, 3) @ np.array([[1, 0, 0], [0, c, s], [0, -s, c]]), faces)
+            Mesh(vertices.reshape(-1, 3) @ np.array([[1, 0, 0], [0, c, s], [0, -s, c]]), faces)
         )
     return _along(joined(*blades), along)
 

@@ -37,17 +37,17 @@ class JetNodes:
         """Show the jets of forces (n, 3) [N], body frame, and what they take at rest, by the
         `scale` of arrows [m/N], as thick as `size` says; nothing for None, or for a layout without
         interaction."""
-        known = None if layout is None else plant_of(layout).interaction
-        if layout is None or known is None:
+        interaction = None if layout is None else plant_of(layout).interaction
+        if layout is None or interaction is None:
             self._hide(0)
             return
-        diameter = known.geometry.diameter
+        diameter = interaction.geometry.diameter
         jets = jets_of(force, diameter)
-        taken = known.at_rest(force)
+        taken = interaction.at_rest(force)
         speed = np.where(diameter > 0.0, jets.speed, 0.0)
-        share = speed / max(float(speed.max()), 1e-9)
-        ways = -np.round((LONGEST * diameter * share)[:, None] * jets.ahead, 3)
-        blows = (share >= LEAST_SPEED) & (np.linalg.norm(ways, axis=1) > 0.0)
+        fraction = speed / max(float(speed.max()), 1e-9)
+        directions = -np.round((LONGEST * diameter * fraction)[:, None] * jets.ahead, 3)
+        blows = (fraction >= LEAST_SPEED) & (np.linalg.norm(directions, axis=1) > 0.0)
         counts = np.linalg.norm(taken, axis=1) > LEAST_TAKEN * np.linalg.norm(force, axis=1).max()
         form = layout.interaction if isinstance(layout.interaction, Jets) else Jets()
         for i in range(layout.n):
@@ -57,11 +57,11 @@ class JetNodes:
                 arrow.node, visible=bool(counts[i]), position=layout.position[i], scale=size
             )
             if blows[i]:
-                jet.show(cone, ways[i], float(diameter[i]), form.width, form.spread)
+                jet.show(cone, directions[i], float(diameter[i]), form.width, form.spread)
             if counts[i]:
-                way = taken[i] * scale
-                start = CLEAR * part_size(layout) / size * way / np.linalg.norm(way)
-                arrow.show(force_arrow, way, start, 0.009)
+                direction = taken[i] * scale
+                start = CLEAR * part_size(layout) / size * direction / np.linalg.norm(direction)
+                arrow.show(force_arrow, direction, start, 0.009)
         self._hide(layout.n)
 
     def _node(self, index: int) -> tuple[Shape, Shape]:
@@ -80,12 +80,12 @@ class JetNodes:
         self.drawn = first
 
 
-def cone(way: Array, diameter: float, width: float, spread: float) -> Mesh:
+def cone(direction: Array, diameter: float, width: float, spread: float) -> Mesh:
     """A jet along `way` (3,) [m] from the origin, as wide as its water has 1/e of the speed in its
     middle."""
-    length = float(np.linalg.norm(way))
+    length = float(np.linalg.norm(direction))
     if not length:
         return NOTHING
     along = np.linspace(0.0, length, 12)
     radius = diameter * np.sqrt(((along / diameter) ** 2 + width**2) / spread)
-    return tube(along[:, None] * way / length, radius, 24)
+    return tube(along[:, None] * direction / length, radius, 24)

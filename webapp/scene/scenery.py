@@ -113,12 +113,12 @@ class Scenery:
         to come to one, or to leave, ends a swim. At its end the camera stands where it stood
         before."""
         session = self._session
-        before = self._stop
+        old_stop = self._stop
         stop = self._stop = session.guide.stop
-        if stop is before:
+        if stop is old_stop:
             return
         self.end_swim()
-        if before is None:
+        if old_stop is None:
             self._camera = self.robot.camera
         if stop is None:
             self.robot.aim(*self._camera)
@@ -196,11 +196,11 @@ class SwimScene:
             [path[:, 0].min() - BEYOND_M, path[:, 1].max() + BEYOND_M, path[:, 2].mean()]
         )
         self._water.show(force_arrow, np.round(FLOW_S * flow, 2), position, 0.03)
-        places = moment.record[:, PLACE : PLACE + 3]
-        places = places[:: max(1, len(places) // TRAIL_POINTS)]
+        positions = moment.record[:, PLACE : PLACE + 3]
+        positions = positions[:: max(1, len(positions) // TRAIL_POINTS)]
         points = (
-            np.stack([places[:-1], places[1:]], axis=1).astype(np.float32)
-            if len(places) > 1
+            np.stack([positions[:-1], positions[1:]], axis=1).astype(np.float32)
+            if len(positions) > 1
             else NO_LINE
         )
         set_properties(self._trail, points=points, colors=np.array(DELIVERED, dtype=np.uint8))
@@ -245,15 +245,15 @@ class SwimScene:
         self._clock = min(
             self._clock + elapsed * (swimming.pace.rate or swimming.pace.speed), ahead.time
         )
-        share = (self._clock - behind.time) / (ahead.time - behind.time)
+        fraction = (self._clock - behind.time) / (ahead.time - behind.time)
         start = behind.pose
         end = ahead.pose.copy()
         if start[3:] @ end[3:] < 0:
             end[3:] *= -1.0
-        self._pose((1 - share) * start + share * end)
+        self._pose((1 - fraction) * start + fraction * end)
 
 
 def _goal(path: Array) -> Mesh:
     steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
-    kept = path[np.concatenate([[True], steps > 1e-6])]
-    return joined(tube(kept, 0.006, 8)) if len(kept) > 1 else NOTHING
+    points_apart = path[np.concatenate([[True], steps > 1e-6])]
+    return joined(tube(points_apart, 0.006, 8)) if len(points_apart) > 1 else NOTHING

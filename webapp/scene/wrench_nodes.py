@@ -75,7 +75,7 @@ def fitting(
     return next((step for step in steps if unit * largest / step <= ends[1]), steps[-1])
 
 
-def swim_scale(swimmer: Swimmer, before: Scale) -> Scale:
+def swim_scale(swimmer: Swimmer, previous: Scale) -> Scale:
     """The scale of a swim, which only grows, so that its arrows compare; `before` is the last
     one."""
     moment = swimmer.visible_moment
@@ -84,7 +84,7 @@ def swim_scale(swimmer: Swimmer, before: Scale) -> Scale:
         for v in (moment.force, moment.asked[:3], moment.delivered[:3])
     ]
     fits = (step for step in NEWTONS if LENGTH * max(sizes) / step <= ARROWS[1])
-    return Scale(max(next(fits, NEWTONS[-1]), before.newtons), 1.0)
+    return Scale(max(next(fits, NEWTONS[-1]), previous.newtons), 1.0)
 
 
 class WrenchNodes:
@@ -131,13 +131,13 @@ class WrenchNodes:
         self._root.position = np.array([0.0, 0.0, top + HEIGHT * size])
         for node in self._nodes:
             node.scale = size
-        asked = size * scale * target[:3]
+        asked_force = size * scale * target[:3]
         delivered = size * scale * got[:3]
         starts = np.stack([np.zeros(3), delivered])
         vectors = np.stack([delivered, size * scale * missing[:3]])
         self._forces.show(starts, vectors, FORCE_COLORS, size)
-        length = float(np.linalg.norm(asked))
-        self._asked_force.show(asked, length, (round(length, DIGITS), size, size))
+        length = float(np.linalg.norm(asked_force))
+        self._asked_force.show(asked_force, length, (round(length, DIGITS), size, size))
         for ring, wrench in zip(self._torques, (target, got, missing), strict=True):
             torque = wrench[3:]
             length = float(np.linalg.norm(torque))
@@ -172,12 +172,12 @@ class UnitMesh:
             self.node.wxyz = quaternion(self._turn(direction))
 
 
-def along_x(way: Array) -> Array:
+def along_x(direction: Array) -> Array:
     """A rotation (3, 3) that takes the x axis to a direction (3,)."""
-    across = np.eye(3)[int(np.argmin(np.abs(way)))]
-    side = _cross(way, across)
+    across = np.eye(3)[int(np.argmin(np.abs(direction)))]
+    side = _cross(direction, across)
     side /= np.linalg.norm(side)
-    return np.stack([way, side, _cross(way, side)], axis=1)
+    return np.stack([direction, side, _cross(direction, side)], axis=1)
 
 
 def about_z(axis: Array) -> Array:
@@ -187,9 +187,9 @@ def about_z(axis: Array) -> Array:
     So a ring begins out of the way of the force's arrow, which mostly points ahead.
     """
     astern = np.array([-1.0, 0.0, 0.0]) if abs(axis[0]) < 0.9 else np.array([0.0, 0.0, 1.0])
-    first = astern - axis * (astern @ axis)
-    first /= np.linalg.norm(first)
-    return np.stack([first, _cross(axis, first), axis], axis=1)
+    perpendicular = astern - axis * (astern @ axis)
+    perpendicular /= np.linalg.norm(perpendicular)
+    return np.stack([perpendicular, _cross(axis, perpendicular), axis], axis=1)
 
 
 def _cross(a: Array, b: Array) -> Array:
@@ -274,9 +274,13 @@ class DirectionHandle:
         self._direction = np.array([1.0, 0.0, 0.0])
         scene = client.scene
         self._root = scene.add_frame("/robot/direction", show_axes=False, visible=False)
-        way = np.array([[-NEEDLE, 0.0, 0.0], [NEEDLE, 0.0, 0.0]])
+        needle = np.array([[-NEEDLE, 0.0, 0.0], [NEEDLE, 0.0, 0.0]])
         needle = Shape(
-            scene, "/robot/direction/needle", LIGHT.line, tube(way, 0.0025, 10), cast_shadow=False
+            scene,
+            "/robot/direction/needle",
+            LIGHT.line,
+            tube(needle, 0.0025, 10),
+            cast_shadow=False,
         )
         self._ends = []
         for name, radius, sign in (("tip", TIP, 1.0), ("tail", TAIL, -1.0)):
@@ -291,9 +295,9 @@ class DirectionHandle:
                 center = np.array(self._root.position)
                 eye = np.array(self._client.camera.position)
                 aim = np.array(event.end_position) - eye
-                before = sign * self._direction
+                previous = sign * self._direction
                 radius = NEEDLE * self._size
-                self._direction = sign * snapped(on_sphere(eye - center, aim, radius, before))
+                self._direction = sign * snapped(on_sphere(eye - center, aim, radius, previous))
                 self._turn()
                 self._on_turn(event.phase, self._direction)
 
@@ -324,7 +328,7 @@ class DirectionHandle:
         set_properties(self._root, wxyz=wxyz / np.linalg.norm(wxyz))
 
 
-def on_sphere(eye: Array, aim: Array, radius: float, before: Array) -> Array:
+def on_sphere(eye: Array, aim: Array, radius: float, previous: Array) -> Array:
     """Direction (3,) to the point of a sphere about the origin that a ray from an eye (3,) along
     `aim` (3,) meets, the one nearer to `before` (3,) of two; the nearest to the ray where it passes
     by."""
@@ -333,7 +337,7 @@ def on_sphere(eye: Array, aim: Array, radius: float, before: Array) -> Array:
     inside = radius**2 - foot @ foot
     if inside > 0.0:
         both = foot + np.sqrt(inside) * np.array([[-1.0], [1.0]]) * aim
-        foot = both[np.argmax(both @ before)]
+        foot = both[np.argmax(both @ previous)]
     return np.asarray(foot / np.linalg.norm(foot))
 
 
