@@ -28,7 +28,7 @@ from webapp.markup.verdict import (
     Verdict,
     answer_sentence,
     bound_sentence,
-    rest_sentence,
+    missing_sentence,
     verdict_of,
     verdict_sentence,
 )
@@ -59,21 +59,21 @@ def test_reachable_and_not() -> None:
     allocator = Allocator(layout, StandIn)
     easy = allocator.allocate(PRESETS["Turn"])
     assert easy.reachable and verdict_sentence(easy, True) == "Exact"
-    assert rest_sentence(easy) == "Nothing is left undone."
+    assert missing_sentence(easy) == "Nothing is left undone."
     hard = allocator.allocate([0, 0, 60, 0, 0, 0])
     assert not hard.reachable
     assert verdict_sentence(hard, False) == "Out of reach, closest"
     state = State(layout, target=(0.0, 0.0, 60.0, 0.0, 0.0, 0.0), method="sqp")
     assert not Solver().reply(state).in_reach
-    assert "N of heave is left undone" in rest_sentence(hard)
+    assert "N of heave is left undone" in missing_sentence(hard)
     told = {"reachable": False, "scale": np.ones(6), "target": np.array([0.0, 0.0, 5.0, 0, 0, 0])}
     beside: Any = SimpleNamespace(unallocated=np.array([0.0, -2.0, 1.0, 0, 0, 0]), **told)
     assert (
-        rest_sentence(beside)
+        missing_sentence(beside)
         == "1.00 N of heave is left undone; 2.00 N of sway comes along unasked."
     )
     beside.unallocated = np.array([0.0, -2.0, -1.0, 0, 0, 0])  # more heave than asked
-    assert rest_sentence(beside) == "2.00 N of sway and 1.00 N of heave come along unasked."
+    assert missing_sentence(beside) == "2.00 N of sway and 1.00 N of heave come along unasked."
 
 
 @pytest.mark.parametrize("share", [0.0, 0.5, 0.93, 0.985, 0.999, 1.0, 1.02, 1.5])

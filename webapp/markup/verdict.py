@@ -1,4 +1,8 @@
-"""What an answer is worth, in a word, in a sentence and axis by axis; all three say the same."""
+"""What an answer is worth, in a word, in a sentence and axis by axis; all three say the same.
+
+The corner of the view (`panels/status.py`) shows the word, the panel of the wrench
+(`panels/wrench_tab.py`) the sentences.
+"""
 
 from enum import Enum
 
@@ -17,7 +21,7 @@ WORKING = "Working …"
 SPOKEN = 0.05
 """Share of the largest miss, each axis over its scale, from which another axis is spoken of,
 too."""
-FAR = 9.0
+UNKNOWN_GAP = 9.0
 """Share above the bound that says nothing of an answer, such as noise that pushes for nothing in a
 table."""
 PROVED = 1e-4
@@ -73,23 +77,30 @@ def verdict_sentence(allocation: Allocation, in_reach: bool) -> str:
     return f"{verdict.value}, {allocation.policy.kind}"
 
 
-def rest_sentence(allocation: Allocation) -> str:
+def missing_sentence(allocation: Allocation) -> str:
     """One sentence on what is left undone, and on what comes along unasked, axis by axis."""
     if allocation.reachable:
         return "Nothing is left undone."
-    rest = allocation.unallocated
-    size = np.abs(allocation.unallocated / allocation.scale)
-    spoken = [k for k in np.argsort(-size) if size[k] >= SPOKEN * size.max()]
-    less = [_amount(rest[k], k) for k in spoken if rest[k] * allocation.target[k] > 0.0]
-    more = [_amount(rest[k], k) for k in spoken if rest[k] * allocation.target[k] <= 0.0]
-    parts = [f"{listed(less)} {'is' if len(less) == 1 else 'are'} left undone"] if less else []
-    parts += (
-        [f"{listed(more)} {'comes' if len(more) == 1 else 'come'} along unasked"] if more else []
-    )
-    return f"{'; '.join(parts)}."
+    unallocated = allocation.unallocated
+    size = np.abs(unallocated / allocation.scale)
+    undone = []
+    unasked = []
+    for k in np.argsort(-size):
+        if size[k] < SPOKEN * size.max():
+            continue
+        is_undone = unallocated[k] * allocation.target[k] > 0.0
+        (undone if is_undone else unasked).append(_amount(unallocated[k], k))
+    phrases = []
+    if undone:
+        phrases.append(f"{listed(undone)} {'is' if len(undone) == 1 else 'are'} left undone")
+    if unasked:
+        verb = "comes" if len(unasked) == 1 else "come"
+        phrases.append(f"{listed(unasked)} {verb} along unasked")
+    return f"{'; '.join(phrases)}."
 
 
 def _gap(allocation: Allocation, bound: float) -> float:
+    """How far its watts lie above a bound [W], as a share of that."""
     return (allocation.power - bound) / max(bound, LEAST_WATTS)
 
 
@@ -106,28 +117,30 @@ def bound_sentence(allocation: Allocation) -> str:
     gap = _gap(allocation, allocation.bound)
     if gap <= PROVED:
         return "Its watts are proved least."
-    if gap > FAR:
+    if gap > UNKNOWN_GAP:
         return "How far its watts are from the least is not known."
-    share = f"{100 * gap:.2g}" if gap < 0.1 else f"{100 * gap:.0f}"
-    return f"Its watts are at most {share} % above the least."
+    percent = f"{100 * gap:.2g}" if gap < 0.1 else f"{100 * gap:.0f}"
+    return f"Its watts are at most {percent} % above the least."
 
 
 def answer_sentence(
     state: State, allocation: Allocation | None, busy: bool, searching: bool = False
 ) -> Markup:
-    """What is left undone, why, and what the method ignores; while `busy` of an earlier question,
-    and while `searching` without what is proved of it."""
+    """What is left undone, why, and what the method ignores.
+
+    Args:
+        state: the present state.
+        allocation: the answer that is on the robot, if any.
+        busy: whether the answer is one to an earlier question.
+        searching: whether what is proved of the answer is not known yet, and not said.
+    """
     sentences: list[str] = []
     if allocation is not None and not busy:
         if allocation.unknown_fins:
             sentences.append(_warning("; ".join(allocation.notes) + "."))
-        sentences.append(rest_sentence(allocation))
+        sentences.append(missing_sentence(allocation))
         if not allocation.reachable and not allocation.unknown_fins:
-            share = round(100 * allocation.share)
-            remarks = [f"{share} % of what is asked is delivered"] if 0 <= share < 100 else []
-            remarks += [*allocation.binding, *(() if searching else allocation.notes)]
-            sentence = "; ".join(note for note in remarks if not note.endswith(AT_REST))
-            sentences.append(in_app(f"{sentence[0].upper()}{sentence[1:]}.") if sentence else "")
+            sentences.append(_remarks_sentence(allocation, searching))
         elif allocation.reachable and not searching:
             sentences.append(bound_sentence(allocation))
             if doubt := allocation.measure_next:
@@ -140,6 +153,19 @@ def answer_sentence(
     if blind is not None:
         sentences.insert(0, _warning(blind))
     return Markup(" ").join(filter(None, sentences))
+
+
+def _remarks_sentence(allocation: Allocation, searching: bool) -> str:
+    """How much is delivered, what binds, and what the method notes unless it is `searching`."""
+    percent = round(100 * allocation.share)
+    remarks = []
+    if 0 <= percent < 100:
+        remarks.append(f"{percent} % of what is asked is delivered")
+    remarks += allocation.binding
+    if not searching:
+        remarks += allocation.notes
+    sentence = "; ".join([remark for remark in remarks if not remark.endswith(AT_REST)])
+    return in_app(f"{sentence[0].upper()}{sentence[1:]}.") if sentence else ""
 
 
 def _amount(value: float, axis: int) -> str:

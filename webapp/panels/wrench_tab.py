@@ -15,7 +15,7 @@ from finlab.layout import Layout
 from webapp.handles import add_html, placed, press
 from webapp.markup.answer import bars_of, fin_table
 from webapp.markup.reach import reach_style
-from webapp.markup.verdict import answer_sentence, rest_sentence
+from webapp.markup.verdict import answer_sentence, missing_sentence
 from webapp.markup.words import SPEED, error_digits, html, listed, marker, row, three_digits
 from webapp.memoized import Memoized
 from webapp.page import Page
@@ -213,6 +213,6 @@ def jets_table(jet_comparison: JetComparison | None) -> str:
         row("error", error_digits(with_jets.err_norm), error_digits(without_jets.err_norm)),
         row("power [W]", three_digits(with_jets.power), three_digits(without_jets.power)),
     ]
-    sentence = rest_sentence(without_jets)
+    sentence = missing_sentence(without_jets)
     words = "<div class='fl'><table>{}{}</table><div class='said'>Without: {}</div></div>"
     return html(words, JETS_HEADER, rows, sentence[0].lower() + sentence[1:])
