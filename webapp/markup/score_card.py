@@ -115,7 +115,11 @@ def _axes(card: ScoreCard, old_card: ScoreCard | None) -> str:
     for k, word in enumerate(AXES):
         if word in card.authority.free:
             continue
-        shares = [loss.share_left[k] for loss in card.losses if loss.share_left[k] is not None]
+        shares = []
+        for loss in card.losses:
+            share = loss.share_left[k]
+            if share is not None:
+                shares.append(share)
         power = card.unit_power[k]
         rows.append(
             row(

@@ -274,12 +274,12 @@ class DirectionHandle:
         self._direction = np.array([1.0, 0.0, 0.0])
         scene = client.scene
         self._root = scene.add_frame("/robot/direction", show_axes=False, visible=False)
-        needle = np.array([[-NEEDLE, 0.0, 0.0], [NEEDLE, 0.0, 0.0]])
+        needle_path = np.array([[-NEEDLE, 0.0, 0.0], [NEEDLE, 0.0, 0.0]])
         needle = Shape(
             scene,
             "/robot/direction/needle",
             LIGHT.line,
-            tube(needle, 0.0025, 10),
+            tube(needle_path, 0.0025, 10),
             cast_shadow=False,
         )
         self._ends = []
