@@ -83,8 +83,8 @@ def missing_sentence(allocation: Allocation) -> str:
         return "Nothing is left undone."
     unallocated = allocation.unallocated
     size = np.abs(unallocated / allocation.scale)
-    undone = []
-    unasked = []
+    undone: list[str] = []
+    unasked: list[str] = []
     for k in np.argsort(-size):
         if size[k] < SPOKEN * size.max():
             continue
