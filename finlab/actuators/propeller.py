@@ -199,7 +199,7 @@ def form_of(kind: Literal["thruster", "pod"], limits: Array, sign: float = 1.0) 
         sign: sign of a thruster's command for a force along its `Line`.
     """
     gives_nothing = not limits.any()
-    return Form(kind, axes=np.zeros((3, 3)) if gives_nothing else None, sign=sign)
+    return Form(kind, axes=np.zeros((3, 3)) if gives_nothing else None, command_sign=sign)
 
 
 def _law_of(table: PowerTable) -> PowerLaw:

@@ -24,11 +24,9 @@ from finlab.display import Block, Table
 from finlab.layout.layout import Layout
 from finlab.physics.plant import Plant
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # an `Allocation` prints itself by what is here
+    from finlab.allocation.allocation import Allocation
     from finlab.allocation.method import Method
-
-Allocation = Any
-"""`finlab.allocation.Allocation`, which prints itself by what is here."""
 
 PLAIN_GAP = 0.01
 """Share by which the power may exceed its bound without a sentence."""

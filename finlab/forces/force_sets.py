@@ -236,8 +236,8 @@ def _shape(response: Response, is_fin: bool) -> Shape:
         radius = max(largest, -least) if least <= 0.0 <= largest else 0.5 * (largest - least)
         return Shape(directions, radius, 0.0, 0.0, (np.array([[least, 0.0], [largest, 0.0]]),))
     directions = response.effectiveness[:, :3]
-    middle = response.middle
-    half = response.half
+    middle = response.sector_center
+    half = response.sector_half_angle
     turn = half * np.linspace(-1.0, 1.0, ALONG)
     if response.gauge is not None or half == 0.0:
         gauge = np.ones(1) if response.gauge is None else response.gauge

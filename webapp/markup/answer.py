@@ -8,8 +8,8 @@ from markupsafe import Markup
 from numpy.typing import ArrayLike, NDArray
 
 from finlab.allocation.allocation import Allocation
-from finlab.allocation.policy import AXES
 from finlab.arrays import Array
+from finlab.axes import AXES
 from finlab.layout import Actuator, Fin, Layout
 from finlab.layout.damage import WHOLE, Damage
 from webapp.markup.words import damage_words, html, saturated

@@ -6,7 +6,7 @@ import numpy as np
 from markupsafe import Markup
 
 from finlab.allocation.allocation import Allocation
-from finlab.allocation.policy import AXES
+from finlab.axes import AXES
 from finlab.physics.objective import REACHED
 from webapp.handles import put
 from webapp.markup.verdict import COLORS, WORKING, verdict_of, verdict_sentence

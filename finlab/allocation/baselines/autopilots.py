@@ -22,10 +22,10 @@ from scipy.optimize import linear_sum_assignment
 
 from finlab.allocation.baselines.fixed_actuators import fixed_actuators_of
 from finlab.allocation.method import LeastErrorMethod
-from finlab.allocation.policy import AXES as WRENCH_AXES
 from finlab.allocation.settings import Settings, choice
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
+from finlab.axes import AXES as WRENCH_AXES
 from finlab.axes import Axis
 from finlab.exchange.motor_factors import AXES, FRAMES
 from finlab.exchange.motor_factors import SIGNS as SUB_SIGNS

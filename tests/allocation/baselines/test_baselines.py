@@ -208,7 +208,7 @@ def test_a_descent_never_goes_up_nor_out(seed: int, reach: float) -> None:
     target = reach * targets_of(layout, 1, seed)[0]
     end, errors = method.descent(target, plant.sample(rng, (1,))[0])
     assert len(errors) > 2 and (np.diff(errors) <= 0.0).all()
-    missing = (plant.wrench(end) - target) / method.sigma
+    missing = (plant.wrench(end) - target) / method.asked_scale
     assert errors[-1] == pytest.approx(missing @ missing, rel=1e-9, abs=1e-15)
     assert (end >= layout.lower).all() and (end <= layout.upper).all()
 
