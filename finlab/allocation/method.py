@@ -72,11 +72,11 @@ class Method(ABC):
     """Whether `solve` takes the `reference` of the next ticks."""
     needs_networks: ClassVar[bool] = False
     """Whether it is made with trained networks, of a checkpoint."""
-    weights: Networks | None
+    networks: Networks | None
     """Trained networks; None for methods without."""
 
     def __init__(
-        self, layout: Layout, settings: Settings, scale: Array, weights: Networks | None = None
+        self, layout: Layout, settings: Settings, scale: Array, networks: Networks | None = None
     ) -> None:
         """Prepares the method for a robot.
 
@@ -84,7 +84,7 @@ class Method(ABC):
             layout: of healthy actuators, with the axes that count.
             settings: of its `settings_class`.
             scale: wrench scale (6,) [N, N m] of the whole robot, by which errors are normalized.
-            weights: trained networks; None for a method without.
+            networks: trained networks; None for a method without.
 
         Raises:
             AllocationError: the method cannot work with these settings.
@@ -96,7 +96,7 @@ class Method(ABC):
         self.layout = layout
         self.settings = settings
         self.scale = scale
-        self.weights = weights
+        self.networks = networks
         self.plant = plant_of(layout).counting(layout.commanded)
         self.prepare()
 

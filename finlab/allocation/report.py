@@ -24,9 +24,12 @@ from finlab.display import Block, Table
 from finlab.layout.layout import Layout
 from finlab.physics.plant import Plant
 
-if TYPE_CHECKING:  # an `Allocation` prints itself by what is here
-    from finlab.allocation.allocation import Allocation
+if TYPE_CHECKING:
     from finlab.allocation.method import Method
+
+Allocation = Any
+"""`finlab.allocation.Allocation`, which prints itself by what is here: it imports this module, so
+that this one cannot import it, not even for its type."""
 
 PLAIN_GAP = 0.01
 """Share by which the power may exceed its bound without a sentence."""

@@ -127,7 +127,7 @@ def parse_robot(files: Files, source: str = "bundle") -> DeployedRobot:
     check_bundle_files(files, source)
     robot = robot_of(files, source, parse_layout)
     allocator = Allocator.of_choice(robot.layout, bundled_method(files, source))
-    if (None if allocator.weights is None else allocator.weights.sha256) != robot.weights_sha256:
+    if (None if allocator.networks is None else allocator.networks.sha256) != robot.weights_sha256:
         raise DataError(
             f"{source}: was made with other networks than this finlab's; export it with this one"
         )

@@ -102,13 +102,13 @@ class Mdn(LearnedMethod):
     settings: MdnSettings
 
     def __init__(
-        self, layout: Layout, settings: Settings, scale: Array, weights: TrainedWeights
+        self, layout: Layout, settings: Settings, scale: Array, networks: TrainedWeights
     ) -> None:
-        self.config = weights.network_of(ForceNetworkConfig)
-        super().__init__(layout, settings, scale, weights)
+        self.config = networks.network_of(ForceNetworkConfig)
+        super().__init__(layout, settings, scale, networks)
         self.sigma = TYPICAL_SHARE * scale
         self.robot = effort_robot(self.plant, self.sigma)
-        self._network = weights.single_precision
+        self._network = networks.single_precision
         self._one_thread = single_threaded_products()
 
     def solve(self, targets: Array, *, policy: Policy, **wanted: Any) -> Solution:

@@ -177,9 +177,9 @@ class Exciting(Method):
     settings: ExcitingSettings
 
     def __init__(
-        self, layout: Layout, settings: Settings, scale: Array, weights: Networks | None = None
+        self, layout: Layout, settings: Settings, scale: Array, networks: Networks | None = None
     ) -> None:
-        super().__init__(layout, settings, scale, weights)
+        super().__init__(layout, settings, scale, networks)
         self._rng = np.random.default_rng(self.settings.seed)
         self._owner = _owners(layout)
         self._max_force = largest_forces(layout)
