@@ -246,10 +246,11 @@ class Allocator:
         question = self._question(damage_of(damage, lost), policy, flow, seed, free)
         state = question.state
         method = state.method
-        options: dict[str, Any] = {}
+        prices: Array | None = None
+        reference_of_method: Array | None = None
         if isinstance(previous, Allocation):
             if method.begins_at_prices and previous.prices is not None:
-                options["prices"] = previous.prices
+                prices = previous.prices
             previous = previous.command
         command_previous = None if previous is None else check_previous(previous, state.layout)
 
@@ -259,9 +260,11 @@ class Allocator:
             wrenches_expected = check_reference(reference)
             target = method.in_time(target, wrenches_expected)
             if method.looks_ahead:
-                options["reference"] = state.with_free_axes(wrenches_expected, 0.0)
+                reference_of_method = state.with_free_axes(wrenches_expected, 0.0)
         targets = state.with_free_axes(target, 0.0)[None]
-        solution = question.solve(targets, command_previous, **options)
+        solution = question.solve(
+            targets, command_previous, prices=prices, reference=reference_of_method
+        )
         solve_ms = (time.perf_counter() - start) * 1e3
 
         target_shown = state.with_free_axes(target, np.nan).copy()

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from finlab.allocation.dual.compiled import Compiled, miss_cost_of, power_bound
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
-from finlab.allocation.method import Method
+from finlab.allocation.method import Method, MethodQuestion
 from finlab.allocation.policy import CLOSEST, Policy
 from finlab.allocation.settings import Settings, number
 from finlab.allocation.solution import Solution
@@ -113,41 +113,24 @@ class Dual(Method):
             self._in_last_flow = _MethodInFlow(key, other)
         return other
 
-    def solve(
-        self,
-        targets: Array,
-        *,
-        policy: Policy,
-        previous: Array | None = None,
-        flow: Array | None = None,
-        seed: int = 0,
-        prices: Array | None = None,
-        lost: NDArray[np.bool_] | None = None,
-        free: NDArray[np.bool_] | None = None,
-        reference: Array | None = None,
-    ) -> Solution:
-        """Solves for targets; what is not listed is as for `Method.solve`.
-
-        Args:
-            prices: multipliers (6,) [W/N, W/(N m)] at which Newton's method begins, for a single
-                target; None for its own.
-            lost: which actuators (n,) do not work; None where all do.
-            free: which axes (6,) may take any wrench; None for none.
-            reference: wrenches (K, 6) of the next ticks [N, N m]; pods turn in time for them.
+    def solve(self, question: MethodQuestion) -> Solution:
+        """Solves for targets; see `Method.solve`. In a tick pods turn in time for the reference.
 
         Returns:
             Commands (N, n, 3), NaN for lost actuators, and the lower bound of their power.
         """
-        if len(targets) == 0:
+        if len(question.targets) == 0:
             return Solution(np.empty((0, self.layout.n, 3)), lambda _: np.empty(0))
+        previous = question.previous
+        reference = question.reference
         calm = 0.0 if previous is None else self.settings.calm
-        conditions = Conditions(previous, lost, free, calm)
-        method = self.at(flow)
+        conditions = Conditions(previous, question.lost, question.free, calm)
+        method = self.at(question.flow)
         if reference is not None and len(reference) and method.turns_ahead and previous is not None:
             from finlab.allocation.dual.ahead import conditions_ahead
 
             conditions = conditions_ahead(method, reference, conditions)
-        return method.solve_under(conditions, targets, policy, prices)
+        return method.solve_under(conditions, question.targets, question.policy, question.prices)
 
     @cached_property
     def turning_pods(self) -> NDArray[np.bool_]:

@@ -12,12 +12,12 @@ Where a target is out of reach the default method says which wrench is to be del
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from finlab.allocation.dual.method import Dual
-from finlab.allocation.method import Method, Takes
+from finlab.allocation.method import Method, MethodQuestion, Takes
 from finlab.allocation.policy import Policy
 from finlab.allocation.rates import Rates
 from finlab.allocation.settings import MAX_CANDIDATES, Settings, number
@@ -111,10 +111,11 @@ class Mdn(LearnedMethod):
         self._network = networks.single_precision
         self._one_thread = single_threaded_products()
 
-    def solve(self, targets: Array, *, policy: Policy, **wanted: Any) -> Solution:
-        target = targets / self.sigma
-        previous = wanted.get("previous")
-        seed = wanted.get("seed", 0)
+    def solve(self, question: MethodQuestion) -> Solution:
+        target = question.targets / self.sigma
+        policy = question.policy
+        previous = question.previous
+        seed = question.seed
         if len(target) == 1:
             with self._one_thread():
                 found = self._proposed_and_refined(policy, target, seed)
@@ -191,7 +192,8 @@ class Mdn(LearnedMethod):
         answers = refined(robot, target, answers.command, answers.origin, MORE_STEPS)
         inexact = answers.error[:, 0] > robot.exact
         if inexact.any():
-            command = self._default.solve(target[inexact] * self.sigma, policy=policy).command
+            unanswered = MethodQuestion(target[inexact] * self.sigma, policy)
+            command = self._default.solve(unanswered).command
             wrench = robot.commands.wrench(command)
             answers.command[inexact, 0] = command
             answers.wrench[inexact, 0] = wrench

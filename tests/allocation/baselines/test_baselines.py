@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finlab.allocation import Allocator, Policy
+from finlab.allocation import Allocator
 from finlab.allocation.baselines.linear import PaperSqp, PaperSqpSettings, box_qp
+from finlab.allocation.method import MethodQuestion
 from finlab.errors import LayoutError
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout
 from finlab.physics import Plant, plant_of
@@ -104,7 +105,7 @@ def test_a_failed_fin_is_a_removed_fin(method: str) -> None:
     alone = choice.kind(
         rest, choice.settings, yardstick(layout)
     )  # errors are those of the whole robot
-    removed = alone.solve(np.array([target]), policy=Policy()).command[0]
+    removed = alone.solve(MethodQuestion(np.array([target]))).command[0]
     assert np.isnan(lost[1]).all()
     np.testing.assert_array_equal(lost[[0, 2]], removed)
 
