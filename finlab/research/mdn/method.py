@@ -106,13 +106,13 @@ class Mdn(LearnedMethod):
     ) -> None:
         self.config = networks.network_of(ForceNetworkConfig)
         super().__init__(layout, settings, scale, networks)
-        self.sigma = TYPICAL_SHARE * scale
-        self.robot = effort_robot(self.plant, self.sigma)
+        self.asked_scale = TYPICAL_SHARE * scale
+        self.robot = effort_robot(self.plant, self.asked_scale)
         self._network = networks.single_precision
         self._one_thread = single_threaded_products()
 
     def solve(self, question: MethodQuestion) -> Solution:
-        target = question.targets / self.sigma
+        target = question.targets / self.asked_scale
         policy = question.policy
         previous = question.previous
         seed = question.seed
@@ -135,7 +135,7 @@ class Mdn(LearnedMethod):
         return Solution(command)
 
     def refinement(self, target: Array, *, flow: Array | None, seed: int) -> tuple[Candidates, ...]:
-        normalized = target[None] / self.sigma
+        normalized = target[None] / self.asked_scale
         with self._one_thread():
             proposal = self.proposals(normalized, seed)
             trace = traced(
@@ -192,7 +192,7 @@ class Mdn(LearnedMethod):
         answers = refined(robot, target, answers.command, answers.origin, MORE_STEPS)
         inexact = answers.error[:, 0] > robot.exact
         if inexact.any():
-            unanswered = MethodQuestion(target[inexact] * self.sigma, policy)
+            unanswered = MethodQuestion(target[inexact] * self.asked_scale, policy)
             command = self._default.solve(unanswered).command
             wrench = robot.commands.wrench(command)
             answers.command[inexact, 0] = command
@@ -265,4 +265,6 @@ class Mdn(LearnedMethod):
         command = self.robot.commands.feasible(command)
         wrench = self.robot.commands.wrench(command)
         error = TYPICAL_SHARE * np.linalg.norm(wrench - target, axis=-1)
-        return Candidates(command, wrench * self.sigma, error, *costs(self.layout, command), names)
+        return Candidates(
+            command, wrench * self.asked_scale, error, *costs(self.layout, command), names
+        )
