@@ -1,5 +1,5 @@
-"""What thrusters with a fixed axis and turning ones have in common: a propeller, with its limits,
-its power, its jet, and its input for a force."""
+"""The propeller that thrusters with a fixed axis and turning ones share: its limits, its power, its
+jet, and its input for a force."""
 
 import math
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,8 @@
-"""What messages between actuators, and between an actuator and the hull, are made of.
+"""Features and vectors of the messages between actuators, and between an actuator and the hull; the
+networks of `finlab.interaction.learned` read them.
 
-What counts is the frame: features are invariants in the frame of a source's jet (distance along and
-beside it in diameters, cosines, ratios), and a message is a sum of vectors along the pair's own
+The choice of frame matters: features are invariants in the frame of a source's jet (distances along
+and across it in diameters, cosines, ratios), and a message is a sum of vectors along the pair's own
 directions. So one network serves robots of any number of actuators. Rows are packed: the features,
 then the vectors.
 """

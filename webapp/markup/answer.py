@@ -1,4 +1,5 @@
-"""What is asked and delivered: six bars, and the table of commands with one row per fin."""
+"""Markup of an answer: six bars of the wrench desired and delivered, and the table of commands with
+one row per fin."""
 
 import math
 from functools import cache

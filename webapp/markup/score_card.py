@@ -1,4 +1,4 @@
-"""What a layout can do, as one card, and the quick checks below its editor."""
+"""Markup of a layout's score card, and of the quick checks below the layout's editor."""
 
 from collections.abc import Callable
 from itertools import combinations

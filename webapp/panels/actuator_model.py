@@ -1,4 +1,4 @@
-"""What the selected actuators are known by: a formula with its numbers, or a table of
+"""Editor of the selected actuators' force model: a formula with its numbers, or a table of
 measurements."""
 
 from collections.abc import Callable, Sequence

@@ -1,5 +1,4 @@
-"""Which actuators are lost, and what is wrong with the others: a button for each, and
-sliders."""
+"""Damage of actuators: a button for each one that may be lost, and sliders for partial faults."""
 
 import math
 from collections.abc import Callable, Sequence

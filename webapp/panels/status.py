@@ -1,4 +1,4 @@
-"""What lies over the 3D view: the status line and the legend."""
+"""Overlays of the 3D view: the status line and the legend."""
 
 from functools import lru_cache
 
