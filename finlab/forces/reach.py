@@ -180,7 +180,9 @@ def weakest(sets: ForceSets, n_random: int = N_RANDOM, fine: bool = True) -> Ext
     common = np.concatenate([np.eye(axes), drawn])
     of_robot = np.swapaxes(vectors[full], -1, -2)
     starts = np.concatenate([np.broadcast_to(common, (len(full), *common.shape)), of_robot], axis=1)
-    if (sets.half[full] < np.pi).any() or sets.place.any():  # else opposite directions are alike
+    if (
+        sets.sector_half_angle[full] < np.pi
+    ).any() or sets.polygon_offset.any():  # else opposite directions are alike
         starts = np.concatenate([starts, -starts], axis=1)
     for walks, close in ((N_WALKS, COARSE), (FINE_WALKS, FINE))[: 2 if fine else 1]:
         rows = sets.take(np.repeat(full, starts.shape[1]))

@@ -138,7 +138,7 @@ def test_a_plane_and_forces_prove_each_size(half: float, scale: float) -> None:
     assert found.gap.max() < small
     assert (np.linalg.norm(found.force, axis=-1) <= sets.radius * (1.0 + 1e-9)).all()
     if half <= np.pi / 2:
-        angle = np.arctan2(found.force[..., 1], found.force[..., 0]) - sets.middle
+        angle = np.arctan2(found.force[..., 1], found.force[..., 0]) - sets.sector_center
         assert (np.cos(angle) >= np.cos(half) - 1e-6)[
             np.linalg.norm(found.force, axis=-1) > 1e-3
         ].all()
@@ -168,7 +168,9 @@ def ranges_by_polygons(layout: Layout, wrench: list[float], lost: tuple[str, ...
     none."""
     sets = force_sets(layout, lost)
     n = sets.radius.shape[1]
-    turn = sets.middle[0, :, None] + sets.half[0, :, None] * np.linspace(-1, 1, CORNERS)
+    turn = sets.sector_center[0, :, None] + sets.sector_half_angle[0, :, None] * np.linspace(
+        -1, 1, CORNERS
+    )
     force = sets.radius[0, :, None, None] * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
     corners = np.einsum("npc,nck->npk", force, sets.effectiveness[0]).reshape(-1, 6)
     share = np.kron(np.eye(n), np.ones(CORNERS))
