@@ -8,7 +8,12 @@ from scipy.optimize import linprog
 
 from finlab.analysis import authority
 from finlab.forces.force_sets import SCALE, ForceSets, convex_parts, force_sets
-from finlab.forces.reach import axis_ranges, largest, max_wrench_along, max_wrench_along_exactly
+from finlab.forces.reach import (
+    axis_ranges,
+    largest_along_rays,
+    max_wrench_along,
+    max_wrench_along_exactly,
+)
 from finlab.layout import Layout
 from finlab.physics import Plant
 from tests.exhaustive import crossed
@@ -129,7 +134,7 @@ def test_a_plane_and_forces_prove_each_size(half: float, scale: float) -> None:
     ray /= np.linalg.norm(ray, axis=-1, keepdims=True)
     inside = sets.farthest(rng.standard_normal((40, 6)))[1]
     origin = 0.5 * sets.wrench(inside)
-    found = largest(sets, ray, origin)
+    found = largest_along_rays(sets, ray, origin)
     end = origin + found.size[:, None] * ray
     normal = found.normal / np.linalg.norm(found.normal, axis=-1, keepdims=True)
     small = 1e-7 * float(sets.unit.max())
@@ -157,7 +162,10 @@ def test_robots_without_anything_to_push_with() -> None:
         assert (
             found.size == pytest.approx(np.zeros(40), abs=1e-6) and np.isfinite(found.normal).all()
         )
-        assert largest(dead, ray, np.tile(100.0 * np.eye(6)[1], (40, 1))).size.max() == -np.inf
+        assert (
+            largest_along_rays(dead, ray, np.tile(100.0 * np.eye(6)[1], (40, 1))).size.max()
+            == -np.inf
+        )
 
 
 CORNERS = 96
