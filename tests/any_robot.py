@@ -41,8 +41,8 @@ class AnyRobot:
     @property
     def normalization(self) -> WrenchNormalization:
         """What the networks were trained with; the paper's where there are none."""
-        if self.choice.weights is not None:
-            return self.choice.weights.normalization
+        if self.choice.networks is not None:
+            return self.choice.networks.normalization
         return read_normalization(resolve_checkpoint("default"))
 
     @property

@@ -1,4 +1,4 @@
-"""What a user does on one page, and what the page tells of it in notes."""
+"""Actions of a user on one page, and the notes by which the page reports them."""
 
 import traceback
 from collections.abc import Callable

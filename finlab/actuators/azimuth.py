@@ -108,7 +108,7 @@ class AzimuthGroup(Group):
     def forms(self) -> list[Form]:
         return [form_of("pod", limits) for limits in self._limits]
 
-    def radial_worth(self, price: Array, back: Array, ends: Array | None) -> Array:
+    def radial_conjugate_bound(self, price: Array, back: Array, ends: Array | None) -> Array:
         least, most = (self._limits if ends is None else ends).T
         ahead = self._power.conjugate(price, np.maximum(least, 0.0), np.maximum(most, 0.0))
         astern = self._power.conjugate(-back, np.minimum(least, 0.0), np.minimum(most, 0.0))
@@ -125,7 +125,7 @@ def _plane(azimuth: Azimuth, matrix: Array, center: float, half_angle: float) ->
     table = radial_table(azimuth.model, 1, max(least, 0.0), max(most, 0.0))
     reverse = radial_table(azimuth.model, -1, max(-most, 0.0), -least) if least < 0.0 else None
     return Plane(
-        matrix, table, center, half_angle, band=azimuth.dead_band, reverse=reverse, high=most
+        matrix, table, center, half_angle, dead_band=azimuth.dead_band, reverse=reverse, high=most
     )
 
 

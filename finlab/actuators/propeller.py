@@ -1,5 +1,5 @@
-"""What thrusters with a fixed axis and turning ones have in common: a propeller, with its limits,
-its power, its jet, and its input for a force."""
+"""The propeller that thrusters with a fixed axis and turning ones share: its limits, its power, its
+jet, and its input for a force."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -199,7 +199,7 @@ def form_of(kind: Literal["thruster", "pod"], limits: Array, sign: float = 1.0) 
         sign: sign of a thruster's command for a force along its `Line`.
     """
     gives_nothing = not limits.any()
-    return Form(kind, axes=np.zeros((3, 3)) if gives_nothing else None, sign=sign)
+    return Form(kind, axes=np.zeros((3, 3)) if gives_nothing else None, command_sign=sign)
 
 
 def _law_of(table: PowerTable) -> PowerLaw:

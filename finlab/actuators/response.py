@@ -54,22 +54,24 @@ class RadialTable:
         top: price from which on the force is the largest one [W/N].
         force: forces (CELLS + 1,) at the ends of the intervals, rising [N].
         slope: their derivatives by the price (CELLS + 1,) [N^2/W].
-        rest: power at the least force [W].
+        power_at_least: power at the least force [W].
         base: table that this one is scaled of; None for one that is itself measured or computed.
     """
 
     top: float
     force: Array
     slope: Array
-    rest: float
+    power_at_least: float
     base: Origin | None = None
 
     @classmethod
-    def of_forces(cls, top: float, force: Array, rest: float) -> RadialTable:
+    def of_forces(cls, top: float, force: Array, power_at_least: float) -> RadialTable:
         """Returns a table of forces (CELLS + 1,) [N] at `price_grid(top)`, monotone cubic (Fritsch
-        and Carlson, 1980), with the power `rest` [W] at the least force."""
+        and Carlson, 1980), with the power `power_at_least` [W] at the least force."""
         force = np.maximum.accumulate(np.asarray(force, np.float64))
-        return cls(float(top), force, monotone_slopes(price_grid(top), force), float(rest))
+        return cls(
+            float(top), force, monotone_slopes(price_grid(top), force), float(power_at_least)
+        )
 
     @property
     def largest(self) -> float:
@@ -90,7 +92,7 @@ class RadialTable:
             top=self.top / force_per_power,
             force=self.force * share,
             slope=self.slope * share * force_per_power,
-            rest=self.rest * cost,
+            power_at_least=self.power_at_least * cost,
             base=Origin(table, share * force_scale, cost * power_scale),
         )
 
@@ -131,7 +133,7 @@ class RadialTable:
         m0, m1 = self._slopes
         mean = 0.5 * (self.force[:-1] + self.force[1:]) + (m0 - m1) / 12.0
         gains = self.top * np.diff(_GRID) * mean
-        return np.concatenate([[0.0], np.cumsum(gains)]) - self.rest
+        return np.concatenate([[0.0], np.cumsum(gains)]) - self.power_at_least
 
     @cached_property
     def numbers(self) -> Array:
@@ -139,7 +141,7 @@ class RadialTable:
         step = CELLS
         while step > 1 and not self._keeps_values(step):
             step //= 2
-        return table_numbers(self.top, self.force[::step], self.slope[::step], self.rest)
+        return table_numbers(self.top, self.force[::step], self.slope[::step], self.power_at_least)
 
     def _keeps_values(self, step: int) -> bool:
         """Whether the cubics between every `step`-th of the grid's prices pass through all
@@ -162,27 +164,28 @@ class RadialTable:
         responds as this one does at v."""
         price = price_grid(self.top) + 2.0 * weight * self.force
         top = float(price[-1])
-        rest = self.rest + weight * float(self.force[0]) ** 2
-        return self.of_forces(top, np.interp(price_grid(top), price, self.force), rest)
+        power_at_least = self.power_at_least + weight * float(self.force[0]) ** 2
+        return self.of_forces(top, np.interp(price_grid(top), price, self.force), power_at_least)
 
 
-def table_numbers(top: float, force: Array, slope: Array, rest: float) -> Array:
+def table_numbers(top: float, force: Array, slope: Array, power_at_least: float) -> Array:
     """Returns a table as the core takes it.
 
     Args:
         top: price from which on the force is the largest one [W/N].
         force: forces (k + 1,) [N] at prices top (j / k)^4.
         slope: their derivatives by the price (k + 1,) [N^2/W].
-        rest: power at the least force [W].
+        power_at_least: power at the least force [W].
 
     Returns:
-        `top`, k, `rest`, then force, its derivative and its conjugate at each price (3 k + 6,).
+        `top`, k, `power_at_least`, then force, its derivative and its conjugate at each price
+        (3 k + 6,).
     """
     width = np.diff(top * np.linspace(0.0, 1.0, len(force)) ** 4)
     mean = 0.5 * (force[:-1] + force[1:]) + width * (slope[:-1] - slope[1:]) / 12.0
-    conjugate = np.concatenate([[0.0], np.cumsum(width * mean)]) - rest
+    conjugate = np.concatenate([[0.0], np.cumsum(width * mean)]) - power_at_least
     knots = np.stack([force, slope, conjugate], axis=-1)
-    return np.concatenate([[top, len(force) - 1, rest], knots.ravel()])
+    return np.concatenate([[top, len(force) - 1, power_at_least], knots.ravel()])
 
 
 def monotone_slopes(x: Array, y: Array) -> Array:
@@ -214,21 +217,21 @@ class Line:
         effectiveness: wrench (6,) per newton [1, m], body frame.
         table: response to a positive price.
         reverse: response to a negative price, as sizes; None where the force has one sign.
-        band: dead band: forces smaller than this, other than 0, cannot be held [N].
+        dead_band: dead band: forces smaller than this, other than 0, cannot be held [N].
         low: least force, where that is more than the tables give [N].
         high: largest force, where that is less than the tables give [N].
         drag: wrench (6,) per newton of drag that comes with the force [1, m]; None where none does.
-        speed: power per newton of drag [m/s].
+        flow_speed: power per newton of drag [m/s].
     """
 
     effectiveness: Array
     table: RadialTable
     reverse: RadialTable | None = None
-    band: float = 0.0
+    dead_band: float = 0.0
     low: float = -np.inf
     high: float = np.inf
     drag: Array | None = None
-    speed: float = 0.0
+    flow_speed: float = 0.0
 
     @property
     def rows(self) -> Array:
@@ -249,12 +252,12 @@ class Plane:
     Args:
         effectiveness: wrench (2, 6) per newton along its two directions [1, m], body frame.
         table: response to a price along the force; its first force is the least one.
-        middle: centre of the arc of force directions, from the first direction towards the second
-            [rad].
-        half: half angle of that arc; pi for a full circle [rad].
+        sector_center: centre of the arc of force directions, from the first direction towards the
+            second [rad].
+        sector_half_angle: half angle of that arc; pi for a full circle [rad].
         gauge: share (G,) of the table's force that the same cost gives in each of G directions
             around the circle, from angle 0 on [1]; None for a fin that is alike all round.
-        band: dead band: forces smaller than this, other than 0, cannot be held [N].
+        dead_band: dead band: forces smaller than this, other than 0, cannot be held [N].
         reverse: response of forces against the directions of the arc, from rest on; None where it
             pushes one way.
         high: largest force, below 0 in reverse, where that is less than the tables give [N].
@@ -262,10 +265,10 @@ class Plane:
 
     effectiveness: Array
     table: RadialTable
-    middle: float = 0.0
-    half: float = np.pi
+    sector_center: float = 0.0
+    sector_half_angle: float = np.pi
     gauge: Array | None = None
-    band: float = 0.0
+    dead_band: float = 0.0
     reverse: RadialTable | None = None
     high: float = np.inf
 
@@ -323,16 +326,16 @@ class Form(NamedTuple):
     Of a foil: lift coefficients, rising [1], and angles [rad] (K, 2)."""
     deflection: Array | None = None
     """Of a fin with a gauge: angles (POINTS,) [rad] from the command's direction to the force's."""
-    sign: float = 1.0
+    command_sign: float = 1.0
     """Of a thruster: sign of its command over its force, -1 where it only pulls."""
-    lean: float = 0.0
+    lean_angle: float = 0.0
     """Of a fin: angle from the command's direction to the force's [rad]. Of a foil: direction of
     travel [rad]."""
-    uneven: float = 0.0
+    unevenness: float = 0.0
     """Of a fin: e of the factor 1 + e cos(phi - phi_e) of its force [1]."""
-    uneven_at: float = 0.0
+    unevenness_angle: float = 0.0
     """Of a fin: phi_e of that factor [rad]."""
-    pressure: float = 1.0
+    pressure_area: float = 1.0
     """Of a foil: dynamic pressure times area [N]."""
     zero_lift_angle: float = 0.0
     """Of a foil: command at which it has no lift [rad]."""
@@ -363,7 +366,7 @@ class Group(ABC):
         """Returns the wrench offset (N, 6) [N, N m] at forces (N, m, 2) [N] of the responses."""
         return np.zeros((len(force), 6))
 
-    def radial_worth(self, price: Array, back: Array, ends: Array | None) -> Array | None:
+    def radial_conjugate_bound(self, price: Array, back: Array, ends: Array | None) -> Array | None:
         """Returns the conjugate of each actuator's power along its force, by the law itself
         (Eq. 4).
 
@@ -379,7 +382,7 @@ class Group(ABC):
         """
         return None
 
-    def worth(self, price: Array) -> Array | None:
+    def conjugate_bound(self, price: Array) -> Array | None:
         """Returns an upper bound of the conjugate of each actuator's power over all that it can
         give, the wrench offset left out (Eq. 4).
 

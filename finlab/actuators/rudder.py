@@ -305,12 +305,12 @@ class RudderGroup(Group):
                     low=low,
                     high=high,
                     drag=self._drag_wrench[i],
-                    speed=speed,
+                    flow_speed=speed,
                 )
             )
         return responses
 
-    def worth(self, price: Array) -> Array:
+    def conjugate_bound(self, price: Array) -> Array:
         """See `Group`: by the law at many deflections, at more around the best of them, and by the
         parabola through the best of these."""
         lift_price = price @ self._lift_wrench.T
@@ -379,8 +379,8 @@ class RudderGroup(Group):
                 axes=np.array([lift_axis, drag_axis, [0.0, 0.0, 0.0]]),
                 law=self._grids[i],
                 beat=np.stack([curve.lift, curve.angle], axis=-1),
-                lean=course,
-                pressure=max(self._flow.pressure[i], NOTHING),
+                lean_angle=course,
+                pressure_area=max(self._flow.pressure[i], NOTHING),
                 zero_lift_angle=self._no_lift[i],
                 zero_lift_drag=self._law.drag[i],
             )

@@ -127,20 +127,20 @@ class TableCurves:
     def __init__(self, model: PowerTable) -> None:
         """Makes the curves of the sides that the table has."""
         _, force, power = model.columns
-        self.rest = float(power.min())
+        self.power_at_rest = float(power.min())
         """Power at rest [W]."""
         self.sides: list[Side] = []
         for sign in (1.0, -1.0):
             size, side_power = side_points(force, power, int(sign))
             side_power = np.minimum.accumulate(side_power[::-1])[::-1]
-            side_power[0] = self.rest
+            side_power[0] = self.power_at_rest
             if len(size) > 1:
                 self.sides.append(Side(ConvexCurve(*lower_hull(size, side_power)), sign))
 
     def power_and_marginal_cost(self, force: AnyArray) -> tuple[Array, Array]:
         """See `PowerCurve`."""
         marginal_cost = 0.0 * force  # keeps the NaN of a lost actuator
-        power = self.rest + marginal_cost
+        power = self.power_at_rest + marginal_cost
         for curve, sign in self.sides:
             is_here = force * sign > 0.0
             power[is_here], slope = curve.power_and_marginal_cost(sign * force[is_here])

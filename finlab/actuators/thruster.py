@@ -89,7 +89,7 @@ class ThrusterGroup(Group):
             forms.append(form_of("thruster", limits, sign))
         return forms
 
-    def radial_worth(self, price: Array, back: Array, ends: Array | None) -> Array:
+    def radial_conjugate_bound(self, price: Array, back: Array, ends: Array | None) -> Array:
         if ends is None:
             return self._power.conjugate(self._sign * price, *self._limits.T)
         low, high = np.sort(self._sign[:, None] * ends, axis=1).T
@@ -101,7 +101,9 @@ def _line(thruster: Thruster, along: Array) -> Line:
     never positive that of a negative force."""
     least, most = usable_force(thruster)
     if most <= 0.0:
-        return Line(along, radial_table(thruster.model, -1, -most, -least), band=thruster.dead_band)
+        return Line(
+            along, radial_table(thruster.model, -1, -most, -least), dead_band=thruster.dead_band
+        )
     reverse = radial_table(thruster.model, -1, 0.0, -least) if least < 0.0 else None
     ahead = radial_table(thruster.model, 1, max(least, 0.0), most)
     return Line(along, ahead, reverse, thruster.dead_band)

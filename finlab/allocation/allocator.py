@@ -75,15 +75,12 @@ class Allocator:
             method: one of `finlab.allocation.METHODS`, or a class of your own.
             checkpoint: for methods with networks: a checkpoint folder, the name of a shipped
                 checkpoint, or what `read_checkpoint` gives; by default the shipped one.
-            robust: what an expected miss of 1 % of the wrench scale is worth [W], growing with its
-                square; from 0 to 1e9, 0 by default: how far actuators may be from their laws then
-                costs nothing.
-            period_s: time between ticks [s], above 0 and up to 1000, 0.1 by default: with the rates
-                of the drives it says how far a command may change from `previous`. Method `mdn` has
-                it, too.
-            calm: what turning costs in a tick, from 0 to 10, 2 by default: 0 is nothing, 2 spends
-                some power for half the turning of azimuths and tilts.
-            settings: of other methods, by name.
+            robust: what an expected miss of 1 % of the wrench scale costs [W]; ranges and defaults
+                are in `finlab.allocation.dual.method.DualSettings`.
+            period_s: time between ticks [s]: with the rates of the drives it says how far a command
+                may change from `previous`. Method `mdn` has it, too.
+            calm: what turning costs in a tick [1]; see `DualSettings`.
+            settings: of other methods, by name; see the `settings_class` of each.
 
         Raises:
             AllocationError: unknown method or setting, or a value out of its range.
@@ -177,14 +174,14 @@ class Allocator:
         return self._scale
 
     @property
-    def weights(self) -> Networks | None:
+    def networks(self) -> Networks | None:
         """Trained networks; None for methods without."""
-        return self._choice.weights
+        return self._choice.networks
 
     @property
     def checkpoint(self) -> str | None:
         """Name of the checkpoint that the networks come from; None for methods without."""
-        return None if self.weights is None else self.weights.name
+        return None if self.networks is None else self.networks.name
 
     @property
     def policy_under_way(self) -> PolicyName:
@@ -249,10 +246,11 @@ class Allocator:
         question = self._question(damage_of(damage, lost), policy, flow, seed, free)
         state = question.state
         method = state.method
-        options: dict[str, Any] = {}
+        prices: Array | None = None
+        reference_of_method: Array | None = None
         if isinstance(previous, Allocation):
             if method.begins_at_prices and previous.prices is not None:
-                options["prices"] = previous.prices
+                prices = previous.prices
             previous = previous.command
         command_previous = None if previous is None else check_previous(previous, state.layout)
 
@@ -262,9 +260,11 @@ class Allocator:
             wrenches_expected = check_reference(reference)
             target = method.in_time(target, wrenches_expected)
             if method.looks_ahead:
-                options["reference"] = state.with_free_axes(wrenches_expected, 0.0)
+                reference_of_method = state.with_free_axes(wrenches_expected, 0.0)
         targets = state.with_free_axes(target, 0.0)[None]
-        solution = question.solve(targets, command_previous, **options)
+        solution = question.solve(
+            targets, command_previous, prices=prices, reference=reference_of_method
+        )
         solve_ms = (time.perf_counter() - start) * 1e3
 
         target_shown = state.with_free_axes(target, np.nan).copy()
@@ -439,7 +439,7 @@ class Allocator:
         layout = without_lost(damaged, damage)
         if free is not None:
             layout = replace(layout, axes=axes_in(commanded))
-        method = choice.kind(layout, choice.settings, self._scale, choice.weights)
+        method = choice.kind(layout, choice.settings, self._scale, choice.networks)
         return RobotState(damaged, damage, works, method, plant_of(damaged), free_axes)
 
     def __repr__(self) -> str:

@@ -10,7 +10,7 @@ from finlab.layout.layout import Layout
 
 WITHIN = 1e-3
 """Share of a range, or of what a rate allows in a tick, within which a command is at its end."""
-ROUNDING = 1e-9
+END_SLACK = 1e-9
 """By how much a command may miss the end of a range that has no width."""
 MISSING_SHARE = 0.1
 """Share of what is missing along the worst axis from which on another axis is named."""
@@ -48,7 +48,7 @@ def at_limits(layout: Layout, command: Array) -> tuple[NDArray[np.bool_], NDArra
         row = command[..., i, :]
         low = np.array(actuator.lower)
         high = np.array(actuator.upper)
-        slack = WITHIN * (high - low) + ROUNDING
+        slack = WITHIN * (high - low) + END_SLACK
         at_low = row <= low + slack
         at_high = row >= high - slack
         if actuator.KIND.driven_by_flow:

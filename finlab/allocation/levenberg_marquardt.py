@@ -48,7 +48,7 @@ class CommandProblem:
     """Angles (n, 3) that are brought near to the middle of their limits by full turns."""
     no_limits: NDArray[np.bool_]
     """Those of them (n, 3) that all angles may follow: at +-pi they are at no limit."""
-    sigma: Array | None = None
+    error_scale: Array | None = None
     """What wrenches are divided by (6,), of a plant whose actuators act on each other; None of any
     other."""
     works: NDArray[np.bool_] | None = None
@@ -57,24 +57,24 @@ class CommandProblem:
     """Which axes (6,) of the wrench count; None where all do."""
 
     @classmethod
-    def of(cls, plant: Plant, sigma: Array) -> Self:
+    def of(cls, plant: Plant, error_scale: Array) -> Self:
         """Poses the problem by the actuators' own laws.
 
         Args:
             plant: of the robot.
-            sigma: what wrenches (6,) are divided by [N, N m].
+            error_scale: what wrenches (6,) are divided by [N, N m].
 
         Returns:
             The problem within the limits of the robot.
         """
         return cls(
             forces=plant,
-            effectiveness=plant.effectiveness / sigma,
+            effectiveness=plant.effectiveness / error_scale,
             lower=plant.lower,
             upper=plant.upper,
             wraps=plant.turns | FIN_DIRECTION,
             no_limits=plant.turns,
-            sigma=None if plant.interaction is None else sigma,
+            error_scale=None if plant.interaction is None else error_scale,
         )
 
     def restricted(self, works: NDArray[np.bool_] | None, counts: NDArray[np.bool_] | None) -> Self:
@@ -96,7 +96,7 @@ class CommandProblem:
 
     def in_tick(self, box: "CommandBox") -> Self:
         """Returns the problem within what may follow the command of the tick before."""
-        no_limits = box.free & self.no_limits
+        no_limits = box.any_angle & self.no_limits
         return replace(self, lower=box.lower, upper=box.upper, no_limits=no_limits)
 
     @cached_property
@@ -120,20 +120,20 @@ class CommandProblem:
         """Returns the normalized wrenches (R, 6) of forces (R, n, 3) [N]."""
         effectiveness = self.effectiveness.reshape(-1, 6)
         wrench: AnyArray = force.reshape(len(force), len(effectiveness)).dot(effectiveness)
-        if self.sigma is None:
+        if self.error_scale is None:
             return wrench
-        offset = self.forces.offset(self._of_working(force)) / self.sigma
+        offset = self.forces.offset(self._of_working(force)) / self.error_scale
         return wrench + self._in_counted_axes(offset)
 
     def wrench_and_jacobian(self, command: AnyArray) -> tuple[AnyArray, AnyArray]:
         """Returns the normalized wrenches (R, 6) of commands (R, n, 3), and their derivatives J
         (R, n, 3, 6) by the commands."""
         force, force_jacobian = self.forces.force_and_jacobian(command)
-        if self.sigma is None:
+        if self.error_scale is None:
             return self.wrench_of(force), np.matmul(force_jacobian, self.effectiveness)
         offset, effectiveness = self.forces.effect(self._of_working(force))
-        offset = offset / self.sigma
-        effectiveness = effectiveness / self.sigma
+        offset = offset / self.error_scale
+        effectiveness = effectiveness / self.error_scale
         if self.works is not None:
             effectiveness = np.where(self.works[:, None, None], effectiveness, 0.0)
         offset = self._in_counted_axes(offset)

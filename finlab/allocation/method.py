@@ -11,11 +11,12 @@ from collections.abc import Mapping
 from copy import copy
 from dataclasses import fields
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol, Self
+from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple, Protocol, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
-from finlab.allocation.policy import Policy, PolicyName
+from finlab.allocation.policy import CLOSEST, Policy, PolicyName
 from finlab.allocation.settings import USUAL_PERIOD_S, Settings
 from finlab.allocation.solution import Candidates, Solution
 from finlab.arrays import Array
@@ -49,6 +50,31 @@ Checkpoint = str | os.PathLike[str] | Networks | None
 """A checkpoint folder, the name of a shipped checkpoint, or the contents of one."""
 
 
+class MethodQuestion(NamedTuple):
+    """What a method is asked, all checked, of a robot of n actuators."""
+
+    targets: Array
+    """Desired wrenches (N, 6) [N, N m]; 0 along axes that do not count."""
+    policy: Policy = CLOSEST
+    """What to give for those out of reach."""
+    previous: Array | None = None
+    """Command (n, 3) of the tick before, for a single target; None outside of ticks."""
+    flow: Array | None = None
+    """Velocity (6,) of the body relative to the water [m/s, rad/s]; None at rest."""
+    seed: int = 0
+    """Makes the answer repeatable."""
+    lost: NDArray[np.bool_] | None = None
+    """Which actuators (n,) do not work, for methods that take losses; None where all do."""
+    free: NDArray[np.bool_] | None = None
+    """Which axes (6,) may take any wrench, for methods that take losses; None for none."""
+    prices: Array | None = None
+    """Multipliers (6,) [W/N, W/(N m)] of an earlier answer, for a single target and methods that
+    begin there; None for their own."""
+    reference: Array | None = None
+    """Wrenches (K, 6) of the next ticks [N, N m], for methods that look ahead; None where they are
+    not known."""
+
+
 class Method(ABC):
     """Turns target wrenches into commands. `finlab.Allocator` asks, and makes results of
     answers."""
@@ -64,19 +90,19 @@ class Method(ABC):
     takes: ClassVar[Takes] = "any actuator"
     """What the robot may have."""
     takes_losses: ClassVar[bool] = False
-    """Whether `solve` takes `lost` actuators and `free` axes, rather than being made for a robot
+    """Whether `solve` reads `lost` actuators and `free` axes, rather than being made for a robot
     without them."""
     begins_at_prices: ClassVar[bool] = False
-    """Whether `solve` takes the `prices` of an earlier answer, to begin there."""
+    """Whether `solve` reads the `prices` of an earlier answer, to begin there."""
     looks_ahead: ClassVar[bool] = False
-    """Whether `solve` takes the `reference` of the next ticks."""
+    """Whether `solve` reads the `reference` of the next ticks."""
     needs_networks: ClassVar[bool] = False
     """Whether it is made with trained networks, of a checkpoint."""
-    weights: Networks | None
+    networks: Networks | None
     """Trained networks; None for methods without."""
 
     def __init__(
-        self, layout: Layout, settings: Settings, scale: Array, weights: Networks | None = None
+        self, layout: Layout, settings: Settings, scale: Array, networks: Networks | None = None
     ) -> None:
         """Prepares the method for a robot.
 
@@ -84,7 +110,7 @@ class Method(ABC):
             layout: of healthy actuators, with the axes that count.
             settings: of its `settings_class`.
             scale: wrench scale (6,) [N, N m] of the whole robot, by which errors are normalized.
-            weights: trained networks; None for a method without.
+            networks: trained networks; None for a method without.
 
         Raises:
             AllocationError: the method cannot work with these settings.
@@ -96,7 +122,7 @@ class Method(ABC):
         self.layout = layout
         self.settings = settings
         self.scale = scale
-        self.weights = weights
+        self.networks = networks
         self.plant = plant_of(layout).counting(layout.commanded)
         self.prepare()
 
@@ -158,23 +184,12 @@ class Method(ABC):
         return [field.name for field in fields(cls.settings_class)]
 
     @abstractmethod
-    def solve(
-        self,
-        targets: Array,
-        *,
-        policy: Policy,
-        previous: Array | None = None,
-        flow: Array | None = None,
-        seed: int = 0,
-    ) -> Solution:
-        """Solve for targets.
+    def solve(self, question: MethodQuestion) -> Solution:
+        """Solves for the targets of a question.
 
         Args:
-            targets: desired wrenches (N, 6) [N, N m]; 0 along axes that do not count.
-            policy: what to do with those out of reach; one that `check_policy` accepts.
-            previous: command (n, 3) of the previous tick, for a single target, or None.
-            flow: velocity (6,) of the body relative to the water [m/s, rad/s], or None at rest.
-            seed: makes the answer repeatable.
+            question: whose policy `check_policy` accepts; what the facts of the class say that it
+                does not read, it leaves alone.
 
         Returns:
             Commands (N, n, 3) within the limits, and what else the method has to tell.
@@ -292,11 +307,9 @@ class LeastErrorMethod(Method):
     def _solve(self, targets: Array, *, seed: int, previous: Array | None) -> Solution:
         """Solve for targets (N, 6); see `Method.solve`."""
 
-    def solve(self, targets: Array, *, flow: Array | None = None, **question: Any) -> Solution:
+    def solve(self, question: MethodQuestion) -> Solution:
         """Solves for targets in a flow; see `Method.solve`. The policy is the plain one."""
-        if len(targets) == 0:
+        if len(question.targets) == 0:
             return Solution(np.empty((0, self.layout.n, 3)))
-        in_flow = self.at(flow)
-        if in_flow is not self:
-            return in_flow.solve(targets, **question)
-        return self._solve(targets, seed=question.get("seed", 0), previous=question.get("previous"))
+        in_flow = self.at(question.flow)
+        return in_flow._solve(question.targets, seed=question.seed, previous=question.previous)

@@ -56,7 +56,7 @@ class MethodChoice:
     """Its class."""
     settings: Settings
     """Its settings."""
-    weights: Networks | None = None
+    networks: Networks | None = None
     """Its networks, where it has any."""
 
 

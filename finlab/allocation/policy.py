@@ -7,14 +7,13 @@ from typing import Any, Literal, cast, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.axes import AXES as AXES
-from finlab.axes import Axis, mask_of
+from finlab.axes import AXES, Axis, mask_of
 from finlab.errors import CommandError
 
 PolicyName = Literal["closest", "direction", "priority"]
 """`closest`: least weighted error. `direction`: the same direction, scaled down. `priority`: groups
 of axes, each served as far as those before it allow."""
-KINDS: tuple[PolicyName, ...] = get_args(PolicyName)
+POLICY_NAMES: tuple[PolicyName, ...] = get_args(PolicyName)
 """Names of all policies."""
 
 
@@ -49,15 +48,17 @@ class Policy:
     them."""
 
     kind: PolicyName = "closest"
-    """One of `KINDS`."""
+    """One of `POLICY_NAMES`."""
     axis_weights: tuple[float, ...] = (1.0,) * 6
     """For `closest`: weight of each axis of the normalized error."""
     order: tuple[tuple[Axis, ...], ...] = (("Fz",), ("Tx", "Ty", "Tz"), ("Fx", "Fy"))
     """For `priority`: groups of axes, most important first; axes that are not named come last."""
 
     def __post_init__(self) -> None:
-        if self.kind not in KINDS:
-            raise CommandError(f"policy: expected one of {', '.join(KINDS)}, got {self.kind!r}")
+        if self.kind not in POLICY_NAMES:
+            raise CommandError(
+                f"policy: expected one of {', '.join(POLICY_NAMES)}, got {self.kind!r}"
+            )
         try:
             weights = np.asarray(self.axis_weights, dtype=np.float64)
         except (TypeError, ValueError):
@@ -101,7 +102,7 @@ def policy_from(
     """Makes a policy as the command line names it.
 
     Args:
-        kind: one of `KINDS`.
+        kind: one of `POLICY_NAMES`.
         axis_weights: for `closest`: six weights; all 1 when None.
         priority: for `priority`: groups of axes joined by commas, such as `["Fz", "Tx,Ty"]`.
 

@@ -14,12 +14,12 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from finlab.allocation.method import Method
+from finlab.allocation.method import Method, MethodQuestion
 from finlab.allocation.policy import Policy
 from finlab.allocation.report import answer_notes
 from finlab.allocation.solution import Candidates, Solution, among_all
@@ -135,7 +135,12 @@ class CheckedQuestion(NamedTuple):
     """Makes the answer repeatable."""
 
     def solve(
-        self, targets: Array, previous: Array | None = None, offset: int = 0, **options: Any
+        self,
+        targets: Array,
+        previous: Array | None = None,
+        offset: int = 0,
+        prices: Array | None = None,
+        reference: Array | None = None,
     ) -> Solution:
         """Asks the method.
 
@@ -144,7 +149,8 @@ class CheckedQuestion(NamedTuple):
             previous: command (n, 3) of the tick before; None outside of ticks.
             offset: index of the first target among all of the question, which shifts the seed, so
                 that a target gets the same answer in any batch.
-            options: further arguments of `Method.solve` that this method takes.
+            prices: multipliers (6,) [W/N, W/(N m)] of an earlier answer, for a single target.
+            reference: wrenches (K, 6) of the next ticks [N, N m], 0 along free axes.
 
         Returns:
             The method's solution. In a tick its commands lie within the limits and rates of the
@@ -153,16 +159,20 @@ class CheckedQuestion(NamedTuple):
         state = self.state
         method = state.method
         previous_of_method = previous
-        if method.takes_losses:
-            options["lost"] = state.lost
-            options["free"] = state.free
-        elif previous is not None:
+        if previous is not None and not method.takes_losses:
             previous_of_method = previous[state.works]
-        if previous_of_method is not None:
-            options["previous"] = previous_of_method
-        solution = method.solve(
-            targets, policy=self.policy, flow=self.flow, seed=self.seed + offset, **options
+        question = MethodQuestion(
+            targets,
+            policy=self.policy,
+            previous=previous_of_method,
+            flow=self.flow,
+            seed=self.seed + offset,
+            lost=state.lost if method.takes_losses else None,
+            free=state.free if method.takes_losses else None,
+            prices=prices,
+            reference=reference,
         )
+        solution = method.solve(question)
         if previous_of_method is None:
             return solution._replace(command=method.plant.rested(solution.command))
         box = method.rates.box(previous_of_method)

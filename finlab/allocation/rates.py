@@ -23,7 +23,7 @@ class CommandBox(NamedTuple):
     may lie beyond a full turn."""
     upper: Array
     """Largest commands (n, 3), counted in the same way."""
-    free: NDArray[np.bool_]
+    any_angle: NDArray[np.bool_]
     """Angles (n, 3) that may be any: they reach all around the circle in one tick."""
     turns: NDArray[np.bool_]
     """Angles (n, 3) without limits of their own, of which the rates leave an interval."""
@@ -80,11 +80,11 @@ class Rates:
         is_known = np.asarray(np.isfinite(previous).all(axis=1))[:, None]
         # A step of half a turn reaches every angle.
         turns = self.plant.turns & is_known & (step < np.pi)
-        free = self.plant.turns & ~turns
+        any_angle = self.plant.turns & ~turns
         center = np.where(turns, previous, np.clip(previous, lower, upper))
         center = np.where(is_known, center, lower)
         low = np.where(turns, center - step, np.maximum(center - step, lower))
         high = np.where(turns, center + step, np.minimum(center + step, upper))
-        low = np.where(is_known & ~free, low, lower)
-        high = np.where(is_known & ~free, high, upper)
-        return CommandBox(low, high, free, turns)
+        low = np.where(is_known & ~any_angle, low, lower)
+        high = np.where(is_known & ~any_angle, high, upper)
+        return CommandBox(low, high, any_angle, turns)

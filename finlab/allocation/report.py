@@ -28,7 +28,8 @@ if TYPE_CHECKING:
     from finlab.allocation.method import Method
 
 Allocation = Any
-"""`finlab.allocation.Allocation`, which prints itself by what is here."""
+"""`finlab.allocation.Allocation`, which prints itself by what is here: it imports this module, so
+that this one cannot import it, not even for its type."""
 
 PLAIN_GAP = 0.01
 """Share by which the power may exceed its bound without a sentence."""

@@ -1,1 +1,1 @@
-"""What a robot runs: the bundle and `finlab-runtime`, and the allocator as C sources."""
+"""Software on a robot: the bundle and `finlab-runtime`, and the allocator as C sources."""

@@ -98,7 +98,7 @@ def make_bundle(allocator: Allocator, lost: tuple[str, ...] = ()) -> Bundle:
     layout = allocator.layout
     cases = self_tests(allocator, lost)
     embedded, tables = with_tables_inside(layout)
-    sha256, networks = method_class(allocator.method).networks_for_bundle(allocator.weights)
+    sha256, networks = method_class(allocator.method).networks_for_bundle(allocator.networks)
     files = {
         bundle_files.ROBOT: _robot_bytes(Robot(embedded, lost, sha256, cases)),
         bundle_files.ABOUT: _settings_bytes(allocator),

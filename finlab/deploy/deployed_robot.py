@@ -18,7 +18,7 @@ from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.bundled_method import bundled_method
 from finlab.allocation.methods import method_class
-from finlab.allocation.policy import KINDS
+from finlab.allocation.policy import POLICY_NAMES
 from finlab.arrays import Array
 from finlab.axes import AXES
 from finlab.bundle_files import Files, check_bundle_files, is_bundle, read_bundle_files
@@ -127,7 +127,7 @@ def parse_robot(files: Files, source: str = "bundle") -> DeployedRobot:
     check_bundle_files(files, source)
     robot = robot_of(files, source, parse_layout)
     allocator = Allocator.of_choice(robot.layout, bundled_method(files, source))
-    if (None if allocator.weights is None else allocator.weights.sha256) != robot.weights_sha256:
+    if (None if allocator.networks is None else allocator.networks.sha256) != robot.weights_sha256:
         raise DataError(
             f"{source}: was made with other networks than this finlab's; export it with this one"
         )
@@ -223,7 +223,7 @@ def extremes(robot: DeployedRobot) -> Finding:
     layout = robot.layout
     unanswered = []
     n = 0
-    kinds = KINDS if method_class(robot.allocator.method).every_policy else KINDS[:1]
+    kinds = POLICY_NAMES if method_class(robot.allocator.method).every_policy else POLICY_NAMES[:1]
     alive = [name for name in layout.names if name not in robot.lost]
     for lost in [(), *([name] for name in alive if len(alive) > 1)]:
         for policy, i in product(kinds, np.flatnonzero(layout.commanded)):

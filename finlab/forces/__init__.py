@@ -1,1 +1,1 @@
-"""Convex sets of what actuators can push, and how these add up. numpy and scipy."""
+"""Convex sets of feasible forces, and the attainable wrenches that are their sums."""

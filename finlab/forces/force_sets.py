@@ -1,14 +1,14 @@
-"""Convex sets of what each actuator can push, in a plane of its own, and how these add up to a
-wrench.
+"""Convex sets of the feasible forces of each actuator, in a plane of its own, and the sum of these
+sets as wrenches. `finlab.forces.reach`, the attainable sets and the analyses use them.
 
-A fin or an azimuth that may turn a full circle pushes anywhere within a disc whose radius is its
-largest thrust. With stops it pushes within a sector of that disc. A sector wider than half a turn
-is not convex: here it stands for its convex hull, the disc cut off along the chord between the
-stops, unless `convex_parts` has cut it in two. All else is a polygon: the line of a thruster, the
-convex hull of what a fin pushes that pushes harder in some directions than in others, and that of
-what the flow gives, such as the lift and drag of a foil between its limits. Dead bands, and the
-tiny thrust that a fin cannot go below, are left out; an azimuth that cannot stop has the polygon
-around what is left, one that pushes either way within an arc that around both parts.
+A fin or an azimuth without limits of direction has a disc, whose radius is its largest thrust. With
+stops it has a sector of that disc. A sector wider than half a turn is not convex: it is replaced by
+its convex hull, the disc cut off along the chord between the stops, unless `convex_parts` has cut
+it in two. All other sets are polygons: the line of a thruster; the convex hull of the forces of a
+fin that are larger in some directions than in others; the convex hull of forces by the flow, such
+as lift and drag of a foil between its limits. Dead bands, and the tiny thrust that a fin cannot go
+below, are neglected. An azimuth that cannot stop has the convex hull of its ring sector; one with
+thrust of both signs within an arc has the convex hull of both sectors.
 
 Wrenches are scaled: torques are divided by `LEVER`, so that all six entries are in newton.
 """
@@ -37,52 +37,62 @@ LEVER = 0.2
 """Length [m] that makes torques comparable to forces: about the distance of a fin from the
 centre."""
 SCALE = np.array([1.0, 1.0, 1.0, LEVER, LEVER, LEVER])
-"""What a wrench is divided by, entry by entry."""
+"""Divisors (6,) of a wrench [1, m]."""
 HALF_TURN_TOLERANCE = 1e-9
-"""By how much half an arc [rad] may exceed a quarter turn and still be convex."""
-ALONG = 193
-"""Forces of an actuator along its limits, or its rim, of which a polygon is made."""
-UNEVEN, BOUNDARY, SIDES = 193, 48, 24
-"""Sides of the polygon of an uneven fin, of an azimuth and of forces of the flow: they lie inside
-by at most
-0.01 %, 0.2 % and 1 % of its width."""
-THINNEST = 1e-3
-"""Share of a set's length below which it has no width."""
+"""Most by which half an arc may exceed a quarter turn and still count as convex [rad]."""
+N_SAMPLES = 193
+"""Forces of an actuator along its limits, or its rim, whose convex hull is taken."""
+SIDES_OF_GAUGE = 193
+"""Sides of the polygon of a fin whose largest force differs by direction: it lies inside the hull
+by at most 0.01 % of the width."""
+SIDES_OF_AZIMUTH = 48
+"""Sides of the polygon of an azimuth: inside by at most 0.2 % of the width."""
+SIDES_OF_FLOW = 24
+"""Sides of the polygon of forces by the flow: inside by at most 1 % of the width."""
+MIN_ASPECT = 1e-3
+"""Width over length below which a set counts as a line [1]."""
 MAX_CUT = 3
-"""Most fins whose wide sectors are cut with both halves kept, which doubles the number of parts
-each time."""
+"""Most actuators whose wide sectors are cut and give two parts each: every one doubles the number
+of parts."""
 
 
 class ForceSets(NamedTuple):
-    """R robots of n actuators each, in m coordinates of a wrench. One with radius 0 is not
-    there."""
+    """Feasible forces of R robots of n actuators each, in m coordinates of a wrench. An actuator
+    with radius 0 gives no force."""
 
     effectiveness: Array
     """Scaled wrench per newton (R, n, 2, m) along both axes of each actuator's plane."""
     radius: Array
-    """Largest force (R, n) [N], of polygons that do not hold 0 from their middle."""
-    middle: Array
+    """Largest force (R, n) [N]; of polygons that do not contain 0, from their centre."""
+    sector_center: Array
     """Middle of the arc of force directions (R, n) [rad]."""
-    half: Array
-    """Half of the arc (R, n) [rad]; pi for a full circle, 0 for a line, and for an actuator of one
-    command, such as a foil, whatever its polygon."""
-    place: Array
-    """Where in the block the polygon (R, n) is; 0 for a sector."""
+    sector_half_angle: Array
+    """Half of the arc (R, n) [rad]; pi for a full circle, 0 for a line, and for any polygon of an
+    actuator of one command, such as a foil."""
+    polygon_offset: Array
+    """Offset of the polygon in the block (R, n); 0 for a sector."""
     block: Array
-    """Polygons, of all robots, for the core."""
+    """Polygons of all robots, as the core reads them."""
 
     def take(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> ForceSets:
-        """Returns some of the robots, in the order asked for, repeated where asked for twice."""
+        """Returns the robots of some rows, by a mask (R,) or by indices, which may repeat."""
         names = self._fields[:-1]
         return self._replace(**{name: getattr(self, name)[rows] for name in names})
 
-    def lose(self, rows: Any, places: Any) -> None:
-        """Takes actuators out of some robots, in place."""
-        self.effectiveness[rows, places] = self.radius[rows, places] = 0.0
+    def lose(self, rows: Any, actuators: Any) -> None:
+        """Sets the forces of actuators of some robots to zero, in place.
 
-    def along(self, places: Sequence[int] | NDArray[np.intp]) -> ForceSets:
-        """Returns the sets in some of the wrench's coordinates alone."""
-        return self._replace(effectiveness=np.ascontiguousarray(self.effectiveness[..., places]))
+        Args:
+            rows: indices of robots.
+            actuators: indices of actuators, broadcast with `rows`.
+        """
+        self.effectiveness[rows, actuators] = 0.0
+        self.radius[rows, actuators] = 0.0
+
+    def along(self, coordinates: Sequence[int] | NDArray[np.intp]) -> ForceSets:
+        """Returns the sets in some of the wrench's coordinates, by their indices."""
+        effectiveness = np.ascontiguousarray(self.effectiveness[..., coordinates])
+        return self._replace(effectiveness=effectiveness)
 
     def repeat(self, times: int) -> ForceSets:
         """Returns each robot several times, side by side."""
@@ -93,232 +103,339 @@ class ForceSets(NamedTuple):
         return self.take(np.tile(np.arange(len(self.radius)), times))
 
     def pull(self, normal: Array) -> Array:
-        """Returns the dot products (R, n, 2) of each one's columns with the direction `normal` (R,
-        m)."""
+        """Returns the dot products (R, n, 2) of the columns of each actuator's effectiveness with
+        the direction `normal` (R, m)."""
         rows, n = self.radius.shape
-        return (self.effectiveness.reshape(rows, 2 * n, -1) @ normal[..., None]).reshape(rows, n, 2)
+        columns = self.effectiveness.reshape(rows, 2 * n, -1)
+        return (columns @ normal[..., None]).reshape(rows, n, 2)
 
     def wrench(self, force: Array) -> Array:
-        """Returns the scaled wrenches (R, m) of planar forces (R, n, 2) [N]."""
+        """Returns the scaled wrenches (R, m) [N] of planar forces (R, n, 2) [N]."""
         rows, n = self.radius.shape
-        return (force.reshape(rows, 1, 2 * n) @ self.effectiveness.reshape(rows, 2 * n, -1))[:, 0]
+        columns = self.effectiveness.reshape(rows, 2 * n, -1)
+        return (force.reshape(rows, 1, 2 * n) @ columns)[:, 0]
 
     @property
     def unit(self) -> Array:
         """Scaled wrench (R,) [N] of each robot's strongest actuator."""
-        size: Array = (np.sqrt((self.effectiveness**2).sum((-1, -2))) * self.radius).max(-1)
+        gain = np.sqrt((self.effectiveness**2).sum((-1, -2)))
+        size: Array = (gain * self.radius).max(-1)
         return np.where(size > 0.0, size, 1.0)
 
-    def reach(self, origin: Array, ray: Array, close: float) -> tuple[Array, Array, Array]:
-        """Returns how far (R,) rays (R, m) from points (R, m) go within all wrenches, minus
-        infinity where they meet none: never less than that, and the planar forces (R, n, 2) found
-        are off the end by at most twice `close`, in the strongest actuator's wrench; and the normal
-        (R, m) of the plane that proves it."""
+    def reach(self, origin: Array, ray: Array, tolerance: float) -> tuple[Array, Array, Array]:
+        """Returns the distances to which rays stay within the attainable wrenches.
+
+        Args:
+            origin: points (R, m) where the rays begin, scaled wrenches [N].
+            ray: directions (R, m) [1].
+            tolerance: gap at which the search ends, over the strongest actuator's wrench [1];
+                infinity for one step.
+
+        Returns:
+            Upper bounds of the distances (R,) over the length of the ray, minus infinity of a ray
+            that misses all wrenches; normals (R, m) of the planes that prove them; and planar
+            forces (R, n, 2) [N] whose wrench is off the end by at most twice the tolerance.
+        """
         rows, n, _, m = self.effectiveness.shape
-        own = np.zeros((rows, n, 16))
         unit = self.unit
-        ends = np.zeros((2, rows, 6))
-        own[..., :4] = np.stack([self.place, self.radius, self.middle, self.half], axis=-1)
-        own[..., 4:].reshape(rows, n, 2, 6)[..., :m] = (
-            self.effectiveness / unit[:, None, None, None]
-        )
-        ends[..., :m] = origin / unit[:, None], ray
-        size, normal, force = ray_reach(self.block, own, ends[0], ends[1], close)
-        return size * unit, normal[:, :m], np.where(self.radius[..., None] > 0.0, force, 0.0)
+        records = np.zeros((rows, n, 16))
+        records[..., 0] = self.polygon_offset
+        records[..., 1] = self.radius
+        records[..., 2] = self.sector_center
+        records[..., 3] = self.sector_half_angle
+        columns = records[..., 4:].reshape(rows, n, 2, 6)  # a view
+        columns[..., :m] = self.effectiveness / unit[:, None, None, None]
+        # The core has six coordinates; those beyond m are zero.
+        core_origin = np.zeros((rows, 6))
+        core_origin[:, :m] = origin / unit[:, None]
+        core_ray = np.zeros((rows, 6))
+        core_ray[:, :m] = ray
+        size, normal, force = ray_reach(self.block, records, core_origin, core_ray, tolerance)
+        is_working = self.radius[..., None] > 0.0
+        return size * unit, normal[:, :m], np.where(is_working, force, 0.0)
 
     def farthest(self, normal: Array) -> tuple[Array, Array]:
-        """Returns the support function (R,) of all wrenches along `normal` (R, m), and the planar
-        forces (R, n, 2) that reach it; where a sector is wider than half a turn, those of its
-        hull."""
+        """Returns the support function of the attainable wrenches.
+
+        Args:
+            normal: directions (R, m).
+
+        Returns:
+            Its values (R,) [N], and planar forces (R, n, 2) [N] that attain them; of a sector wider
+            than half a turn those of its hull.
+        """
         size, _, force = self.reach(np.zeros_like(normal), normal, np.inf)
         return size * (normal * normal).sum(-1), force
 
     def full_effectiveness(self) -> Array:
-        """Returns the scaled wrenches (R, 2n, m) of each one's largest force along both axes of its
-        plane; one that pushes along a line has zeros for the other."""
+        """Returns the scaled wrenches (R, 2n, m) [N] of each actuator's largest force along both
+        axes of its plane; one whose force is along a line has zeros for the second."""
         full = self.effectiveness * self.radius[..., None, None]
-        fixed = self.half == 0.0
-        if fixed.any():
-            only = np.stack([np.cos(self.middle), np.sin(self.middle)], axis=-1)
-            both = np.stack(
-                [(only[..., None] * full).sum(-2), np.zeros_like(full[..., 0, :])], axis=-2
-            )
-            full = np.where(fixed[..., None, None], both, full)
+        is_line = self.sector_half_angle == 0.0
+        if is_line.any():
+            direction = np.stack([np.cos(self.sector_center), np.sin(self.sector_center)], axis=-1)
+            along_line = (direction[..., None] * full).sum(-2)
+            across_line = np.zeros_like(full[..., 0, :])
+            of_lines = np.stack([along_line, across_line], axis=-2)
+            full = np.where(is_line[..., None, None], of_lines, full)
         rows, n = self.radius.shape
         return full.reshape(rows, 2 * n, -1)
 
 
 class Shape(NamedTuple):
-    """What one actuator can push, in a plane spanned by two directions; fields as in
+    """Feasible forces of one actuator, in a plane spanned by two directions; fields as in
     `ForceSets`."""
 
     directions: Array
     """Both axes of the plane (2, 3), by the actuator's own axes."""
     radius: float
-    middle: float
-    half: float
+    """Largest force [N]."""
+    sector_center: float
+    """Middle of the arc of force directions [rad]."""
+    sector_half_angle: float
+    """Half of the arc [rad]."""
     polygons: tuple[Array, ...] = ()
     """Corners (K, 2) [N] of a polygon and, where its arc is wide, of those of the upper and the
     lower half of it; none for a sector."""
 
     @property
     def axes(self) -> int:
-        """In how many directions it pushes."""
-        return (2 if self.half > 0.0 else 1) if self.radius > 0.0 else 0
+        """Dimension of the set: 0 without force, 1 of a line, else 2."""
+        if self.radius <= 0.0:
+            return 0
+        return 2 if self.sector_half_angle > 0.0 else 1
 
     @property
     def one_way(self) -> bool:
-        """Whether it cannot push against the middle of its arc."""
-        ahead = np.array([math.cos(self.middle), math.sin(self.middle)])
-        back = min((float((corners @ ahead).min()) for corners in self.polygons), default=0.0)
-        return self.half <= 0.5 * math.pi and back >= -THINNEST * self.radius
+        """Whether it has no force against the middle of its arc."""
+        ahead = np.array([math.cos(self.sector_center), math.sin(self.sector_center)])
+        least_ahead = 0.0
+        if self.polygons:
+            least_ahead = min(float((corners @ ahead).min()) for corners in self.polygons)
+        is_convex = self.sector_half_angle <= 0.5 * math.pi
+        return is_convex and least_ahead >= -MIN_ASPECT * self.radius
 
 
 def force_sets(
     layout: Layout, lost: Collection[str] = (), flow: ArrayLike | None = None
 ) -> ForceSets:
-    """Returns what the actuators of one robot can push along the axes that it commands; nothing
-    counts along the others. Those in `lost` push nothing, and the body moves through the water with
-    `flow` (6,) [m/s, rad/s], body frame, None at rest. A `LayoutError` at an unknown name."""
-    gone = layout.indices(tuple(lost), "lost")
-    sets = assembled([shapes_of(layout, flow)], own_effectiveness(layout)[None] * layout.commanded)
-    sets.lose(0, list(gone))
+    """Returns the feasible forces of one robot, with their wrenches along the axes that it
+    commands; along the others these are zero.
+
+    Args:
+        layout: the robot.
+        lost: names of actuators that give no force.
+        flow: velocity of the body relative to the water (6,), body frame [m/s, rad/s]; None at
+            rest.
+
+    Raises:
+        LayoutError: there is no actuator of a name.
+    """
+    lost_indices = layout.indices(tuple(lost), "lost")
+    effectiveness = own_effectiveness(layout)[None] * layout.commanded
+    sets = assembled([shapes_of(layout, flow)], effectiveness)
+    sets.lose(0, list(lost_indices))
     return sets
 
 
 def assembled(shapes: Sequence[Sequence[Shape]], effectiveness: Array) -> ForceSets:
-    """Returns R robots with shapes (R, n) and wrenches (R, n, 3, 6) of 1 N along their own axes."""
-    numbers = [block_of_planes(len(shapes[0]))]
-    fields = []
-    end = len(numbers[0])
-    for shape in (shape for robot in shapes for shape in robot):
-        fields.append((shape.radius, shape.middle, shape.half, end if shape.polygons else 0))
-        for corners in shape.polygons:
-            numbers += [np.array([len(corners)]), corners.ravel()]
-            end += 1 + corners.size
-    directions = np.array([[shape.directions for shape in robot] for robot in shapes])
-    columns = np.moveaxis(np.array(fields, np.float64).reshape(len(shapes), -1, 4), -1, 0)
-    radius, middle, half, place = np.ascontiguousarray(columns)
+    """Returns the sets of R robots.
+
+    Args:
+        shapes: feasible forces of each robot's n actuators (R, n).
+        effectiveness: wrenches (R, n, 3, 6) of 1 N along their own axes [1, m], body frame.
+    """
+    robots = len(shapes)
+    n = len(shapes[0])
+    directions = np.empty((robots, n, 2, 3))
+    radius = np.empty((robots, n))
+    sector_center = np.empty((robots, n))
+    sector_half_angle = np.empty((robots, n))
+    polygon_offset = np.zeros((robots, n))
+    tables = [block_of_planes(n)]
+    end_of_block = len(tables[0])
+    for row, robot in enumerate(shapes):
+        for i, shape in enumerate(robot):
+            directions[row, i] = shape.directions
+            radius[row, i] = shape.radius
+            sector_center[row, i] = shape.sector_center
+            sector_half_angle[row, i] = shape.sector_half_angle
+            if shape.polygons:
+                polygon_offset[row, i] = end_of_block
+            for corners in shape.polygons:
+                # A polygon in the block: the number of its corners, then their coordinates.
+                tables.append(np.array([len(corners)]))
+                tables.append(corners.ravel())
+                end_of_block += 1 + corners.size
     return ForceSets(
-        np.ascontiguousarray(directions @ effectiveness / SCALE),
-        *(radius, middle, half, place),
-        np.concatenate(numbers),
+        effectiveness=np.ascontiguousarray(directions @ effectiveness / SCALE),
+        radius=radius,
+        sector_center=sector_center,
+        sector_half_angle=sector_half_angle,
+        polygon_offset=polygon_offset,
+        block=np.concatenate(tables),
     )
 
 
 def shapes_of(layout: Layout, flow: ArrayLike | None = None) -> list[Shape]:
-    """Returns what each actuator can push; arguments as for `force_sets`."""
-    shapes: dict[str, Shape] = {}
-    for places, law in laws_of(layout.actuators):
-        if law.feels_flow:
-            met = plant_of(layout).inflow(None if flow is None else np.asarray(flow, np.float64))
-            lower = layout.lower[places]
-            upper = layout.upper[places]
-            command = lower + np.linspace(0.0, 1.0, ALONG)[:, None, None] * (upper - lower)
-            force = law.force(command, None if met is None else met[places])[..., 1:]
-            for k, place in enumerate(places):
-                shapes[layout.names[place]] = _polygon(np.eye(3)[1:], force[:, k], 0.0, SIDES)
-    others = tuple(part for part in layout.actuators if part.name not in shapes)
-    if others:
-        rest = layout.without(shapes) if shapes else layout
-        own = np.broadcast_to(np.eye(3, 6), (rest.n, 3, 6))
-        for places, group in groups_of(rest.actuators, own):
-            for place, response in zip(places, group.responses, strict=True):
-                shapes[rest.names[place]] = _shape(response, isinstance(group, FinGroup))
+    """Returns the feasible forces of each actuator (n), in the order of the layout.
+
+    Args:
+        layout: the robot.
+        flow: velocity of the body relative to the water (6,), body frame [m/s, rad/s]; None at
+            rest.
+    """
+    shapes = _flow_shapes(layout, flow)
+    if len(shapes) < layout.n:
+        others = layout.without(shapes) if shapes else layout
+        # Unit wrenches: the responses then have their directions by own axes.
+        own_axes = np.broadcast_to(np.eye(3, 6), (others.n, 3, 6))
+        for indices, group in groups_of(others.actuators, own_axes):
+            is_fin = isinstance(group, FinGroup)
+            for i, response in zip(indices, group.responses, strict=True):
+                shapes[others.names[i]] = _shape(response, is_fin)
     return [shapes[name] for name in layout.names]
 
 
+def _flow_shapes(layout: Layout, flow: ArrayLike | None) -> dict[str, Shape]:
+    """Feasible forces, by name, of the actuators whose force is that of the flow."""
+    body_flow = None if flow is None else np.asarray(flow, np.float64)
+    shapes: dict[str, Shape] = {}
+    for indices, law in laws_of(layout.actuators):
+        if not law.feels_flow:
+            continue
+        inflow = plant_of(layout).inflow(body_flow)
+        lower = layout.lower[indices]
+        upper = layout.upper[indices]
+        share = np.linspace(0.0, 1.0, N_SAMPLES)[:, None, None]
+        command = lower + share * (upper - lower)
+        force = law.force(command, None if inflow is None else inflow[indices])[..., 1:]
+        for k, i in enumerate(indices):
+            plane = np.eye(3)[1:]
+            shapes[layout.names[i]] = _polygon(plane, force[:, k], 0.0, SIDES_OF_FLOW)
+    return shapes
+
+
 def _shape(response: Response, is_fin: bool) -> Shape:
-    """What an actuator with an answer to prices, by its own axes, can push."""
-    least, largest = response.ends
+    """Feasible forces of an actuator, by its response to prices along its own axes."""
+    force_min, force_max = response.ends
     if not isinstance(response, Plane):
-        directions = np.stack([response.effectiveness[:3], np.zeros(3)])
-        radius = max(largest, -least) if least <= 0.0 <= largest else 0.5 * (largest - least)
-        return Shape(directions, radius, 0.0, 0.0, (np.array([[least, 0.0], [largest, 0.0]]),))
+        return _segment(response.effectiveness[:3], force_min, force_max)
     directions = response.effectiveness[:, :3]
-    middle = response.middle
-    half = response.half
-    turn = half * np.linspace(-1.0, 1.0, ALONG)
-    if response.gauge is not None or half == 0.0:
+    center = response.sector_center
+    half_angle = response.sector_half_angle
+    if response.gauge is not None or half_angle == 0.0:
         gauge = np.ones(1) if response.gauge is None else response.gauge
-        around = TURN / len(gauge) * np.arange(len(gauge) + 1)
-        arcs = (-1.0, 1.0), (0.0, 1.0), (-1.0, 0.0)
-        rims = [
-            middle + half * np.linspace(*arc, ALONG) for arc in arcs[: 3 if _is_wide(half) else 1]
-        ]
-        sizes = [
-            largest * np.interp(rim % TURN, around, np.append(gauge, gauge[0])) for rim in rims
-        ]
-        ends = [
-            np.append(_points(*rim), [[0.0, 0.0]], axis=0) for rim in zip(rims, sizes, strict=True)
-        ]
-        hulls = [_polygon(directions, points, half, UNEVEN) for points in ends]
-        return hulls[0]._replace(
-            radius=largest * float(gauge.max()),
-            middle=middle,
-            polygons=tuple(hull.polygons[0] for hull in hulls),
-        )
-    if least < 0.0 and half < np.pi:
-        points = _points(middle + np.append(turn, turn), np.repeat((largest, least), ALONG))
-    elif is_fin or least <= THINNEST * largest or half > 0.5 * np.pi:
-        return Shape(directions, max(largest, -least), middle, half)
+        return _gauge_shape(directions, center, half_angle, force_max, gauge)
+    turn = half_angle * np.linspace(-1.0, 1.0, N_SAMPLES)
+    if force_min < 0.0 and half_angle < np.pi:
+        # Two opposite sectors.
+        angle = center + np.append(turn, turn)
+        size = np.repeat((force_max, force_min), N_SAMPLES)
+    elif is_fin or force_min <= MIN_ASPECT * force_max or half_angle > 0.5 * np.pi:
+        return Shape(directions, max(force_max, -force_min), center, half_angle)
     else:
-        angle = middle + np.append(turn, (-half, half))
-        points = _points(angle, np.append(np.full(ALONG, largest), (least, least)))
-    return _polygon(directions, points, np.pi, BOUNDARY)
+        # A ring sector: its outer arc, and both ends of the inner one.
+        angle = center + np.append(turn, (-half_angle, half_angle))
+        size = np.append(np.full(N_SAMPLES, force_max), (force_min, force_min))
+    return _polygon(directions, _polar(angle, size), np.pi, SIDES_OF_AZIMUTH)
 
 
-def _points(angle: Array, size: Array) -> Array:
+def _segment(axis: Array, force_min: float, force_max: float) -> Shape:
+    """Forces along one axis (3,) between two limits [N]."""
+    directions = np.stack([axis, np.zeros(3)])
+    contains_zero = force_min <= 0.0 <= force_max
+    radius = max(force_max, -force_min) if contains_zero else 0.5 * (force_max - force_min)
+    ends = np.array([[force_min, 0.0], [force_max, 0.0]])
+    return Shape(directions, radius, 0.0, 0.0, (ends,))
+
+
+def _gauge_shape(
+    directions: Array, center: float, half_angle: float, force_max: float, gauge: Array
+) -> Shape:
+    """Forces within an arc [rad] whose largest size depends on the direction: `force_max` [N] times
+    the gauge (K,) [1], evenly spaced around the circle."""
+    gauge_angle = TURN / len(gauge) * np.arange(len(gauge) + 1)
+    closed_gauge = np.append(gauge, gauge[0])
+    arcs = [(-1.0, 1.0)]
+    if _is_wide(half_angle):
+        arcs += [(0.0, 1.0), (-1.0, 0.0)]  # its upper and its lower half, see `convex_parts`
+    hulls = []
+    for begin, end in arcs:
+        angle = center + half_angle * np.linspace(begin, end, N_SAMPLES)
+        size = force_max * np.interp(angle % TURN, gauge_angle, closed_gauge)
+        points = np.append(_polar(angle, size), [[0.0, 0.0]], axis=0)
+        hulls.append(_polygon(directions, points, half_angle, SIDES_OF_GAUGE))
+    return hulls[0]._replace(
+        radius=force_max * float(gauge.max()),
+        sector_center=center,
+        polygons=tuple(hull.polygons[0] for hull in hulls),
+    )
+
+
+def _polar(angle: Array, size: Array) -> Array:
     """Forces (S, 2) [N] of angles (S,) [rad] and sizes (S,) [N]."""
     return np.asarray(size[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1))
 
 
-def _polygon(directions: Array, points: Array, half: float, sides: int) -> Shape:
-    """A polygon that fills the convex hull of forces (S, 2) [N]; two of them where it has no
-    width."""
-    middle = points.mean(axis=0)
-    axes = np.linalg.svd(points - middle)[2]
-    along = (points - middle) @ axes.T
-    low = along.min(axis=0)
-    high = along.max(axis=0)
+def _polygon(directions: Array, points: Array, half_angle: float, sides: int) -> Shape:
+    """A polygon inside the convex hull of forces (S, 2) [N], with their extreme points as its
+    corners; a line where the hull has no width."""
+    center = points.mean(axis=0)
+    axes = np.linalg.svd(points - center)[2]
+    principal = (points - center) @ axes.T  # coordinates along the principal axes
+    low = principal.min(axis=0)
+    high = principal.max(axis=0)
     length, width = high - low
     angle = math.atan2(axes[0, 1], axes[0, 0])
-    if width <= THINNEST * length or length == 0.0:
+    if width <= MIN_ASPECT * length or length == 0.0:
         ends = np.array([low, high])
         ends[:, 1] = ends[:, 1].mean()
-        return Shape(directions, 0.5 * length, angle, 0.0, (middle + ends @ axes,))
-    # Corners are the farthest points in directions around a set as wide as it is long.
+        return Shape(directions, 0.5 * length, angle, 0.0, (center + ends @ axes,))
+    # Corners are the extreme points in directions around the set scaled to be as wide as long.
     turn = TURN / sides * np.arange(sides)
-    best = (along / (length, width) @ np.stack([np.cos(turn), np.sin(turn)])).argmax(axis=0)
-    corners = points[best[best != np.roll(best, 1)]]
+    normals = np.stack([np.cos(turn), np.sin(turn)])
+    extreme = (principal / (length, width) @ normals).argmax(axis=0)
+    is_new = extreme != np.roll(extreme, 1)
+    corners = points[extreme[is_new]]
     radius = float(np.linalg.norm(corners - corners.mean(axis=0), axis=-1).max())
-    return Shape(directions, radius, angle, half, (corners,))
+    return Shape(directions, radius, angle, half_angle, (corners,))
 
 
-def _is_wide(half: Any) -> Any:
-    """Whether an arc of half an angle [rad] is wider than half a turn and no full circle."""
-    return (half > np.pi / 2 + HALF_TURN_TOLERANCE) & (half < np.pi)
+def _is_wide(half_angle: Any) -> Any:
+    """Whether arcs of half angles [rad] are wider than half a turn and no full circle."""
+    return (half_angle > np.pi / 2 + HALF_TURN_TOLERANCE) & (half_angle < np.pi)
 
 
 def wide_arcs(sets: ForceSets) -> NDArray[np.intp]:
-    """Returns the places of working actuators whose arcs are wider than half a turn and no full
+    """Returns the indices of working actuators whose arcs are wider than half a turn and no full
     circle."""
-    return np.flatnonzero(_is_wide(sets.half[0]) & (sets.radius > 0.0).any(axis=0))
+    is_working = (sets.radius > 0.0).any(axis=0)
+    return np.flatnonzero(_is_wide(sets.sector_half_angle[0]) & is_working)
 
 
 def convex_parts(sets: ForceSets) -> ForceSets:
-    """Returns convex sets of R robots with the same arcs, P of each, one round of robots after the
-    other. Wide sectors are cut along their middle, of the first `MAX_CUT` both halves are kept, in
-    all combinations; further ones stay what they are, with their hulls."""
+    """Returns P convex parts of each of R robots with the same arcs, robots fastest (P * R rows).
+
+    Wide sectors are cut along their middle. Of the first `MAX_CUT` both halves are used, in all
+    combinations; further ones are not cut and have their hulls.
+    """
     cut = wide_arcs(sets)[:MAX_CUT]
-    signs = np.zeros((2 ** len(cut), 1, sets.radius.shape[1]))
-    signs[:, 0, cut] = list(product((-0.5, 0.5), repeat=len(cut)))
-    signs = np.repeat(signs, len(sets.radius), axis=1)
-    signs = signs.reshape(-1, signs.shape[-1])
-    parts = sets.tile(2 ** len(cut))
-    for behind in (signs != 0.0, signs < 0.0):  # the upper and the lower half follow the whole arc
-        at = parts.place[behind & (parts.place > 0.0)]
-        parts.place[behind & (parts.place > 0.0)] += 1.0 + 2.0 * sets.block[at.astype(np.intp)]
+    n_parts = 2 ** len(cut)
+    # Shift of the sector's centre over its half angle: 0 where it is not cut.
+    shift = np.zeros((n_parts, 1, sets.radius.shape[1]))
+    shift[:, 0, cut] = list(product((-0.5, 0.5), repeat=len(cut)))
+    shift = np.repeat(shift, len(sets.radius), axis=1)
+    shift = shift.reshape(-1, shift.shape[-1])
+    parts = sets.tile(n_parts)
+    # In the block, the polygon of a wide arc is followed by those of its upper and its lower half.
+    has_polygon = parts.polygon_offset > 0.0
+    for is_later in (shift != 0.0, shift < 0.0):
+        skipped = is_later & has_polygon
+        corners = sets.block[parts.polygon_offset[skipped].astype(np.intp)]
+        parts.polygon_offset[skipped] += 1.0 + 2.0 * corners
+    half_angle_share = np.where(shift == 0.0, 1.0, 0.5)
     return parts._replace(
-        middle=parts.middle + signs * parts.half, half=np.where(signs == 0.0, 1.0, 0.5) * parts.half
+        sector_center=parts.sector_center + shift * parts.sector_half_angle,
+        sector_half_angle=half_angle_share * parts.sector_half_angle,
     )

@@ -1,5 +1,5 @@
-"""The largest wrench in a given direction with nothing beside it, or with the other axes as they
-are, and the weakest direction of all."""
+"""Largest attainable wrenches: along a ray, along an axis with the others fixed, and in the
+weakest direction of all. The attainable sets, the analyses and the app use them."""
 
 from collections.abc import Collection
 from functools import lru_cache
@@ -16,18 +16,18 @@ from finlab.forces.force_sets import SCALE, ForceSets, convex_parts, force_sets
 from finlab.layout import Layout
 
 FINE = 1e-8
-"""Gap of answers that are shown, over the strongest actuator's wrench [1]."""
+"""Gap of final results, over the strongest actuator's wrench [1]."""
 COARSE = 1e-3
-"""Gap of answers that only begin a search, over the same [1]."""
+"""Gap of results that only begin a search, over the strongest actuator's wrench [1]."""
 OFF_RAY = 1e-6
-"""Most by which a wrench may miss the ray that it is to lie on, over the same [1]."""
+"""Largest distance of a wrench from its ray, over the strongest actuator's wrench [1]."""
 CROSSED = 1e-6
 """Scaled wrench by which the ends of a range may cross, from rounding [N]."""
 UNPROVEN = 1e-3
-"""Gap, over the size plus one, above which no force counts as a proof [1]."""
+"""Gap, over the size plus one, above which a result counts as unproven [1]."""
 
 
-class Largest(NamedTuple):
+class LargestWrenches(NamedTuple):
     """Largest scaled wrenches along R rays."""
 
     size: Array
@@ -35,41 +35,52 @@ class Largest(NamedTuple):
     gap: Array
     """Upper bound less the distance that forces prove (R,) [N]."""
     force: Array
-    """Planar forces (R, n, 2) [N] that prove it."""
+    """Planar forces (R, n, 2) [N] that attain the lower bound."""
     normal: Array
     """Normal (R, m) of the plane that bounds the set of wrenches there, not normalized."""
 
 
-def largest(
-    sets: ForceSets, ray: Array, origin: Array | float = 0.0, close: float = FINE
-) -> Largest:
+def largest_along_rays(
+    sets: ForceSets, ray: Array, origin: Array | float = 0.0, tolerance: float = FINE
+) -> LargestWrenches:
     """Returns the largest scaled wrenches along rays.
 
-    Each is bracketed: a plane bounds the set of all wrenches from outside, and forces lie inside.
+    Each is bracketed: a plane bounds the set of all wrenches from outside, and forces attain a
+    wrench inside.
 
     Args:
         sets: sets of forces of R robots.
         ray: unit directions (R, m).
         origin: points where the rays begin (R, m) [N].
-        close: gap at which the search ends, over the strongest actuator's wrench [1].
+        tolerance: gap at which the search ends, over the strongest actuator's wrench [1].
 
     Returns:
         The largest wrenches; of a ray that does not meet the set the size is minus infinity.
     """
     origin = np.broadcast_to(origin, ray.shape)
-    size, normal, force = sets.reach(origin, ray, close)
-    wrench = sets.wrench(force)
-    along = ((wrench - origin) * ray).sum(-1)
-    # A wrench off the ray proves nothing.
-    off_ray = np.linalg.norm(wrench - origin - along[:, None] * ray, axis=-1)
-    proven = np.where(off_ray <= max(OFF_RAY, 3.0 * close) * sets.unit, along, 0.0)
-    return Largest(size, np.maximum(size - proven, 0.0), force, normal)
+    size, normal, force = sets.reach(origin, ray, tolerance)
+    displacement = sets.wrench(force) - origin
+    along = (displacement * ray).sum(-1)
+    # A wrench off the ray is no lower bound.
+    off_ray = np.linalg.norm(displacement - along[:, None] * ray, axis=-1)
+    is_on_ray = off_ray <= max(OFF_RAY, 3.0 * tolerance) * sets.unit
+    lower_bound = np.where(is_on_ray, along, 0.0)
+    return LargestWrenches(size, np.maximum(size - lower_bound, 0.0), force, normal)
 
 
-def max_wrench_along(sets: ForceSets, direction: Array, close: float = FINE) -> Largest:
-    """Returns the largest wrenches that point exactly along unit `direction` (R, m), all else zero;
-    none where rest is out of reach and the direction meets nothing."""
-    result = largest(sets, direction, close=close)
+def max_wrench_along(sets: ForceSets, direction: Array, tolerance: float = FINE) -> LargestWrenches:
+    """Returns the largest wrenches along directions, exactly: all other components are zero.
+
+    Args:
+        sets: sets of forces of R robots.
+        direction: unit directions (R, m).
+        tolerance: gap at which the search ends, over the strongest actuator's wrench [1].
+
+    Returns:
+        The largest wrenches; size 0 where zero force is infeasible and the direction meets no
+        attainable wrench.
+    """
+    result = largest_along_rays(sets, direction, tolerance=tolerance)
     is_unproven = (result.size < 0.0) | (result.gap > UNPROVEN * (1.0 + result.size))
     result.size[is_unproven] = 0.0
     result.gap[is_unproven] = 0.0
@@ -77,22 +88,30 @@ def max_wrench_along(sets: ForceSets, direction: Array, close: float = FINE) -> 
 
 
 def max_wrench_along_exactly(sets: ForceSets, directions: Array) -> tuple[Array, float]:
-    """Returns the largest wrenches (P, D) of robots (P) along unit `directions` (D, 6), and the
-    largest gap. Wide sectors count as their convex parts, with too many of them some as hulls, see
-    `convex_parts`."""
+    """Returns the largest wrenches along directions, with wide sectors as their convex parts; with
+    too many of them, some as their hulls (see `convex_parts`).
+
+    Args:
+        sets: sets of forces of P robots.
+        directions: unit directions (D, m), the same for all robots.
+
+    Returns:
+        Sizes (P, D) of scaled wrenches [N], and the largest gap of all [N].
+    """
     robots = len(sets.radius)
-    n = len(directions)
+    n_directions = len(directions)
     parts = convex_parts(sets)
-    result = max_wrench_along(parts.repeat(n), np.tile(directions, (len(parts.radius), 1)))
-    size, proven = (
-        v.reshape(-1, robots, n).max(axis=0) for v in (result.size, result.size - result.gap)
-    )
-    return size, float((size - proven).max())
+    rows = np.tile(directions, (len(parts.radius), 1))
+    result = max_wrench_along(parts.repeat(n_directions), rows)
+    by_part = (-1, robots, n_directions)
+    size = result.size.reshape(by_part).max(axis=0)
+    lower_bound = (result.size - result.gap).reshape(by_part).max(axis=0)
+    return size, float((size - lower_bound).max())
 
 
 class Ranges(NamedTuple):
-    """What each component of a wrench may be, the other five held; NaN where those five are out of
-    reach."""
+    """Attainable range of each component of a wrench, the other five being fixed; NaN where those
+    five are not attainable."""
 
     low: Array
     """Smallest values (6,) [N, N m]."""
@@ -100,7 +119,9 @@ class Ranges(NamedTuple):
     """Largest values (6,) [N, N m]."""
 
     def _repr_html_(self) -> str:
-        rows = [(axis, f"{a:.3f}", f"{b:.3f}") for axis, a, b in zip(AXES, *self, strict=True)]
+        rows = []
+        for axis, low, high in zip(AXES, self.low, self.high, strict=True):
+            rows.append((axis, f"{low:.3f}", f"{high:.3f}"))
         table = Table(("axis", "least [N, N m]", "most [N, N m]"), rows, (True, False, False))
         return html([table], lambda: ranges_picture("each axis, the others held", AXES, *self))
 
@@ -108,89 +129,129 @@ class Ranges(NamedTuple):
 def axis_ranges(
     layout: Layout, wrench: ArrayLike, lost: Collection[str] = (), flow: ArrayLike | None = None
 ) -> Ranges:
-    """Returns the range of each axis with the others held as in a wrench (6,) [N, N m], too wide by
-    about a millionth at most; `lost`, `flow` and errors are as for `force_sets`."""
-    water = None if flow is None else tuple(np.asarray(flow, np.float64).tolist())
-    parts = _parts(layout, tuple(lost), water, layout.stamps)
-    axes = np.concatenate([np.eye(6), -np.eye(6)])
-    held = np.where(axes == 0.0, np.asarray(wrench, np.float64) / SCALE, 0.0)
-    count = len(parts.radius) // len(axes)
-    rays = np.tile(axes, (count, 1))
-    origins = np.tile(held, (count, 1))
-    size = largest(parts, rays, origins).size.reshape(-1, 2, 6)
-    # Planes that leave nothing between them prove that the five others cannot be had together.
-    there = size.sum(axis=1) >= -CROSSED
-    high, low = np.where(there[:, None], size, -np.inf).max(axis=0)
-    scale = np.where(there.any(axis=0), SCALE, np.nan)
+    """Returns the attainable range of each axis, too wide by about a millionth at most.
+
+    Args:
+        layout: the robot.
+        wrench: values (6,) at which the other axes are fixed [N, N m], body frame.
+        lost: names of actuators that give no force.
+        flow: velocity of the body relative to the water (6,), body frame [m/s, rad/s]; None at
+            rest.
+
+    Raises:
+        LayoutError: there is no actuator of a name.
+    """
+    hashable_flow = None if flow is None else tuple(np.asarray(flow, np.float64).tolist())
+    parts = _parts_for_axes(layout, tuple(lost), hashable_flow, layout.stamps)
+    rays = np.concatenate([np.eye(6), -np.eye(6)])
+    # Each ray begins at the fixed values of the other axes.
+    origins = np.where(rays == 0.0, np.asarray(wrench, np.float64) / SCALE, 0.0)
+    n_parts = len(parts.radius) // len(rays)
+    result = largest_along_rays(parts, np.tile(rays, (n_parts, 1)), np.tile(origins, (n_parts, 1)))
+    size = result.size.reshape(-1, 2, 6)
+    # Two bounding planes that have crossed prove that the other five values are not attainable.
+    is_attainable = size.sum(axis=1) >= -CROSSED
+    high, low = np.where(is_attainable[:, None], size, -np.inf).max(axis=0)
+    scale = np.where(is_attainable.any(axis=0), SCALE, np.nan)
     return Ranges(-low * scale + 0.0, high * scale + 0.0)
 
 
 @lru_cache(maxsize=16)
-def _parts(
+def _parts_for_axes(
     layout: Layout, lost: tuple[str, ...], flow: tuple[float, ...] | None, stamps: object
 ) -> ForceSets:
-    """Convex parts of a robot, each for both ways along all axes."""
+    """Convex parts of a robot, each repeated for both signs of all six axes; the stamps are part of
+    the cache's key."""
     return convex_parts(force_sets(layout, lost, flow)).repeat(12)
 
 
 RANK_TOLERANCE = 1e-6
 """Share of the largest singular value below which another counts as zero."""
 N_RANDOM = 24
-"""Random directions from which the weakest one is sought, beside axes and singular vectors."""
-N_WALKS = 4
-"""Steps from face to face of the set of wrenches."""
-FINE_WALKS = 20
-"""Further steps from the best ends."""
-KEPT = 6
-"""Ends from which these begin."""
+"""Random directions from which the search for the weakest one starts, with axes and singular
+vectors."""
+N_STEPS = 4
+"""Steps from face to face of the set of wrenches, from each start."""
+N_FINE_STEPS = 20
+"""Further steps from the best directions."""
+N_BEST = 6
+"""Directions from which the further steps start."""
+MIN_SINGULAR_VALUE = 1e-9
+"""Floor of the largest singular value in the test of rank [N]."""
 
 
-class Extent(NamedTuple):
+class WeakestDirection(NamedTuple):
     """The weakest direction of the sets of wrenches of P robots, in scaled wrenches."""
 
     size: Array
-    """(P,) [N]."""
+    """Largest wrench along it (P,) [N]."""
     direction: Array
     """Unit scaled wrench (P, m)."""
 
 
 def singular_values(sets: ForceSets) -> tuple[Array, Array]:
-    """Returns singular values (P, m) [N], falling, and their directions (P, m, m), in columns, of
-    the wrenches of each one's largest force along the axes of its plane."""
+    """Returns the singular values of the matrix of full wrenches: those of each actuator's largest
+    force along the axes of its plane.
+
+    Returns:
+        Singular values (P, m) [N], falling, 0 beyond the number of columns; and their directions
+        (P, m, m), scaled wrenches in columns.
+    """
     matrix = np.swapaxes(sets.full_effectiveness(), -1, -2)
     directions, values, _ = np.linalg.svd(matrix, full_matrices=True)
-    return np.pad(values, ((0, 0), (0, directions.shape[-1] - values.shape[-1]))), directions
+    n_missing = directions.shape[-1] - values.shape[-1]
+    return np.pad(values, ((0, 0), (0, n_missing))), directions
 
 
-def weakest(sets: ForceSets, n_random: int = N_RANDOM, fine: bool = True) -> Extent:
-    """Returns the direction in which the sets of wrenches end soonest, and where: every wrench of
-    that size is within reach. The walk starts from axes, singular vectors and random directions,
-    goes to the face of the set that lies that way, turns to its normal and goes again; the least
-    end of all is returned."""
+def weakest(sets: ForceSets, n_random: int = N_RANDOM, fine: bool = True) -> WeakestDirection:
+    """Returns the direction in which the largest attainable wrench is smallest, by a local search:
+    every wrench of that size is attainable.
+
+    From each start, a step finds the face of the set that the direction meets, and continues along
+    the normal of that face; the smallest support of all is returned. Starts are the axes, the
+    singular vectors and random directions.
+
+    Args:
+        sets: sets of forces of P robots.
+        n_random: random directions among the starts.
+        fine: whether the best directions are refined by further steps.
+    """
     values, vectors = singular_values(sets)
     size = np.zeros(len(values))
     direction = vectors[:, :, -1].copy()
-    full = np.flatnonzero(values[:, -1] > RANK_TOLERANCE * np.maximum(values[:, 0], 1e-9))
-    if not len(full):
-        return Extent(size, direction)
-    rng = np.random.default_rng(0)
-    axes = values.shape[1]
-    drawn = rng.standard_normal((n_random, axes))
-    drawn /= np.linalg.norm(drawn, axis=-1, keepdims=True)
-    common = np.concatenate([np.eye(axes), drawn])
-    of_robot = np.swapaxes(vectors[full], -1, -2)
-    starts = np.concatenate([np.broadcast_to(common, (len(full), *common.shape)), of_robot], axis=1)
-    if (sets.half[full] < np.pi).any() or sets.place.any():  # else opposite directions are alike
+    threshold = RANK_TOLERANCE * np.maximum(values[:, 0], MIN_SINGULAR_VALUE)
+    full_rank = np.flatnonzero(values[:, -1] > threshold)
+    if not len(full_rank):
+        return WeakestDirection(size, direction)
+    m = values.shape[1]
+    starts = _starts(vectors[full_rank], n_random)
+    is_symmetric = (sets.sector_half_angle[full_rank] >= np.pi).all()
+    if not is_symmetric or sets.polygon_offset.any():
         starts = np.concatenate([starts, -starts], axis=1)
-    for walks, close in ((N_WALKS, COARSE), (FINE_WALKS, FINE))[: 2 if fine else 1]:
-        rows = sets.take(np.repeat(full, starts.shape[1]))
-        ends = starts.reshape(-1, axes)
-        for _ in range(walks):
-            normal = max_wrench_along(rows, ends, close).normal
-            ends = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
-        reach = rows.farthest(ends)[0].reshape(starts.shape[:2])
-        best = np.argsort(reach, axis=1)[:, :KEPT]
-        starts = np.take_along_axis(ends.reshape(starts.shape), best[..., None], axis=1)
-    size[full] = np.maximum(reach.min(axis=1), 0.0)
-    direction[full] = starts[:, 0]
-    return Extent(size, direction)
+    stages = [(N_STEPS, COARSE)]
+    if fine:
+        stages.append((N_FINE_STEPS, FINE))
+    for n_steps, tolerance in stages:
+        rows = sets.take(np.repeat(full_rank, starts.shape[1]))
+        directions = starts.reshape(-1, m)
+        for _ in range(n_steps):
+            normal = max_wrench_along(rows, directions, tolerance).normal
+            directions = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+        support = rows.farthest(directions)[0].reshape(starts.shape[:2])
+        best = np.argsort(support, axis=1)[:, :N_BEST]
+        starts = np.take_along_axis(directions.reshape(starts.shape), best[..., None], axis=1)
+    size[full_rank] = np.maximum(support.min(axis=1), 0.0)
+    direction[full_rank] = starts[:, 0]
+    return WeakestDirection(size, direction)
+
+
+def _starts(singular_vectors: Array, n_random: int) -> Array:
+    """Unit directions (P, S, m) from which the search starts, of robots with singular vectors (P,
+    m, m) in columns: the axes, seeded random directions, and the singular vectors."""
+    n_robots, m, _ = singular_vectors.shape
+    rng = np.random.default_rng(0)
+    random_directions = rng.standard_normal((n_random, m))
+    random_directions /= np.linalg.norm(random_directions, axis=-1, keepdims=True)
+    common = np.concatenate([np.eye(m), random_directions])
+    of_all_robots = np.broadcast_to(common, (n_robots, *common.shape))
+    return np.concatenate([of_all_robots, np.swapaxes(singular_vectors, -1, -2)], axis=1)

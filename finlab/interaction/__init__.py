@@ -1,5 +1,5 @@
-"""What actuators do to each other, to the hull, and what speed through the water takes from their
-thrust."""
+"""Hydrodynamic interaction: the forces of jets on other actuators and on the hull, and the loss of
+thrust by speed through the water."""
 
 INTERACTIONS: dict[str, str] = {
     "jets": "finlab.interaction.jets:Jets",

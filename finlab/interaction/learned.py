@@ -43,7 +43,7 @@ Weights = Mapping[str, AnyArray]
 
 @dataclass(frozen=True)
 class Learned(InteractionModel):
-    """What the jets of a robot's actuators take, by a network. Checked on construction.
+    """Model of the interaction by a network. Checked on construction.
 
     Args:
         path: file of the network, as `finlab train interaction` writes it; absolute once loaded
@@ -57,7 +57,7 @@ class Learned(InteractionModel):
     def of(self, geometry: JetGeometry) -> "LearnedInteraction":
         """Returns the interaction of a robot's actuators. Raises CheckpointError: the file holds no
         such network."""
-        return LearnedInteraction(*_kept(self.path, file_stamp(self.path)), geometry)
+        return LearnedInteraction(*_cached_network(self.path, file_stamp(self.path)), geometry)
 
     @property
     def reads(self) -> str:
@@ -99,8 +99,8 @@ class LearnedInteraction(PointInteraction):
         by_force = np.asarray(np.einsum("...jaib,ibw->...jaw", slope, self.lever))
         if inflow is None:
             return offset, by_force
-        _, lost, more = self.by_core(force, inflow, True)
-        return offset + lost, by_force + more
+        _, loss, loss_slope = self.by_core(force, inflow, True)
+        return offset + loss, by_force + loss_slope
 
     def deviation(self, force: Array) -> Array:
         each = np.einsum("m...ib,ibw->m...w", self._each(force), self.lever)
@@ -130,32 +130,34 @@ class LearnedInteraction(PointInteraction):
         receiver = force[..., pairs.receiver, :]
         sent, by_source, by_receiver = self._slopes(
             "pair",
-            (lambda some: pairs.rows(some, receiver), source),
-            (lambda some: pairs.rows(source, some), receiver),
+            (lambda varied: pairs.rows(varied, receiver), source),
+            (lambda varied: pairs.rows(source, varied), receiver),
         )
         change = self._among @ sent
-        own = np.einsum("np,...pab->...nab", self._among, by_receiver)
+        by_own = np.einsum("np,...pab->...nab", self._among, by_receiver)
         if self._has_hull:
-            more, by_own = self._slopes(
-                "hull", (lambda some: hull_rows(self.geometry, some), force)
+            hull_change, by_hull_force = self._slopes(
+                "hull", (lambda varied: hull_rows(self.geometry, varied), force)
             )
-            change = change + more
-            own = own + by_own
+            change = change + hull_change
+            by_own = by_own + by_hull_force
         slope = np.zeros((*force.shape[:-2], n * n, 3, 3))
         slope[..., pairs.source * n + pairs.receiver, :, :] = by_source
         slope = slope.reshape(*force.shape[:-2], n, n, 3, 3).swapaxes(-3, -2)
-        return change, with_diagonal(slope, own)
+        return change, with_diagonal(slope, by_own)
 
-    def _slopes(self, name: str, *ways: tuple[Callable[[AnyArray], Any], Array]) -> list[Array]:
+    def _slopes(
+        self, name: str, *variations: tuple[Callable[[AnyArray], Any], Array]
+    ) -> list[Array]:
         """Messages (..., p, 3) [N], and their derivatives (..., p, 3, 3) by each of some forces
         (..., p, 3), given with the function that makes rows of them."""
-        each = [complex_slope(*way) for way in ways]
-        features, vectors = unpacked(name, each[0][0])
-        number, steep = numbers_and_slopes(self._weights, name, features)
+        rows_and_slopes = [complex_slope(*variation) for variation in variations]
+        features, vectors = unpacked(name, rows_and_slopes[0][0])
+        number, factor_jacobian = numbers_and_slopes(self._weights, name, features)
         results = [(number[..., None] * vectors).sum(axis=-2)]
-        for _, rows in each:
+        for _, rows in rows_and_slopes:
             by_features, by_vectors = unpacked(name, rows)
-            part = (by_features @ steep.swapaxes(-1, -2)) @ vectors
+            part = (by_features @ factor_jacobian.swapaxes(-1, -2)) @ vectors
             results.append(part + (number[..., None, :, None] * by_vectors).sum(axis=-2))
         return results
 
@@ -195,14 +197,17 @@ def numbers_and_slopes(weights: Weights, name: str, features: Array) -> tuple[Ar
 
 
 @lru_cache(maxsize=16)
-def _kept(path: str, stamp: object) -> tuple[Weights, float]:
+def _cached_network(path: str, stamp: object) -> tuple[Weights, float]:
     """A network as it is read from its file; once for all robots that name it."""
     return read_network(path)
 
 
 def read_network(path: str) -> tuple[Weights, float]:
-    """Returns weights, and what `LearnedInteraction` is told to trust, of a file. Raises
-    CheckpointError: it is missing, damaged or of another kind."""
+    """Returns the weights in a file, and the `trust` of `LearnedInteraction`.
+
+    Raises:
+        CheckpointError: the file is missing, damaged or of another kind.
+    """
     from safetensors import SafetensorError
     from safetensors.numpy import load
 
@@ -212,11 +217,11 @@ def read_network(path: str) -> tuple[Weights, float]:
         trust = float(weights.pop("trust")[0])
         for name, form in FORMS.items():
             for layer in range(LAYERS):
-                into = (
+                width_in = (
                     form.features if layer == 0 else weights[f"{name}.{layer - 1}.weight"].shape[2]
                 )
                 weight, bias = (weights[f"{name}.{layer}.{kind}"] for kind in ("weight", "bias"))
-                if weight.shape[:2] != (MEMBERS, into) or bias.shape != (
+                if weight.shape[:2] != (MEMBERS, width_in) or bias.shape != (
                     MEMBERS,
                     1,
                     weight.shape[2],

@@ -17,45 +17,50 @@ FaultKind = Literal["lost", "weak", "torn", "stuck", "running", "whole"]
 """State of an actuator."""
 Share = Annotated[float, Meta(gt=0.0, le=1.0)]
 """A share of a force [1]."""
-Kept = Annotated[float, Meta(ge=-1e6, le=1e6)]
+CommandNumber = Annotated[float, Meta(ge=-1e6, le=1e6)]
 """A number of a command, such as an angle [rad] or a force [N]."""
 FAULT_VALUES: Mapping[str, Any] = {
     "weak": Share,
     "torn": Share,
-    "stuck": Kept,
-    "running": Annotated[tuple[Kept, ...], Meta(min_length=1, max_length=3)],
+    "stuck": CommandNumber,
+    "running": Annotated[tuple[CommandNumber, ...], Meta(min_length=1, max_length=3)],
 }
-"""Damage of an actuator that still works -> type of its value."""
+"""Fault of an actuator that still works -> type of its value."""
 
 
 def lost_names(lost: Sequence[str]) -> tuple[str, ...]:
-    """Returns the names of what is lost. Raises AllocationError: they are no list of names."""
-    if isinstance(lost, str) or not (
-        isinstance(lost, Sequence) and all(isinstance(name, str) for name in lost)
-    ):
-        hint = f"the text {lost!r}; write [{lost!r}]" if isinstance(lost, str) else repr(lost)
-        raise AllocationError(f"lost: expected a list of names, got {hint}")
+    """Returns the names of lost actuators as a tuple.
+
+    Raises:
+        AllocationError: they are no list of names.
+    """
+    if isinstance(lost, str):
+        raise AllocationError(
+            f"lost: expected a list of names, got the text {lost!r}; write [{lost!r}]"
+        )
+    if not isinstance(lost, Sequence) or not all(isinstance(name, str) for name in lost):
+        raise AllocationError(f"lost: expected a list of names, got {lost!r}")
     return tuple(lost)
 
 
 @dataclass(frozen=True)
 class Damage:
-    """Damage of actuators, by name; those that are not named are whole. Not to be changed.
+    """Damage of actuators, by name; those that are not named are undamaged. Immutable.
 
-    All but `lost` leaves a layout with other limits, or with a smaller fin, so that every method
-    accounts for it and limits hold as always: what hangs at a command has that one alone, and the
-    others compensate for it. How many numbers a command has, and which forces are possible, is
-    known with the layout: see `applied_to`.
+    A fault other than `lost` changes the limits of a layout, or makes a fin smaller, so that every
+    method accounts for it: an actuator that is stuck at a command has equal limits there, and the
+    others compensate. Whether a command has the right count of numbers, and a force is feasible, is
+    checked against the layout in `applied_to`.
 
     Args:
         lost: names of those that give no force and leave the layout.
-        weak: share that is left of the largest amplitude and frequency, or of the force, above 0
-            and up to 1 [1].
+        weak: remaining share of the largest amplitude and frequency, or of the force, above 0 and
+            up to 1 [1].
         torn: share of its law's thrust that one gives at every command, as a fin with a torn blade
             does [1].
-        stuck: value that one keeps: the angle at which a fin, an azimuth or a tilt no longer turns,
-            though it still pushes [rad]; the force at which a thruster hangs [N].
-        running: command that one keeps whatever is asked: of a fin (amplitude [rad], frequency
+        stuck: value at which one is stuck: the angle at which a fin, an azimuth or a tilt no longer
+            turns, though it still pushes [rad]; the force of a thruster [N].
+        running: constant command that ignores the controller: of a fin (amplitude [rad], frequency
             [Hz], zero direction [rad]), of an azimuth or a tilt (angle [rad], force [N]), of a
             thruster (force [N],).
 
@@ -73,49 +78,66 @@ class Damage:
     def __post_init__(self) -> None:
         object.__setattr__(self, "lost", lost_names(self.lost))
         for kind, value in FAULT_VALUES.items():
-            named = checked(getattr(self, kind), dict[str, Any], AllocationError, f"damage: {kind}")
+            faults = getattr(self, kind)
+            unchecked = checked(faults, dict[str, Any], AllocationError, f"damage: {kind}")
             by_name = {}
-            for name, own in named.items():
-                by_name[name] = checked(own, value, AllocationError, f"damage: {kind} {name}")
+            for name, fault in unchecked.items():
+                by_name[name] = checked(fault, value, AllocationError, f"damage: {kind} {name}")
             object.__setattr__(self, kind, by_name)
-        if both := set(self.stuck) & set(self.running):
+        contradictory = set(self.stuck) & set(self.running)
+        if contradictory:
             raise AllocationError(
-                f"damage: an actuator is stuck or running, got both of {', '.join(both)}"
+                f"damage: an actuator is stuck or running, got both of {', '.join(contradictory)}"
             )
 
     @property
     def partly(self) -> dict[str, Mapping[str, Any]]:
-        """What is known of those that work in part, by kind of fault."""
+        """Faults by kind, and by name of the actuators that still work."""
         return {kind: getattr(self, kind) for kind in FAULT_VALUES if getattr(self, kind)}
 
     def of(self, name: str) -> dict[str, Any]:
         """Returns the faults of one actuator that still works, by kind."""
-        return {kind: known[name] for kind, known in self.partly.items() if name in known}
+        return {kind: by_name[name] for kind, by_name in self.partly.items() if name in by_name}
 
     def with_fault(self, name: str, kind: str, value: Any) -> "Damage":
-        """Returns it with another fault of an actuator, with a value as of that field (of `lost`
-        any); None mends that fault. What is stuck does not run. Errors are as on construction."""
+        """Returns the damage with one fault set or repaired.
+
+        Args:
+            name: the actuator.
+            kind: name of the field, such as `stuck`; a stuck actuator ceases to run, and a running
+                one to be stuck.
+            value: value of that field (of `lost` any); None repairs that fault.
+
+        Raises:
+            AllocationError: as on construction.
+        """
         if kind == "lost":
-            others = tuple(other for other in self.lost if other != name)
-            return replace(self, lost=others if value is None else (*others, name))
-        replaced: tuple[str, ...] = (kind,)
+            lost = [lost_name for lost_name in self.lost if lost_name != name]
+            if value is not None:
+                lost.append(name)
+            return replace(self, lost=tuple(lost))
+        replaced_kinds: tuple[str, ...] = (kind,)
         if kind in ("stuck", "running") and value is not None:
-            replaced = ("stuck", "running")
-        changed: dict[str, Any] = {}
-        for each in replaced:
-            changed[each] = dict(getattr(self, each))
-            changed[each].pop(name, None)
+            replaced_kinds = ("stuck", "running")
+        changes: dict[str, Any] = {}
+        for replaced_kind in replaced_kinds:
+            changes[replaced_kind] = dict(getattr(self, replaced_kind))
+            changes[replaced_kind].pop(name, None)
         if value is not None:
-            changed[kind][name] = value
-        return replace(self, **changed)
+            changes[kind][name] = value
+        return replace(self, **changes)
 
     def renamed(self, names: Mapping[str, str]) -> "Damage":
-        """Returns it for actuators with new names, by their old ones; others are forgotten."""
-        known = {
-            kind: {names[k]: v for k, v in own.items() if k in names}
-            for kind, own in self.partly.items()
-        }
-        return Damage([names[name] for name in self.lost if name in names], **known)
+        """Returns the damage by new names; `names` maps old ones to new ones, and actuators that it
+        does not have are dropped."""
+        faults: dict[str, Any] = {}
+        for kind, by_name in self.partly.items():
+            faults[kind] = {}
+            for name, value in by_name.items():
+                if name in names:
+                    faults[kind][names[name]] = value
+        lost = [names[name] for name in self.lost if name in names]
+        return Damage(lost, **faults)
 
     @classmethod
     def known(
@@ -125,21 +147,37 @@ class Damage:
         torn: Mapping[str, float],
         stuck: Mapping[str, float],
     ) -> "Damage":
-        """What actuators that are lost, torn (the share of their force that is left) and stuck
-        (where: an angle [rad], of a thruster its force [N]) leave.
+        """Returns the damage that represents known faults, within what each kind may have.
 
-        What cannot be used any more counts as lost: a stuck rudder. A torn thruster is weak: it
-        gives the force that it is allocated where it is asked for more; one that is stuck as well
-        gives its share.
+        An actuator whose kind cannot be stuck, a rudder, counts as lost. One that cannot be torn, a
+        thruster, counts as weak: its controller can make up for it within the smaller limit; one
+        that is stuck as well gives that share of its force.
+
+        Args:
+            layout: the robot.
+            lost: names of lost actuators.
+            torn: remaining share of the force, by name [1].
+            stuck: angle [rad], of a thruster its force [N], by name.
         """
-        may = {part.name: part.KIND.faults for part in layout.actuators}
-        known = {name: at for name, at in stuck.items() if "stuck" in may[name]}
-        blades = {name: share for name, share in torn.items() if "torn" in may[name]}
-        weak = {name: share for name, share in torn.items() if name not in blades}
-        for name in set(weak) & set(known):
+        possible = {actuator.name: actuator.KIND.faults for actuator in layout.actuators}
+        stuck_values = {}
+        lost_by_stop = []
+        for name, value in stuck.items():
+            if "stuck" in possible[name]:
+                stuck_values[name] = value
+            else:
+                lost_by_stop.append(name)
+        torn_shares = {}
+        weak_shares = {}
+        for name, share in torn.items():
+            if "torn" in possible[name]:
+                torn_shares[name] = share
+            else:
+                weak_shares[name] = share
+        for name in set(weak_shares) & set(stuck_values):
             if not layout.part(name).KIND.sticks_at_angle:
-                known[name] *= weak.pop(name)
-        return cls((*lost, *(name for name in stuck if name not in known)), weak, blades, known)
+                stuck_values[name] *= weak_shares.pop(name)
+        return cls((*lost, *lost_by_stop), weak_shares, torn_shares, stuck_values)
 
     @classmethod
     def parse(
@@ -151,88 +189,115 @@ class Damage:
         stuck: Sequence[str] = (),
         running: Sequence[str] = (),
     ) -> "Damage":
-        """Returns damage of a layout from texts, directions in degrees: `bow=0.5` for a share;
-        `bow=20` for where one is stuck, a fin or a pod at 20 deg, a thruster at 20 N; for a command
-        `bow=0.3,1.0,20` of a fin [rad, Hz, deg], `bow=20,5` of a pod [deg, N], `bow=5` of a
-        thruster [N].
+        """Returns damage of a layout from texts `NAME=NUMBERS`, as the command line has them.
 
-        Raises AllocationError: a text that says something else; LayoutError: there is no actuator
-        of a name.
+        Args:
+            layout: the robot.
+            lost: names of lost actuators.
+            weak: a share each, such as `bow=0.5` [1].
+            torn: a share each, such as `bow=0.5` [1].
+            stuck: a value each: `bow=20` is 20 deg of a fin or a pod, 20 N of a thruster.
+            running: a command each: `bow=0.3,1.0,20` of a fin [rad, Hz, deg], `bow=20,5` of a pod
+                [deg, N], `bow=5` of a thruster [N].
+
+        Raises:
+            AllocationError: a text has another form.
+            LayoutError: there is no actuator of a name.
         """
-        shares = {
-            kind: {name: share for name, (share,) in _named(kind, texts, 1).items()}
-            for kind, texts in (("weak", weak), ("torn", torn))
-        }
-        held: dict[str, float] = {}
-        for name, (value,) in _named("stuck", stuck, 1).items():
-            held[name] = math.radians(value) if layout.part(name).KIND.sticks_at_angle else value
-        kept: dict[str, tuple[float, ...]] = {}
-        for name, values in _named("running", running, None).items():
-            part = layout.part(name)
-            turns = part.KIND.stuck_number if part.KIND.sticks_at_angle else None
-            # Of a kind that cannot run on, that is said where the damage is applied.
-            if "running" in part.KIND.faults and len(values) != len(part.KIND.numbers):
-                labels = [number.label for number in part.KIND.numbers]
-                if turns is not None:
-                    labels[turns] = f"{part.KIND.numbers[turns].name} [deg]"
-                wanted = ",".join(labels)
-                got = ",".join(f"{value:g}" for value in values)
-                raise AllocationError(
-                    f"running: expected NAME={wanted} of the {part.type} {name!r}, got "
-                    f"'{name}={got}'"
-                )
-            kept[name] = tuple(math.radians(v) if k == turns else v for k, v in enumerate(values))
-        return cls(lost, shares["weak"], shares["torn"], held, kept)
+        weak_shares = _number_by_name("weak", weak)
+        torn_shares = _number_by_name("torn", torn)
+        stuck_values: dict[str, float] = {}
+        for name, value in _number_by_name("stuck", stuck).items():
+            is_angle = layout.part(name).KIND.sticks_at_angle
+            stuck_values[name] = math.radians(value) if is_angle else value
+        commands: dict[str, tuple[float, ...]] = {}
+        for name, values in _numbers_by_name("running", running, None).items():
+            commands[name] = _command_in_radians(layout.part(name), values)
+        return cls(lost, weak_shares, torn_shares, stuck_values, commands)
 
     def applied_to(self, layout: Layout) -> Layout:
-        """Returns the layout with the limits that are left; the lost ones are still there. Raises
-        LayoutError: there is no actuator of a name, or one whose law is a table is torn;
-        AllocationError: its kind cannot be damaged so, its command has another number of values, or
-        a thruster or a pod cannot give the force at which it is said to hang."""
+        """Returns the layout with the limits that remain; lost actuators are not removed.
+
+        Raises:
+            LayoutError: there is no actuator of a name, or one whose law is a table is torn.
+            AllocationError: its kind cannot have the fault, its command has another count of
+                numbers, or a thruster or a pod cannot give the force at which it is stuck.
+        """
         return _applied(self, layout) if self.partly else layout
 
 
 WHOLE = Damage()
-"""Nothing is damaged."""
+"""No damage."""
 
 
 @lru_cache(maxsize=64)
 def _applied(damage: Damage, layout: Layout) -> Layout:
-    for kind, known in damage.partly.items():
-        for part in [layout.part(name, f"damage: {kind}") for name in known]:
-            if kind not in part.KIND.faults:
-                may = ", ".join((*part.KIND.faults, "lost"))
+    """As `Damage.applied_to`; cached, since every answer of a damaged robot asks for it."""
+    for kind, by_name in damage.partly.items():
+        damaged = [layout.part(name, f"damage: {kind}") for name in by_name]
+        for actuator in damaged:
+            if kind not in actuator.KIND.faults:
+                possible = ", ".join((*actuator.KIND.faults, "lost"))
                 raise AllocationError(
-                    f"damage of {part.name!r}: {part.type}s may be {may}, got {kind}"
+                    f"damage of {actuator.name!r}: {actuator.type}s may be {possible}, got {kind}"
                 )
     for name, command in damage.running.items():
         _check_count(layout.part(name), command)
-    parts = []
-    for part in layout.actuators:
+    actuators = []
+    for actuator in layout.actuators:
         try:
-            parts.append(part.damaged(Faults(**damage.of(part.name))))
+            actuators.append(actuator.damaged(Faults(**damage.of(actuator.name))))
         except LayoutError as error:
-            raise LayoutError(error.problem, error.key, f"damage of {part.name!r}") from None
-    return replace(layout, actuators=tuple(parts))
+            raise LayoutError(error.problem, error.key, f"damage of {actuator.name!r}") from None
+    return replace(layout, actuators=tuple(actuators))
 
 
-def _check_count(part: Actuator, command: Sequence[float]) -> None:
-    """Refuses a command that an actuator is said to keep, if it has another number of values than
-    its kind's. Raises AllocationError."""
-    if len(command) != len(part.KIND.numbers):
-        wanted = ", ".join(number.label for number in part.KIND.numbers)
-        got = ", ".join(f"{value:g}" for value in command)
+def _check_count(actuator: Actuator, command: Sequence[float]) -> None:
+    """Refuses a constant command with another count of numbers than its kind's. Raises
+    AllocationError."""
+    numbers = actuator.KIND.numbers
+    if len(command) != len(numbers):
+        labels = ", ".join(number.label for number in numbers)
+        values = ", ".join(f"{value:g}" for value in command)
         raise AllocationError(
-            f"damage of {part.name!r}: running: expected the command that {part.type}s have "
-            f"({wanted}), "
-            f"{len(part.KIND.numbers)} in all, got {len(command)} ({got})"
+            f"damage of {actuator.name!r}: running: expected the command that {actuator.type}s "
+            f"have ({labels}), {len(numbers)} in all, got {len(command)} ({values})"
         )
 
 
-def _named(option: str, texts: Sequence[str], count: int | None) -> dict[str, tuple[float, ...]]:
-    """Numbers by name, of texts NAME=NUMBER,..., so many of each, where that is not None; errors
-    say which option."""
-    named = {}
+def _command_in_radians(actuator: Actuator, values: tuple[float, ...]) -> tuple[float, ...]:
+    """A constant command from a text, whose angle at which the actuator may be stuck is in
+    degrees. Raises AllocationError: it has another count of numbers than its kind's."""
+    kind = actuator.KIND
+    angle_number = kind.stuck_number if kind.sticks_at_angle else None
+    # A kind that cannot run on is refused where the damage is applied.
+    if "running" in kind.faults and len(values) != len(kind.numbers):
+        labels = [number.label for number in kind.numbers]
+        if angle_number is not None:
+            labels[angle_number] = f"{kind.numbers[angle_number].name} [deg]"
+        form = ",".join(labels)
+        got = ",".join(f"{value:g}" for value in values)
+        raise AllocationError(
+            f"running: expected NAME={form} of the {actuator.type} {actuator.name!r}, got "
+            f"'{actuator.name}={got}'"
+        )
+    command = list(values)
+    if angle_number is not None and angle_number < len(command):
+        command[angle_number] = math.radians(command[angle_number])
+    return tuple(command)
+
+
+def _number_by_name(option: str, texts: Sequence[str]) -> dict[str, float]:
+    """One number by name, of texts NAME=NUMBER; errors name the option."""
+    return {name: value for name, (value,) in _numbers_by_name(option, texts, 1).items()}
+
+
+def _numbers_by_name(
+    option: str, texts: Sequence[str], count: int | None
+) -> dict[str, tuple[float, ...]]:
+    """Numbers by name, of texts NAME=NUMBER,... with `count` numbers each, None for any; errors
+    name the option."""
+    by_name = {}
     for text in texts:
         name, _, numbers = text.partition("=")
         try:
@@ -240,11 +305,9 @@ def _named(option: str, texts: Sequence[str], count: int | None) -> dict[str, tu
         except ValueError:
             values = ()
         if not name or not values or count not in (None, len(values)):
-            wanted = (
-                "NAME=NUMBER"
-                if count == 1
-                else "NAME=A,F,DEG of a fin, NAME=DEG,N of a pod, or NAME=N"
-            )
-            raise AllocationError(f"{option}: expected {wanted}, got {text!r}")
-        named[name] = values
-    return named
+            form = "NAME=A,F,DEG of a fin, NAME=DEG,N of a pod, or NAME=N"
+            if count == 1:
+                form = "NAME=NUMBER"
+            raise AllocationError(f"{option}: expected {form}, got {text!r}")
+        by_name[name] = values
+    return by_name

@@ -1,4 +1,5 @@
-"""The geometry of forces, for numpy's arrays and torch's tensors: own axes, body frame, wrench.
+"""Geometry of forces, for numpy arrays and torch tensors: own axes, body frame, wrench. The plant,
+the methods and the networks use it.
 
 Fin frame x' = shaft, y' = e_h, z' = e_z (see `finlab.actuators.fin.fin`); body frame FLU about the
 centre of gravity. Wrench order [Fx, Fy, Fz, Tx, Ty, Tz] in N and N m.
@@ -13,7 +14,7 @@ from finlab.layout.layout import Layout
 
 
 def force_effectiveness(position: Any, mounting_angle: Any) -> Any:
-    """Returns what one newton along each fin's three axes does to the robot.
+    """Returns the effectiveness of fins with horizontal shafts.
 
     Args:
         position: (..., n, 3), body frame [m]; an array or a tensor.
@@ -31,14 +32,16 @@ def force_effectiveness(position: Any, mounting_angle: Any) -> Any:
     s = xp.sin(mounting_angle)
     zero = xp.zeros_like(x)
     one = xp.ones_like(x)
+    # Each row is an axis a, then the torque r x a of 1 N along it.
     shaft = [c, s, zero, -z * s, z * c, x * s - y * c]
     horizontal = [-s, c, zero, -z * c, -z * s, x * c + y * s]
     vertical = [zero, zero, one, y, -x, zero]
-    return xp.stack([xp.stack(axis, axis=-1) for axis in (shaft, horizontal, vertical)], axis=-2)
+    rows = [xp.stack(axis, axis=-1) for axis in (shaft, horizontal, vertical)]
+    return xp.stack(rows, axis=-2)
 
 
 def own_effectiveness(layout: Layout) -> Array:
-    """What one newton along each actuator's own three axes does to the robot.
+    """Returns the effectiveness of each actuator along its own axes.
 
     Returns:
         (n, 3, 6): wrench [Fx, Fy, Fz, Tx, Ty, Tz] about the origin of 1 N along each row of
@@ -48,15 +51,27 @@ def own_effectiveness(layout: Layout) -> Array:
 
 
 def moved_effectiveness(layout: Layout, position: Array, frames: Array) -> Array:
-    """The same (..., n, 3, 6) of actuators at positions (..., n, 3) [m] with own axes (..., n, 3,
-    3)."""
-    reaction = np.array([getattr(part, "torque_per_newton", 0.0) for part in layout.actuators])
-    torque = np.cross(position[..., None, :], frames) + reaction[:, None, None] * frames
+    """Returns `own_effectiveness` of a layout whose actuators have been moved.
+
+    Args:
+        layout: the robot, whose propellers have a reaction torque.
+        position: points (..., n, 3) where the forces act, body frame [m].
+        frames: own axes (..., n, 3, 3), rows in the body frame.
+
+    Returns:
+        (..., n, 3, 6): wrench about the origin of 1 N along each own axis [1, m].
+    """
+    torque_per_newton = [
+        getattr(actuator, "torque_per_newton", 0.0) for actuator in layout.actuators
+    ]
+    reaction = np.array(torque_per_newton)[:, None, None] * frames
+    # tau = r x a + k a, with the reaction torque k a about the force
+    torque = np.cross(position[..., None, :], frames) + reaction
     return np.concatenate([frames, torque], axis=-1)
 
 
 def layout_effectiveness(layout: Layout) -> Array:
-    """What one newton along each direction in which an actuator pushes does to the robot.
+    """Returns the effectiveness matrix of a layout, by the directions in which actuators push.
 
     Returns:
         (6, m): wrench [Fx, Fy, Fz, Tx, Ty, Tz] of 1 N, actuators side by side: of a fin along zero
@@ -64,12 +79,14 @@ def layout_effectiveness(layout: Layout) -> Array:
         axis, of an azimuth along zero and turn_axis x zero, of a rudder along shaft x zero, its
         lift ahead.
     """
-    pairs = zip(own_effectiveness(layout), layout.actuators, strict=True)
-    return np.concatenate([own[list(actuator.KIND.push_rows)] for own, actuator in pairs]).T
+    columns = []
+    for effectiveness, actuator in zip(own_effectiveness(layout), layout.actuators, strict=True):
+        columns.append(effectiveness[list(actuator.KIND.push_rows)])
+    return np.concatenate(columns).T
 
 
 def body_force(own_force: Values, frames: Values) -> Values:
-    """Turns forces from the actuators' own frames to the body frame.
+    """Returns forces rotated from the actuators' own frames to the body frame.
 
     Args:
         own_force: (..., 3) along own axes [N].
@@ -82,11 +99,15 @@ def body_force(own_force: Values, frames: Values) -> Values:
 
 
 def wrench_of_forces(fin_force: Values, effectiveness: Values) -> Values:
-    """Sums forces (..., n, 3) [N] in fin frames to wrenches (..., 6) [N, N m].
+    """Returns the wrenches of forces, w = sum_i B_i y_i.
 
     Args:
-        fin_force: broadcast with the effectiveness.
-        effectiveness: wrench per newton of each fin (..., n, 3, 6), from `force_effectiveness`.
+        fin_force: forces (..., n, 3), own frames [N]; an array or a tensor.
+        effectiveness: wrenches (..., n, 3, 6) of 1 N along own axes [1, m]; leading axes broadcast
+            with those of the forces.
+
+    Returns:
+        (..., 6) [N, N m], body frame.
     """
     n = fin_force.shape[-2]
     flat = effectiveness.reshape(*effectiveness.shape[:-3], 3 * n, 6)

@@ -11,31 +11,30 @@ from finlab.files.schema import Name, checked
 from finlab.layout.layout import MAX_ACTUATORS
 
 POSITION_SCALE = 0.3
-"""Positions [m] of order one: the paper's layouts lie within."""
+"""Divisor of positions [m] that makes them of order one: the paper's layouts lie within."""
 SCALES = (0.6, 2.1, math.pi)
-"""Amplitude [rad], frequency [Hz] and zero direction [rad] of order one."""
+"""Divisors of amplitude [rad], frequency [Hz] and zero direction [rad]."""
 
 
 class Edge(Struct, forbid_unknown_fields=True):
-    """Two actuators, or one twice."""
+    """An edge of the graph, between two actuators or from one to itself."""
 
     source: Name
     target: Name
 
 
 class Normalization(Struct, forbid_unknown_fields=True):
-    """What numbers are divided by to be of order one."""
+    """Divisors that make numbers of order one."""
 
     features: dict[str, float]
-    """Of the features of fins with horizontal shafts, by name, as the paper's network takes
-    them."""
+    """Of the features of fins with horizontal shafts, by name, as the paper's network has them."""
     wrench: dict[str, float]
-    """Of each axis of a wrench [N, N m]: the robot's own wrench scale, in which errors are
-    measured."""
+    """Of each axis of a wrench [N, N m]: the robot's wrench scale, by which errors are
+    normalized."""
 
 
 class Data(Struct, forbid_unknown_fields=True):
-    """What holds for the whole graph."""
+    """Attributes of the graph."""
 
     layout: dict[str, Any]
     """A layout file of version 2 without its actuators, which are the nodes."""
@@ -60,21 +59,31 @@ class Graph(Struct, forbid_unknown_fields=True):
 
 
 def layout_in_graph(data: Any) -> dict[str, Any]:
-    """Returns the plain values of the layout file that a graph file holds. Raises LayoutError: a
-    part of the graph is missing, unknown or not what it has to be."""
+    """Returns the plain values of the layout file that a graph file contains.
+
+    Raises:
+        LayoutError: a key of the graph is missing, unknown or has a wrong value.
+    """
     graph = checked(data, Graph)
     names = [node.get("id") for node in graph.nodes]
     if [(edge.source, edge.target) for edge in graph.edges] != edges_of(names):
         raise LayoutError(
             "expected each actuator with itself and with those after it, in order", "edges"
         )
-    parts = [
-        {"name": node.get("id")} | {key: node[key] for key in node if key not in ("id", "features")}
-        for node in graph.nodes
-    ]
-    return {**graph.graph.layout, "actuators": parts}
+    actuators = []
+    for node in graph.nodes:
+        actuator = {"name": node.get("id")}
+        for key, value in node.items():
+            if key not in ("id", "features"):
+                actuator[key] = value
+        actuators.append(actuator)
+    return {**graph.graph.layout, "actuators": actuators}
 
 
 def edges_of(names: list[Any]) -> list[tuple[Any, Any]]:
-    """Returns all pairs of names, each with itself too."""
-    return [(a, b) for k, a in enumerate(names) for b in names[k:]]
+    """Returns all unordered pairs of names, those of a name with itself included."""
+    edges = []
+    for i, source in enumerate(names):
+        for target in names[i:]:
+            edges.append((source, target))
+    return edges

@@ -1,4 +1,4 @@
-"""Layouts: the actuators of one robot, in order, and optionally its body."""
+"""The layout of a robot: its actuators, in order, and optionally its body."""
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -34,18 +34,18 @@ class Layout(Checked):
     """The actuators of one robot. Immutable and comparable; every change returns a new layout."""
 
     name: Name
-    """What the layout is called."""
+    """Name of the layout."""
     actuators: tuple[Actuator, ...]
     """The actuators, 1 to 64, with unique names. Commands and arrays follow this order."""
     description: Annotated[str, Meta(max_length=MAX_DESCRIPTION_LENGTH)] = ""
-    """What there is to know about it, for people."""
+    """Description for people."""
     body: "Body | None" = None
     """Hull, mass and hydrodynamics, where known."""
     axes: CommandedAxes = AXES
     """Axes of the wrench that the robot commands; the others take what the cheapest answer gives
     them."""
     interaction: "InteractionModel | None" = None
-    """What the actuators do to each other; None where that does not count."""
+    """Model of the hydrodynamic interaction of the actuators; None to neglect it."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -71,7 +71,7 @@ class Layout(Checked):
         )
 
     def __hash__(self) -> int:
-        # Kept: every call of an allocator looks its layout up, and hashing all parts takes longer.
+        # Cached: every call of an allocator looks its layout up, and hashing all fields is slow.
         return self._hash
 
     def __getstate__(self) -> dict[str, Any]:
@@ -94,17 +94,17 @@ class Layout(Checked):
     @cached_property
     def fins(self) -> tuple[Fin, ...]:
         """The actuators that are fins, in order; of a robot of fins all of them."""
-        return tuple(part for part in self.actuators if isinstance(part, Fin))
+        return tuple(actuator for actuator in self.actuators if isinstance(actuator, Fin))
 
     @cached_property
     def is_fin(self) -> NDArray[np.bool_]:
         """Which actuators (n,) are fins."""
-        return np.array([isinstance(part, Fin) for part in self.actuators])
+        return np.array([isinstance(actuator, Fin) for actuator in self.actuators])
 
     @cached_property
     def by_flow(self) -> tuple[str, ...]:
         """Names of the actuators that give nothing at rest: their force is that of the flow."""
-        return tuple(part.name for part in self.actuators if part.KIND.driven_by_flow)
+        return tuple(actuator.name for actuator in self.actuators if actuator.KIND.driven_by_flow)
 
     @cached_property
     def fins_alone(self) -> "Layout":
@@ -114,21 +114,21 @@ class Layout(Checked):
     @cached_property
     def files(self) -> tuple[str, ...]:
         """Paths of the tables and of the network that its laws and its interaction read."""
-        return tuple(part.reads for part in self._readers if part.reads)
+        return tuple(reader.reads for reader in self._readers if reader.reads)
 
     @property
     def stamps(self) -> tuple[tuple[int, int] | None, ...]:
-        """Time and size of each file that a law reads, for what is kept until one of them
-        changes."""
-        return tuple(part.stamp for part in self._readers)
+        """Time and size of each file that a law or the interaction reads; a cache is valid until
+        one of them changes."""
+        return tuple(reader.stamp for reader in self._readers)
 
     @cached_property
     def _readers(self) -> "tuple[Actuator | InteractionModel, ...]":
-        """What reads a file: interaction and actuators, in this order."""
-        parts: tuple[Actuator | InteractionModel, ...] = self.actuators
+        """The interaction and the actuators, in this order, that read a file."""
+        candidates: tuple[Actuator | InteractionModel, ...] = self.actuators
         if self.interaction is not None:
-            parts = (self.interaction, *parts)
-        return tuple(part for part in parts if part.reads)
+            candidates = (self.interaction, *candidates)
+        return tuple(candidate for candidate in candidates if candidate.reads)
 
     @cached_property
     def is_of_fins(self) -> bool:
@@ -136,25 +136,27 @@ class Layout(Checked):
         return self.n_fins == self.n
 
     def only(self, what: str, kind: str = "fin", horizontal: bool = False) -> None:
-        """Refuses a robot whose actuators are not all of one type, for what is made for that.
-        Raises LayoutError: the sentence names `what` and the first actuator that it does not take.
+        """Refuses a robot whose actuators are not all of one type.
 
         Args:
-            what: what was asked for, as the sentence begins.
+            what: the feature that needs it, with which the error's sentence begins.
             kind: the type.
             horizontal: whether the fins' shafts have to be horizontal, too, with a mounting angle.
+
+        Raises:
+            LayoutError: an actuator is of another type; the sentence names the first one.
         """
-        for part in self.actuators:
-            if part.type != kind:
-                wanted = f"robots of {kind}s"
-                problem = f"is of type {part.type}"
-            elif horizontal and getattr(part, "mounting_angle", None) is None:
-                wanted = "fins with a mounting angle"
+        for actuator in self.actuators:
+            if actuator.type != kind:
+                accepted = f"robots of {kind}s"
+                problem = f"is of type {actuator.type}"
+            elif horizontal and getattr(actuator, "mounting_angle", None) is None:
+                accepted = "fins with a mounting angle"
                 problem = "has a shaft of its own direction"
             else:
                 continue
             raise LayoutError(
-                f"{what} works for {wanted} only, and {part.name!r} of layout {self.name} "
+                f"{what} works for {accepted} only, and {actuator.name!r} of layout {self.name} "
                 f"{problem}; "
                 "method dual of `finlab allocate` takes any actuator"
             )
@@ -166,8 +168,8 @@ class Layout(Checked):
 
     @cached_property
     def position(self) -> Array:
-        """Where each actuator's force acts (n, 3), body frame [m]; read-only."""
-        return _read_only([part.position for part in self.actuators])
+        """Points (n, 3) where the actuators' forces act, body frame [m]; read-only."""
+        return _read_only([actuator.position for actuator in self.actuators])
 
     @cached_property
     def frames(self) -> Array:
@@ -175,7 +177,7 @@ class Layout(Checked):
 
         Fin: shaft, zero, shaft x zero; see the other types for theirs.
         """
-        return _read_only([part.frame for part in self.actuators])
+        return _read_only([actuator.frame for actuator in self.actuators])
 
     @cached_property
     def mounting_angle(self) -> Array:
@@ -188,12 +190,12 @@ class Layout(Checked):
     def lower(self) -> Array:
         """Least command of each actuator (n, 3), of a fin amplitude [rad], frequency [Hz] and zero
         direction [rad]; read-only."""
-        return _read_only([part.lower for part in self.actuators])
+        return _read_only([actuator.lower for actuator in self.actuators])
 
     @cached_property
     def upper(self) -> Array:
         """Greatest command of each actuator (n, 3), as `lower`; read-only."""
-        return _read_only([part.upper for part in self.actuators])
+        return _read_only([actuator.upper for actuator in self.actuators])
 
     @cached_property
     def servo_poles(self) -> Array:
@@ -204,44 +206,51 @@ class Layout(Checked):
 
     @cached_property
     def rates(self) -> Array:
-        """How fast the commands of each actuator change at most from tick to tick (n, 3) [per
-        second], infinite where nothing limits them; read-only."""
-        return _read_only([part.rates for part in self.actuators])
+        """Largest rates of the commands (n, 3) [rad/s, Hz/s, N/s], infinite where nothing limits
+        them; read-only."""
+        return _read_only([actuator.rates for actuator in self.actuators])
 
     @cached_property
     def delay_s(self) -> float:
-        """How late the slowest actuator follows its command [s]."""
-        return max(part.delay_s for part in self.actuators)
+        """Delay of the slowest actuator after its command [s]."""
+        return max(actuator.delay_s for actuator in self.actuators)
 
     @cached_property
     def speed_limit(self) -> Array:
-        """How fast each fin can turn (n,) [rad/s]; read-only."""
+        """Largest angular speeds of the fins (n_fins,) [rad/s]; read-only."""
         return _read_only([fin.servo.speed_limit for fin in self.fins])
 
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the actuators, in order."""
-        return tuple(part.name for part in self.actuators)
+        return tuple(actuator.name for actuator in self.actuators)
 
     @property
     def n(self) -> int:
-        """How many actuators there are."""
+        """Number of actuators."""
         return len(self.actuators)
 
     @property
     def n_fins(self) -> int:
-        """How many fins there are."""
+        """Number of fins."""
         return len(self.fins)
 
     @property
     def counted(self) -> str:
-        """How many actuators there are of each type, such as `4 fins and 2 thrusters`."""
-        counts = Counter(part.type for part in self.actuators)
+        """Number of actuators of each type in words, such as `4 fins and 2 thrusters`."""
+        counts = Counter(actuator.type for actuator in self.actuators)
         return " and ".join(f"{n} {kind}{'s' if n > 1 else ''}" for kind, n in counts.items())
 
     def index(self, name: str, argument: str = "") -> int:
-        """Returns the place of the actuator called `name`. Raises LayoutError: there is none; the
-        message lists those there are, and begins with the `argument` that the name stood in."""
+        """Returns the index of an actuator.
+
+        Args:
+            name: the actuator.
+            argument: the argument that holds the name, with which an error begins.
+
+        Raises:
+            LayoutError: there is none of this name; the message lists the names of all.
+        """
         if name not in self.names:
             what = "fin" if self.is_of_fins else "actuator"
             raise LayoutError(
@@ -251,32 +260,45 @@ class Layout(Checked):
         return self.names.index(name)
 
     def indices(self, names: Sequence[str], argument: str = "") -> tuple[int, ...]:
-        """Returns the places of several actuators, in the order asked for; errors as for
-        `index`."""
+        """Returns the indices of several actuators, in the order of their names; arguments and
+        errors as for `index`."""
         return tuple(self.index(name, argument) for name in names)
 
     def part(self, name: str, argument: str = "") -> Actuator:
-        """Returns the actuator called `name`; errors as for `index`."""
+        """Returns the actuator of a name; arguments and errors as for `index`."""
         return self.actuators[self.index(name, argument)]
 
-    def with_part(self, part: Actuator, name: str = "") -> "Layout":
-        """Returns the layout with another actuator in the place of the one of that name, by default
-        its own. Raises LayoutError: there is none, or the new name is another one's."""
-        i = self.index(name or part.name)
-        return replace(self, actuators=(*self.actuators[:i], part, *self.actuators[i + 1 :]))
+    def with_part(self, actuator: Actuator, name: str = "") -> "Layout":
+        """Returns the layout with one actuator replaced.
+
+        Args:
+            actuator: the new actuator.
+            name: the one that it replaces; by default that of the new one's name.
+
+        Raises:
+            LayoutError: there is none of that name, or the new name is that of another one.
+        """
+        i = self.index(name or actuator.name)
+        return replace(self, actuators=(*self.actuators[:i], actuator, *self.actuators[i + 1 :]))
 
     def without(self, names: Iterable[str], argument: str = "") -> "Layout":
-        """Returns the layout that is left when the actuators called `names` are lost. Raises
-        LayoutError: a name is unknown, or none is left; the message begins with the `argument` that
-        the names stood in."""
+        """Returns the layout without some actuators.
+
+        Args:
+            names: the actuators to remove.
+            argument: the argument that holds the names, with which an error begins.
+
+        Raises:
+            LayoutError: there is no actuator of a name, or none remains.
+        """
         names = [names] if isinstance(names, str) else list(names)
         lost = set(self.indices(names, argument))
         if len(lost) == self.n:
             what = "fin" if self.is_of_fins else "actuator"
             problem = f"layout {self.name} has no {what} left once all are lost; repair one"
             raise LayoutError(problem, argument)
-        left = tuple(part for i, part in enumerate(self.actuators) if i not in lost)
-        return replace(self, actuators=left)
+        working = tuple(actuator for i, actuator in enumerate(self.actuators) if i not in lost)
+        return replace(self, actuators=working)
 
     def replace_actuator(self, name: str, /, **changes: Any) -> "Layout":
         """Returns the layout with some fields of one actuator changed, such as `position=(0.1, 0,
@@ -285,6 +307,7 @@ class Layout(Checked):
 
 
 def _read_only(values: ArrayLike) -> Array:
+    """A copy of values as an array that cannot be changed, since layouts share it."""
     array = np.array(values, dtype=np.float64)
     array.setflags(write=False)
     return array

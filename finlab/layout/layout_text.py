@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 from finlab.display import Block, Table
 
 Layout = Any
-"""`finlab.layout.Layout`, which shows itself by what is here."""
+"""`finlab.layout.Layout`, which prints itself by this module."""
 
 
 class Column(NamedTuple):
@@ -21,13 +21,13 @@ class Column(NamedTuple):
 
 
 COLUMNS = (
-    Column("actuator", lambda part: part.name, is_text=True),
-    Column("type", lambda part: part.type, is_text=True),
-    Column("x [m]", lambda part: f"{part.position[0]:6.3f}"),
-    Column("y [m]", lambda part: f"{part.position[1]:6.3f}"),
-    Column("z [m]", lambda part: f"{part.position[2]:6.3f}"),
-    Column("direction", lambda part: part.direction_words, is_text=True),
-    Column("limits", lambda part: part.limits_words, is_text=True),
+    Column("actuator", lambda actuator: actuator.name, is_text=True),
+    Column("type", lambda actuator: actuator.type, is_text=True),
+    Column("x [m]", lambda actuator: f"{actuator.position[0]:6.3f}"),
+    Column("y [m]", lambda actuator: f"{actuator.position[1]:6.3f}"),
+    Column("z [m]", lambda actuator: f"{actuator.position[2]:6.3f}"),
+    Column("direction", lambda actuator: actuator.direction_words, is_text=True),
+    Column("limits", lambda actuator: actuator.limits_words, is_text=True),
 )
 """The columns from left to right; the first one says which actuator a row is of."""
 
@@ -35,7 +35,9 @@ COLUMNS = (
 def layout_blocks(layout: Layout) -> list[Block]:
     """Returns a layout in words, and a table of its actuators."""
     head = [column.title for column in COLUMNS]
-    rows = [[column.cell(part) for column in COLUMNS] for part in layout.actuators]
+    rows = []
+    for actuator in layout.actuators:
+        rows.append([column.cell(actuator) for column in COLUMNS])
     is_text = [column.is_text for column in COLUMNS]
     title = f"{layout.name}: {layout.description}" if layout.description else layout.name
     return [title, Table(head, rows, is_text)]

@@ -1,4 +1,4 @@
-"""Layouts written: as the plain values of a layout file, and into one."""
+"""Writing of layouts: as the plain values of a layout file, and into a file."""
 
 import json
 import math
@@ -26,49 +26,69 @@ def layout_to_dict(layout: Layout) -> dict[str, Any]:
     if layout.axes != AXES:
         data["axes"] = list(layout.axes)
     data["actuators"] = plain(layout.actuators)
-    others = {name: getattr(layout, name) for name in ("body", "interaction")}
-    return data | {name: plain(part) for name, part in others.items() if part is not None}
+    for name in ("body", "interaction"):
+        value = getattr(layout, name)
+        if value is not None:
+            data[name] = plain(value)
+    return data
 
 
 def save_layout(layout: Layout, path: str | os.PathLike[str]) -> None:
-    """Writes a layout file, JSON if the name ends in `.json`, else YAML; an existing file is
-    replaced whole. Raises LayoutError: the file cannot be written."""
+    """Writes a layout file; an existing file is replaced at once, never in part.
+
+    Args:
+        layout: the robot.
+        path: the file: JSON if its name ends in `.json`, else YAML.
+
+    Raises:
+        LayoutError: the file cannot be written.
+    """
     data = layout_to_dict(layout)
     is_json = Path(path).suffix.lower() == ".json"
-    write_whole(path, json.dumps(data, indent=2) + "\n" if is_json else yaml_text(data))
+    content = json.dumps(data, indent=2) + "\n" if is_json else yaml_text(data)
+    write_whole(path, content)
 
 
 def plain(value: Any) -> Any:
-    """Returns the plain values of a part of a layout file; what is as usual is left out."""
+    """Returns an object of a layout as the plain values of a file, without those that are the
+    defaults."""
     if isinstance(value, FinModelSpec):
         return {"type": value.type, **dict(value.parameters)}
     if isinstance(value, tuple):
         return [plain(item) for item in value]
     if not isinstance(value, Checked):
         return value
-    keys = {**value.KEYS, **{name: key for name, (key, _) in value.DEGREES.items()}}
+    keys = dict(value.KEYS)
+    for name, (key, _) in value.DEGREES.items():
+        keys[name] = key
     data = {}
     for field in fields(value):
         if field.name in value.UNSAID:
             continue
-        own = getattr(value, field.name)
-        if own != field.default or field.name in value.WRITTEN:
-            own = degrees_of(own) if field.name in value.DEGREES else own
-            data[keys.get(field.name, field.name)] = plain(own)
-    name = {"name": data.pop("name")} if "name" in data else {}
-    return {**name, **({"type": value.type} if value.type else {}), **data}
+        field_value = getattr(value, field.name)
+        if field_value == field.default and field.name not in value.WRITTEN:
+            continue
+        if field.name in value.DEGREES:
+            field_value = degrees_of(field_value)
+        data[keys.get(field.name, field.name)] = plain(field_value)
+    # Name and type come first in a file.
+    first = {}
+    if "name" in data:
+        first["name"] = data.pop("name")
+    if value.type:
+        first["type"] = value.type
+    return {**first, **data}
 
 
 def degrees_of(value: Any) -> Any:
-    """Returns degrees of radians [rad], one or a tuple: twelve digits give back what people wrote;
-    where they do not, more are taken, so that reading gives the same radians."""
+    """Returns degrees of radians [rad], a number or a tuple, such that reading gives the same
+    radians: rounded to twelve digits, as a person would have written them, where that does."""
     if isinstance(value, tuple):
         return tuple(map(degrees_of, value))
     exact = math.degrees(value)
-    near = (
-        round(exact, 12),
-        exact,
-        math.nextafter(exact, math.inf),
-        math.nextafter(exact, -math.inf),
-    )
-    return next((angle for angle in near if math.radians(angle) == value), near[0])
+    rounded = round(exact, 12)
+    neighbours = (math.nextafter(exact, math.inf), math.nextafter(exact, -math.inf))
+    for angle in (rounded, exact, *neighbours):
+        if math.radians(angle) == value:
+            return angle
+    return rounded

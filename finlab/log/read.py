@@ -168,12 +168,12 @@ def _axes_of(robot: Layout) -> Array:
     return np.array([getattr(actuator, "axis", (0.0, 0.0, 0.0)) for actuator in robot.actuators])
 
 
-def _unit(form: Form, robot: Layout, scale: ArrayLike | None) -> Array:
+def _unit(source_program: Form, robot: Layout, scale: ArrayLike | None) -> Array:
     """The wrench (6,) that a setpoint of 1 stands for [N, N m], FLU; NaN along an axis that the
     robot does not drive.
 
     Args:
-        form: the program that wrote the log.
+        source_program: the program that wrote the log.
         robot: the robot; by its forces where `scale` is None.
         scale: the user's (6,); of ROS the factor of its wrenches.
 
@@ -188,9 +188,9 @@ def _unit(form: Form, robot: Layout, scale: ArrayLike | None) -> Array:
         raise DataError(
             f"scale: expected six numbers above 0, newtons and newton metres, got {scale!s:.80}"
         )
-    if form == "ros":
+    if source_program == "ros":
         return np.ones(6)
-    kind = Px4 if form == "px4" else ArduSub
+    kind = Px4 if source_program == "px4" else ArduSub
     return np.abs(kind(robot, kind.settings_class(), yardstick(robot)).setpoint_unit)
 
 

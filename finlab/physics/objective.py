@@ -1,7 +1,8 @@
-"""Costs that an allocation keeps least: mean power in watts, or the paper's effort `J_en`; and the
-yardstick of a robot, with which errors are compared.
+"""Costs that an allocation minimizes: mean power in watts, or the paper's effort `J_en`; and the
+wrench scale of a robot, by which errors are normalized.
 
-`J_en` is a sum of squares and one product of normalized commands.
+`J_en` is a sum of squares and one product of normalized commands. Methods, the score of an answer,
+the judge of logs and the experiments use this module.
 """
 
 from functools import lru_cache
@@ -27,16 +28,25 @@ LEAST_SCALE = 1e-3
 
 
 def effort_scale(upper: Values) -> Values:
-    """What each command is divided by: its own fin's upper limit (..., 3), an array or a tensor.
+    """Returns the divisors (..., 3) that normalize commands: the sizes of the fins' upper limits.
 
-    One of zero or below, such as that of an arc below zero, would blow up or change the sign: its
-    size counts, and no less than a floor.
+    An upper limit of zero or below, such as that of an arc below zero, would divide by zero or
+    change the sign; so its absolute value is taken, and at least `LEAST_SCALE`.
+
+    Args:
+        upper: upper limits (..., 3) [rad, Hz, rad], an array or a tensor.
     """
     return abs(upper).clip(LEAST_SCALE)
 
 
 def effort_of_shares(amplitude: Values, frequency: Values, zero_direction: Values) -> Values:
-    """One fin's summand of `J_en`, from commands over their scale: arrays, tensors or symbols."""
+    """Returns the summand (...,) of one fin in `J_en` (the paper's Eq. 9).
+
+    Args:
+        amplitude: over its scale (...,) [1]; an array, a tensor or a symbol.
+        frequency: over its scale (...,) [1].
+        zero_direction: over its scale (...,) [1].
+    """
     a = amplitude
     f = frequency
     d = zero_direction
@@ -44,47 +54,59 @@ def effort_of_shares(amplitude: Values, frequency: Values, zero_direction: Value
 
 
 def fin_effort(command: Values, upper: Values) -> Values:
-    """Energy (...,) of each fin: commands (..., 3) and upper limits (..., 3), arrays or tensors."""
+    """Returns the effort (...,) of each fin.
+
+    Args:
+        command: commands (..., 3) [rad, Hz, rad], an array or a tensor.
+        upper: upper limits (..., 3) [rad, Hz, rad].
+    """
     scaled = command / effort_scale(upper)
     return effort_of_shares(scaled[..., 0], scaled[..., 1], scaled[..., 2])
 
 
 def command_effort(command: NDArray[np.floating], upper: NDArray[np.floating]) -> AnyArray:
-    """`J_en` (the paper's Eq. 9) of whole robots: commands (..., n, 3) to energies (...,). Lost
-    fins (NaN) count nothing."""
+    """Returns the effort `J_en` (...,) of robots (the paper's Eq. 9).
+
+    Args:
+        command: commands (..., n, 3) [rad, Hz, rad]; a row of NaN is a lost fin and adds nothing.
+        upper: upper limits (n, 3) [rad, Hz, rad].
+    """
     effort = fin_effort(command, upper)
     return np.asarray(np.where(np.isnan(effort), 0.0, effort).sum(-1))
 
 
 class EffortMeter:
-    """The energy proxy of one robot whose fins are all healthy, ready for many commands."""
+    """Effort `J_en` of one robot all of whose fins work, as a quadratic form u^T Q u / 2 of its
+    commands u."""
 
     def __init__(self, upper: Array) -> None:
-        """Make it for upper limits (n, 3)."""
+        """Computes the matrix Q for upper limits (n, 3) [rad, Hz, rad]."""
         self.upper = upper
         self._scale = effort_scale(upper)
-        squares = np.array([AMPLITUDE, FREQUENCY, ZERO_DIRECTION])
-        self._twice = 2.0 * squares / self._scale**2
-        self._product = PRODUCT / (self._scale[:, 0] * self._scale[:, 1])
+        weights = np.array([AMPLITUDE, FREQUENCY, ZERO_DIRECTION])
+        self._hessian_diagonal = 2.0 * weights / self._scale**2
+        """Diagonal (n, 3) of Q."""
+        self._hessian_product = PRODUCT / (self._scale[:, 0] * self._scale[:, 1])
+        """Entries (n,) of Q for amplitude and frequency of one fin."""
 
     def __call__(self, command: NDArray[np.floating]) -> AnyArray:
-        """Energies (R,) of commands (R, n, 3)."""
-        # Of a quadratic form, half the slopes times the commands.
-        energy: AnyArray = 0.5 * np.einsum("rni,rni->r", self.gradient(command), command)
-        return energy
+        """Returns the efforts (R,) of commands (R, n, 3)."""
+        effort, _ = self.with_gradient(command)
+        return effort
 
     def gradient(self, command: NDArray[np.floating]) -> AnyArray:
-        """Derivatives (R, n, 3) of the energies by commands (R, n, 3)."""
-        gradient: AnyArray = command * self._twice
-        gradient[..., 0] += self._product * command[..., 1]
-        gradient[..., 1] += self._product * command[..., 0]
+        """Returns the derivatives Q u (R, n, 3) of the efforts by commands u (R, n, 3)."""
+        gradient: AnyArray = command * self._hessian_diagonal
+        gradient[..., 0] += self._hessian_product * command[..., 1]
+        gradient[..., 1] += self._hessian_product * command[..., 0]
         return gradient
 
     def with_gradient(self, command: NDArray[np.floating]) -> tuple[AnyArray, AnyArray]:
-        """Both, for little more than the price of one."""
+        """Returns the efforts (R,) of commands (R, n, 3), and their derivatives (R, n, 3)."""
         gradient = self.gradient(command)
-        # Of a quadratic form, half the slopes times the commands.
-        return 0.5 * np.einsum("rni,rni->r", gradient, command), gradient
+        # J = u^T Q u / 2
+        effort: AnyArray = 0.5 * np.einsum("rni,rni->r", gradient, command)
+        return effort, gradient
 
 
 Name = Literal["power", "effort"]
@@ -93,81 +115,114 @@ Name = Literal["power", "effort"]
 
 
 class PowerMeter:
-    """The power of one robot whose fins are all healthy, ready for many commands."""
+    """Power of one robot all of whose actuators work."""
 
     def __init__(self, plant: Plant) -> None:
-        """Make it for the fins of a plant."""
+        """Takes the plant of the robot."""
         self._plant = plant
 
     def __call__(self, command: Array) -> Array:
-        """Power (R,) [W] of commands (R, n, 3)."""
+        """Returns the power (R,) [W] of commands (R, n, 3)."""
         total: Array = self._plant.power(command).sum(-1)
         return total
 
     def gradient(self, command: Array) -> Array:
-        """Derivatives (R, n, 3) of the power by commands (R, n, 3)."""
+        """Returns the derivatives (R, n, 3) of the power by commands (R, n, 3)."""
         return self._plant.power_gradient(command)
 
 
 CostMeter = PowerMeter | EffortMeter
-"""Commands (R, n, 3) of one robot to costs (R,), and their slopes."""
+"""Costs (R,) of commands (R, n, 3) of one robot, and their gradients."""
 
 
 def cost_meter(objective: Name, plant: Plant) -> CostMeter:
-    """Returns the meter of what the commands of a robot cost."""
+    """Returns the cost function of a robot.
+
+    Args:
+        objective: the cost by name.
+        plant: the robot; of fins alone for `effort`.
+    """
     return PowerMeter(plant) if objective == "power" else EffortMeter(plant.upper)
 
 
 STEPS = (9, 9, 17)
-"""Values of each of its three numbers that an actuator is tried with, evenly spread over its
-limits."""
+"""Values of each of an actuator's three command numbers on the grid over its limits that is
+searched for its largest force."""
 LEAST_LEVER = 1e-3
-"""Least ratio [m] of the scale of torques to that of forces, for robots whose actuators turn
-nothing."""
+"""Least ratio [m] of the scale of torques to that of forces, for robots whose actuators give no
+torque."""
 
 
 def yardstick(layout: Layout) -> Array:
-    """The scales (6,) of a robot's wrench: three times F [N], three times T [N m].
+    """Returns the wrench scale sigma (6,) of a robot: three times F [N], three times T [N m].
 
     F is the root of the sum of squares of the actuators' largest forces, and T is F times the root
     mean square of their levers: each one's largest torque about the origin over its largest force.
-    So how a force compares with a torque is a matter of where actuators stand, and stays as it is
-    while rates, damage or a tick leave some of them less to give. A robot that gives nothing has F
-    = 1 N. Raises DataError: a fin's force table cannot be read."""
+    So the ratio of T to F depends on the positions of the actuators alone, and does not change
+    while rates, damage or a tick reduce the limits of some of them. A robot without force has
+    F = 1 N.
+
+    Raises:
+        DataError: a fin's force table cannot be read.
+    """
     plant = Plant(layout)
-    wrench = np.einsum("kni,niw->knw", plant.force(plant.grid(STEPS)), plant.effectiveness)
-    forces = np.linalg.norm(wrench[..., :3], axis=-1).max(axis=0)
-    torques = np.linalg.norm(wrench[..., 3:], axis=-1).max(axis=0)
-    force = float(np.sqrt((forces**2).sum())) or 1.0
-    pushes = forces > 0.0
-    levers = torques[pushes] / forces[pushes]
-    lever = float(np.sqrt((levers**2).mean())) if pushes.any() else 0.0
-    scale = np.repeat([force, max(lever, LEAST_LEVER) * force], 3)
+    force = plant.force(plant.grid(STEPS))
+    wrench = np.einsum("kni,niw->knw", force, plant.effectiveness)
+    largest_forces = np.linalg.norm(wrench[..., :3], axis=-1).max(axis=0)
+    largest_torques = np.linalg.norm(wrench[..., 3:], axis=-1).max(axis=0)
+    # F = sqrt(sum f_i^2), and l = sqrt(mean (t_i / f_i)^2) over those with a force
+    force_scale = float(np.sqrt((largest_forces**2).sum())) or 1.0
+    has_force = largest_forces > 0.0
+    levers = largest_torques[has_force] / largest_forces[has_force]
+    lever = float(np.sqrt((levers**2).mean())) if has_force.any() else 0.0
+    torque_scale = max(lever, LEAST_LEVER) * force_scale
+    scale = np.repeat([force_scale, torque_scale], 3)
     scale.setflags(write=False)
     return scale
 
 
 REACHED = 1e-3
-"""Share of the yardstick up to which an error is none: the wrench counts as delivered."""
+"""Error over the wrench scale up to which a wrench counts as delivered [1]."""
 
 
 def judged_power(plant: Plant, command: Array) -> Array:
-    """Mean mechanical power (N,) [W] of commands (N, n, 3); what is lost (NaN) takes none."""
+    """Returns the mean mechanical power of a robot.
+
+    Args:
+        plant: the robot.
+        command: commands (N, n, 3); a row of NaN is a lost actuator and takes no power.
+
+    Returns:
+        (N,) [W].
+    """
     return np.asarray(np.nansum(plant.power(command), axis=-1))
 
 
 def judged_effort(layout: Layout, command: Array) -> Array:
-    """Effort `J_en` (N,) of commands (N, n, 3), the paper's energy proxy, without what is lost
-    (NaN)."""
-    lost = np.isnan(command).any(axis=-1, keepdims=True)
-    return np.asarray(_meter(layout)(np.where(lost, 0.0, command) if lost.any() else command))
+    """Returns the effort `J_en` (N,) of a robot of fins, the paper's energy proxy.
+
+    Args:
+        layout: the robot.
+        command: commands (N, n, 3) [rad, Hz, rad]; a row of NaN is a lost fin and adds nothing.
+    """
+    is_lost = np.isnan(command).any(axis=-1, keepdims=True)
+    working = np.where(is_lost, 0.0, command) if is_lost.any() else command
+    return np.asarray(_effort_meter(layout)(working))
 
 
 def costs(layout: Layout, command: Array) -> tuple[Array, Array]:
-    """Effort (K,) and power (K,) [W] of commands (K, n, 3) of fins that all work."""
-    return _meter(layout)(command), judged_power(plant_of(layout), command)
+    """Returns the effort (K,) and the power (K,) [W] of a robot of fins that all work.
+
+    Args:
+        layout: the robot.
+        command: commands (K, n, 3) [rad, Hz, rad].
+    """
+    effort = _effort_meter(layout)(command)
+    power = judged_power(plant_of(layout), command)
+    return effort, power
 
 
 @lru_cache(maxsize=256)
-def _meter(layout: Layout) -> EffortMeter:
+def _effort_meter(layout: Layout) -> EffortMeter:
+    """The effort of a robot of fins; cached, since every answer of one robot asks for it."""
     return EffortMeter(layout.upper)

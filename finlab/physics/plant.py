@@ -3,6 +3,7 @@ double precision.
 
 It scores every allocation method, and the model-based methods optimize over it. `flow` (..., 6) is
 the velocity of the body relative to the water [m/s, rad/s], body frame; None is a robot at rest.
+An actuator's own frame has its own axes as rows (`Layout.frames`).
 """
 
 from collections.abc import Sequence
@@ -32,8 +33,11 @@ class Plant:
     derivatives."""
 
     def __init__(self, layout: Layout) -> None:
-        """Prepares the laws of the layout's actuators; `plant_of` keeps plants that were made.
-        Raises DataError: a fin's force table cannot be read."""
+        """Prepares the laws of the layout's actuators; `plant_of` caches plants.
+
+        Raises:
+            DataError: a fin's force table cannot be read.
+        """
         self.layout = layout
         self.n = layout.n
         self.n_fins = layout.n_fins
@@ -42,50 +46,52 @@ class Plant:
         self.width = self.upper - self.lower
         """Ranges of the limits (n, 3)."""
         self.turns: NDArray[np.bool_] = free_angles(layout.actuators) & is_full_turn(self.width)
-        """Commands (n, 3) that may turn freely: they wrap instead of ending at a limit."""
+        """Commands (n, 3) that are angles without limits: they wrap."""
         self.full_turn = self.turns[:, 2]
-        """Fins (n,) whose zero direction does."""
+        """Fins (n,) whose zero direction wraps."""
         self.effectiveness: Array = own_effectiveness(layout)
-        """Wrench (n, 3, 6) of 1 N along the own axes of each actuator."""
+        """Wrench (n, 3, 6) of 1 N along the own axes of each actuator [1, m], body frame."""
         laws = laws_of(layout.actuators)
-        # A robot of one law is spared the copies of fancy indexing.
-        self._laws: list[tuple[Any, ActuatorLaw]] = (
-            [(slice(None), laws[0][1])] if len(laws) == 1 else laws
-        )
-        own = layout.interaction
+        self._laws: list[tuple[Any, ActuatorLaw]] = laws
+        """Indices of actuators with one law, and the law."""
+        if len(laws) == 1:
+            # A slice in place of indices: numpy copies no array for it.
+            only_law = laws[0][1]
+            self._laws = [(slice(None), only_law)]
+        model = layout.interaction
         self.interaction: PointInteraction | None = None
-        """What the actuators do to each other; None where that does not count."""
-        if own is not None:
+        """Hydrodynamic interaction of the actuators; None where the layout names none."""
+        if model is not None:
             from finlab.layout.jet_geometry import jet_geometry_of
 
-            self.interaction = own.of(jet_geometry_of(layout))
+            self.interaction = model.of(jet_geometry_of(layout))
         self.counts: NDArray[np.bool_] = np.ones(6, bool)
-        """Axes (6,) of the wrench that count, the others being 0."""
-        self.feels_flow = own is not None or any(law.feels_flow for _, law in self._laws)
-        """Whether forces, or wrenches, depend on the flow."""
+        """Axes (6,) of the wrench that count; the others are 0."""
+        self.feels_flow = model is not None or any(law.feels_flow for _, law in self._laws)
+        """Whether forces or wrenches depend on the flow."""
         self.flow: Array | None = None
-        """The flow (..., 6) where a call names none."""
+        """The flow (..., 6) [m/s, rad/s] of calls that are given none."""
         self._inflow: Array | None = None
 
     def at(self, flow: ArrayLike | None) -> Self:
-        """Returns the plant for those who ask it many times at one flow (..., 6); itself where the
-        flow is without effect."""
+        """Returns the plant with a flow (..., 6) [m/s, rad/s], body frame, for calls that are given
+        none; itself where the flow has no effect."""
         if flow is None or not self.feels_flow:
             return self
-        other = copy(self)
-        other.flow = np.asarray(flow, np.float64)
-        other._inflow = other.inflow(other.flow)
-        return other
+        plant = copy(self)
+        plant.flow = np.asarray(flow, np.float64)
+        plant._inflow = plant.inflow(plant.flow)
+        return plant
 
     def counting(self, axes: NDArray[np.bool_]) -> Self:
-        """Returns the plant for those to whom only some axes (6,) of the wrench count, the others
-        being 0; itself where all do."""
+        """Returns the plant with the axes (6,) of the wrench that count, the others being 0; itself
+        where all count."""
         if axes.all():
             return self
-        other = copy(self)
-        other.effectiveness = np.where(axes, self.effectiveness, 0.0)
-        other.counts = axes
-        return other
+        plant = copy(self)
+        plant.effectiveness = np.where(axes, self.effectiveness, 0.0)
+        plant.counts = axes
+        return plant
 
     def inflow(self, flow: Array | None) -> Array | None:
         """Returns the velocity (..., n, 3) of each actuator's point through the water in its own
@@ -94,69 +100,122 @@ class Plant:
             return self._inflow
         if not self.feels_flow:
             return None
-        met: Array = np.einsum("...nb,nab->...na", self._moved(flow), self.layout.frames)
-        return met
+        velocity: Array = np.einsum(
+            "...nb,nab->...na", self._point_velocity(flow), self.layout.frames
+        )
+        return velocity
 
-    def _moved(self, flow: Array) -> Array:
+    def _point_velocity(self, flow: Array) -> Array:
         """Velocity (..., n, 3) of each actuator's point through the water, body frame [m/s]."""
-        water = np.asarray(flow, np.float64)[..., None, :]
-        return np.asarray(water[..., :3] + np.cross(water[..., 3:], self.layout.position))
+        body_velocity = np.asarray(flow, np.float64)[..., None, :]
+        linear = body_velocity[..., :3]
+        angular = body_velocity[..., 3:]
+        # v_i = v + omega x r_i
+        return np.asarray(linear + np.cross(angular, self.layout.position))
 
     def wrench(self, command: ArrayLike, *, flow: Array | None = None) -> Array:
-        """Returns the wrench that a command causes. Raises CommandError: the shape does not fit the
-        layout, or a value is infinite or partly NaN.
+        """Returns the wrench of a command.
 
         Args:
-            command: (..., n, 3), of fins [rad, Hz, rad]; a row of NaN is a lost one and gives no
-            force.
-            flow: (..., 6), or None at rest.
+            command: (..., n, 3), of fins [rad, Hz, rad]; a row of NaN is a lost actuator and gives
+                no force.
+            flow: velocity of the body relative to the water (..., 6), body frame [m/s, rad/s];
+                None for that of the plant, at rest unless `at` has set one.
 
         Returns:
             (..., 6) [N, N m], body frame.
+
+        Raises:
+            CommandError: the shape does not fit the layout, or a value is infinite or partly NaN.
         """
         return self.wrench_of(self.forces(command, flow=flow), flow=flow)
 
     def wrench_of(self, force: Array, *, flow: Array | None = None) -> Array:
-        """Returns the wrench (..., 6) [N, N m] of forces (..., n, 3) [N] in own frames."""
+        """Returns the wrench of forces, with that of the interaction.
+
+        Args:
+            force: (..., n, 3) [N], own frames.
+            flow: velocity of the body relative to the water (..., 6), body frame [m/s, rad/s];
+                None for that of the plant, at rest unless `at` has set one.
+
+        Returns:
+            (..., 6) [N, N m], body frame.
+        """
         wrench: Array = wrench_of_forces(force, self.effectiveness)
         return wrench if self.interaction is None else wrench + self.offset(force, flow=flow)
 
     def offset(self, force: Array, *, flow: Array | None = None) -> Array:
-        """Returns the wrench offset (..., 6) [N, N m] by the interaction, at forces (..., n, 3) [N]
-        in own frames."""
+        """Returns the wrench offset by the interaction.
+
+        Args:
+            force: (..., n, 3) [N], own frames.
+            flow: velocity of the body relative to the water (..., 6), body frame [m/s, rad/s];
+                None for that of the plant, at rest unless `at` has set one.
+
+        Returns:
+            (..., 6) [N, N m], body frame.
+        """
         if self.interaction is None:
             return np.zeros((*force.shape[:-2], 6))
         in_body = body_force(force, self.layout.frames)
-        return self.interaction.offset(in_body, self.met_by_all(flow)) * self.counts
+        offset = self.interaction.offset(in_body, self.met_by_all(flow))
+        return offset * self.counts
 
     def effect(self, force: Array, *, flow: Array | None = None) -> tuple[Array, Array]:
-        """Returns `offset`, and the wrench (..., n, 3, 6) per newton along own axes [1, m], that of
-        the interaction at forces (..., n, 3) [N] included."""
+        """Returns the wrench offset, and the effectiveness with that of the interaction.
+
+        Args:
+            force: (..., n, 3) [N], own frames.
+            flow: velocity of the body relative to the water (..., 6), body frame [m/s, rad/s];
+                None for that of the plant, at rest unless `at` has set one.
+
+        Returns:
+            The offset (..., 6) [N, N m], and the wrench (..., n, 3, 6) per newton along own axes
+            [1, m], body frame.
+        """
         frames = self.layout.frames
         if self.interaction is None:
             return self.offset(force), self.effectiveness
         in_body = body_force(force, frames)
-        offset, slope = self.interaction.effect(in_body, self.met_by_all(flow))
-        return offset * self.counts, self.effectiveness + (frames @ slope) * self.counts
+        offset, jacobian = self.interaction.effect(in_body, self.met_by_all(flow))
+        jacobian_in_own_axes = frames @ jacobian
+        effectiveness = self.effectiveness + jacobian_in_own_axes * self.counts
+        return offset * self.counts, effectiveness
 
     def met_by_all(self, flow: Array | None) -> Array | None:
         """Returns the velocity (..., n, 3) of each actuator's point through the water, body frame
         [m/s]; of the plant's own flow when `flow` is None, and None at rest."""
         flow = self.flow if flow is None else flow
-        return None if flow is None else self._moved(flow)
+        return None if flow is None else self._point_velocity(flow)
 
     def forces(self, command: ArrayLike, *, flow: Array | None = None) -> Array:
-        """Returns each actuator's force (..., n, 3) [N] in its own frame (`layout.frames`); see
-        `wrench`."""
-        values, lost = self._checked(command)
+        """Returns the forces of a command.
+
+        Args:
+            command: as for `wrench`, which has the same errors.
+            flow: velocity of the body relative to the water (..., 6), body frame [m/s, rad/s];
+                None for that of the plant, at rest unless `at` has set one.
+
+        Returns:
+            (..., n, 3) [N], own frames.
+        """
+        values, is_lost = self._checked(command)
         force = self.force(values, flow=flow)
-        if lost is not None:
-            force[np.broadcast_to(lost, force.shape[:-1])] = 0.0
+        if is_lost is not None:
+            force[np.broadcast_to(is_lost, force.shape[:-1])] = 0.0
         return force
 
     def force(self, command: Array, *, flow: Array | None = None) -> Array:
-        """Returns forces (..., n, 3) [N] in own frames of commands (..., n, 3) known to be
-        finite."""
+        """Returns the forces of a finite command, which is not checked.
+
+        Args:
+            command: (..., n, 3), of fins [rad, Hz, rad].
+            flow: velocity of the body relative to the water (..., 6), body frame [m/s, rad/s];
+                None for that of the plant, at rest unless `at` has set one.
+
+        Returns:
+            (..., n, 3) [N], own frames.
+        """
         if not self.feels_flow and len(self._laws) == 1:
             return np.asarray(self._laws[0][1].force(command))
         inflow = self.inflow(flow)
@@ -169,7 +228,16 @@ class Plant:
     def force_and_jacobian(
         self, command: Array, *, flow: Array | None = None
     ) -> tuple[Array, Array]:
-        """Returns `force` and its derivatives (..., n, 3 commands, 3 axes)."""
+        """Returns the forces of a finite command, and their derivatives.
+
+        Args:
+            command: (..., n, 3), of fins [rad, Hz, rad].
+            flow: velocity of the body relative to the water (..., 6), body frame [m/s, rad/s];
+                None for that of the plant, at rest unless `at` has set one.
+
+        Returns:
+            Forces (..., n, 3) [N], own frames, and derivatives (..., n, 3 commands, 3 axes).
+        """
         inflow = self.inflow(flow)
         shape = _broadcast(command, inflow)
         force = np.empty(shape)
@@ -182,22 +250,42 @@ class Plant:
         return force, jacobian
 
     def body_forces(self, command: ArrayLike, *, flow: Array | None = None) -> Array:
-        """Returns each actuator's force (..., n, 3) [N] in the body frame; see `wrench`."""
+        """Returns the forces of a command in the body frame (..., n, 3) [N]; arguments and errors
+        as for `wrench`."""
         force: Array = body_force(self.forces(command, flow=flow), self.layout.frames)
         return force
 
     def linearize(self, command: Array, *, flow: Array | None = None) -> tuple[Array, Array]:
-        """Returns wrenches (..., 6) of commands (..., n, 3) without lost ones, and their
-        derivatives (..., 6, 3 n), one actuator after the other."""
-        force, jacobian = self.force_and_jacobian(command, flow=flow)
+        """Returns the wrench of a finite command, and its Jacobian.
+
+        Args:
+            command: (..., n, 3), of fins [rad, Hz, rad], without lost actuators.
+            flow: velocity of the body relative to the water (..., 6), body frame [m/s, rad/s];
+                None for that of the plant, at rest unless `at` has set one.
+
+        Returns:
+            Wrenches (..., 6) [N, N m], body frame, and derivatives (..., 6, 3 n), actuator by
+            actuator.
+        """
+        force, dforce_dcommand = self.force_and_jacobian(command, flow=flow)
         offset, effectiveness = self.effect(force, flow=flow)
-        jacobian = (jacobian @ effectiveness).reshape(*force.shape[:-2], 3 * self.n, 6)
+        # dw/du_i = (dy_i/du_i) B_i, one row for each number of a command
+        dwrench_dcommand = dforce_dcommand @ effectiveness
+        rows = dwrench_dcommand.reshape(*force.shape[:-2], 3 * self.n, 6)
         wrench: Array = wrench_of_forces(force, self.effectiveness) + offset
-        return wrench, jacobian.swapaxes(-1, -2)
+        return wrench, rows.swapaxes(-1, -2)
 
     def power(self, command: Array, *, flow: Array | None = None) -> Array:
-        """Returns each actuator's power (..., n) [W] of commands (..., n, 3), NaN for a lost
-        one's."""
+        """Returns the power of each actuator.
+
+        Args:
+            command: (..., n, 3), of fins [rad, Hz, rad].
+            flow: velocity of the body relative to the water (..., 6), body frame [m/s, rad/s];
+                None for that of the plant, at rest unless `at` has set one.
+
+        Returns:
+            (..., n) [W]; NaN of a lost actuator.
+        """
         if not self.feels_flow and len(self._laws) == 1:
             return np.asarray(self._laws[0][1].power(command))
         inflow = self.inflow(flow)
@@ -208,7 +296,11 @@ class Plant:
         return power
 
     def power_gradient(self, command: Array, *, flow: Array | None = None) -> Array:
-        """Returns the power's derivatives (..., n, 3) by each command."""
+        """Returns the derivatives of the power; arguments as for `power`.
+
+        Returns:
+            (..., n, 3): watts per rad, Hz or N, as the command has them.
+        """
         inflow = self.inflow(flow)
         gradient = np.empty(_broadcast(command, inflow))
         for indices, law in self._laws:
@@ -218,61 +310,70 @@ class Plant:
 
     @cached_property
     def is_uncertain(self) -> bool:
-        """Whether something is known of the errors of its forces; see
-        `finlab.physics.expected_miss`."""
-        return self.interaction is not None or any(
-            part.is_uncertain for part in self.layout.actuators
-        )
+        """Whether its forces have an error model; see `finlab.physics.expected_miss`."""
+        if self.interaction is not None:
+            return True
+        return any(actuator.is_uncertain for actuator in self.layout.actuators)
 
     @cached_property
     def blade(self) -> Blade:
-        """The plates whose beating takes power, side by side, one for each fin."""
+        """Constants of the power of all fins' blades, each an array (n_fins,)."""
         fins = [astuple(make_law(fin.model).blade) for fin in self.layout.fins]
         return Blade(*map(np.array, zip(*fins, strict=True)))
 
     def thrust(self, amplitude: Array, frequency: Array) -> Array:
-        """Returns the size of each fin's force (..., n) [N] at zero direction zero."""
+        """Returns the size of each fin's force at zero direction 0.
+
+        Args:
+            amplitude: (..., n) [rad].
+            frequency: (..., n) [Hz].
+
+        Returns:
+            (..., n) [N].
+        """
         command = np.stack(np.broadcast_arrays(amplitude, frequency, 0.0), axis=-1)
         size: Array = np.linalg.norm(self.forces(command), axis=-1)
         return size
 
     def feasible(self, command: Array) -> Array:
-        """Returns commands (..., n, 3) brought within the limits exactly: full turns wrap, all else
-        clips."""
+        """Returns commands (..., n, 3) within the limits exactly: angles without limits wrap, other
+        numbers are clipped."""
         return feasible(np.asarray(command, np.float64), self.lower, self.upper, self.turns)
 
     @cached_property
     def _dead_band(self) -> Array | None:
         """Dead bands (n, 3) [N] of the commands that are forces; None where there is none."""
         bands = np.zeros((self.n, 3))
-        for i, part in enumerate(self.layout.actuators):
-            if part.KIND.force_number is not None:
-                bands[i, part.KIND.force_number] = getattr(part, "dead_band", 0.0)
+        for i, actuator in enumerate(self.layout.actuators):
+            force_number = actuator.KIND.force_number
+            if force_number is not None:
+                bands[i, force_number] = getattr(actuator, "dead_band", 0.0)
         return bands if bands.any() else None
 
     def rested(self, command: Array) -> Array:
-        """Returns commands (..., n, 3) with those inside a dead band, which give no force, at
-        rest."""
+        """Returns commands (..., n, 3) in which those inside a dead band, which give no force, are
+        0."""
         if self._dead_band is None:
             return command
         from finlab.actuators.propeller import outside_dead_band
 
-        return outside_dead_band(command, self._dead_band, np.clip(0.0, self.lower, self.upper))
+        nearest_to_zero = np.clip(0.0, self.lower, self.upper)
+        return outside_dead_band(command, self._dead_band, nearest_to_zero)
 
     def grid(self, counts: Sequence[int]) -> Array:
-        """Returns commands (K, n, 3) evenly spread over the limits, `counts` values of each
-        number."""
-        share = np.stack(
-            np.meshgrid(*(np.linspace(0.0, 1.0, count) for count in counts), indexing="ij"), -1
-        )
+        """Returns commands (K, n, 3) on a grid over the limits of each actuator; K is the product
+        of the three `counts` of values."""
+        axes = [np.linspace(0.0, 1.0, count) for count in counts]
+        share = np.stack(np.meshgrid(*axes, indexing="ij"), -1)
         return np.asarray(self.lower + share.reshape(-1, 1, 3) * self.width)
 
     def sample(self, rng: np.random.Generator, size: tuple[int, ...]) -> Array:
-        """Returns uniform commands (*size, n, 3) within the limits."""
+        """Returns random commands (*size, n, 3), uniform within the limits."""
         return np.asarray(self.lower + rng.uniform(size=(*size, self.n, 3)) * self.width)
 
     def _checked(self, command: ArrayLike) -> tuple[Array, NDArray[np.bool_] | None]:
-        """Finite float64 commands (..., n, 3), and which are lost (..., n), None where none has."""
+        """Finite commands (..., n, 3), 0 of lost actuators, and which are lost (..., n); None where
+        none is."""
         try:
             values = np.asarray(command, dtype=np.float64)
         except (TypeError, ValueError):
@@ -287,18 +388,18 @@ class Plant:
             )
         if np.isfinite(values).all():
             return values, None
-        lost: NDArray[np.bool_] = np.asarray(np.isnan(values).all(axis=-1))
-        values = np.where(lost[..., None], 0.0, values)
+        is_lost: NDArray[np.bool_] = np.asarray(np.isnan(values).all(axis=-1))
+        values = np.where(is_lost[..., None], 0.0, values)
         if not np.isfinite(values).all():
             raise CommandError(
                 f"the command for layout {self.layout.name} holds NaN or infinite values; "
                 "a lost actuator has NaN in all three entries, any other has none"
             )
-        return values, lost
+        return values, is_lost
 
 
 def _broadcast(command: Array, inflow: Array | None) -> tuple[int, ...]:
-    """Shape (..., n, 3) of forces."""
+    """Shape (..., n, 3) of the forces of commands (..., n, 3) at velocities (..., n, 3)."""
     return command.shape if inflow is None else np.broadcast_shapes(command.shape, inflow.shape)
 
 
@@ -307,17 +408,21 @@ def _inflow_of(law: ActuatorLaw, inflow: Array | None, indices: Any) -> Array | 
     does not feel the flow."""
     if inflow is None or not law.feels_flow:
         return None
-    own: Array = inflow[..., indices, :]
-    return own
+    selected: Array = inflow[..., indices, :]
+    return selected
 
 
 def plant_of(layout: Layout) -> Plant:
-    """Returns the plant of a layout, kept from the last time it was asked for. Raises DataError: a
-    fin's force table cannot be read."""
-    return _made(layout, layout.stamps)
+    """Returns the plant of a layout, from a cache.
+
+    Raises:
+        DataError: a fin's force table cannot be read.
+    """
+    return _cached_plant(layout, layout.stamps)
 
 
 @lru_cache(maxsize=256)
-def _made(layout: Layout, stamps: tuple[tuple[int, int] | None, ...]) -> Plant:
-    """A plant; tables whose files have changed are read again."""
+def _cached_plant(layout: Layout, stamps: tuple[tuple[int, int] | None, ...]) -> Plant:
+    """The plant; the stamps are part of the cache's key, so that tables whose files have changed
+    are read again."""
     return Plant(layout)

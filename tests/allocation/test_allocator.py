@@ -13,6 +13,7 @@ import finlab
 from finlab.actuators.law import Blade
 from finlab.allocation import METHODS, Allocation, Allocator, Candidates, Solution, allocator
 from finlab.allocation.method import LeastErrorMethod
+from finlab.allocation.methods import method_class
 from finlab.cli.robot_verbs import allocate
 from finlab.errors import AllocationError, CommandError, LayoutError
 from finlab.layout import Fin, Layout, load_layout
@@ -219,7 +220,7 @@ def test_the_time_is_that_of_the_solver_shared_by_its_targets(
     assert method.allocate_batch(ROBOT, np.empty((0, 6))).solve_ms.tolist() == []
 
 
-@pytest.mark.parametrize("method", ["mdn", "paper", "qp", "sqp", "paper_sqp", "fixed_frequency"])
+@pytest.mark.parametrize("method", [name for name in METHODS if "fins" in method_class(name).takes])
 def test_a_thruster_is_named_with_its_type(method: str) -> None:
     with pytest.raises(
         LayoutError, match=f"method {method} works for .* 'lift_left' .* is of type thruster"

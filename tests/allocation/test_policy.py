@@ -9,8 +9,9 @@ from scipy.optimize import least_squares
 
 from finlab.allocation import Allocation
 from finlab.allocation.binding import limits_reached
-from finlab.allocation.policy import AXES, CLOSEST, Policy, as_policy, policy_from
+from finlab.allocation.policy import CLOSEST, Policy, as_policy, policy_from
 from finlab.assets import shipped_layouts
+from finlab.axes import AXES
 from finlab.errors import AllocationError, CommandError
 from finlab.layout import Fin, Layout, Limits, load_layout
 from finlab.layout.effectiveness import layout_effectiveness

@@ -56,10 +56,11 @@ def test_other_settings_answer_otherwise(method: str) -> None:
 def test_networks_are_shared() -> None:
     network = Allocator(load_layout("A"), "mdn")
     assert (
-        network.on(load_layout("B")).weights is network.weights and network.checkpoint == "default"
+        network.on(load_layout("B")).networks is network.networks
+        and network.checkpoint == "default"
     )
-    again = Allocator(load_layout("ucat"), "mdn", checkpoint=network.weights)
-    assert again.weights is network.weights
+    again = Allocator(load_layout("ucat"), "mdn", checkpoint=network.networks)
+    assert again.networks is network.networks
 
 
 @pytest.mark.parametrize("method", METHODS)

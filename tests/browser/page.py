@@ -8,8 +8,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from webapp.session.looking import DRAWERS, TASKS, Desk, SearchRequest
-from webapp.session.swim_plan import SwimSettings
+from webapp.session.looking import DRAWERS, TASKS
 from webapp.viser_internals import run_script
 
 WAIT_MS = 120_000
@@ -82,10 +81,7 @@ class Page:
 
         def restart() -> None:
             self.session.start_over()
-            self.session.display = self._display
-            self.session.desk = Desk()
-            self.session.draft = SearchRequest()
-            self.session.swim = SwimSettings()
+            self.session.forget_view(self._display)
             self.view.jobs.improver.forget()
             self.view.scenery.end_swim()
             self.view.scenery.robot.look_from("3D")

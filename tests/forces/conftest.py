@@ -51,9 +51,12 @@ def largest_by_polygons(sets: ForceSets, direction: Array, corners: int, outer: 
     for i in range(n):
         reach = sets.radius[0, i] * (1.0 if outer else np.cos(np.pi / corners))
         normals = [(angle, reach) for angle in angles]
-        if sets.half[0, i] <= np.pi / 2:
-            stop = sets.half[0, i] + np.pi / 2
-            normals += [(sets.middle[0, i] + stop, 0.0), (sets.middle[0, i] - stop, 0.0)]
+        if sets.sector_half_angle[0, i] <= np.pi / 2:
+            stop = sets.sector_half_angle[0, i] + np.pi / 2
+            normals += [
+                (sets.sector_center[0, i] + stop, 0.0),
+                (sets.sector_center[0, i] - stop, 0.0),
+            ]
         for angle, limit in normals:
             row = np.zeros(2 * n + 1)
             row[2 * i : 2 * i + 2] = np.cos(angle), np.sin(angle)

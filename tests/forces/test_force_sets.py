@@ -37,7 +37,9 @@ def pulls(rows: int = 200) -> Array:
 
 def sector(sets: ForceSets, row: int) -> Array:
     """Points (S, 2) all over one fin's sector, its rim and its tip included."""
-    angle = sets.middle[row, 0] + np.linspace(-1.0, 1.0, 721) * sets.half[row, 0]
+    angle = (
+        sets.sector_center[row, 0] + np.linspace(-1.0, 1.0, 721) * sets.sector_half_angle[row, 0]
+    )
     boundary = sets.radius[row, 0] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     return np.concatenate([boundary * share for share in np.linspace(0.0, 1.0, 60)])
 
@@ -89,7 +91,9 @@ def test_an_uneven_fin_reaches_as_far_as_its_law(half: float) -> None:
     sets = force_sets(layout)
     parts = convex_parts(sets)
     ahead = (
-        [sets.middle[0, 0], *parts.middle[:, 0]] if len(parts.radius) > 1 else [sets.middle[0, 0]]
+        [sets.sector_center[0, 0], *parts.sector_center[:, 0]]
+        if len(parts.radius) > 1
+        else [sets.sector_center[0, 0]]
     )
     for number, part in enumerate(
         [sets, *(parts.take(np.array([k])) for k in range(len(ahead) - 1))]
@@ -97,7 +101,9 @@ def test_an_uneven_fin_reaches_as_far_as_its_law(half: float) -> None:
         turned = (np.arctan2(force[:, 1], force[:, 0]) - ahead[number] + np.pi) % (
             2.0 * np.pi
         ) - np.pi
-        own = force[(np.abs(turned) <= part.half[0, 0] + 1e-6) | (force == 0.0).all(-1)]
+        own = force[
+            (np.abs(turned) <= part.sector_half_angle[0, 0] + 1e-6) | (force == 0.0).all(-1)
+        ]
         reach = part.tile(60).farthest(np.pad(normal, ((0, 0), (1, 3))))[0]
         np.testing.assert_allclose(
             reach, (own @ normal.T).max(axis=0), atol=2e-3 * sets.radius[0, 0]
@@ -123,12 +129,12 @@ def test_only_wide_sectors_are_cut(half: float, parts: int) -> None:
 
 
 def test_fins_beyond_the_first_few_keep_their_hulls() -> None:
-    assert (convex_parts(five_fins(2.0)).half[:, MAX_CUT:] == 2.0).all()
+    assert (convex_parts(five_fins(2.0)).sector_half_angle[:, MAX_CUT:] == 2.0).all()
 
 
 def test_a_fin_whose_stops_coincide_has_one_column() -> None:
     sets = five_fins(0.0)
     full = sets.full_effectiveness().reshape(2, 5, 2, 6)
-    unit = np.stack([np.cos(sets.middle), np.sin(sets.middle)], axis=-1)
+    unit = np.stack([np.cos(sets.sector_center), np.sin(sets.sector_center)], axis=-1)
     assert full[:, :, 0] == pytest.approx((unit[..., None] * sets.effectiveness).sum(2))
     assert (full[:, :, 1] == 0.0).all()

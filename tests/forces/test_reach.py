@@ -8,7 +8,12 @@ from scipy.optimize import linprog
 
 from finlab.analysis import authority
 from finlab.forces.force_sets import SCALE, ForceSets, convex_parts, force_sets
-from finlab.forces.reach import axis_ranges, largest, max_wrench_along, max_wrench_along_exactly
+from finlab.forces.reach import (
+    axis_ranges,
+    largest_along_rays,
+    max_wrench_along,
+    max_wrench_along_exactly,
+)
 from finlab.layout import Layout
 from finlab.physics import Plant
 from tests.exhaustive import crossed
@@ -129,7 +134,7 @@ def test_a_plane_and_forces_prove_each_size(half: float, scale: float) -> None:
     ray /= np.linalg.norm(ray, axis=-1, keepdims=True)
     inside = sets.farthest(rng.standard_normal((40, 6)))[1]
     origin = 0.5 * sets.wrench(inside)
-    found = largest(sets, ray, origin)
+    found = largest_along_rays(sets, ray, origin)
     end = origin + found.size[:, None] * ray
     normal = found.normal / np.linalg.norm(found.normal, axis=-1, keepdims=True)
     small = 1e-7 * float(sets.unit.max())
@@ -138,7 +143,7 @@ def test_a_plane_and_forces_prove_each_size(half: float, scale: float) -> None:
     assert found.gap.max() < small
     assert (np.linalg.norm(found.force, axis=-1) <= sets.radius * (1.0 + 1e-9)).all()
     if half <= np.pi / 2:
-        angle = np.arctan2(found.force[..., 1], found.force[..., 0]) - sets.middle
+        angle = np.arctan2(found.force[..., 1], found.force[..., 0]) - sets.sector_center
         assert (np.cos(angle) >= np.cos(half) - 1e-6)[
             np.linalg.norm(found.force, axis=-1) > 1e-3
         ].all()
@@ -157,7 +162,10 @@ def test_robots_without_anything_to_push_with() -> None:
         assert (
             found.size == pytest.approx(np.zeros(40), abs=1e-6) and np.isfinite(found.normal).all()
         )
-        assert largest(dead, ray, np.tile(100.0 * np.eye(6)[1], (40, 1))).size.max() == -np.inf
+        assert (
+            largest_along_rays(dead, ray, np.tile(100.0 * np.eye(6)[1], (40, 1))).size.max()
+            == -np.inf
+        )
 
 
 CORNERS = 96
@@ -168,7 +176,9 @@ def ranges_by_polygons(layout: Layout, wrench: list[float], lost: tuple[str, ...
     none."""
     sets = force_sets(layout, lost)
     n = sets.radius.shape[1]
-    turn = sets.middle[0, :, None] + sets.half[0, :, None] * np.linspace(-1, 1, CORNERS)
+    turn = sets.sector_center[0, :, None] + sets.sector_half_angle[0, :, None] * np.linspace(
+        -1, 1, CORNERS
+    )
     force = sets.radius[0, :, None, None] * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
     corners = np.einsum("npc,nck->npk", force, sets.effectiveness[0]).reshape(-1, 6)
     share = np.kron(np.eye(n), np.ones(CORNERS))

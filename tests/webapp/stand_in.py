@@ -53,10 +53,10 @@ class StandIn(LeastErrorMethod):
         layout: Layout,
         settings: Settings,
         scale: Array,
-        weights: TrainedWeights | None = None,
+        networks: TrainedWeights | None = None,
     ) -> None:
         """Settings as method `mdn` has them; the temperature widens the samples."""
-        super().__init__(layout, settings, scale, weights)
+        super().__init__(layout, settings, scale, networks)
         self._inner = Sqp(layout, SqpSettings(n_starts=1), scale)
         self._other = Sqp(layout, SqpSettings(n_starts=1, objective="effort"), scale)
 

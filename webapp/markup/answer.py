@@ -1,4 +1,4 @@
-"""What is demanded and delivered: six bars, and the table of commands with one row per actuator.
+"""Markup of an answer: six bars of the wrench, and the table of commands, a row per actuator.
 
 The panel of the wrench (`panels/wrench_tab.py`) shows both. They are written at every step of a
 slider, so rows are joined as plain strings of ours, which need no escaping, in few calls.
@@ -12,8 +12,8 @@ from markupsafe import Markup
 from numpy.typing import ArrayLike, NDArray
 
 from finlab.allocation.allocation import Allocation
-from finlab.allocation.policy import AXES
 from finlab.arrays import Array
+from finlab.axes import AXES
 from finlab.layout import Actuator, Fin, Layout
 from finlab.layout.damage import WHOLE, Damage
 from webapp.markup.words import damage_words, html, saturated

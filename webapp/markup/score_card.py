@@ -1,4 +1,4 @@
-"""What a layout can do, as one card, and the quick checks below its editor.
+"""Markup of a layout's score card, and of the quick checks below the layout's editor.
 
 `panels/limits_tab.py` shows the card, `panels/cards.py` the checks.
 """

@@ -1,4 +1,4 @@
-"""What an answer is worth, in a word, in a sentence and axis by axis; all three say the same.
+"""Verdict on an answer in a word, in a sentence and axis by axis; the three agree.
 
 The corner of the view (`panels/status.py`) shows the word, the panel of the wrench
 (`panels/wrench_tab.py`) the sentences.

@@ -1,4 +1,4 @@
-"""What the selected actuators are known by: a formula with its numbers, or a table of measurements.
+"""Editor of the selected actuators' force model: a formula, or a table of measurements.
 
 `panels/actuator_inspector.py` shows the choice of a model, and below it the curves and the file
 from which a table is fitted.

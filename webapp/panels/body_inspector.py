@@ -1,5 +1,4 @@
-"""What a layout says of the robot as a whole: its name, what it is, its mass, damping and
-buoyancy."""
+"""Inspector of the robot as a whole: its name, its description, its mass, damping and buoyancy."""
 
 from collections.abc import Callable
 from functools import partial

@@ -1,4 +1,4 @@
-"""What can be done on a page by a key, or from its list of commands (Ctrl+K)."""
+"""Commands of a page, by a key or from its list of commands (Ctrl+K)."""
 
 from collections.abc import Callable
 from functools import partial

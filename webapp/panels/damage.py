@@ -1,4 +1,4 @@
-"""Which actuators are lost, and what is wrong with the others: a button for each, and sliders.
+"""Damage of actuators: a button for each one that may be lost, and sliders of partial faults.
 
 The faults are a section of the left column (`panels/places.py`); the tabs of the wrench, of limits
 and of swims have rows of buttons.

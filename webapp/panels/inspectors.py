@@ -1,4 +1,4 @@
-"""What the inspector of the selected actuators offers, by kind: labels, hints and steps of boxes.
+"""Labels, hints and steps of the boxes in the inspector of the selected actuators, by kind.
 
 Actuator classes know fields and units; how people edit them stands here. A kind that has no entry
 in `INSPECTORS`, such as one of another package, gets boxes by its fields and their units.

@@ -1,4 +1,4 @@
-"""What this layout can do (attainable sets, the score card), and a search for a better one."""
+"""Tab on a layout's limits (attainable sets, the score card), and a search for a better layout."""
 
 from collections.abc import Callable
 from functools import partial

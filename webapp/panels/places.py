@@ -1,4 +1,4 @@
-"""Which panel stands where on the page, and when; `Frame` builds them in this order."""
+"""Arrangement of panels on the page, and when each is shown; `Frame` builds them in this order."""
 
 from collections.abc import Callable
 from typing import NamedTuple

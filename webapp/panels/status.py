@@ -1,4 +1,4 @@
-"""What lies over the 3D view: the status line and the legend."""
+"""Overlays of the 3D view: the status line and the legend."""
 
 from functools import lru_cache
 
@@ -6,7 +6,7 @@ import numpy as np
 from markupsafe import Markup
 
 from finlab.allocation.allocation import Allocation
-from finlab.allocation.policy import AXES
+from finlab.axes import AXES
 from finlab.physics.objective import REACHED
 from webapp.handles import set_properties
 from webapp.markup.verdict import COLORS, WORKING, verdict_of, verdict_sentence

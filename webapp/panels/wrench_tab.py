@@ -9,7 +9,8 @@ import viser
 from markupsafe import Markup
 
 from finlab.allocation.allocation import Allocation
-from finlab.allocation.policy import AXES, KINDS
+from finlab.allocation.policy import POLICY_NAMES
+from finlab.axes import AXES
 from finlab.forces.reach import Ranges
 from finlab.layout import Layout
 from webapp.handles import add_html, placed, press
@@ -101,7 +102,7 @@ def add_target(page: Page) -> None:
     board.act(hint)
     page.add_html(_ranges_error)
     policies = "Come closest, keep the direction, or serve axes by priority, heave first."
-    box = gui.add_dropdown("Out of reach", KINDS, hint=policies)
+    box = gui.add_dropdown("Out of reach", POLICY_NAMES, hint=policies)
     page.bind(box, partial(session.set_setting, "policy"), lambda policy: policy)
 
 

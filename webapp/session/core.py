@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from finlab.allocation.policy import AXES
-from finlab.axes import axes_in
+from finlab.axes import AXES, axes_in
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.layout.damage import Damage

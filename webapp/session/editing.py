@@ -20,8 +20,9 @@ from webapp.session.core import Core
 from webapp.session.key_words import key_words
 from webapp.session.layout_edits import partner, unlinked, with_twin
 from webapp.session.lessons import Guide
-from webapp.session.looking import Display
+from webapp.session.looking import Desk, Display, SearchRequest
 from webapp.session.state import method_for
+from webapp.session.swim_plan import SwimSettings
 
 UNITS = ("kg", "kgm2", "m", "n")
 """Ends of the names of a body's fields that say a unit, and are no part of what undo calls them."""
@@ -35,12 +36,22 @@ class Session(Core):
         self.guide = Guide(self)
 
     def start_over(self) -> None:
-        """Everything as at first sight, outside of tour and lessons; the way here can be undone."""
+        """Everything as at first sight, outside of tour and lessons; the way here can be undone.
+        What is looked at, and how, stays: see `forget_view`."""
         self.guide.stop = None  # nothing comes back
         self._commit("Start over", self._first)
         self.saved = self._first.layout
         self.selection_order = ()
         self.mode = 0
+
+    def forget_view(self, display: Display) -> None:
+        """All that `start_over` keeps, as at first sight: what is shown and which task is open, the
+        request for a better layout and the settings of a swim. `display` are the switches of a new
+        page."""
+        self.display = display
+        self.desk = Desk()
+        self.draft = SearchRequest()
+        self.swim = SwimSettings()
 
     # Robots.
 

@@ -10,7 +10,8 @@ from typing import Any
 
 from finlab.actuators.fin.fin_model import MAX_AMPLITUDE, MAX_FREQUENCY
 from finlab.allocation.methods import METHODS, method_class
-from finlab.allocation.policy import AXES, KINDS
+from finlab.allocation.policy import POLICY_NAMES
+from finlab.axes import AXES
 from finlab.errors import FinlabError
 from finlab.layout import Actuator, Fin, Layout
 from finlab.layout.damage import WHOLE, Damage
@@ -35,7 +36,7 @@ COMPARED = ("dual", "analytic", "qp", "mdn", "sqp", "paper")
 first."""
 LEAST = {"watts": "dual", "effort": "mdn"}
 """What answers may keep least, and the method that does it best."""
-CHOICES: dict[str, tuple[str, ...]] = {"method": tuple(METHODS), "policy": KINDS}
+CHOICES: dict[str, tuple[str, ...]] = {"method": tuple(METHODS), "policy": POLICY_NAMES}
 DRAWING: dict[str, MdnSettings | PaperSettings] = {"mdn": MdnSettings(), "paper": PaperSettings()}
 """Methods that draw candidates from a mixture, with their own settings."""
 

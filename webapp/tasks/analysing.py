@@ -1,5 +1,4 @@
-"""What a layout can do, and what is in reach of a question: score cards, attainable sets,
-ranges."""
+"""Analyses of a layout and of a question: score cards, attainable sets, and ranges of the axes."""
 
 from dataclasses import dataclass
 from functools import lru_cache

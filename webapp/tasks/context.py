@@ -1,4 +1,4 @@
-"""What the tasks of one page work with."""
+"""Context that the tasks of one page share."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""What is found about an answer after it: the proof of its power, and its modes."""
+"""Searches that follow an answer: the proof of its power, and its modes."""
 
 from dataclasses import dataclass
 

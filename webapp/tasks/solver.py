@@ -13,7 +13,7 @@ import numpy as np
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import MethodChoice, choose_method
-from finlab.allocation.policy import KINDS, Policy
+from finlab.allocation.policy import POLICY_NAMES, Policy
 from finlab.allocation.solution import Candidates
 from finlab.errors import FinlabError
 from finlab.layout import Layout
@@ -134,7 +134,7 @@ KEPT = 24
 ALTERNATIVE_ERROR = 1e-4
 """Normalized error up to which another answer is an alternative."""
 SHIPPED = NetworkConfig.shipped
-POLICIES: dict[str, Policy] = {kind: Policy(kind) for kind in KINDS}
+POLICIES: dict[str, Policy] = {kind: Policy(kind) for kind in POLICY_NAMES}
 RUNS = "runs"
 """Folder in the one where the app was started, whose folders are looked at."""
 

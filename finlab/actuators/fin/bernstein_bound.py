@@ -44,9 +44,9 @@ class TableBound:
             *axis, ends = _axis(knots, law.periodic and k == 2, *limits, k == 2)
             self._axes.append(axis)
             each.append(ends)
-        place = np.indices([len(ends) for ends in each])
-        self._ends = np.stack([ends[i] for ends, i in zip(each, place, strict=True)], axis=-2)
-        small = place[0].size <= MOST_KEPT
+        index = np.indices([len(ends) for ends in each])
+        self._ends = np.stack([ends[i] for ends, i in zip(each, index, strict=True)], axis=-2)
+        small = index[0].size <= MOST_KEPT
         self._kept = self._cells(np.eye(self._values.shape[-1])) if small else None
 
     def __call__(self, price: Array) -> Array:
@@ -70,11 +70,11 @@ class TableBound:
         least = best + CLOSE * np.abs(best) + slack
         left = bound > least[:, None, None, None]
         most = np.maximum(best, np.where(left, -np.inf, bound).max(axis=inner))
-        places: list[NDArray[np.intp]] = list(np.nonzero(left))
-        row, *place = places
+        indices: list[NDArray[np.intp]] = list(np.nonzero(left))
+        row, *index = indices
         bound = bound[left]
-        ends = self._ends[*place]
-        pair = np.stack([cells[row, *place], cells[-1, *place]], axis=1)
+        ends = self._ends[*index]
+        pair = np.stack([cells[row, *index], cells[-1, *index]], axis=1)
         for _ in range(ROUNDS):
             if not 0 < 8 * len(row) <= MOST_CELLS:
                 break
@@ -159,7 +159,7 @@ def _split(
 def _axis(
     knots: Array, periodic: bool, low: float, high: float, turns: bool
 ) -> tuple[Any, Array, Array]:
-    """Of the cells of an axis with knots (n,), cut at limits: the places (c, 4) of their neighbours
+    """Of the cells of an axis with knots (n,), cut at limits: indices (c, 4) of their neighbours
     in a table with a rim, the Bernstein coefficients by the values there (c, 4, 4), and the ends
     (c, 2), twice the first one outside the knots, where the nearer one counts."""
     middle = 0.5 * (knots[0] + knots[-1])

@@ -49,9 +49,9 @@ NO_SIZE = 1e-300
 class Directions(NamedTuple):
     """The directions in which a fin can push."""
 
-    middle: float
+    sector_center: float
     """Centre of the arc of force directions [rad]."""
-    half: float
+    sector_half_angle: float
     """Half angle of that arc; pi for a full circle [rad]."""
     gauge: Array | None
     """Share (POINTS,) of the table's force in each direction around the circle, from 0 on [1]; None
@@ -112,14 +112,16 @@ class FinGroup(Group):
         self.responses = []
         for table, matrix in zip(tables, effectiveness, strict=True):
             arc = table.directions
-            self.responses.append(Plane(matrix[1:], table.table, arc.middle, arc.half, arc.gauge))
+            self.responses.append(
+                Plane(matrix[1:], table.table, arc.sector_center, arc.sector_half_angle, arc.gauge)
+            )
         self._largest = np.array([table.table.largest for table in tables])
 
     @property
     def forms(self) -> list[Form]:
         return [table.form for table in self._tables]
 
-    def radial_worth(self, price: Array, back: Array, ends: Array | None) -> Array:
+    def radial_conjugate_bound(self, price: Array, back: Array, ends: Array | None) -> Array:
         """See `Group`: from the commands of the table on both sides of each price, by the law; NaN
         for fins that were measured. Where a price is below 0, or the force is not largest at the
         largest command, also from a grid of commands."""
@@ -138,7 +140,7 @@ class FinGroup(Group):
             result[:, i] = profit
         return result
 
-    def worth(self, price: Array) -> Array:
+    def conjugate_bound(self, price: Array) -> Array:
         """See `Group`: an upper bound, of fins that were measured alone."""
         result = np.full((len(price), len(self._tables)), np.nan)
         for table in {id(table): table for table in self._tables}.values():
@@ -202,9 +204,9 @@ def _form(law: FinLaw, box: LawBox, beat: Array, directions: Directions) -> Form
         law=law.grid_numbers(box.lower, box.upper),
         beat=beat,
         deflection=None if is_even else directions.deflection,
-        lean=float(directions.deflection[0]) if is_even else float(law.offset),
-        uneven=e,
-        uneven_at=phi_e,
+        lean_angle=float(directions.deflection[0]) if is_even else float(law.offset),
+        unevenness=e,
+        unevenness_angle=phi_e,
     )
 
 

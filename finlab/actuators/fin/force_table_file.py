@@ -180,9 +180,9 @@ def _grid(rows: Array, lines: NDArray[np.intp], source: str) -> tuple[list[Array
     uniques = [np.unique(rows[:, i], return_inverse=True) for i in range(3)]
     axes = [values for values, _ in uniques]
     shape = tuple(len(axis) for axis in axes)
-    place = np.ravel_multi_index(tuple(inverse.ravel() for _, inverse in uniques), shape)
-    order = place.argsort(kind="stable")
-    repeated = np.flatnonzero(np.diff(place[order]) == 0)
+    flat_index = np.ravel_multi_index(tuple(inverse.ravel() for _, inverse in uniques), shape)
+    order = flat_index.argsort(kind="stable")
+    repeated = np.flatnonzero(np.diff(flat_index[order]) == 0)
     if len(repeated):
         first = order[repeated[0]]
         second = order[repeated[0] + 1]
@@ -191,8 +191,8 @@ def _grid(rows: Array, lines: NDArray[np.intp], source: str) -> tuple[list[Array
             f"{lines[second]}; "
             "keep one"
         )
-    if len(place) != math.prod(shape):
-        hole = np.flatnonzero(~np.isin(np.arange(math.prod(shape)), place))[0]
+    if len(flat_index) != math.prod(shape):
+        hole = np.flatnonzero(~np.isin(np.arange(math.prod(shape)), flat_index))[0]
         at = ", ".join(
             f"{name} = {axis[i]:.6g}"
             for name, axis, i in zip(COLUMNS, axes, np.unravel_index(hole, shape), strict=False)
@@ -204,7 +204,7 @@ def _grid(rows: Array, lines: NDArray[np.intp], source: str) -> tuple[list[Array
             "missing (write equal values with equal digits)"
         )
     values = np.empty((math.prod(shape), rows.shape[1] - 3))
-    values[place] = rows[:, 3:]
+    values[flat_index] = rows[:, 3:]
     return axes, values.reshape(*shape, -1)
 
 

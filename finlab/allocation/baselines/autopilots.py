@@ -22,10 +22,10 @@ from scipy.optimize import linear_sum_assignment
 
 from finlab.allocation.baselines.fixed_actuators import fixed_actuators_of
 from finlab.allocation.method import LeastErrorMethod
-from finlab.allocation.policy import AXES as WRENCH_AXES
 from finlab.allocation.settings import Settings, choice
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
+from finlab.axes import AXES as WRENCH_AXES
 from finlab.axes import Axis
 from finlab.exchange.motor_factors import AXES, FRAMES
 from finlab.exchange.motor_factors import SIGNS as SUB_SIGNS
@@ -213,14 +213,17 @@ class ArduSub(LeastErrorMethod):
         from_others = SUB_SIGNS * (targets - self._wrench_of_fixed)[:, COLUMNS]
         for group in GROUPS:
             columns = list(group)
-            part = from_others[:, columns] @ self._force_per_wrench[:, columns].T
-            limit = np.where(part < 0.0, lower, upper)
+            group_force = from_others[:, columns] @ self._force_per_wrench[:, columns].T
+            limit = np.where(group_force < 0.0, lower, upper)
             share = np.divide(
-                limit, part, out=np.full_like(part, np.inf), where=np.abs(part) > NO_PART
+                limit,
+                group_force,
+                out=np.full_like(group_force, np.inf),
+                where=np.abs(group_force) > NO_PART,
             )
             # A thruster that cannot reverse is clipped, and scales nobody down.
             share[share <= 0.0] = np.inf
-            force += part * np.minimum(share.min(axis=1, keepdims=True), 1.0)
+            force += group_force * np.minimum(share.min(axis=1, keepdims=True), 1.0)
         command = np.zeros((*force.shape, 3))
         command[..., 0] = force
         return Solution(self.plant.feasible(command))

@@ -46,14 +46,14 @@ class ForceProgram:
     parameter."""
 
     def __init__(
-        self, casadi: Any, inverse: PseudoInverse, sigma: Array, options: dict[str, Any]
+        self, casadi: Any, inverse: PseudoInverse, error_scale: Array, options: dict[str, Any]
     ) -> None:
         """Makes the program and its solver.
 
         Args:
             casadi: the module, which is an extra.
             inverse: gives starts, and commands of forces.
-            sigma: what wrenches (6,) are divided by [N, N m].
+            error_scale: what wrenches (6,) are divided by [N, N m].
             options: of IPOPT.
         """
         self._inverse = inverse
@@ -86,8 +86,8 @@ class ForceProgram:
         for actuator in self._actuators:
             constraints += actuator.constraints
         # The wrench counts along the directions in which the actuators push at all.
-        residual = (wrench - target) / casadi.DM(sigma)
-        axes = pushed_axes(wrench_per_share / sigma[:, None])
+        residual = (wrench - target) / casadi.DM(error_scale)
+        axes = pushed_axes(wrench_per_share / error_scale[:, None])
         for along_axis in casadi.vertsplit(casadi.DM(axes) @ residual):
             constraints.append(_Constraint(along_axis, 0.0, 0.0))
 
@@ -236,8 +236,8 @@ class _PlaneProgram:
             plane: what the actuator offers.
             share: its variables (2,).
         """
-        center = plane.middle
-        half_angle = plane.half
+        center = plane.sector_center
+        half_angle = plane.sector_half_angle
         table = plane.table
         self._center = center
         self._half_angle = half_angle
@@ -354,7 +354,7 @@ class Ipopt(ModelBased):
                 break
             ends.append(self._program.command(target, start))
         best = self._best(target, np.array(ends), POLISH)
-        if np.linalg.norm((self.plant.wrench(best) - target) / self.sigma) > SOLVED:
+        if np.linalg.norm((self.plant.wrench(best) - target) / self.asked_scale) > SOLVED:
             best = self._best(target, np.array(ends), APPROACH)
         return best
 
@@ -362,7 +362,7 @@ class Ipopt(ModelBased):
     def _program(self) -> ForceProgram:
         """The program of this robot, made when it is first asked."""
         options = SOLVER_OPTIONS | {"ipopt.max_cpu_time": 0.5 * self.settings.time_limit_s}
-        return ForceProgram(self._casadi, self._inverse, self.sigma, options)
+        return ForceProgram(self._casadi, self._inverse, self.asked_scale, options)
 
 
 def import_casadi() -> Any:

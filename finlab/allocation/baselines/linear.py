@@ -32,14 +32,14 @@ class LinearMap:
     """The actuation map of a layout, linearized by central differences at the middle of the
     limits."""
 
-    def __init__(self, plant: Plant, sigma: Array) -> None:
+    def __init__(self, plant: Plant, error_scale: Array) -> None:
         self.reference = (plant.lower + plant.upper) / 2
         n = self.reference.size
         offset = DIFFERENCE_STEP * np.eye(n).reshape(n, -1, 3) * plant.width
         rise = plant.wrench(self.reference + offset) - plant.wrench(self.reference - offset)
-        self.free = plant.width.ravel() > 0
+        self.has_range = plant.width.ravel() > 0
         """Commands (3 n,) that have a range at all; SciPy takes no others."""
-        self.matrix = (rise / (2 * DIFFERENCE_STEP) / sigma).T[:, self.free]
+        self.matrix = (rise / (2 * DIFFERENCE_STEP) / error_scale).T[:, self.has_range]
         self.wrench = plant.wrench(self.reference)
 
 
@@ -47,9 +47,9 @@ class Qp(ModelBased):
     """Linearized once per layout, solved per target by SciPy's active-set
     `lsq_linear(method="bvls")`.
 
-    Minimizes `||(w_ref + J du - target) / sigma||^2 + ||du||^2` over commands as positions between
-    their limits, where `w_ref` and `J` belong to the middle of the limits. What commands cost plays
-    no part. (What the paper's QP regularizes it does not say.)
+    Minimizes `||(w_ref + J du - target) / asked_scale||^2 + ||du||^2` over commands as positions
+    between their limits, where `w_ref` and `J` belong to the middle of the limits. What commands
+    cost plays no part. (What the paper's QP regularizes it does not say.)
     """
 
     name = "qp"
@@ -57,18 +57,18 @@ class Qp(ModelBased):
     @cached_property
     def _map(self) -> LinearMap:
         """The linear map of this robot, made when it is first asked."""
-        return LinearMap(self.plant, self.sigma)
+        return LinearMap(self.plant, self.asked_scale)
 
     def _commands(self, targets: Array, seed: int) -> Array:
         """Solves one box problem for each target."""
         linear = self._map
         plant = self.plant
-        n_free = int(linear.free.sum())
-        step = np.zeros((len(targets), linear.free.size))
-        if n_free:
-            half = np.full(n_free, 0.5)
-            for i, wanted in enumerate((targets - linear.wrench) / self.sigma):
-                step[i, linear.free] = box_qp(linear.matrix, wanted, 1.0, -half, half)
+        n_ranged = int(linear.has_range.sum())
+        step = np.zeros((len(targets), linear.has_range.size))
+        if n_ranged:
+            half = np.full(n_ranged, 0.5)
+            for i, wanted in enumerate((targets - linear.wrench) / self.asked_scale):
+                step[i, linear.has_range] = box_qp(linear.matrix, wanted, 1.0, -half, half)
         return linear.reference + step.reshape(-1, plant.n_fins, 3) * plant.width
 
 
@@ -88,11 +88,11 @@ class PaperSqpSettings(TimeLimitedSettings):
 class PaperSqp(ModelBased):
     """The paper's sequential quadratic programming: linearize at the iterate, box QP, line search.
 
-    At the iterate u with the normalized residual r = (target - w(u)) / sigma and the Jacobian J of
-    w / sigma, the step d keeps `||J d - r||^2 + regularization ||d||^2` least with u + d inside the
-    limits; it is halved until J_norm = `||r||^2` falls by enough. Jacobians are those of the fins'
-    own laws, in closed form. What commands cost plays no part. The next start is tried where one
-    ends off the target; the answer is the end with the least error.
+    At the iterate u with the normalized residual r = (target - w(u)) / asked_scale and the Jacobian
+    J of w / asked_scale, the step d keeps `||J d - r||^2 + regularization ||d||^2` least with u + d
+    inside the limits; it is halved until J_norm = `||r||^2` falls by enough. Jacobians are those of
+    the fins' own laws, in closed form. What commands cost plays no part. The next start is tried
+    where one ends off the target; the answer is the end with the least error.
     """
 
     name = "paper_sqp"
@@ -130,21 +130,23 @@ class PaperSqp(ModelBased):
         """
         plant = self.plant
         width = self.plant.width
-        free = width.ravel() > 0.0
+        has_range = width.ravel() > 0.0
 
         def residual(command: Array) -> Array:
-            return (target - plant.wrench(command)) / self.sigma
+            return (target - plant.wrench(command)) / self.asked_scale
 
         command = start
         r = residual(start)
         errors = [float(r @ r)]
-        for _ in range(self.settings.n_steps if free.any() else 0):
-            jacobian = (plant.linearize(command)[1] / self.sigma[:, None] * width.ravel())[:, free]
-            share = (command - plant.lower).ravel()[free] / width.ravel()[free]
+        for _ in range(self.settings.n_steps if has_range.any() else 0):
+            jacobian = (plant.linearize(command)[1] / self.asked_scale[:, None] * width.ravel())[
+                :, has_range
+            ]
+            share = (command - plant.lower).ravel()[has_range] / width.ravel()[has_range]
             share = share.clip(0.0, 1.0)
-            step = np.zeros(free.size)
-            step[free] = box_qp(jacobian, r, self.settings.regularization, -share, 1.0 - share)
-            slope = -2.0 * float(r @ (jacobian @ step[free]))
+            step = np.zeros(has_range.size)
+            step[has_range] = box_qp(jacobian, r, self.settings.regularization, -share, 1.0 - share)
+            slope = -2.0 * float(r @ (jacobian @ step[has_range]))
             length = 1.0
             for _ in range(HALVINGS):
                 tried = np.clip(

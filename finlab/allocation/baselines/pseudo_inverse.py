@@ -56,15 +56,15 @@ class PseudoInverse:
     Forces (n, 2) [N] are along each actuator's own two directions; the second one of a line is 0.
     """
 
-    def __init__(self, plant: Plant, sigma: Array) -> None:
+    def __init__(self, plant: Plant, error_scale: Array) -> None:
         """Inverts the effectiveness, columns scaled by the largest forces.
 
         Args:
             plant: of the robot, in its flow.
-            sigma: what rows (6,) are divided by [N, N m].
+            error_scale: what rows (6,) are divided by [N, N m].
         """
         self.plant = plant
-        compiled = Compiled(plant.layout, plant, sigma).at(plant.inflow(None))
+        compiled = Compiled(plant.layout, plant, error_scale).at(plant.inflow(None))
         robot = compiled.robot
         self._core = robot.core
         self.groups = compiled.groups
@@ -93,12 +93,12 @@ class PseudoInverse:
         self._sector_half_angle = np.full(plant.n, np.pi)
         for i, response in enumerate(self.responses):
             if isinstance(response, Plane):
-                self._sector_center[i] = response.middle
-                self._sector_half_angle[i] = response.half
+                self._sector_center[i] = response.sector_center
+                self._sector_half_angle[i] = response.sector_half_angle
         column_scale = np.repeat(np.maximum(self.largest, NO_FORCE), 2)
-        scaled = self.effectiveness * column_scale / sigma[:, None]
+        scaled = self.effectiveness * column_scale / error_scale[:, None]
         scaled_inverse = np.linalg.pinv(scaled, rcond=RCOND)
-        self.inverse = (column_scale[:, None] * scaled_inverse / sigma).T.copy()
+        self.inverse = (column_scale[:, None] * scaled_inverse / error_scale).T.copy()
         """Target (6,) times this (6, 2 n) gives each actuator's forces [N]."""
 
     def command(self, targets: Array) -> Array:
@@ -151,13 +151,13 @@ class ModelBased(LeastErrorMethod):
         """What is kept least."""
         if self.objective == "effort":
             self.layout.only("objective 'effort'")
-        self.sigma = USUAL_SHARE * self.scale
+        self.asked_scale = USUAL_SHARE * self.scale
         """What wrenches (6,) are divided by: what a robot is mostly asked for."""
 
     @cached_property
     def _inverse(self) -> PseudoInverse:
         """What answers by the pseudo-inverse, and where others start."""
-        return PseudoInverse(self.plant, self.sigma)
+        return PseudoInverse(self.plant, self.asked_scale)
 
     @abstractmethod
     def _commands(self, targets: Array, seed: int) -> Array:
@@ -175,8 +175,8 @@ class ModelBased(LeastErrorMethod):
         Returns:
             The cheapest command (n, 3) that meets the target, else the one with the smallest error.
         """
-        problem = CommandProblem.of(self.plant, self.sigma)
-        refined = refine(problem, target[None] / self.sigma, commands, steps)
+        problem = CommandProblem.of(self.plant, self.asked_scale)
+        refined = refine(problem, target[None] / self.asked_scale, commands, steps)
         is_missed = refined.error > SOLVED
         cost = cost_meter(self.objective, self.plant)(refined.command)
         merit = np.where(is_missed, refined.error, cost)
@@ -196,9 +196,9 @@ class TimeLimitedSettings(Settings):
 
 
 class Analytic(ModelBased):
-    """Pseudo-inverse of the forces, rows scaled by sigma and columns by each actuator's largest
-    force, which each gives by its cheapest command. What does not fit is clipped, the rest not
-    redistributed."""
+    """Pseudo-inverse of the forces, rows scaled by `asked_scale` and columns by each actuator's
+    largest force, which each gives by its cheapest command. What does not fit is clipped, the rest
+    not redistributed."""
 
     name = "analytic"
     takes = "any actuator"
@@ -246,7 +246,7 @@ class FixedFrequency(ModelBased):
             frequency = min(max(self.settings.frequency, low), high)
             fins.append(fin.with_value("frequency", (frequency, frequency)))
         plant = plant_of(replace(layout, actuators=tuple(fins))).counting(layout.commanded)
-        return PseudoInverse(plant.at(self.plant.flow), self.sigma)
+        return PseudoInverse(plant.at(self.plant.flow), self.asked_scale)
 
     def _commands(self, targets: Array, seed: int) -> Array:
         """Scales the pseudo-inverse's forces down together, and stops fins that give too little."""

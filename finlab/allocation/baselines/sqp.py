@@ -64,8 +64,8 @@ class Sqp(ModelBased):
     def _program(self) -> tuple[CommandProblem, Solve]:
         """What brings starts onto a target, and what makes them cheap there."""
         meter = cost_meter(self.objective, self.plant)
-        solve = cheapest_program(self.plant, meter, self.sigma, self.settings.n_steps)
-        return CommandProblem.of(self.plant, self.sigma), solve
+        solve = cheapest_program(self.plant, meter, self.asked_scale, self.settings.n_steps)
+        return CommandProblem.of(self.plant, self.asked_scale), solve
 
     def _commands(self, targets: Array, seed: int) -> Array:
         """Solves for one target after the other."""
@@ -73,7 +73,7 @@ class Sqp(ModelBased):
         plant = self.plant
         answer = self._inverse.command(targets)
         random = plant.sample(np.random.default_rng(seed), (self.settings.n_starts - 1,))
-        for i, target in enumerate(targets / self.sigma):
+        for i, target in enumerate(targets / self.asked_scale):
             over = thread_time() + self.settings.time_limit_s
             starts = np.array([answer[i], (plant.lower + plant.upper) / 2, *random])
             near = refine(problem, target[None], starts, APPROACH)
@@ -85,46 +85,50 @@ class Sqp(ModelBased):
         return answer
 
 
-def cheapest_program(plant: Plant, meter: CostMeter, sigma: Array, steps: int) -> Solve:
+def cheapest_program(plant: Plant, meter: CostMeter, error_scale: Array, steps: int) -> Solve:
     """Makes what finds the commands of least cost that deliver a target, by SciPy's SLSQP.
 
     Args:
         plant: of the robot.
         meter: of the cost.
-        sigma: what wrenches (6,) are divided by [N, N m].
+        error_scale: what wrenches (6,) are divided by [N, N m].
         steps: most quadratic programs from a start.
 
     Returns:
         A function of a normalized target (6,) and a start (n, 3), that returns the command (n, 3)
         where SLSQP ends.
     """
-    axes = pushed_axes(layout_effectiveness(plant.layout) / sigma[:, None])
+    axes = pushed_axes(layout_effectiveness(plant.layout) / error_scale[:, None])
     width = plant.width
-    free = width.ravel() > 0.0
+    has_range = width.ravel() > 0.0
     usual = max(float(meter(plant.sample(np.random.default_rng(0), (16,))).mean()), 1e-300)
 
     def command_at(x: Array) -> Array:
-        share = np.zeros(free.size)
-        share[free] = x
+        share = np.zeros(has_range.size)
+        share[has_range] = x
         return np.asarray(plant.lower + share.reshape(-1, 3) * width)
 
     def cost(x: Array) -> float:
         return float(meter(command_at(x)[None])[0]) / usual
 
     def cost_gradient(x: Array) -> Array:
-        return np.asarray((meter.gradient(command_at(x)[None])[0] * width).ravel()[free]) / usual
+        return (
+            np.asarray((meter.gradient(command_at(x)[None])[0] * width).ravel()[has_range]) / usual
+        )
 
     def solve(target: Array, start: Array) -> Array:
         def missing(x: Array) -> Array:
-            return np.asarray(axes @ (plant.wrench(command_at(x)) / sigma - target))
+            return np.asarray(axes @ (plant.wrench(command_at(x)) / error_scale - target))
 
         def gradient(x: Array) -> Array:
             _, jacobian = plant.linearize(command_at(x))
-            return np.asarray(axes @ (jacobian / sigma[:, None] * width.ravel())[:, free])
+            return np.asarray(
+                axes @ (jacobian / error_scale[:, None] * width.ravel())[:, has_range]
+            )
 
-        if not free.any():
+        if not has_range.any():
             return start
-        first = ((start - plant.lower) / np.where(width > 0.0, width, 1.0)).ravel()[free]
+        first = ((start - plant.lower) / np.where(width > 0.0, width, 1.0)).ravel()[has_range]
         exactly: Any = {"type": "eq", "fun": missing, "jac": gradient}
         how: dict[str, Any] = {"method": "SLSQP", "options": {"maxiter": steps, "ftol": SETTLED}}
         limits = [(0.0, 1.0)] * len(first)

@@ -180,12 +180,14 @@ class Compiled:
         single = self._single_of_group.get(index)
         if single is not None:
             # Identical tables: one actuator, within all that its limits allow, answers for all.
-            bound = single.radial_worth(price.reshape(-1, 1), price_reverse.reshape(-1, 1), None)
+            bound = single.radial_conjugate_bound(
+                price.reshape(-1, 1), price_reverse.reshape(-1, 1), None
+            )
             return None if bound is None else bound.reshape(price.shape)
         force_limits = np.stack(
             [by_tables.force_min[0, indices], by_tables.force_max[0, indices]], axis=-1
         )
-        return group.radial_worth(price, price_reverse, force_limits)
+        return group.radial_conjugate_bound(price, price_reverse, force_limits)
 
 
 def _shares_tables(group: Group) -> bool:
@@ -244,7 +246,7 @@ def power_bound(
     conjugate = by_tables.conjugate.copy()
     for index, (indices, group) in enumerate(compiled.groups):
         along_price = compiled.conjugates_by_laws(index, by_tables)
-        in_all_directions = group.worth(lam)
+        in_all_directions = group.conjugate_bound(lam)
         for by_laws in (along_price, in_all_directions):
             if by_laws is not None:
                 is_said = ~np.isnan(by_laws)

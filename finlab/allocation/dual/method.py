@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from finlab.allocation.dual.compiled import Compiled, miss_cost_of, power_bound
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
-from finlab.allocation.method import Method
+from finlab.allocation.method import Method, MethodQuestion
 from finlab.allocation.policy import CLOSEST, Policy
 from finlab.allocation.settings import Settings, number
 from finlab.allocation.solution import Solution
@@ -36,8 +36,6 @@ TABLE_ERROR = 10.0 * CLOSE
 """Share of a power by which the core's tables may be off."""
 _TRUNCATED = "the search for a better answer was ended by its limit of steps"
 """Note of an answer whose search ended early."""
-_NONE_ALONE = "no share of the target was found that the actuators can give alone"
-"""Note of an answer that is off the ray of its target."""
 
 
 @dataclass(frozen=True)
@@ -115,41 +113,24 @@ class Dual(Method):
             self._in_last_flow = _MethodInFlow(key, other)
         return other
 
-    def solve(
-        self,
-        targets: Array,
-        *,
-        policy: Policy,
-        previous: Array | None = None,
-        flow: Array | None = None,
-        seed: int = 0,
-        prices: Array | None = None,
-        lost: NDArray[np.bool_] | None = None,
-        free: NDArray[np.bool_] | None = None,
-        reference: Array | None = None,
-    ) -> Solution:
-        """Solves for targets; what is not listed is as for `Method.solve`.
-
-        Args:
-            prices: multipliers (6,) [W/N, W/(N m)] at which Newton's method begins, for a single
-                target; None for its own.
-            lost: which actuators (n,) do not work; None where all do.
-            free: which axes (6,) may take any wrench; None for none.
-            reference: wrenches (K, 6) of the next ticks [N, N m]; pods turn in time for them.
+    def solve(self, question: MethodQuestion) -> Solution:
+        """Solves for targets; see `Method.solve`. In a tick pods turn in time for the reference.
 
         Returns:
             Commands (N, n, 3), NaN for lost actuators, and the lower bound of their power.
         """
-        if len(targets) == 0:
+        if len(question.targets) == 0:
             return Solution(np.empty((0, self.layout.n, 3)), lambda _: np.empty(0))
+        previous = question.previous
+        reference = question.reference
         calm = 0.0 if previous is None else self.settings.calm
-        conditions = Conditions(previous, lost, free, calm)
-        method = self.at(flow)
+        conditions = Conditions(previous, question.lost, question.free, calm)
+        method = self.at(question.flow)
         if reference is not None and len(reference) and method.turns_ahead and previous is not None:
             from finlab.allocation.dual.ahead import conditions_ahead
 
             conditions = conditions_ahead(method, reference, conditions)
-        return method.solve_under(conditions, targets, policy, prices)
+        return method.solve_under(conditions, question.targets, question.policy, question.prices)
 
     @cached_property
     def turning_pods(self) -> NDArray[np.bool_]:
@@ -194,8 +175,9 @@ class Dual(Method):
         notes = {_TRUNCATED} if answer.is_truncated else set()
         command = self.exact(answer, conditions)
         if policy.kind == "direction":
-            for row in unreachable:
-                notes.add(self._keep_on_ray(targets[row], row, answer, command, conditions))
+            from finlab.allocation.dual.ray import keep_on_rays
+
+            notes |= keep_on_rays(self, targets, unreachable, answer, command, conditions)
         if unreachable:
             notes |= self.undriven_notes(targets[unreachable], conditions)
         return self.solution(
@@ -276,72 +258,7 @@ class Dual(Method):
             return problem
         return problem.in_tick(self.rates.box(conditions.command_previous))
 
-    def _keep_on_ray(
-        self, target: Array, row: int, answer: CoreAnswer, command: Array, conditions: Conditions
-    ) -> str:
-        """Keeps one answer on the ray of its target, where the laws differ from the core's tables.
-
-        Args:
-            target: desired wrench (6,) [N, N m], along which the answer is to lie.
-            row: of the target in `answer` and `command`, which is overwritten by the largest share
-                of the target that the laws give (Eq. 14), found by bisection.
-            answer: of the core, to N targets.
-            command: (N, n, 3).
-            conditions: what holds of the robot.
-
-        Returns:
-            The note where no share can be given; else none.
-        """
-        ray = target / self.scale
-        wrench_served = answer.wrench_served
-        size_squared = max(float(ray @ ray), 1e-300)
-        along_ray = float(wrench_served[row] / self.scale @ ray)
-        error = self.error(command[row : row + 1], wrench_served[row : row + 1], conditions)[0]
-        off_ray = wrench_served[row] / self.scale - along_ray / size_squared * ray
-        if error <= NEARLY and np.abs(off_ray).max() <= NEARLY:
-            return ""
-        if conditions.command_previous is not None:
-            return ""  # what the rates leave is the nearest to the ray already (Eq. 15)
-
-        low = 0.0
-        high = along_ray
-        is_kept = False
-        while high > low + NEARLY * size_squared:
-            middle = 0.5 * (low + high)
-            tried = middle / size_squared * target[None]
-            tried_answer = self.forces(tried, None, None, conditions)
-            tried_command = self.exact(tried_answer, conditions)
-            if self.error(tried_command, tried, conditions)[0] > NEARLY:
-                high = middle
-                continue
-            low = middle
-            is_kept = True
-            command[row] = tried_command[0]
-            wrench_served[row] = tried[0]
-            answer.lam[row] = tried_answer.lam[0]
-            answer.gap_power_bound[row] = tried_answer.gap_power_bound[0]
-        if is_kept:
-            return ""
-        cancelling = self._cancelling_command(conditions)
-        if cancelling is None:
-            return _NONE_ALONE
-        command[row] = cancelling
-        wrench_served[row] = 0.0
-        answer.lam[row] = 0.0
-        answer.gap_power_bound[row] = 0.0
-        return ""
-
-    def _cancelling_command(self, conditions: Conditions) -> Array | None:
-        """A command (n, 3) of actuators that cannot rest whose least forces, nearly, cancel; None
-        without any."""
-        lower = self.layout.lower
-        width = self.layout.upper - lower
-        share = np.random.default_rng(0).random((ROUNDS, *lower.shape))
-        share[..., :-1] **= 4  # most of them near the least forces
-        starts = lower + share * width
-        return self._cheapest_exact(self.problem_under(conditions), np.zeros(6), starts)
-
-    def _cheapest_exact(
+    def cheapest_exact(
         self, problem: CommandProblem, wrench_normalized: Array, starts: Array
     ) -> Array | None:
         """The cheapest command (n, 3) that gives a normalized wrench (6,), of those to which steps
@@ -563,7 +480,7 @@ class Dual(Method):
         for row in rough[unmet].tolist():
             # Such as idle fins in line, or a least force: no small change of these commands helps.
             starts = self._starts_around(command[row])
-            other = self._cheapest_exact(problem, wanted[row], starts)
+            other = self.cheapest_exact(problem, wanted[row], starts)
             command[row] = command[row] if other is None else other
         return self.plant.rested(command)
 

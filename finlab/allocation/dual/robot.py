@@ -27,6 +27,16 @@ from finlab.core.calls import Core
 from finlab.core.fields import constant, numbers_of, struct, tables_begin
 from finlab.core.library import VERSION
 
+_FIELDS_OF_FORM = (
+    "command_sign",
+    "lean_angle",
+    "unevenness",
+    "unevenness_angle",
+    "pressure_area",
+    "zero_lift_angle",
+    "zero_lift_drag",
+)
+"""Numbers of a `Form` that the core reads as they are, by the same names in `fl_actuator`."""
 _NO_FORCE = 1e-12
 """Added to largest forces [N], so that nothing is divided by 0."""
 _LEAST_POSITIVE = 1e-300
@@ -168,7 +178,7 @@ class DualRobot:
             return 0.0
         response = self.responses[i]
         power = power_of(response, np.array(force))
-        power_at_rest = response.table.rest
+        power_at_rest = response.table.power_at_least
         return float((power - power_at_rest) / self.flow_speed[i])
 
     def _block(self) -> Array:
@@ -214,27 +224,22 @@ def _describe(actuator: Any, response: Response, form: Form, offsets: "TableOffs
     _, force_scale, power_scale = response.table.origin
     actuator["force_scale"] = force_scale
     actuator["power_scale"] = power_scale
-    actuator["dead_band"] = response.band
+    actuator["dead_band"] = response.dead_band
     # A foil has two rows: lift, and the drag of that lift.
     actuator["rows"] = 1.0 if actuator["flow_speed"] == 0.0 else 2.0
     actuator["force_min_needed"] = actuator["force_min"]
     if isinstance(response, Plane):
         actuator["rows"] = 2.0
-        actuator["sector_center"] = response.middle
-        actuator["sector_half_angle"] = response.half
+        actuator["sector_center"] = response.sector_center
+        actuator["sector_half_angle"] = response.sector_half_angle
         if _needs_no_reverse(response):
             actuator["force_min_needed"] = 0.0
 
     actuator["command_kind"] = constant(f"FL_{form.kind.upper()}")
     for field, offset in offsets._asdict().items():
         actuator[field] = offset
-    actuator["command_sign"] = form.sign
-    actuator["lean_angle"] = form.lean
-    actuator["unevenness"] = form.uneven
-    actuator["unevenness_angle"] = form.uneven_at
-    actuator["pressure_area"] = form.pressure
-    actuator["zero_lift_angle"] = form.zero_lift_angle
-    actuator["zero_lift_drag"] = form.zero_lift_drag
+    for field in _FIELDS_OF_FORM:
+        actuator[field] = getattr(form, field)
 
 
 class TableOffsets(NamedTuple):
@@ -304,7 +309,7 @@ class _Tables:
 def _flow_speed(response: Response) -> float:
     """Power per newton of drag [m/s] of a foil; 0 of all else."""
     if isinstance(response, Line) and response.drag is not None:
-        return response.speed
+        return response.flow_speed
     return 0.0
 
 
@@ -379,9 +384,9 @@ def _needs_no_reverse(plane: Plane) -> bool:
     power."""
     ahead = plane.table
     back = plane.reverse
-    if back is None or plane.half < np.pi:
+    if back is None or plane.sector_half_angle < np.pi:
         return False
-    if back.largest > ahead.largest or back.rest < ahead.rest:
+    if back.largest > ahead.largest or back.power_at_least < ahead.power_at_least:
         return False
     price = price_grid(back.top)
     force_ahead = np.interp(price, price_grid(ahead.top), ahead.force)

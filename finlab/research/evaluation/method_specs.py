@@ -22,9 +22,8 @@ import numpy as np
 
 from finlab.allocation import methods
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.method import Method
+from finlab.allocation.method import Method, MethodQuestion
 from finlab.allocation.solution import Solution
-from finlab.arrays import Array
 from finlab.errors import AllocationError, DataError
 from finlab.layout import Layout
 from finlab.physics.objective import Name
@@ -135,14 +134,14 @@ class _OwnMethod(Method):
     function: ClassVar[Callable[..., Any]]
     wanted: ClassVar[tuple[str, ...]]
 
-    def solve(self, targets: Array, *, previous: Array | None = None, **rest: Any) -> Solution:
+    def solve(self, question: MethodQuestion) -> Solution:
         """See `Method`. AllocationError: the function raised, or what it gave are no commands
         within the limits."""
         known = {
-            "targets": targets,
+            "targets": question.targets,
             "layout": self.layout,
             "sigma": self.scale,
-            "previous": previous,
+            "previous": question.previous,
         }
         try:
             answer = self.function(**{key: known[key] for key in self.wanted if key in known})
@@ -152,7 +151,7 @@ class _OwnMethod(Method):
             raise AllocationError(
                 f"{self.name}: layout {self.layout.name!r:.60}: {words:.300}"
             ) from error
-        shape = (len(targets), self.layout.n, 3)
+        shape = (len(question.targets), self.layout.n, 3)
         if command.shape != shape or not np.isfinite(command).all():
             raise AllocationError(
                 f"{self.name}: expected finite commands of shape {shape}, got shape {command.shape}"

@@ -63,8 +63,16 @@ def temperature_picture(rows: Sequence[Row]) -> Figure:
 
 
 def candidates_picture(rows: Sequence[Row]) -> Figure:
-    """Effort over error of raw and refined candidates (the paper's figure A, right). Raises
-    DataError: no row has any."""
+    """Effort over error of raw and refined candidates (the paper's figure A, right).
+
+    Args:
+        rows: of the experiment; "points" of one is a list with an entry for each robot, which has
+            under "raw" and "refined" a list (S, 2) of candidates, the best first: normalized error
+            and effort of each.
+
+    Raises:
+        DataError: no row has any.
+    """
     figure, axes = _axes("Candidates before and after their refinement")
     marks = {"raw": (COLORS[0], 7, 0.35), "refined": (COLORS[1], 22, 0.9)}
     points = [each for row in rows for each in row.get("points", ())]

@@ -54,7 +54,7 @@ class EffortRobot(NamedTuple):
     def within(self, box: CommandBox) -> "EffortRobot":
         """The same robot, each fin kept within what may follow a previous command."""
         fins = self.forces.fins
-        free = box.free[:, 2]
+        free = box.any_angle[:, 2]
         lower, upper = (box.lower[:, 2], box.upper[:, 2])
         middle = 0.5 * (lower + upper)
         half = np.where(free, np.pi, 0.5 * (upper - lower))

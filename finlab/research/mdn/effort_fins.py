@@ -105,8 +105,8 @@ class EffortFins:
             table=np.stack([table for _, table in costs]),
             gauge=None if even else np.array(gauges),
             lean=np.array([np.broadcast_to(each.deflection, POINTS) for each in compiled]),
-            middle=np.array([each.middle for each in compiled]),
-            half=np.array([each.half for each in compiled]),
+            middle=np.array([each.sector_center for each in compiled]),
+            half=np.array([each.sector_half_angle for each in compiled]),
         )
 
     @cached_property

@@ -12,12 +12,12 @@ Where a target is out of reach the default method says which wrench is to be del
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from finlab.allocation.dual.method import Dual
-from finlab.allocation.method import Method, Takes
+from finlab.allocation.method import Method, MethodQuestion, Takes
 from finlab.allocation.policy import Policy
 from finlab.allocation.rates import Rates
 from finlab.allocation.settings import MAX_CANDIDATES, Settings, number
@@ -102,19 +102,20 @@ class Mdn(LearnedMethod):
     settings: MdnSettings
 
     def __init__(
-        self, layout: Layout, settings: Settings, scale: Array, weights: TrainedWeights
+        self, layout: Layout, settings: Settings, scale: Array, networks: TrainedWeights
     ) -> None:
-        self.config = weights.network_of(ForceNetworkConfig)
-        super().__init__(layout, settings, scale, weights)
-        self.sigma = TYPICAL_SHARE * scale
-        self.robot = effort_robot(self.plant, self.sigma)
-        self._network = weights.single_precision
+        self.config = networks.network_of(ForceNetworkConfig)
+        super().__init__(layout, settings, scale, networks)
+        self.asked_scale = TYPICAL_SHARE * scale
+        self.robot = effort_robot(self.plant, self.asked_scale)
+        self._network = networks.single_precision
         self._one_thread = single_threaded_products()
 
-    def solve(self, targets: Array, *, policy: Policy, **wanted: Any) -> Solution:
-        target = targets / self.sigma
-        previous = wanted.get("previous")
-        seed = wanted.get("seed", 0)
+    def solve(self, question: MethodQuestion) -> Solution:
+        target = question.targets / self.asked_scale
+        policy = question.policy
+        previous = question.previous
+        seed = question.seed
         if len(target) == 1:
             with self._one_thread():
                 found = self._proposed_and_refined(policy, target, seed)
@@ -134,7 +135,7 @@ class Mdn(LearnedMethod):
         return Solution(command)
 
     def refinement(self, target: Array, *, flow: Array | None, seed: int) -> tuple[Candidates, ...]:
-        normalized = target[None] / self.sigma
+        normalized = target[None] / self.asked_scale
         with self._one_thread():
             proposal = self.proposals(normalized, seed)
             trace = traced(
@@ -191,7 +192,8 @@ class Mdn(LearnedMethod):
         answers = refined(robot, target, answers.command, answers.origin, MORE_STEPS)
         inexact = answers.error[:, 0] > robot.exact
         if inexact.any():
-            command = self._default.solve(target[inexact] * self.sigma, policy=policy).command
+            unanswered = MethodQuestion(target[inexact] * self.asked_scale, policy)
+            command = self._default.solve(unanswered).command
             wrench = robot.commands.wrench(command)
             answers.command[inexact, 0] = command
             answers.wrench[inexact, 0] = wrench
@@ -263,4 +265,6 @@ class Mdn(LearnedMethod):
         command = self.robot.commands.feasible(command)
         wrench = self.robot.commands.wrench(command)
         error = TYPICAL_SHARE * np.linalg.norm(wrench - target, axis=-1)
-        return Candidates(command, wrench * self.sigma, error, *costs(self.layout, command), names)
+        return Candidates(
+            command, wrench * self.asked_scale, error, *costs(self.layout, command), names
+        )

@@ -24,7 +24,7 @@ class LearnedMethod(Method):
     """A method with trained networks."""
 
     needs_networks = True
-    weights: TrainedWeights
+    networks: TrainedWeights
     shipped_checkpoint: ClassVar[str] = "default"
     """Name of the shipped checkpoint that holds its networks."""
     fin_model: FinModelSpec | None = None
@@ -103,7 +103,7 @@ class LearnedMethod(Method):
         ]
         return (
             f"the method does not know these fins: {', '.join(self.unknown_fins)}; checkpoint "
-            f"{self.weights.name!r} takes them for fins of model {model.type!r} "
+            f"{self.networks.name!r} takes them for fins of model {model.type!r} "
             f"({', '.join(values)}): trust "
             "the plant's error or train a surrogate for them",
         )

@@ -70,16 +70,16 @@ class Paper(LearnedMethod, LeastErrorMethod):
     shipped_checkpoint = "paper"
 
     def __init__(
-        self, layout: Layout, settings: Settings, scale: Array, weights: TrainedWeights
+        self, layout: Layout, settings: Settings, scale: Array, networks: TrainedWeights
     ) -> None:
-        super().__init__(layout, settings, scale, weights)
-        self.config = weights.network_of(NetworkConfig)
-        self.surrogate = LayoutSurrogate(layout, weights)
-        self.normalization = weights.normalization
-        self.fin_model = FinModelSpec.from_values(weights.fin_model)
-        self._network = weights.single_precision
+        super().__init__(layout, settings, scale, networks)
+        self.config = networks.network_of(NetworkConfig)
+        self.surrogate = LayoutSurrogate(layout, networks)
+        self.normalization = networks.normalization
+        self.fin_model = FinModelSpec.from_values(networks.fin_model)
+        self._network = networks.single_precision
         self._one_thread = single_threaded_products()
-        effectiveness = self.surrogate.effectiveness / weights.normalization.std
+        effectiveness = self.surrogate.effectiveness / networks.normalization.std
         self._effectiveness = effectiveness.reshape(-1, 6)
         """Normalized wrench (3n, 6) per newton of each fin's force along the axes of the body."""
         self.limits = layout.lower.astype(np.float32), layout.upper.astype(np.float32)
@@ -87,7 +87,7 @@ class Paper(LearnedMethod, LeastErrorMethod):
         features = raw_features(layout.position, layout.mounting_angle, layout.lower, layout.upper)
         self._features = features.astype(np.float32)
         self._effort = EffortMeter(layout.upper)
-        self._commands = CommandProblem.of(self.plant, weights.normalization.std)
+        self._commands = CommandProblem.of(self.plant, networks.normalization.std)
         """Brings directions to the nearer end of an arc, as angles."""
 
     def _solve(self, targets: AnyArray, *, seed: int, previous: AnyArray | None) -> Solution:

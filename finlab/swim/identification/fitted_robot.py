@@ -1,5 +1,5 @@
-"""What becomes of a fit: the robot's actuators with their uncertainty, its layout with tables of
-fins, and words on it.
+"""Results of a robot's fit: its actuators with their uncertainty, its layout with force tables of
+fins, and a report in words.
 
 `finlab fit robot` writes these; `online_fit.py` hands the actuators to a robot that swims.
 """

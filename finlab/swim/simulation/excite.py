@@ -10,13 +10,12 @@ farther than it may go. Where the robot leaves its bounds, the excitation fades 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.method import Method, Networks
+from finlab.allocation.method import Method, MethodQuestion, Networks
 from finlab.allocation.settings import Settings, number
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
@@ -177,9 +176,9 @@ class Exciting(Method):
     settings: ExcitingSettings
 
     def __init__(
-        self, layout: Layout, settings: Settings, scale: Array, weights: Networks | None = None
+        self, layout: Layout, settings: Settings, scale: Array, networks: Networks | None = None
     ) -> None:
-        super().__init__(layout, settings, scale, weights)
+        super().__init__(layout, settings, scale, networks)
         self._rng = np.random.default_rng(self.settings.seed)
         self._owner = _owners(layout)
         self._max_force = largest_forces(layout)
@@ -200,9 +199,9 @@ class Exciting(Method):
             self._grid = self._plant.grid((13, 41, 1))
             self._amplitude = self._plant.upper[:, 0]
 
-    def solve(self, targets: Array, **asked: Any) -> Solution:
+    def solve(self, question: MethodQuestion) -> Solution:
         """See `Method`; each target is a tick of the controller."""
-        return Solution(np.stack([self._command(target) for target in targets]))
+        return Solution(np.stack([self._command(target) for target in question.targets]))
 
     def _command(self, target: Array) -> Array:
         """The next command (n, 3); each call is a tick of the controller."""

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finlab.allocation import Allocator, Policy
+from finlab.allocation import Allocator
 from finlab.allocation.baselines.linear import PaperSqp, PaperSqpSettings, box_qp
+from finlab.allocation.method import MethodQuestion
 from finlab.errors import LayoutError
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout
 from finlab.physics import Plant, plant_of
@@ -104,7 +105,7 @@ def test_a_failed_fin_is_a_removed_fin(method: str) -> None:
     alone = choice.kind(
         rest, choice.settings, yardstick(layout)
     )  # errors are those of the whole robot
-    removed = alone.solve(np.array([target]), policy=Policy()).command[0]
+    removed = alone.solve(MethodQuestion(np.array([target]))).command[0]
     assert np.isnan(lost[1]).all()
     np.testing.assert_array_equal(lost[[0, 2]], removed)
 
@@ -208,7 +209,7 @@ def test_a_descent_never_goes_up_nor_out(seed: int, reach: float) -> None:
     target = reach * targets_of(layout, 1, seed)[0]
     end, errors = method.descent(target, plant.sample(rng, (1,))[0])
     assert len(errors) > 2 and (np.diff(errors) <= 0.0).all()
-    missing = (plant.wrench(end) - target) / method.sigma
+    missing = (plant.wrench(end) - target) / method.asked_scale
     assert errors[-1] == pytest.approx(missing @ missing, rel=1e-9, abs=1e-15)
     assert (end >= layout.lower).all() and (end <= layout.upper).all()
 

@@ -176,7 +176,7 @@ def plane_of(low: float, high: float, least: float, is_uneven: bool) -> Plane:
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
     around = np.linspace(0.0, 2.0 * np.pi, 90, endpoint=False)
     gauge = 1.0 + 0.1 * np.cos(around - 0.5) if is_uneven else None
-    return Plane(np.eye(2, 6), table, middle=middle, half=half, gauge=gauge)
+    return Plane(np.eye(2, 6), table, sector_center=middle, sector_half_angle=half, gauge=gauge)
 
 
 @pytest.mark.parametrize("case", PLANES)
@@ -194,14 +194,18 @@ def test_the_conditions_of_a_plane_hold_for_its_forces_alone(
     rng = np.random.default_rng(1)
     judged = set[bool]()
     for _ in range(300):
-        angle = plane.middle + rng.uniform(-1.0, 1.0) * min(1.5 * plane.half + 0.1, np.pi)
+        angle = plane.sector_center + rng.uniform(-1.0, 1.0) * min(
+            1.5 * plane.sector_half_angle + 0.1, np.pi
+        )
         size = rng.uniform(0.0, 1.3)
         cost, *values = (
             float(each) for each in told(size * np.array([np.cos(angle), np.sin(angle)]))
         )
         radius = 1.0 if plane.gauge is None else 1.0 + 0.1 * np.cos(angle - 0.5)
         of_most = size * strongest / radius
-        off = abs(math.remainder(angle - plane.middle, 2.0 * np.pi)) - plane.half
+        off = (
+            abs(math.remainder(angle - plane.sector_center, 2.0 * np.pi)) - plane.sector_half_angle
+        )
         outside = max(of_most - 1.0, least - of_most if least else -1.0, size * off)
         if abs(outside) < 0.02:
             continue  # too near to an edge to tell
@@ -224,9 +228,9 @@ def test_random_starts_of_a_plane_are_anywhere_in_its_arc(
     part = _PlaneProgram(casadi, plane, casadi.MX.sym("share", 2))
     rng = np.random.default_rng(2)
     drawn = np.array([part.random(rng) for _ in range(300)])
-    off = [math.remainder(math.atan2(y, x) - plane.middle, 2.0 * np.pi) for x, y in drawn]
-    assert np.abs(off).max() <= plane.half + 1e-9
-    assert min(off) <= -0.9 * plane.half and max(off) >= 0.9 * plane.half
+    off = [math.remainder(math.atan2(y, x) - plane.sector_center, 2.0 * np.pi) for x, y in drawn]
+    assert np.abs(off).max() <= plane.sector_half_angle + 1e-9
+    assert min(off) <= -0.9 * plane.sector_half_angle and max(off) >= 0.9 * plane.sector_half_angle
     size = np.hypot(*drawn.T)
     assert size.max() <= 1.0 and size.max() > 0.9 and size.min() < 0.1
 

@@ -175,4 +175,4 @@ def test_a_foil_whose_drag_is_welcome_answers_with_the_dearest_lift() -> None:
     rest = plant.wrench(np.zeros((1, 3)), flow=AHEAD)
     for price in np.random.default_rng(0).normal(size=(40, 6)) * [6.0, 2.0, 2.0, 2.0, 2.0, 2.0]:
         worth = ((given - rest) @ price - power).max()
-        assert group.worth(price[None])[0, 0] == pytest.approx(worth, rel=1e-6, abs=1e-6)
+        assert group.conjugate_bound(price[None])[0, 0] == pytest.approx(worth, rel=1e-6, abs=1e-6)

@@ -65,7 +65,7 @@ def method_of(robot: AnyRobot, layout: Layout) -> tuple[Mdn, np.ndarray]:
     """The method of a robot, and `TARGET` (1, 6) as it is normalized there."""
     method = robot.on(layout)._whole.method
     assert isinstance(method, Mdn)
-    return method, np.array([TARGET]) / method.sigma
+    return method, np.array([TARGET]) / method.asked_scale
 
 
 def weights(robot: AnyRobot, layout: Layout) -> np.ndarray:

@@ -15,7 +15,7 @@ from finlab.research.training import loop
 from finlab.research.training.device import Workplace, workplace
 from finlab.research.training.loop import LoopSettings, Training, learning_rate, seeded_generator
 
-SETTINGS = LoopSettings(45, 8, 0.05, warmup=5, ema=0.9)
+SETTINGS = LoopSettings(steps=45, batch_size=8, learning_rate=0.05, warmup=5, ema=0.9)
 CPU = torch.device("cpu")
 
 
@@ -76,7 +76,7 @@ def test_a_run_that_died_ends_with_the_weights_and_the_log_of_one_that_did_not(
 
 def test_it_learns_and_leaves_curves_and_nothing_half(tmp_path: Path) -> None:
     (tmp_path / ".resume.pt.1.part").write_bytes(b"half")
-    found = run(tmp_path, LoopSettings(400, 8, 0.05))
+    found = run(tmp_path, LoopSettings(steps=400, batch_size=8, learning_rate=0.05))
     assert found["slope"] == pytest.approx(3.0, abs=0.05) and found["shift"] == pytest.approx(
         -1.0, abs=0.05
     )
@@ -95,7 +95,7 @@ def test_other_settings_and_damaged_states_are_refused_in_one_sentence(tmp_path:
 
 
 def test_time_that_is_up_ends_a_run_and_what_went_before_counts(tmp_path: Path) -> None:
-    limited = LoopSettings(10**6, 8, 0.05, seconds=0.5)
+    limited = LoopSettings(steps=10**6, batch_size=8, learning_rate=0.05, seconds=0.5)
     run(tmp_path, limited)
     steps = int(log_of(tmp_path)[-1]["step"])
     assert 10 < steps < 10**6 and 0.5 <= float(log_of(tmp_path)[-1]["seconds"]) < 5.0
@@ -110,7 +110,10 @@ def test_the_rate_rises_then_falls_with_the_later_of_steps_and_time() -> None:
     assert rates[0] == pytest.approx(0.05 / 5, rel=1e-6) and max(rates) == rates[4]
     assert (np.diff(rates[4:]) < 0.0).all() and rates[-1] < 0.002
     assert learning_rate(SETTINGS, 10, 0.9) < learning_rate(SETTINGS, 10)
-    assert learning_rate(LoopSettings(10, 1, 0.1, cosine=False), 9) == 0.1
+    assert (
+        learning_rate(LoopSettings(steps=10, batch_size=1, learning_rate=0.1, cosine=False), 9)
+        == 0.1
+    )
 
 
 @pytest.mark.parametrize(

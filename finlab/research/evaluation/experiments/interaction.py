@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from finlab.allocation.dual.method import Dual, DualSettings
-from finlab.allocation.policy import CLOSEST
+from finlab.allocation.method import MethodQuestion
 from finlab.arrays import NEARLY, ROUNDS, Array
 from finlab.fit.interaction.constants import fit_constants
 from finlab.fit.interaction.samples import Samples, left_by_laws
@@ -130,7 +130,7 @@ def _row(
         told: Any = model(samples)
         method.plant = copy(method.plant)
         method.plant.interaction = told
-        command = method.solve(wrenches, policy=CLOSEST).command
+        command = method.solve(MethodQuestion(wrenches)).command
         if name == "oracle":
             command = np.array(
                 [_exact(oracle, method, w, u) for w, u in zip(wrenches, command, strict=True)]

@@ -1,0 +1,154 @@
+"""Answers by policy `direction`: the largest share of a target that the actuators' laws give, where
+these differ from the core's tables (Eq. 14).
+
+Method `dual` asks for it, of targets out of reach alone.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from finlab.allocation.levenberg_marquardt import CommandProblem
+from finlab.allocation.policy import Policy
+from finlab.arrays import NEARLY, ROUNDS, Array
+from finlab.core.calls import Conditions, CoreAnswer
+from finlab.layout.layout import Layout
+
+NONE_ALONE = "no share of the target was found that the actuators can give alone"
+"""Note of an answer that is off the ray of its target."""
+_LEAST_SQUARE = 1e-300
+"""Least square of a target's size by which is divided."""
+
+
+class RayMethod(Protocol):
+    """What is asked of method `dual` here, in its flow."""
+
+    layout: Layout
+    scale: Array
+
+    def forces(
+        self, targets: Array, policy: Policy | None, lam: Array | None, conditions: Conditions
+    ) -> CoreAnswer:
+        """Answers wrenches (N, 6); see `Dual.forces`."""
+        ...
+
+    def exact(self, answer: CoreAnswer, conditions: Conditions) -> Array:
+        """Makes commands (N, n, 3) exact; see `Dual.exact`."""
+        ...
+
+    def error(self, command: Array, wrench: Array, conditions: Conditions) -> Array:
+        """Normalized errors (N,) of commands (N, n, 3); see `Dual.error`."""
+        ...
+
+    def problem_under(self, conditions: Conditions) -> CommandProblem:
+        """Steps on the commands; see `Dual.problem_under`."""
+        ...
+
+    def cheapest_exact(
+        self, problem: CommandProblem, wrench_normalized: Array, starts: Array
+    ) -> Array | None:
+        """The cheapest command (n, 3) that gives a wrench; see `Dual.cheapest_exact`."""
+        ...
+
+
+class RowAnswer(NamedTuple):
+    """The answer to one target."""
+
+    command: Array
+    """(n, 3)."""
+    wrench_served: Array
+    """Wrench (6,) [N, N m] that the command gives."""
+    lam: Array
+    """Multipliers (6,) [W/N, W/(N m)]."""
+    gap_power_bound: float
+    """Power [W] that gaps are proved to need for that wrench, by the core's tables."""
+
+
+def keep_on_rays(
+    method: RayMethod,
+    targets: Array,
+    rows: Sequence[int],
+    answer: CoreAnswer,
+    command: Array,
+    conditions: Conditions,
+) -> set[str]:
+    """Overwrites answers that are off the rays of their targets by others that are on them.
+
+    Args:
+        method: in the flow of the robot.
+        targets: desired wrenches (N, 6) [N, N m], along which the answers are to lie.
+        rows: of the targets that are out of reach.
+        answer: of the core, to all targets; what it served, its multipliers and its bounds of gaps
+            are overwritten.
+        command: (N, n, 3), overwritten, too.
+        conditions: what holds of the robot.
+
+    Returns:
+        The note where no share of a target can be given; else none.
+    """
+    notes = set()
+    for row in rows:
+        first = RowAnswer(
+            command[row],
+            answer.wrench_served[row],
+            answer.lam[row],
+            float(answer.gap_power_bound[row]),
+        )
+        on_ray = _on_ray(method, targets[row], first, conditions)
+        if on_ray is None:
+            notes.add(NONE_ALONE)
+            continue
+        command[row] = on_ray.command
+        answer.wrench_served[row] = on_ray.wrench_served
+        answer.lam[row] = on_ray.lam
+        answer.gap_power_bound[row] = on_ray.gap_power_bound
+    return notes
+
+
+def _on_ray(
+    method: RayMethod, target: Array, first: RowAnswer, conditions: Conditions
+) -> RowAnswer | None:
+    """The answer to a target (6,) with the largest share of it that the laws give, found by
+    bisection below the share of a first answer; that itself where it is on the ray already; None
+    where no share can be given."""
+    ray = target / method.scale
+    size_squared = max(float(ray @ ray), _LEAST_SQUARE)
+    along_ray = float(first.wrench_served / method.scale @ ray)
+    error = method.error(first.command[None], first.wrench_served[None], conditions)[0]
+    off_ray = first.wrench_served / method.scale - along_ray / size_squared * ray
+    if error <= NEARLY and np.abs(off_ray).max() <= NEARLY:
+        return first
+    if conditions.command_previous is not None:
+        return first  # what the rates leave is the nearest to the ray already (Eq. 15)
+
+    low = 0.0
+    high = along_ray
+    best: RowAnswer | None = None
+    while high > low + NEARLY * size_squared:
+        middle = 0.5 * (low + high)
+        tried = middle / size_squared * target[None]
+        answer = method.forces(tried, None, None, conditions)
+        command = method.exact(answer, conditions)
+        if method.error(command, tried, conditions)[0] > NEARLY:
+            high = middle
+            continue
+        low = middle
+        best = RowAnswer(command[0], tried[0], answer.lam[0], float(answer.gap_power_bound[0]))
+    if best is not None:
+        return best
+    cancelling = _cancelling_command(method, conditions)
+    if cancelling is None:
+        return None
+    return RowAnswer(cancelling, np.zeros(6), np.zeros(6), 0.0)
+
+
+def _cancelling_command(method: RayMethod, conditions: Conditions) -> Array | None:
+    """A command (n, 3) of actuators that cannot rest whose least forces, nearly, cancel; None
+    without any."""
+    lower = method.layout.lower
+    width = method.layout.upper - lower
+    share = np.random.default_rng(0).random((ROUNDS, *lower.shape))
+    share[..., :-1] **= 4  # most of them near the least forces
+    starts = lower + share * width
+    return method.cheapest_exact(method.problem_under(conditions), np.zeros(6), starts)
