@@ -159,13 +159,20 @@ def wrenches(n: int = 6) -> np.ndarray:
     return size * np.random.default_rng(0).normal(size=(n, 6)) * [1.0, 0.3, 1.0, 0.05, 0.05, 0.1]
 
 
-def test_the_plain_policy_shares_the_work_and_reaches_as_much() -> None:
+def test_a_batch_errs_as_little_as_single_calls() -> None:
     allocator = AnyRobot()
     layout = load_layout("A")
     targets = wrenches(20)
     batch = allocator.allocate_batch(layout, targets)
     errors = np.array([allocator.allocate(layout, target).err_norm for target in targets])
     np.testing.assert_allclose(batch.err_norm, errors, rtol=1e-6, atol=1e-5)
+
+
+def test_weights_move_the_error_off_the_heavy_axis() -> None:
+    allocator = AnyRobot()
+    layout = load_layout("A")
+    targets = wrenches(20)
+    batch = allocator.allocate_batch(layout, targets)
     weighted = allocator.allocate_batch(
         layout, targets, policy=Policy(axis_weights=(1, 1, 10, 1, 1, 1))
     )

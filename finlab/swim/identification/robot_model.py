@@ -258,6 +258,7 @@ def _shares(model: RobotModel, lengths: Sequence[int], smooth: Array) -> tuple[A
     of_axis = -np.stack([nu, nu * np.abs(nu), np.ones_like(nu)], axis=-1)  # (M, 6, 3)
     by_axis = (np.eye(6)[:, :, None] * of_axis[:, :, None]).reshape(-1, 6, 18)
     regressors = np.concatenate([law_wrench, by_axis], axis=-1)  # (M, 6, n + 18)
+    # Prior standard deviations of the unknowns, in the order of `of_axis`: d_1, d_2, constant.
     axis_deviations = [
         model.blocks["linear"].scale,
         model.blocks["quadratic"].scale,

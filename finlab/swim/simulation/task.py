@@ -54,14 +54,20 @@ class Trajectory:
         if len(time) < 2 or position.shape != (len(time), 3):
             raise DataError(
                 f"trajectory {name}: expected at least two samples of t, x, y, z, got {len(time)} "
-                "times and "
-                f"positions of shape {position.shape}"
+                f"times and positions of shape {position.shape}"
             )
         if not (np.isfinite(time).all() and np.isfinite(position).all()):
             raise DataError(f"trajectory {name}: expected finite numbers, got NaN or infinity")
-        if time[0] != 0.0 or not (np.diff(time) > 0.0).all():
+        if time[0] != 0.0:
             raise DataError(
                 f"trajectory {name}: expected times that rise from 0, got {time[0]:g} first"
+            )
+        is_rising = np.diff(time) > 0.0
+        if not is_rising.all():
+            k = int(np.argmin(is_rising))
+            raise DataError(
+                f"trajectory {name}: expected times that rise from 0, got {time[k]:g} before "
+                f"{time[k + 1]:g}"
             )
         if time[-1] < SHORTEST_S:
             raise DataError(
