@@ -3,6 +3,7 @@
 import ast
 import io
 import re
+import subprocess
 import tokenize
 from collections.abc import Iterator
 from pathlib import Path
@@ -58,3 +59,20 @@ def test_the_files_that_are_named_are_there(folder: str) -> None:
         prose = "\n".join(prose_of(text)) if path.suffix == ".py" else text
         wrong += [f"{name}: {missing}" for missing in missing_paths(prose)]
     assert not wrong, wrong
+
+
+PATCH = re.compile(r'^```diff title="([^"]+)"\n(.*?)^```$', re.MULTILINE | re.DOTALL)
+"""A patch of the tree on a page: its title, and the patch."""
+
+
+@pytest.mark.skipif(not (ROOT / ".git").exists(), reason="no clone: git reads no patch here")
+def test_patches_on_pages_apply_to_this_tree() -> None:
+    """The site applies them when it is built; this says it after each change of the sources."""
+    stale = []
+    for page in sorted((ROOT / "docs").rglob("*.md")):
+        for title, patch in PATCH.findall(page.read_text(encoding="utf-8")):
+            check = ["git", "apply", "--check", "-"]
+            done = subprocess.run(check, cwd=ROOT, input=patch, capture_output=True, text=True)
+            if done.returncode:
+                stale.append(f"{page.relative_to(ROOT)}, {title}: {done.stderr.strip()}")
+    assert not stale, "\n".join(stale)
