@@ -7,16 +7,13 @@ small part is left, as turning there and back with every wave gains little; half
 wanted now, the next tick wants half of what then remains.
 """
 
-from typing import Protocol
-
 import numpy as np
-from numpy.typing import NDArray
 
-from finlab.allocation.policy import CLOSEST, Policy
+from finlab.allocation.dual.prepared import PreparedDual
+from finlab.allocation.policy import CLOSEST
 from finlab.arrays import Array
 from finlab.axes import TURN
-from finlab.core.calls import Conditions, CoreAnswer
-from finlab.layout.layout import Layout
+from finlab.core.calls import Conditions
 
 MAX_TICKS_AHEAD = 8
 """Ticks to which pods look ahead at most."""
@@ -28,29 +25,7 @@ CALM_FACTOR = 10.0
 """Factor of what turning costs: to stand at another angle than is wanted is that much dearer."""
 
 
-class PodMethod(Protocol):
-    """What is asked of method `dual` here, in its flow."""
-
-    layout: Layout
-
-    @property
-    def period_s(self) -> float:
-        """Time between ticks [s]."""
-        ...
-
-    @property
-    def turning_pods(self) -> NDArray[np.bool_]:
-        """Which actuators (n,) are pods whose turning costs."""
-        ...
-
-    def forces(
-        self, targets: Array, policy: Policy | None, lam: Array | None, conditions: Conditions
-    ) -> CoreAnswer:
-        """Answers wrenches (N, 6); see `Dual.forces`."""
-        ...
-
-
-def conditions_ahead(method: PodMethod, reference: Array, conditions: Conditions) -> Conditions:
+def conditions_ahead(method: PreparedDual, reference: Array, conditions: Conditions) -> Conditions:
     """Returns what holds, with the angles near which pods are to stand.
 
     Args:

@@ -10,15 +10,15 @@ programming). The iterations themselves are in finlab/core/src/sequential_convex
 they begin: the whole model is not convex, so several starts are tried.
 """
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.dual.compiled import Compiled
-from finlab.allocation.levenberg_marquardt import CommandProblem, refine
+from finlab.allocation.dual.prepared import PreparedDual
+from finlab.allocation.levenberg_marquardt import refine
 from finlab.allocation.policy import Policy
-from finlab.allocation.rates import Rates
 from finlab.allocation.solution import Solution
 from finlab.arrays import CLOSE, NEARLY, ROUNDS, Array
 from finlab.core.calls import Conditions, CoreAnswer
@@ -47,58 +47,6 @@ WALSH = np.kron(_PAIR, np.kron(_PAIR, _PAIR))
 """Signs (8, 8) of the patterns of Walsh, one pattern in each column."""
 
 
-class OuterMethod(Protocol):
-    """What is asked of method `dual` here, in its flow."""
-
-    plant: Plant
-    scale: Array
-    compiled: Compiled
-
-    @property
-    def coupled(self) -> CoupledCore:
-        """The robot in the core, with its wrench offset."""
-        ...
-
-    @property
-    def rates(self) -> Rates:
-        """How far commands may change in a tick."""
-        ...
-
-    def forces(
-        self, targets: Array, policy: Policy | None, lam: Array | None, conditions: Conditions
-    ) -> CoreAnswer:
-        """Answers wrenches (N, 6) by the laws alone; see `Dual.forces`."""
-        ...
-
-    def exact(self, answer: CoreAnswer, conditions: Conditions) -> Array:
-        """Makes commands (N, n, 3) exact; see `Dual.exact`."""
-        ...
-
-    def error(self, command: Array, wrench: Array, conditions: Conditions) -> Array:
-        """Measures errors (N,) of commands; see `Dual.error`."""
-        ...
-
-    def undriven_notes(self, targets: Array, conditions: Conditions) -> set[str]:
-        """Tells of axes that come together only; see `Dual.undriven_notes`."""
-        ...
-
-    def problem_under(self, conditions: Conditions) -> CommandProblem:
-        """Poses the steps on commands; see `Dual.problem_under`."""
-        ...
-
-    def solution(
-        self,
-        command: Array,
-        wrench_served: Array,
-        lam: Array,
-        gap_power_bound: Array,
-        notes: set[str],
-        conditions: Conditions,
-    ) -> Solution:
-        """Makes a solution; see `Dual.solution`."""
-        ...
-
-
 def coupled_core(plant: Plant, compiled: Compiled) -> CoupledCore:
     """Returns a robot in the core, with what its actuators do to each other.
 
@@ -125,7 +73,7 @@ def coupled_core(plant: Plant, compiled: Compiled) -> CoupledCore:
 
 
 def solve_outer(
-    method: OuterMethod, targets: Array, policy: Policy, conditions: Conditions, lam: Array | None
+    method: PreparedDual, targets: Array, policy: Policy, conditions: Conditions, lam: Array | None
 ) -> Solution:
     """Solves for targets, one after the other, by outer iterations.
 
@@ -165,7 +113,7 @@ def solve_outer(
 
 
 def _best_of_starts(
-    method: OuterMethod, target: Array, policy: Policy, conditions: Conditions, lam: Array | None
+    method: PreparedDual, target: Array, policy: Policy, conditions: Conditions, lam: Array | None
 ) -> CoreAnswer:
     """What outer iterations come to for one target (6,): in a tick from the command before, else
     from the forces by the laws alone and, where the whole model takes more power, from others."""
@@ -230,7 +178,7 @@ def _is_better(one: OuterResult, other: OuterResult) -> bool:
 
 
 def _on_the_ray(
-    method: OuterMethod, target: Array, command: Array, conditions: Conditions
+    method: PreparedDual, target: Array, command: Array, conditions: Conditions
 ) -> tuple[Array, Array]:
     """Finds the largest share of a target that steps on the commands come to (Eq. 14), by
     bisection.

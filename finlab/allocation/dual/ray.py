@@ -5,51 +5,18 @@ Method `dual` asks for it, of targets out of reach alone.
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
-from finlab.allocation.levenberg_marquardt import CommandProblem
-from finlab.allocation.policy import Policy
+from finlab.allocation.dual.prepared import PreparedDual
 from finlab.arrays import NEARLY, ROUNDS, Array
 from finlab.core.calls import Conditions, CoreAnswer
-from finlab.layout.layout import Layout
 
 NONE_ALONE = "no share of the target was found that the actuators can give alone"
 """Note of an answer that is off the ray of its target."""
 _LEAST_SQUARE = 1e-300
 """Least square of a target's size by which is divided."""
-
-
-class RayMethod(Protocol):
-    """What is asked of method `dual` here, in its flow."""
-
-    layout: Layout
-    scale: Array
-
-    def forces(
-        self, targets: Array, policy: Policy | None, lam: Array | None, conditions: Conditions
-    ) -> CoreAnswer:
-        """Answers wrenches (N, 6); see `Dual.forces`."""
-        ...
-
-    def exact(self, answer: CoreAnswer, conditions: Conditions) -> Array:
-        """Makes commands (N, n, 3) exact; see `Dual.exact`."""
-        ...
-
-    def error(self, command: Array, wrench: Array, conditions: Conditions) -> Array:
-        """Normalized errors (N,) of commands (N, n, 3); see `Dual.error`."""
-        ...
-
-    def problem_under(self, conditions: Conditions) -> CommandProblem:
-        """Steps on the commands; see `Dual.problem_under`."""
-        ...
-
-    def cheapest_exact(
-        self, problem: CommandProblem, wrench_normalized: Array, starts: Array
-    ) -> Array | None:
-        """The cheapest command (n, 3) that gives a wrench; see `Dual.cheapest_exact`."""
-        ...
 
 
 class RowAnswer(NamedTuple):
@@ -66,7 +33,7 @@ class RowAnswer(NamedTuple):
 
 
 def keep_on_rays(
-    method: RayMethod,
+    method: PreparedDual,
     targets: Array,
     rows: Sequence[int],
     answer: CoreAnswer,
@@ -107,7 +74,7 @@ def keep_on_rays(
 
 
 def _on_ray(
-    method: RayMethod, target: Array, first: RowAnswer, conditions: Conditions
+    method: PreparedDual, target: Array, first: RowAnswer, conditions: Conditions
 ) -> RowAnswer | None:
     """The answer to a target (6,) with the largest share of it that the laws give, found by
     bisection below the share of a first answer; that itself where it is on the ray already; None
@@ -143,7 +110,7 @@ def _on_ray(
     return RowAnswer(cancelling, np.zeros(6), np.zeros(6), 0.0)
 
 
-def _cancelling_command(method: RayMethod, conditions: Conditions) -> Array | None:
+def _cancelling_command(method: PreparedDual, conditions: Conditions) -> Array | None:
     """A command (n, 3) of actuators that cannot rest whose least forces, nearly, cancel; None
     without any."""
     lower = method.layout.lower
