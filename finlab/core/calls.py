@@ -18,9 +18,6 @@ from finlab.core.fields import Record, constant, struct
 from finlab.core.library import library
 from finlab.errors import CommandError, DataError
 
-POLICIES = ("closest", "direction", "priority")
-"""Kinds of policies: FL_CLOSEST, FL_DIRECTION, FL_PRIORITY."""
-
 
 class CoreAnswer(NamedTuple):
     """Answers of the core to N wrenches; the fields of `fl_answer` that Python reads."""
@@ -98,7 +95,7 @@ class PolicyFields(Protocol):
 
     @property
     def kind(self) -> str:
-        """One of `POLICIES`."""
+        """Name of the policy: "closest" is FL_CLOSEST in C, and so on."""
         ...
 
     @property
@@ -125,7 +122,7 @@ def _policy_record(policy: PolicyFields) -> Record:
     return record
 
 
-class _Question:
+class QuestionRecord:
     """One `fl_question`, the arrays that it points at, and their addresses.
 
     A pointer is written as the address of an array of ours, into which the values are copied, or as
@@ -203,7 +200,7 @@ class _Question:
             self._free_pointer[0] = self._free_address
 
 
-class _Answer:
+class AnswerRecord:
     """One `fl_answer`, and its address."""
 
     def __init__(self, count: int) -> None:
@@ -234,6 +231,25 @@ class _Answer:
         )
 
 
+def prepared_work(block: Array) -> ctypes.Array[ctypes.c_char]:
+    """Returns a work area `fl_work` that is prepared for a robot.
+
+    Args:
+        block: the robot's numbers; see finlab/core/fl_fields.h.
+
+    Raises:
+        DataError: the numbers are out of the range that the core works with.
+    """
+    core = library()
+    work = ctypes.create_string_buffer(constant("sizeof fl_work"))
+    error = core.fl_check(block.ctypes.data, len(block))
+    if not error:
+        error = core.fl_prepare(block.ctypes.data, ctypes.addressof(work))
+    if error:
+        raise DataError(f"the core refuses the robot: {error_text(error)}")
+    return work
+
+
 class Core:
     """One robot in the core. Threads may share it: one call after the other is made."""
 
@@ -247,23 +263,16 @@ class Core:
         Raises:
             DataError: its numbers are out of the range that the core works with.
         """
-        core = library()
-        self._core = core
+        self._core = library()
         self._block = block
         self._count = count
-        self._work = ctypes.create_string_buffer(constant("sizeof fl_work"))
+        self._work = prepared_work(block)
         self._lock = Lock()
         """Held during a call: work area, question and answer are the same for all threads."""
         self._block_address = block.ctypes.data
         self._work_address = ctypes.addressof(self._work)
-        self._question = _Question(count)
-        self._answer = _Answer(count)
-
-        error = core.fl_check(self._block_address, len(block))
-        if not error:
-            error = core.fl_prepare(self._block_address, self._work_address)
-        if error:
-            raise DataError(f"the core refuses the robot: {error_text(error)}")
+        self._question = QuestionRecord(count)
+        self._answer = AnswerRecord(count)
 
     def answer_one(
         self,
@@ -289,15 +298,14 @@ class Core:
         with self._lock:
             self._question.write_wrench(wrench)
             self._question.write(policy, lam, conditions)
-            _raise_refusal(self._call())
+            code = self._core.fl_answer_one(
+                self._block_address,
+                self._work_address,
+                self._question.address,
+                self._answer.address,
+            )
+            raise_refusal(code)
             return self._answer.read()
-
-    def _call(self) -> int:
-        """Answers the question that is written; returns an error code."""
-        code: int = self._core.fl_answer_one(
-            self._block_address, self._work_address, self._question.address, self._answer.address
-        )
-        return code
 
     def answer_many(
         self, wrenches: Array, policy: PolicyFields | None, conditions: Conditions = NOMINAL
@@ -341,7 +349,7 @@ class Core:
                 error.ctypes.data,
             )
         is_truncated = code < 0
-        _raise_refusal(max(code, 0))
+        raise_refusal(max(code, 0))
         return CoreAnswer(
             force, lam, wrench_served, gap_power_bound, is_attainable, command, error, is_truncated
         )
@@ -374,7 +382,8 @@ class Core:
         return command
 
     def dual_value(self, wrench: Array, lambda_reduced: Array) -> tuple[Array, float]:
-        """Evaluates the dual function (Eq. 3) at reduced multipliers.
+        """Evaluates the dual function (Eq. 3) at reduced multipliers, in the state (losses, free
+        axes, limits) of the last question.
 
         Args:
             wrench: desired (6,) [N, N m].
@@ -386,13 +395,14 @@ class Core:
         wrench = np.ascontiguousarray(wrench)
         lambda_reduced = np.ascontiguousarray(lambda_reduced)
         force = np.empty((self._count, 2))
-        value = self._core.fl_dual_value(
-            self._block_address,
-            self._work_address,
-            wrench.ctypes.data,
-            lambda_reduced.ctypes.data,
-            force.ctypes.data,
-        )
+        with self._lock:
+            value = self._core.fl_dual_value(
+                self._block_address,
+                self._work_address,
+                wrench.ctypes.data,
+                lambda_reduced.ctypes.data,
+                force.ctypes.data,
+            )
         return force, value
 
     def conjugates(self, lam: Array, conditions: Conditions = NOMINAL) -> Conjugates:
@@ -420,7 +430,7 @@ class Core:
                 len(lam),
                 records.ctypes.data,
             )
-        _raise_refusal(error)
+        raise_refusal(error)
         return Conjugates(
             price_ahead=records["price_ahead"],
             price_reverse=records["price_reverse"],
@@ -436,7 +446,7 @@ def error_text(code: int) -> str:
     return text.decode()
 
 
-def _raise_refusal(code: int) -> None:
+def raise_refusal(code: int) -> None:
     """Raises a `CommandError` at a code other than FL_OK of a question."""
     if code:
         raise CommandError(

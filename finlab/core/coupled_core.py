@@ -15,21 +15,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.arrays import Array
-from finlab.core.calls import NOMINAL, Conditions, Core, CoreAnswer, PolicyFields
+from finlab.core.calls import (
+    NOMINAL,
+    AnswerRecord,
+    Conditions,
+    CoreAnswer,
+    PolicyFields,
+    QuestionRecord,
+    prepared_work,
+    raise_refusal,
+)
 from finlab.core.fields import Record, struct
 from finlab.core.library import library
 
 _OFFSET_CALLBACK = ctypes.CFUNCTYPE(
     None,
-    ctypes.c_void_p,  # numbers of the formula of jets; unused
-    ctypes.c_void_p,  # forces (n, 3)
-    ctypes.c_int,  # n
-    ctypes.c_void_p,  # inflow (n, 3), or 0
-    ctypes.c_void_p,  # numbers that the formula works with; unused
-    ctypes.c_void_p,  # becomes the offset (6,)
-    ctypes.c_void_p,  # becomes its derivatives (n, 3, 6)
+    ctypes.c_void_p,  # constants of a formula in C; unused here
+    ctypes.c_void_p,  # force (count, n, 3)
+    ctypes.c_int,  # count, how many questions
+    ctypes.c_void_p,  # inflow (count, n, 3), or 0
+    ctypes.c_void_p,  # change (count, n, 3) of each actuator's force; not written here
+    ctypes.c_void_p,  # becomes the offset (count, 6)
+    ctypes.c_void_p,  # becomes its derivatives (count, n, 3, 6)
 )
-"""The function by which C asks Python for a wrench offset."""
+"""The function by which C asks Python for a wrench offset: `fl_offset_at` of finlab/core/finlab.h.
+Outer iterations ask with a count of 1, and read no change of single forces."""
 
 
 class WrenchOffset(NamedTuple):
@@ -43,8 +53,8 @@ class WrenchOffset(NamedTuple):
     inflow: Array | None
     """Velocities (n, 3) [m/s] of the actuators' positions through the water, body frame; None at
     rest."""
-    jets: Array | None
-    """Numbers for the core's own formula of jets; None where `effect` is asked."""
+    core_constants: Array | None
+    """What the core's own formula `fl_jets` works with; None where `effect` is asked."""
     effect: Callable[[Array, Array | None], tuple[Array, Array]]
     """For forces (n, 3) [N], body frame, and `inflow`: the offset (6,) [N, N m], and its
     derivatives (n, 3, 6) by the forces."""
@@ -53,21 +63,27 @@ class WrenchOffset(NamedTuple):
 class OuterResult(NamedTuple):
     """What outer iterations end with."""
 
-    answer: CoreAnswer
+    answer: CoreAnswer | None
     """The dual's last answer by which the command got better, with the command; its force is that
-    of the command."""
+    on the linear model. None without an iteration."""
+    force: Array
+    """Forces (n, 2) [N] that the iterations come to."""
     power: float
-    """Of the command [W]."""
-    error_price: float
-    """What an error as large as the wrench scale counts [W], beside the power."""
+    """Of these forces [W]."""
+    penalty: float
+    """What an error as large as the wrench scale counted last [W], beside the power."""
     error: float
     """Distance of the wrench from the target, over the wrench scale, by the grids of the laws."""
     steps: float
     """Steps of Newton's method and on commands that the iterations took."""
 
 
-class CoupledCore(Core):
-    """One robot in the core, with the wrench offset of its forces."""
+class CoupledCore:
+    """One robot in the core, with the wrench offset of its forces. Threads may share it: one call
+    after the other is made.
+
+    It is no `Core`, whose calls leave the offset out.
+    """
 
     def __init__(self, block: Array, wrench_offset: WrenchOffset) -> None:
         """Takes a robot.
@@ -76,21 +92,34 @@ class CoupledCore(Core):
             block: of the robot by its laws alone; the core changes a copy of it.
             wrench_offset: what its actuators do to each other.
         """
-        super().__init__(block.copy(), len(wrench_offset.frames))
+        count = len(wrench_offset.frames)
+        self._core = library()
+        self._count = count
+        self._block_linear = block.copy()
+        """The block of the linear model, which the core changes in each iteration."""
+        self._work = prepared_work(self._block_linear)
+        self._lock = Lock()
+        """Held while outer iterations run: what they read and write is the same for all threads."""
+        self._question = QuestionRecord(count)
+        self._answer = AnswerRecord(count)
         self._wrench_offset = wrench_offset
-        self._iterations_lock = Lock()
-        """Held while outer iterations run: their beginning and end are the same for all threads."""
         self._raised: BaseException | None = None
-        """Raised by the callback, for `_call` to raise again."""
+        """Raised by the callback, for `_settle` to raise again."""
         callback: Any = library().fl_jets
-        if wrench_offset.jets is None:
+        if wrench_offset.core_constants is None:
             callback = _OFFSET_CALLBACK(self._effect)
         frames = np.ascontiguousarray(wrench_offset.frames)
-        self._pointed_at = (wrench_offset.jets, wrench_offset.inflow, block, frames, callback)
+        self._pointed_at = (
+            wrench_offset.core_constants,
+            wrench_offset.inflow,
+            block,
+            frames,
+            callback,
+        )
         """What the struct points at, which has to live as long."""
         robot = np.zeros(1, struct("fl_coupled_robot"))
         robot["offset"] = ctypes.cast(callback, ctypes.c_void_p).value
-        robot["constants"] = _address_of(wrench_offset.jets)
+        robot["constants"] = _address_of(wrench_offset.core_constants)
         robot["inflow"] = _address_of(wrench_offset.inflow)
         robot["block_uncoupled"] = _address_of(block)
         robot["frames"] = _address_of(frames)
@@ -100,19 +129,19 @@ class CoupledCore(Core):
         """When the iterations end."""
         self._result: Record = np.zeros(1, struct("fl_settle_result"))
         """What they end with."""
-        self._force = np.zeros((1, self._count, 2))
+        self._force = np.zeros((count, 2))
         """Forces [N] at which the iterations begin, and then those at which they end."""
 
     def iterate(
         self,
         wrench: Array,
         force: Array | None,
-        iterations: int,
+        most_iterations: int,
         policy: PolicyFields | None = None,
         lam: Array | None = None,
         conditions: Conditions = NOMINAL,
-        error_price: float = 0.0,
-        max_steps: float = math.inf,
+        penalty_least: float = 0.0,
+        most_steps: float = math.inf,
     ) -> OuterResult:
         """Runs outer iterations for one wrench.
 
@@ -120,39 +149,43 @@ class CoupledCore(Core):
             wrench: desired (6,) [N, N m].
             force: (n, 2) [N] at which the iterations begin; None in a tick, where they begin at
                 the command before.
-            iterations: how many at most; 0 for the nearest forces that give the wrench.
+            most_iterations: how many outer iterations; 0 for the nearest forces that give the
+                wrench.
             policy: what to give out of reach; None for nothing else than the wrench.
             lam: multipliers (6,) [W/N, W/(N m)] at which the first iteration begins.
             conditions: what holds of the robot.
-            error_price: what an error as large as the wrench scale counts at least [W].
-            max_steps: steps after which no iteration but the first is begun.
+            penalty_least: what an error as large as the wrench scale counts at least [W].
+            most_steps: steps after which no iteration but the first is begun.
 
         Returns:
-            The best command, and the answer of the dual by which it was found.
+            The best command with the answer of the dual by which it was found, and its forces.
 
         Raises:
             CommandError: the core cannot work with these numbers.
         """
-        with self._iterations_lock:
-            self._force[0] = 0.0 if force is None else force
-            self._limits["penalty_least"] = error_price
-            self._limits["most_steps"] = max_steps
-            self._limits["most_iterations"] = iterations
-            answer = self.answer_one(wrench, policy, lam, conditions)
+        with self._lock:
+            self._force[:] = 0.0 if force is None else force
+            self._limits["penalty_least"] = penalty_least
+            self._limits["most_steps"] = most_steps
+            self._limits["most_iterations"] = most_iterations
+            self._question.write_wrench(wrench)
+            self._question.write(policy, lam, conditions)
+            raise_refusal(self._settle())
             return OuterResult(
-                answer=answer._replace(force=self._force.copy()),
+                answer=self._answer.read() if most_iterations > 0 else None,
+                force=self._force.copy(),
                 power=float(self._result["power"][0]),
-                error_price=float(self._result["penalty"][0]),
+                penalty=float(self._result["penalty"][0]),
                 error=float(self._result["error"][0]),
                 steps=float(self._result["steps"][0]),
             )
 
-    def _call(self) -> int:
+    def _settle(self) -> int:
         """Runs the iterations for the question that is written; returns an error code."""
         error: int = self._core.fl_settle(
             self._robot.ctypes.data,
-            self._block_address,
-            self._work_address,
+            self._block_linear.ctypes.data,
+            ctypes.addressof(self._work),
             self._question.address,
             self._limits.ctypes.data,
             self._force.ctypes.data,

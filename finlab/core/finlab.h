@@ -220,7 +220,7 @@ void fl_reach(const fl_real *block, fl_work *work, const fl_real *sets, const fl
               const fl_wide *ray, int count, fl_wide close, fl_wide *size, fl_wide *normal,
               fl_real *force);
 
-/* Evaluates the dual at multipliers.
+/* Evaluates the dual at multipliers, in the state (losses, free axes, limits) of the last question.
 
    @param wrench          (6,) [N, N m]
    @param lambda_reduced  (6,) multipliers in reduced coordinates [W]
@@ -240,7 +240,7 @@ fl_real fl_dual_value(const fl_real *block, fl_work *work, const fl_real *wrench
    @param force     (n, 2) where they begin, unless the question has commands of the tick before
                     [N]; becomes what they come to
    @param answer    becomes the last answer of the dual by which the commands got better, with
-                    these commands
+                    these commands; untouched where most_iterations is 0
    @param result    becomes what the iterations end with
    @return          as fl_answer_one */
 int fl_settle(const fl_coupled_robot *robot, fl_real *block, fl_work *work,

@@ -90,6 +90,12 @@ class Interaction(ABC):
         """Returns `offset` (..., 6), and its derivatives (..., n, 3, 6) by the forces [1, m];
         arguments as for `offset`."""
 
+    @property
+    def core_constants(self) -> Array | None:
+        """What the core's function `fl_jets` works with, where it gives the whole offset; None
+        where the core has to ask `effect`."""
+        return None
+
     @abstractmethod
     def deviation(self, force: Array) -> Array:
         """Returns the standard deviation (..., 6) of the wrench offset [N, N m] at forces (..., n,

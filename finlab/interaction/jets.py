@@ -78,6 +78,10 @@ class JetInteraction(PointInteraction):
         super().__init__(geometry, (*of_formula, BEHIND, GRAZING))
         self.constants = constants
 
+    @property
+    def core_constants(self) -> Array:
+        return self.table
+
     def at_rest(self, force: Array) -> Array:
         return self.by_core(force, None, False)[0]
 

@@ -21,9 +21,8 @@ from finlab.allocation.levenberg_marquardt import refine
 from finlab.allocation.policy import Policy
 from finlab.allocation.solution import Solution
 from finlab.arrays import CLOSE, NEARLY, ROUNDS, Array
-from finlab.core.calls import Conditions, CoreAnswer
+from finlab.core.calls import Conditions
 from finlab.core.coupled_core import CoupledCore, OuterResult, WrenchOffset
-from finlab.interaction.jets import JetInteraction
 from finlab.physics.plant import Plant
 
 JET_ROTATION = 0.38
@@ -66,7 +65,7 @@ def coupled_core(plant: Plant, compiled: Compiled) -> CoupledCore:
             frames=robot.axes @ plant.layout.frames,
             counts=plant.counts,
             inflow=plant.met_by_all(None),
-            jets=interaction.table if isinstance(interaction, JetInteraction) else None,
+            core_constants=interaction.core_constants,
             effect=interaction.effect,
         ),
     )
@@ -92,7 +91,8 @@ def solve_outer(
     multipliers: list[Array] = []
     notes: set[str] = set()
     for target in targets:
-        answer = _best_of_starts(method, target, policy, conditions, lam)
+        answer = _best_of_starts(method, target, policy, conditions, lam).answer
+        assert answer is not None  # all starts that are kept were followed by iterations
         command = method.exact(answer, conditions)
         wrench_served = answer.wrench_served
         if policy.kind == "direction" and not answer.is_attainable.all():
@@ -114,19 +114,18 @@ def solve_outer(
 
 def _best_of_starts(
     method: PreparedDual, target: Array, policy: Policy, conditions: Conditions, lam: Array | None
-) -> CoreAnswer:
+) -> OuterResult:
     """What outer iterations come to for one target (6,): in a tick from the command before, else
     from the forces by the laws alone and, where the whole model takes more power, from others."""
     coupled = method.coupled
     if conditions.command_previous is not None:
-        in_tick = coupled.iterate(target, None, ITERATIONS_IN_TICK, policy, lam, conditions)
-        return in_tick.answer
+        return coupled.iterate(target, None, ITERATIONS_IN_TICK, policy, lam, conditions)
     by_laws = method.forces(target[None], policy, lam, conditions)
     force_by_laws = by_laws.force[0]
     lam_by_laws = by_laws.lam[0]
     steps_left = MAX_WORK / len(force_by_laws)
     best = coupled.iterate(
-        target, force_by_laws, ROUNDS, policy, lam_by_laws, conditions, max_steps=steps_left
+        target, force_by_laws, ROUNDS, policy, lam_by_laws, conditions, most_steps=steps_left
     )
     steps_left -= best.steps
 
@@ -137,21 +136,21 @@ def _best_of_starts(
         power_before = best.power
         # Without an iteration: the nearest forces that give the target, with what they cost.
         tried = [
-            coupled.iterate(target, start, 0, conditions=conditions, error_price=best.error_price)
+            coupled.iterate(target, start, 0, conditions=conditions, penalty_least=best.penalty)
             for start in starts
         ]
-        merits = [one.power + one.error_price * one.error for one in tried]
+        merits = [one.power + one.penalty * one.error for one in tried]
         for k in np.argsort(merits)[:followed]:
             if steps_left <= 0:
                 break
             other = coupled.iterate(
                 target,
-                tried[k].answer.force[0],
+                tried[k].force,
                 ROUNDS,
                 policy,
                 lam_by_laws,
                 conditions,
-                max_steps=steps_left,
+                most_steps=steps_left,
             )
             steps_left -= other.steps
             best = other if _is_better(other, best) else best
@@ -160,15 +159,15 @@ def _best_of_starts(
     works = slice(None) if conditions.lost is None else ~conditions.lost
     power_by_laws = float(method.plant.power(by_laws.command)[:, works].sum())
     if best.power <= (1.0 + CHEAPER) * power_by_laws:
-        return best.answer
+        return best
     one_reversed = 1.0 - 2.0 * np.eye(len(force_by_laws))[..., None]
     for _ in range(ROUNDS):
-        is_cheaper = follow_cheapest(one_reversed * best.answer.force, REVERSED_FOLLOWED)
+        is_cheaper = follow_cheapest(one_reversed * best.force, REVERSED_FOLLOWED)
         if not is_cheaper:
             break
     rotated = _rotated_starts(force_by_laws, method.compiled.robot.is_line).all()
     follow_cheapest(rotated, ROTATED_FOLLOWED)
-    return best.answer
+    return best
 
 
 def _is_better(one: OuterResult, other: OuterResult) -> bool:

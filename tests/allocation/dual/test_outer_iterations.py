@@ -2,6 +2,8 @@
 ray."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -12,11 +14,14 @@ from finlab.allocation.dual.outer_iterations import (
     JET_ROTATION,
     RANDOM_STARTS,
     WALSH,
+    _best_of_starts,
     _rotated_starts,
 )
+from finlab.allocation.dual.prepared import PreparedDual
 from finlab.allocation.policy import CLOSEST
 from finlab.arrays import ROUNDS, Array
 from finlab.core.calls import NOMINAL
+from finlab.core.coupled_core import OuterResult
 from finlab.interaction.jets import Jets
 from finlab.layout import Layout, load_layout
 from finlab.layout.load import parse_layout
@@ -138,7 +143,49 @@ def test_iterations_settle_in_few_steps_at_the_conditions_of_a_minimum() -> None
         for target in 0.6 * plant.wrench(plant.sample(rng, (3,))):
             laws = dual.forces(target[None], CLOSEST, None, NOMINAL)
             ended = dual.coupled.iterate(
-                target, laws.force[0], ROUNDS, CLOSEST, laws.lam[0], NOMINAL, max_steps=1e6
+                target, laws.force[0], ROUNDS, CLOSEST, laws.lam[0], NOMINAL, most_steps=1e6
             )
             steps += ended.steps
     assert steps <= MOST_STEPS
+
+
+def test_forces_without_an_iteration_come_with_no_answer_of_the_dual() -> None:
+    layout = replace(parse_layout(bluerov2_heavy()), interaction=Jets())
+    dual = Allocator(layout)._whole.method
+    target = 0.5 * dual.scale
+    laws = dual.forces(target[None], CLOSEST, None, NOMINAL)
+    iterated = dual.coupled.iterate(target, laws.force[0], ROUNDS, CLOSEST)
+    assert iterated.answer is not None and iterated.answer.command.shape == (1, layout.n, 3)
+    only_steps = dual.coupled.iterate(target, laws.force[0], 0)
+    assert only_steps.answer is None
+    assert only_steps.force.shape == (layout.n, 2)
+
+
+class _ConstantIterations:
+    """Stands for a `CoupledCore`: whatever the start, iterations come to the same power."""
+
+    def __init__(self) -> None:
+        self.starts_without_iteration = 0
+
+    def iterate(
+        self, target: Array, force: Array, most_iterations: int, *_: Any, **__: Any
+    ) -> OuterResult:
+        self.starts_without_iteration += most_iterations == 0
+        return OuterResult(None, force, power=2.0, penalty=1.0, error=0.0, steps=0.0)
+
+
+def test_starts_that_make_nothing_cheaper_are_reversed_in_one_round_alone() -> None:
+    n = 6
+    coupled = _ConstantIterations()
+    laws = SimpleNamespace(
+        force=np.ones((1, n, 2)), lam=np.zeros((1, 6)), command=np.zeros((1, n, 3))
+    )
+    method = SimpleNamespace(
+        coupled=coupled,
+        forces=lambda *_: laws,
+        plant=SimpleNamespace(power=lambda command: np.full(command.shape[:-1], 1.0 / n)),
+        compiled=SimpleNamespace(robot=SimpleNamespace(is_line=np.zeros(n, bool))),
+    )
+    _best_of_starts(cast("PreparedDual", method), np.zeros(6), CLOSEST, NOMINAL, None)
+    rotated = len(WALSH) + 1 + RANDOM_STARTS
+    assert coupled.starts_without_iteration == n + rotated
