@@ -24,7 +24,7 @@ from finlab.physics.objective import REACHED, judged_effort, judged_power
 from finlab.physics.plant import Plant, plant_of
 
 if TYPE_CHECKING:
-    from finlab.allocation.question import AnsweredQuestion
+    from finlab.allocation.question import LazyFigures
 
 Number = TypeVar("Number", float, Array)
 """A figure of one answer, or of each of many (N,)."""
@@ -88,7 +88,7 @@ class Answer(PlainData, Generic[Number]):
     unknown_fins: tuple[str, ...] = ()
     """Names of fins whose model the method's networks have not learned; answers for them are
     wrong."""
-    answered: "AnsweredQuestion | None" = field(default=None, compare=False)
+    answered: "LazyFigures | None" = field(default=None, compare=False)
     """Computes the lazy properties; None in copies, which have them all."""
 
     def __post_init__(self) -> None:
@@ -351,8 +351,8 @@ class Allocation(Answer[float]):
         """Sentences about the limits, and in a tick the rates, that keep the robot from delivering
         the target.
 
-        None where it does, nor where its networks do not know the fins: then limits are not what
-        keeps it.
+        Empty where the target is delivered, and where the method's networks do not know the fins:
+        then limits are not what keeps it.
         """
         if self.reachable or self.unknown_fins:
             return ()

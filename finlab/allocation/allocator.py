@@ -17,8 +17,8 @@ from finlab.allocation.allocation import Allocation, BatchAllocation, chunks
 from finlab.allocation.method import Checkpoint, Method, Networks
 from finlab.allocation.policy import CLOSEST, Policy, PolicyName, as_policy
 from finlab.allocation.question import (
-    AnsweredQuestion,
     CheckedQuestion,
+    LazyFigures,
     RobotState,
     check_flow,
     check_layout,
@@ -394,7 +394,7 @@ class Allocator:
             flow=question.flow,
             seed=question.seed,
             unknown_fins=state.method.unknown_fins,
-            answered=AnsweredQuestion(question, wrenches, solution),
+            answered=LazyFigures(question, wrenches, solution),
         )
 
     def _state_of(self, result: Allocation) -> RobotState:

@@ -2,13 +2,12 @@
 limits (Eq. 11).
 
 The last stage of a search: it works in commands, not forces, and with the actuators' own laws, so
-it removes the error that compiled tables leave. The baselines use it for all, the paper's method
-with its surrogate.
+it removes the error that compiled tables leave. The baselines use it for all.
 """
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple, Self
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,10 +33,9 @@ networks may lie a turn away; a thruster has nothing there."""
 class CommandProblem:
     """One layout as the refinement sees it: normalized wrenches of commands, and limits."""
 
-    forces: Any
-    """Gives forces (..., n, 3) [N] of commands by `force`, with derivatives by
-    `force_and_jacobian`, as a `Plant` does, each in a frame of its own choice: the actuators' own
-    laws, or a surrogate."""
+    plant: Plant
+    """Gives forces (..., n, 3) [N] of commands by the actuators' own laws, with derivatives, and
+    the wrench offset of actuators that act on each other."""
     effectiveness: AnyArray
     """Normalized wrench (n, 3, 6) per newton along the axes of each force."""
     lower: AnyArray
@@ -49,8 +47,8 @@ class CommandProblem:
     no_limits: NDArray[np.bool_]
     """Those of them (n, 3) that all angles may follow: at +-pi they are at no limit."""
     error_scale: Array | None = None
-    """What wrenches are divided by (6,), of a plant whose actuators act on each other; None of any
-    other."""
+    """What wrenches (6,) are divided by [N, N m], the wrench scale or the `asked_scale` of a
+    method, where actuators act on each other; None where they do not."""
     works: NDArray[np.bool_] | None = None
     """Which actuators (n,) give a force; None where all do."""
     counts: NDArray[np.bool_] | None = None
@@ -62,13 +60,14 @@ class CommandProblem:
 
         Args:
             plant: of the robot.
-            error_scale: what wrenches (6,) are divided by [N, N m].
+            error_scale: what wrenches (6,) are divided by [N, N m]: the wrench scale, or the
+                `asked_scale` of a method.
 
         Returns:
             The problem within the limits of the robot.
         """
         return cls(
-            forces=plant,
+            plant=plant,
             effectiveness=plant.effectiveness / error_scale,
             lower=plant.lower,
             upper=plant.upper,
@@ -114,7 +113,7 @@ class CommandProblem:
 
     def wrench(self, command: AnyArray) -> AnyArray:
         """Returns the normalized wrenches (R, 6) of commands (R, n, 3)."""
-        return self.wrench_of(self.forces.force(command))
+        return self.wrench_of(self.plant.force(command))
 
     def wrench_of(self, force: AnyArray) -> AnyArray:
         """Returns the normalized wrenches (R, 6) of forces (R, n, 3) [N]."""
@@ -122,16 +121,16 @@ class CommandProblem:
         wrench: AnyArray = force.reshape(len(force), len(effectiveness)).dot(effectiveness)
         if self.error_scale is None:
             return wrench
-        offset = self.forces.offset(self._of_working(force)) / self.error_scale
+        offset = self.plant.offset(self._of_working(force)) / self.error_scale
         return wrench + self._in_counted_axes(offset)
 
     def wrench_and_jacobian(self, command: AnyArray) -> tuple[AnyArray, AnyArray]:
         """Returns the normalized wrenches (R, 6) of commands (R, n, 3), and their derivatives J
         (R, n, 3, 6) by the commands."""
-        force, force_jacobian = self.forces.force_and_jacobian(command)
+        force, force_jacobian = self.plant.force_and_jacobian(command)
         if self.error_scale is None:
             return self.wrench_of(force), np.matmul(force_jacobian, self.effectiveness)
-        offset, effectiveness = self.forces.effect(self._of_working(force))
+        offset, effectiveness = self.plant.effect(self._of_working(force))
         offset = offset / self.error_scale
         effectiveness = effectiveness / self.error_scale
         if self.works is not None:
@@ -183,7 +182,7 @@ def refine(
     Returns:
         For each row the best command on the way, never worse than the first one within the limits.
     """
-
+    # Most answers of the default method need no step: `finlab allocate` is to load few files.
     from finlab.least_squares import Damping, levenberg_marquardt
 
     def after_step(at: _Iterate, damping: AnyArray, is_last: bool) -> _Iterate:

@@ -2,7 +2,7 @@
 the checks of all arguments.
 
 `Allocator` makes a `RobotState` for each damage and set of free axes, a `CheckedQuestion` for each
-call, and an `AnsweredQuestion` for each result, which computes from it what is first read later.
+call, and `LazyFigures` for each result, which compute from it what is first read later.
 The checks return their argument in the form in which methods take it, or raise an error that says
 what was got and what was expected. They stand here and in no file of their own since `finlab
 allocate` is to load few files.
@@ -156,31 +156,44 @@ class CheckedQuestion(NamedTuple):
             The method's solution. In a tick its commands lie within the limits and rates of the
             drives; outside of ticks actuators that have nothing to do are at rest.
         """
+        method = self.state.method
+        question = self._for_method(targets, previous, offset, prices, reference)
+        solution = method.solve(question)
+        if question.previous is None:
+            return solution._replace(command=method.plant.rested(solution.command))
+        box = method.rates.box(question.previous)
+        return solution._replace(command=box.clip_feasible(solution.command, method.plant))
+
+    def _for_method(
+        self,
+        targets: Array,
+        previous: Array | None,
+        offset: int,
+        prices: Array | None,
+        reference: Array | None,
+    ) -> MethodQuestion:
+        """The question as the method takes it: of all n actuators with the lost ones and the free
+        axes, or of the m that work alone; arguments as of `solve`."""
         state = self.state
-        method = state.method
-        previous_of_method = previous
-        if previous is not None and not method.takes_losses:
-            previous_of_method = previous[state.works]
-        question = MethodQuestion(
+        takes_losses = state.method.takes_losses
+        if previous is not None and not takes_losses:
+            previous = previous[state.works]
+        return MethodQuestion(
             targets,
             policy=self.policy,
-            previous=previous_of_method,
+            previous=previous,
             flow=self.flow,
             seed=self.seed + offset,
-            lost=state.lost if method.takes_losses else None,
-            free=state.free if method.takes_losses else None,
+            lost=state.lost if takes_losses else None,
+            free=state.free if takes_losses else None,
             prices=prices,
             reference=reference,
         )
-        solution = method.solve(question)
-        if previous_of_method is None:
-            return solution._replace(command=method.plant.rested(solution.command))
-        box = method.rates.box(previous_of_method)
-        return solution._replace(command=box.clip_feasible(solution.command, method.plant))
 
 
-class AnsweredQuestion(NamedTuple):
-    """A question with its answer: what a result computes when it is first read."""
+class LazyFigures(NamedTuple):
+    """The figures that a result computes when they are first read, from a question and its
+    answer."""
 
     question: CheckedQuestion
     """All but the wrenches."""

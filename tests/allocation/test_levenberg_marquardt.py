@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from finlab import Azimuth, PowerLaw
-from finlab.allocation.levenberg_marquardt import CommandProblem, refine
+from finlab.allocation.levenberg_marquardt import RIDGE, CommandProblem, _smallest_change, refine
 from finlab.allocation.rates import Rates
 from finlab.layout import Fin, FinModelSpec, Layout, Limits
 from finlab.physics import plant_of
@@ -223,3 +223,30 @@ def test_clamped_commands_keep_their_limits_and_inner_ones_stay() -> None:
     assert (clamped >= lower).all() and (clamped <= upper).all()
     inner = lower + rng.random((500, 3, 3)) * (upper - lower)
     np.testing.assert_allclose(LIMITS.feasible(inner), inner, atol=1e-12)
+
+
+def _singular_weak() -> np.ndarray:
+    """A Jacobian (6, 6) of rank 2 whose squared singular values are about the absolute ridge."""
+    rng = np.random.default_rng(0)
+    return np.asarray(3e-5 * rng.normal(size=(6, 2)) @ rng.normal(size=(2, 6)) / np.sqrt(6.0))
+
+
+def _singular_strong() -> np.ndarray:
+    """A Jacobian (6, 6) of rank 2 whose smaller squared singular value is the relative ridge, one
+    hundred-trillionth of the larger one."""
+    return np.diag([1e6, 0.1, 0.0, 0.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("damping", [0.0, 1e-9])
+@pytest.mark.parametrize("jacobian", [_singular_weak(), _singular_strong()], ids=["weak", "strong"])
+def test_steps_solve_the_ridge_system_where_the_jacobian_is_singular(
+    jacobian: np.ndarray, damping: float
+) -> None:
+    """x = J^T (J J^T + mu I)^-1 r is the least squares solution of J x = r and sqrt(mu) x = 0."""
+    residual = np.array([1.0, -2.0, 0.5, 3.0, -1.0, 2.0])
+    mu = damping + RIDGE[0] + RIDGE[1] * (jacobian**2).sum()
+    system = np.concatenate([jacobian, np.sqrt(mu) * np.eye(6)])
+    right = np.concatenate([residual, np.zeros(6)])
+    expected = np.linalg.lstsq(system, right, rcond=None)[0]
+    step = _smallest_change(jacobian.T[None], residual[None, :, None], np.array([damping]))
+    np.testing.assert_allclose(step[0, :, 0], expected, rtol=1e-6, atol=1e-9)
