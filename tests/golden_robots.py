@@ -39,7 +39,7 @@ class Question(NamedTuple):
     ray_share: float
     """Largest share of that which can be given."""
     miss: float
-    """Least distance from it, on the yardstick."""
+    """Least distance from it, over the wrench scale."""
 
 
 def _question(plant: OwnPlant, rng: np.random.Generator) -> Question:
@@ -83,7 +83,7 @@ def header(name: str, layout: dict[str, Any], seed: int) -> str:
     block = thinned(Compiled.of(load(layout)).robot.block)
     plant.scales = head_of(block)[
         "wrench_scale"
-    ].copy()  # both measure a miss on the same yardstick
+    ].copy()  # both measure a miss by the same wrench scale
     questions = [_question(plant, rng) for _ in range(N_QUESTIONS)]
     columns = plant.effectiveness.T
     lines = [

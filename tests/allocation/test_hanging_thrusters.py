@@ -29,7 +29,7 @@ TABLE = PowerTable(
     )
 )
 MET = 1e-6
-"""Error, on the yardstick, of a target that is met."""
+"""Error over the wrench scale, of a target that is met."""
 
 
 def unit(rng: np.random.Generator) -> Array:

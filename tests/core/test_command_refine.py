@@ -12,7 +12,7 @@ from tests.core.parts import EITHER_WAY, MOST, Robot, at, functions, robot_of
 # Their commands have no dead bands, and none of their foils stalls.
 SMOOTH = ("azimuths", "fins", "fins any shaft", "fins uneven", "wide arcs", "holes")
 EXACT = 1.1e-8
-"""Error on the yardstick that needs no further step, and a little."""
+"""Error over the wrench scale that needs no further step, and a little."""
 
 
 def wrench_of(robot: Robot, command: Array) -> Array:

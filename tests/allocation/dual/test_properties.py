@@ -119,7 +119,7 @@ def test_a_mirrored_robot_gets_the_mirrored_answer(
 def test_a_lost_one_is_removed(search: AnyRobot, seed: int, limits: str, place: int) -> None:
     layout, target = drawn(seed, limits)
     name = layout.names[place % layout.n_fins]
-    # What is nearest depends on the yardstick, which is that of the whole robot.
+    # What is nearest depends on the wrench scale, which is that of the whole robot.
     without = search.allocate(layout, target, lost=[name], policy="direction")
     removed = search.allocate(layout.without([name]), target, policy="direction")
     alive = [i for i, fin in enumerate(layout.names) if fin != name]
