@@ -117,7 +117,7 @@ def work(objects: Path) -> None:
         source = path.read_text(encoding="utf-8")
         written = path.stat().st_mtime
         path.write_text(fault.applied(source), encoding="utf-8")
-        # Bytecode is known by the second and size of its source: each fault has a second of its own.
+        # Bytecode is known by the second and size of its source: each fault gets its own second.
         os.utime(path, (written, written + number))
         is_built = path.suffix != ".c" or built(path, objects, library)
         loaded = LOADED_FOR_C if path.suffix == ".c" else ()
