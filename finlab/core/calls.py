@@ -46,7 +46,7 @@ class CoreAnswer(NamedTuple):
 
 class Conjugates(NamedTuple):
     """Conjugates of the costs of n actuators at N multipliers (Eq. 4), by the core's tables; the
-    fields of `fl_actuator_worth`."""
+    fields of `fl_actuator_conjugate`."""
 
     price_ahead: Array
     """Price v (N, n) [W/N] along the direction of the force; 0 where an actuator pushes in
@@ -348,8 +348,9 @@ class Core:
                 is_attainable.ctypes.data,
                 error.ctypes.data,
             )
-        is_truncated = code < 0
-        raise_refusal(max(code, 0))
+        is_truncated = code == constant("FL_TRUNCATED")
+        if not is_truncated:
+            raise_refusal(code)
         return CoreAnswer(
             force, lam, wrench_served, gap_power_bound, is_attainable, command, error, is_truncated
         )
@@ -419,10 +420,10 @@ class Core:
             CommandError: the core cannot work with these numbers.
         """
         lam = np.ascontiguousarray(lam)
-        records = np.empty((len(lam), self._count), struct("fl_actuator_worth"))
+        records = np.empty((len(lam), self._count), struct("fl_actuator_conjugate"))
         with self._lock:
             self._question.write_conditions(conditions)
-            error = self._core.fl_worth(
+            error = self._core.fl_conjugates(
                 self._block_address,
                 self._work_address,
                 self._question.address,

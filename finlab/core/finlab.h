@@ -68,7 +68,7 @@ typedef double fl_wide; /* where differences of large numbers matter, in single 
 #define FL_FOILS (FL_FOIL_STEPS * FL_STEPS_AT_KINK * 2 * (FL_STARTS + FL_RAY_SHARES))
 #define FL_BOUND (2 * (FL_FORCES + FL_FOILS))
 
-#define FL_VERSION 7   /* of all structs and functions here */
+#define FL_VERSION 8   /* of all structs and functions here */
 #define FL_MAGIC 41721 /* first number of a block */
 
 /* The structs that cross the border of the library. */
@@ -110,8 +110,16 @@ enum {
   FL_PRIORITY   /* groups of axes, one after the other */
 };
 
-/* What functions return, 0 where all is well; fl_error_text has a sentence for each. */
-enum { FL_OK, FL_BAD_BLOCK, FL_BAD_VERSION, FL_BAD_NUMBER, FL_BAD_ARGUMENT, FL_ERRORS };
+/* What functions return; fl_error_text has a sentence for each. */
+enum {
+  FL_TRUNCATED = -1, /* all is answered, but a search ended at its bound of parts or steps */
+  FL_OK,             /* all is well */
+  FL_BAD_BLOCK,      /* no robot of this library */
+  FL_BAD_VERSION,    /* a block of another FL_VERSION */
+  FL_BAD_NUMBER,     /* of a robot: not finite, or out of its range */
+  FL_BAD_ARGUMENT,   /* of a question or of settings: the same */
+  FL_ERRORS          /* how many codes there are from FL_OK on */
+};
 
 /* Everything that changes while a question is answered; see fl_work.h. */
 typedef struct fl_work fl_work;
@@ -182,7 +190,7 @@ int fl_answer_one(const fl_real *block, fl_work *work, const fl_question *questi
    @param is_attainable    (count,) whether a wrench is within reach
    @param error            (count,) distance of the commands' wrench from the one served, on the
                            yardstick
-   @return                 an error code, or -1 where a search ended at its bound of parts */
+   @return                 FL_OK, FL_TRUNCATED, or the error code of fl_answer_one */
 int fl_answer_many(const fl_real *block, fl_work *work, const fl_question *question,
                    const fl_real *wrench, int count, fl_real *force, fl_real *prices,
                    fl_real *wrench_served, fl_real *gap_power_bound, fl_real *command,
@@ -196,15 +204,15 @@ int fl_answer_many(const fl_real *block, fl_work *work, const fl_question *quest
 void fl_commands(const fl_real *block, fl_work *work, const fl_real *force, int count,
                  const fl_real *previous, fl_real *command);
 
-/* Says what forces are worth at multipliers of the wrench, for proofs of a lower bound of the
-   power.
+/* Evaluates the conjugates of all costs at multipliers of the wrench, Eq. 4, for proofs of a lower
+   bound of the power.
 
-   @param question  what may be given now
-   @param prices    (count, 6) multipliers [W/N, W/(N m)]
-   @param worth     (count, n) of fl_actuator_worth
-   @return          FL_OK or FL_BAD_NUMBER */
-int fl_worth(const fl_real *block, fl_work *work, const fl_question *question,
-             const fl_real *prices, int count, fl_actuator_worth *worth);
+   @param question    what limits the sets of forces; its wrench is not read
+   @param prices      (count, 6) multipliers [W/N, W/(N m)]
+   @param conjugates  becomes those of each actuator (count, n)
+   @return            FL_OK or FL_BAD_NUMBER */
+int fl_conjugates(const fl_real *block, fl_work *work, const fl_question *question,
+                  const fl_real *prices, int count, fl_actuator_conjugate *conjugates);
 
 /* Says how far rays go in the wrenches that robots of planes give.
 

@@ -104,14 +104,14 @@ FL_FIELD(int, is_truncated, , "1", "1 where a search ended at its bound of steps
 FL_FIELD(int, has_foil_commands, , "1", "1 where the commands are those of a search, for foils")
 FL_END(fl_answer)
 
-FL_BEGIN(fl_actuator_worth)
+FL_BEGIN(fl_actuator_conjugate)
 FL_FIELD(fl_real, price_ahead, , "W/N",
          "along the force of an actuator, ahead; 0 where it pushes in reverse")
 FL_FIELD(fl_real, price_reverse, , "W/N", "along the force in reverse")
-FL_FIELD(fl_real, conjugate, , "W", "most that a force is worth, less its power")
+FL_FIELD(fl_real, conjugate, , "W", "c*(s), Eq. 4: most that a force is worth, less its power")
 FL_FIELD(fl_real, force_min, , "N", "least force, of planes below 0 in reverse")
 FL_FIELD(fl_real, force_max, , "N", "largest force")
-FL_END(fl_actuator_worth)
+FL_END(fl_actuator_conjugate)
 
 FL_BEGIN(fl_settings)
 FL_FIELD(int, most_parts, , "1",

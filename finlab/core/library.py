@@ -8,7 +8,7 @@ from pathlib import Path
 
 from finlab.errors import FinlabError
 
-VERSION = 7
+VERSION = 8
 """What `fl_version()` of the C files returns; both rise together where a signature or a struct
 changes."""
 SIGNATURES = {
@@ -22,7 +22,7 @@ SIGNATURES = {
     "fl_answer_many": "ippppippppppp",
     "fl_commands": "vpppipp",
     "fl_dual_value": "rppppp",
-    "fl_worth": "ippppip",
+    "fl_conjugates": "ippppip",
     "fl_reach": "vpppppirppp",
     "fl_jets": "vppipppp",
     "fl_settle": "ipppppppp",

@@ -2,13 +2,14 @@
 program."""
 
 import itertools
+import re
 import subprocess
 from pathlib import Path
 
 import pytest
 
 from finlab import core
-from finlab.core.library import PATH
+from finlab.core.library import PATH, SIGNATURES
 from finlab.deploy.c_sources import c_sources, write_c
 from finlab.layout import load_layout
 
@@ -83,6 +84,39 @@ def test_two_robots_link_into_a_program_in_cpp(tmp_path: Path) -> None:
         [*words, *map(str, objects), "-lm", "-o", str(program)], check=True, cwd=tmp_path
     )
     subprocess.run([str(program)], check=True)
+
+
+_COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
+_PROTOTYPE = re.compile(r"^(int|void|fl_real|const char \*)\s*(fl_\w+)\(([^()]*)\);", re.MULTILINE)
+"""A function of `finlab.h`: what it returns, its name, its arguments."""
+
+
+def _letter(declaration: str) -> str:
+    """The letter of `SIGNATURES` for the type of an argument or of a returned value."""
+    if "char *" in declaration and "unsigned" not in declaration:
+        return "s"
+    if "*" in declaration:
+        return "p"
+    letters = {"int": "i", "fl_real": "r", "fl_wide": "r", "void": "v"}
+    return letters[declaration.split()[0]]
+
+
+def _declared_signatures() -> dict[str, str]:
+    """The signatures of all functions of `finlab.h`, in the letters of `SIGNATURES`."""
+    header = _COMMENT.sub("", (CORE / "finlab.h").read_text(encoding="utf-8"))
+    signatures = {}
+    for returned, name, arguments in _PROTOTYPE.findall(header):
+        letters = [_letter(returned)]
+        if arguments != "void":
+            letters += [_letter(argument) for argument in arguments.split(",")]
+        signatures[name] = "".join(letters)
+    return signatures
+
+
+def test_python_calls_each_function_by_the_signature_of_the_header() -> None:
+    declared = _declared_signatures()
+    assert SIGNATURES.keys() <= declared.keys()
+    assert {name: declared[name] for name in SIGNATURES} == SIGNATURES
 
 
 def test_every_header_compiles_alone_in_c_and_cpp() -> None:

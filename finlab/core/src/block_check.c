@@ -80,9 +80,9 @@ static int is_grid(const real *block, real offset) {
 }
 
 /* How many of the three numbers of a command a kind uses. */
-static int used_numbers(real form) {
-  if (form == FL_FIN) return 3;
-  if (form == FL_POD) return 2;
+static int used_numbers(real command_kind) {
+  if (command_kind == FL_FIN) return 3;
+  if (command_kind == FL_POD) return 2;
   return 1;
 }
 

@@ -25,6 +25,7 @@ static const constant CONSTANTS[] = {
     CONSTANT(FL_CLOSEST),
     CONSTANT(FL_DIRECTION),
     CONSTANT(FL_PRIORITY),
+    CONSTANT(FL_TRUNCATED),
     CONSTANT(FL_OK),
     CONSTANT(FL_BAD_BLOCK),
     CONSTANT(FL_BAD_VERSION),
@@ -92,7 +93,7 @@ int fl_answer_many(const real *block, fl_work *work, const fl_question *question
     error[k] = out.error;
     is_truncated |= out.is_truncated;
   }
-  if (is_truncated) return -1;
+  if (is_truncated) return FL_TRUNCATED;
   return FL_OK;
 }
 
@@ -106,31 +107,32 @@ real fl_dual_value(const real *block, fl_work *work, const real *wrench, const r
   return state->dual_value;
 }
 
-/* What one actuator's force is worth at its prices s, of all that it may give now. */
-static fl_actuator_worth worth_at(const real *block, int i, const fl_set *set, const real *s) {
+/* The conjugate of one actuator's cost at its prices s (Eq. 4), over all that it may give now. */
+static fl_actuator_conjugate conjugate_at(const real *block, int i, const fl_set *set,
+                                          const real *s) {
   wide unused[2];
   const real along_force = fl_support_of_set(block, i, set, s, unused);
-  fl_actuator_worth worth = {0};
+  fl_actuator_conjugate result = {0};
   if (set->is_flipped) {
-    worth.price_reverse = along_force;
-    worth.force_min = -set->force_max;
-    worth.force_max = -set->force_min;
+    result.price_reverse = along_force;
+    result.force_min = -set->force_max;
+    result.force_max = -set->force_min;
   } else {
-    worth.price_ahead = along_force;
-    worth.force_min = set->force_min;
-    worth.force_max = set->force_max;
+    result.price_ahead = along_force;
+    result.force_min = set->force_min;
+    result.force_max = set->force_max;
   }
   if (set->force_max_reverse > 0) {
     const fl_set back = fl_reversed_set(set);
-    worth.price_reverse = fl_support_of_set(block, i, &back, s, unused);
-    worth.force_min = -set->force_max_reverse;
+    result.price_reverse = fl_support_of_set(block, i, &back, s, unused);
+    result.force_min = -set->force_max_reverse;
   }
-  worth.conjugate = fl_response(block, i, set, s).conjugate;
-  return worth;
+  result.conjugate = fl_response(block, i, set, s).conjugate;
+  return result;
 }
 
-int fl_worth(const real *block, fl_work *work, const fl_question *question, const real *prices,
-             int count, fl_actuator_worth *worth) {
+int fl_conjugates(const real *block, fl_work *work, const fl_question *question, const real *prices,
+                  int count, fl_actuator_conjugate *conjugates) {
   fl_question q = *question;
   q.calm = 0; /* turning is no power */
   if (!fl_prepare_question(block, work, &q)) return FL_BAD_NUMBER;
@@ -140,8 +142,7 @@ int fl_worth(const real *block, fl_work *work, const fl_question *question, cons
     for (int i = 0; i < COUNT(block); i++) {
       real s[2];
       actuator_price(work, i, lambda, s);
-      *worth = worth_at(block, i, work->set + i, s);
-      worth++;
+      conjugates[k * COUNT(block) + i] = conjugate_at(block, i, work->set + i, s);
     }
   }
   return FL_OK;
