@@ -31,7 +31,11 @@ MOST = 64
 FIN = constant("FL_FIN")
 POD = constant("FL_POD")
 """Forms of commands, FL_FIN and FL_POD."""
-_MEMBER = re.compile(r"^\s*(fl_real|int|const fl_tangent \*)\s*([^;]*);", re.M)
+POINTS = 8
+"""Most points of a mixture, FL_POINTS."""
+_LENGTHS = {"FL_MOST": MOST, "FL_POINTS": POINTS}
+"""Lengths of arrays in the headers that are macros."""
+_MEMBER = re.compile(r"^\s*(fl_real|fl_wide|int|const fl_tangent \*)\s*([^;]*);", re.M)
 
 
 def _members(header: str, name: str) -> list[tuple[str, Any]]:
@@ -41,16 +45,19 @@ def _members(header: str, name: str) -> list[tuple[str, Any]]:
     body = re.sub(r"/\*.*?\*/", "", body, flags=re.S)
     kinds: dict[str, Any] = {
         "fl_real": REAL,
+        "fl_wide": REAL,
         "int": ctypes.c_int,
         "const fl_tangent *": ctypes.c_void_p,
     }
     fields = list[tuple[str, Any]]()
     for kind, names in _MEMBER.findall(body):
         for member in names.split(","):
-            found = re.match(r"\s*(\w+)(?:\[(\w+)\])?", member)
+            found = re.match(r"\s*(\w+)((?:\[\w+\])*)", member)
             assert found is not None
-            count = found[2]
-            fields.append((found[1], kinds[kind] * int(count) if count else kinds[kind]))
+            field_type = kinds[kind]
+            for length in reversed(re.findall(r"\w+", found[2])):
+                field_type = field_type * (_LENGTHS[length] if length in _LENGTHS else int(length))
+            fields.append((found[1], field_type))
     return fields
 
 
@@ -84,6 +91,18 @@ class Tangent(ctypes.Structure):
     """A foil near to a command: `fl_tangent`."""
 
     _fields_ = _members("fl_work.h", "fl_tangent")
+
+
+class State(ctypes.Structure):
+    """Multipliers and what they give: `fl_state`."""
+
+    _fields_ = _members("fl_work.h", "fl_state")
+
+
+class Mixture(ctypes.Structure):
+    """Points whose mixture comes near to a point out of reach: `fl_mixture`."""
+
+    _fields_ = _members("fl_work.h", "fl_mixture")
 
 
 class Box(ctypes.Structure):
@@ -126,6 +145,7 @@ def functions() -> ctypes.PyDLL:
     made = ctypes.PyDLL(str(PATH))
     returns: dict[str, Any] = {
         "fl_response": Response,
+        "fl_response_with_turning": Response,
         "fl_force_of_price": LineResponse,
         "fl_limited_response": LineResponse,
         "fl_gauge_support": GaugePoint,
@@ -140,6 +160,7 @@ def functions() -> ctypes.PyDLL:
                 ),
                 *("fl_gauge_radius", "fl_gauge_lean", "fl_largest_slope", "fl_refine_commands"),
                 *("fl_drag_of_lift", "fl_dual_value"),
+                *("fl_nearest_point", "fl_farthest_along_ray"),
             ),
             REAL,
         ),
