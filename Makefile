@@ -110,7 +110,8 @@ check: setup
 	$(BIN)/clang-format --dry-run -Werror $(CORE_FILES)
 	$(BIN)/mypy
 
-CORE_FILES = $(wildcard finlab/core/*.h finlab/core/src/*.[ch] finlab/core/tests/test_*.c finlab/core/tests/golden.h)
+CORE_FILES = $(wildcard finlab/core/*.h finlab/core/src/*.[ch] finlab/core/tests/test_*.c finlab/core/tests/golden.h \
+    finlab/deploy/c_files/*.c)
 
 figures: setup
 	$(THREADS) $(BIN)/python tools/figures.py $(PAGE)
