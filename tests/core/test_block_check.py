@@ -1,0 +1,187 @@
+"""What `fl_check` of the core refuses: each number of a block that makes no sense, with its code."""
+
+import numpy as np
+import pytest
+
+from finlab.arrays import Array
+from finlab.core.fields import actuators_of, constant, head_of, tables_begin
+from finlab.core.library import library
+from tests.core.parts import FIN, POD, Robot, robot_of
+
+FOIL = constant("FL_FOIL")
+"""FL_FOIL, the kind of a rudder's command."""
+
+
+def code_of(block: Array, length: int | None = None) -> str:
+    """The name of the code with which a block is refused, or FL_OK."""
+    if length is None:
+        length = len(block)
+    code = library().fl_check(block.ctypes.data, length)
+    names = ("FL_OK", "FL_BAD_BLOCK", "FL_BAD_VERSION", "FL_BAD_NUMBER", "FL_BAD_ARGUMENT")
+    return {constant(name): name for name in names}[code]
+
+
+def first_of(robot: Robot, kind: int) -> int:
+    """The first actuator of a robot whose command is of a kind."""
+    return int(np.flatnonzero(robot.actuators["command_kind"] == kind)[0])
+
+
+def test_robots_of_every_kind_pass() -> None:
+    for name in ("thrusters", "azimuths", "fins uneven", "wide arcs", "holes", "rudders", "all"):
+        assert code_of(robot_of(name).block) == "FL_OK"
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "refused"),
+    [
+        ("magic", 41720.0, "FL_BAD_BLOCK"),
+        ("version", constant("FL_VERSION") - 1.0, "FL_BAD_VERSION"),
+        ("version", constant("FL_VERSION") + 1.0, "FL_BAD_VERSION"),
+        ("n", 0.0, "FL_BAD_BLOCK"),
+        ("n", -1.0, "FL_BAD_BLOCK"),
+        ("n", 1.5, "FL_BAD_BLOCK"),
+        ("n", constant("FL_MOST") + 1.0, "FL_BAD_BLOCK"),
+        ("rank", -1.0, "FL_BAD_BLOCK"),
+        ("rank", 1.5, "FL_BAD_BLOCK"),
+        ("rank", 7.0, "FL_BAD_BLOCK"),
+    ],
+)
+def test_a_head_with_a_wrong_number_is_refused(field: str, value: float, refused: str) -> None:
+    block = robot_of("thrusters").block.copy()
+    head_of(block)[field] = value
+    assert code_of(block) == refused
+
+
+@pytest.mark.parametrize("axis", range(6))
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("axis_scale", 0.0),
+        ("axis_scale", -1.0),
+        ("wrench_scale", 0.0),
+        ("wrench_scale", -1.0),
+        ("is_commanded", 0.5),
+        ("is_commanded", 2.0),
+        ("wrench_offset", 2e30),
+        ("wrench_offset", -2e30),
+    ],
+)
+def test_a_number_of_one_axis_is_refused(field: str, value: float, axis: int) -> None:
+    block = robot_of("thrusters").block.copy()
+    head_of(block)[field][axis] = value
+    assert code_of(block) == "FL_BAD_NUMBER"
+
+
+def test_a_block_of_another_length_is_refused() -> None:
+    block = robot_of("thrusters").block
+    assert code_of(block, len(block) - 1) == "FL_BAD_BLOCK"
+    for length in (0, 1, tables_begin(0) - 1):
+        assert code_of(block, length) == "FL_BAD_BLOCK"
+    # The head says the right length, but has more actuators than it has room for.
+    short = block[: tables_begin(robot_of("thrusters").n) - 1].copy()
+    head_of(short)["length"] = len(short)
+    assert code_of(short) == "FL_BAD_BLOCK"
+
+
+@pytest.mark.parametrize("i", [0, -1])
+@pytest.mark.parametrize(
+    ("field", "value", "refused"),
+    [
+        ("rows", 0.0, "FL_BAD_BLOCK"),
+        ("rows", 3.0, "FL_BAD_BLOCK"),
+        ("command_kind", -1.0, "FL_BAD_BLOCK"),
+        ("command_kind", 0.5, "FL_BAD_BLOCK"),
+        ("command_kind", FOIL + 1.0, "FL_BAD_BLOCK"),
+        ("force_table", 0.0, "FL_BAD_BLOCK"),
+        ("force_table", 0.5, "FL_BAD_BLOCK"),
+        ("force_table_reverse", -1.0, "FL_BAD_BLOCK"),
+        ("gauge_table", 1e9, "FL_BAD_BLOCK"),
+        ("law_grid", 300.0, "FL_BAD_BLOCK"),
+        ("flow_speed", 1.0, "FL_BAD_BLOCK"),
+        ("flow_speed", -1.0, "FL_BAD_NUMBER"),
+        ("force_scale", 0.0, "FL_BAD_NUMBER"),
+        ("power_scale", 0.0, "FL_BAD_NUMBER"),
+        ("force_min", 1e6, "FL_BAD_NUMBER"),
+        ("sector_half_angle", -0.1, "FL_BAD_NUMBER"),
+        ("dead_band", -0.1, "FL_BAD_NUMBER"),
+        ("uncertainty_cost", -0.1, "FL_BAD_NUMBER"),
+        ("secant", -0.1, "FL_BAD_NUMBER"),
+        ("row_force_max", 0.0, "FL_BAD_NUMBER"),
+        ("max_change", -0.1, "FL_BAD_NUMBER"),
+        ("command_min", 1e6, "FL_BAD_NUMBER"),
+    ],
+)
+def test_a_thruster_with_a_wrong_number_is_refused(
+    field: str, value: float, refused: str, i: int
+) -> None:
+    block = robot_of("thrusters").block.copy()
+    actuators_of(block)[field][i] = value
+    assert code_of(block) == refused
+
+
+def test_the_largest_price_of_a_table_is_above_zero() -> None:
+    robot = robot_of("thrusters")
+    for field in ("force_table", "force_table_reverse"):
+        offset = int(robot.actuators[field][0])
+        if offset > 0:
+            block = robot.block.copy()
+            block[offset] = 0.0
+            assert code_of(block) == "FL_BAD_NUMBER"
+
+
+def test_numbers_of_a_command_that_its_kind_does_not_use_are_zero() -> None:
+    """A thruster uses one, a pod two, a fin three, a foil one."""
+    for name, kind, used in (
+        ("thrusters", 0, 1),
+        ("azimuths", POD, 2),
+        ("fins", FIN, 3),
+        ("rudders", FOIL, 1),
+    ):
+        robot = robot_of(name)
+        i = first_of(robot, kind)
+        for k in range(3):
+            block = robot.block.copy()
+            own = actuators_of(block)
+            if k < used:  # an empty range
+                own["command_min"][i, k] = own["command_max"][i, k] + 1.0
+            else:
+                own["command_max"][i, k] = 1.0
+            assert code_of(block) == "FL_BAD_NUMBER", (name, k)
+
+
+def test_the_tables_that_a_kind_needs_are_there() -> None:
+    for name, kind in (("fins", FIN), ("rudders", FOIL)):
+        robot = robot_of(name)
+        i = first_of(robot, kind)
+        for field in ("command_table", "law_grid"):
+            for offset in (0.0, -1.0, len(robot.block) - 1.0):
+                block = robot.block.copy()
+                actuators_of(block)[field][i] = offset
+                assert code_of(block) == "FL_BAD_BLOCK", (name, field, offset)
+
+
+@pytest.mark.parametrize("name", ["fins", "rudders"])
+def test_a_grid_with_a_wrong_number_is_refused(name: str) -> None:
+    """Counts of knots, the period, the columns, and knots that do not ascend."""
+    robot = robot_of(name)
+    grid = int(robot.actuators["law_grid"][first_of(robot, FIN if name == "fins" else FOIL)])
+    counts = robot.block[grid : grid + 3].astype(int)
+    spoiled = [(0, 0.0), (1, 0.5), (2, 1e6), (3, -1.0), (5, 0.0), (5, 4.0)]
+    for index, value in spoiled:
+        block = robot.block.copy()
+        block[grid + index] = value
+        assert code_of(block) == "FL_BAD_BLOCK", (index, value)
+    first_knot = grid + 7
+    for count in counts:
+        if count > 1:
+            block = robot.block.copy()
+            block[first_knot + 1] = block[first_knot]
+            assert code_of(block) == "FL_BAD_BLOCK"
+        first_knot += count
+    # A period has to be wider than the knots of the third axis.
+    last_axis = robot.block[first_knot - counts[2] : first_knot]
+    for share, refused in ((0.99, "FL_BAD_BLOCK"), (1.01, "FL_OK")):
+        if counts[2] > 1:
+            block = robot.block.copy()
+            block[grid + 3] = share * (last_axis[-1] - last_axis[0])
+            assert code_of(block) == refused
