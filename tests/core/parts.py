@@ -111,6 +111,41 @@ class Box(ctypes.Structure):
     _fields_ = [("low", REAL * 3 * MOST), ("high", REAL * 3 * MOST), ("free", ctypes.c_int * MOST)]
 
 
+class State(ctypes.Structure):
+    """Multipliers and what they give: `fl_state`."""
+
+    _fields_ = [
+        ("lambda_reduced", REAL * 6),
+        ("residual", REAL * 6),
+        ("force", REAL * 2 * MOST),
+        ("dy_ds", REAL * 3 * MOST),
+        ("secant", REAL * MOST),
+        ("push_angle", REAL * MOST),
+        ("dual_value", REAL),
+        ("residual_size", REAL),
+    ]
+
+
+@cache
+def work_struct() -> type[ctypes.Structure]:
+    """The work area `fl_work` up to the largest power of all sets."""
+
+    class Work(ctypes.Structure):
+        _fields_ = [
+            *Beginning._fields_,
+            ("box", Box),
+            ("settings", ctypes.c_int * (struct("fl_settings").itemsize // 4)),
+            ("state", State * 2),
+            ("state_found", ctypes.c_void_p),
+            ("metric", REAL * 6 * 6),
+            ("hessian_factor", REAL * 6 * 6),
+            ("trace_min", REAL),
+            ("power_cost_max", REAL),
+        ]
+
+    return Work
+
+
 class Response(ctypes.Structure):
     """The answer to a price: `response`."""
 
