@@ -128,7 +128,7 @@ class State(ctypes.Structure):
 
 @cache
 def work_struct() -> type[ctypes.Structure]:
-    """The work area `fl_work` up to the largest power of all sets."""
+    """The work area `fl_work` up to what follows from all sets."""
 
     class Work(ctypes.Structure):
         _fields_ = [
@@ -141,6 +141,10 @@ def work_struct() -> type[ctypes.Structure]:
             ("hessian_factor", REAL * 6 * 6),
             ("trace_min", REAL),
             ("power_cost_max", REAL),
+            ("is_convex", ctypes.c_int),
+            ("has_forks", ctypes.c_int),
+            ("has_drag", ctypes.c_int),
+            ("has_turn_cost", ctypes.c_int),
         ]
 
     return Work

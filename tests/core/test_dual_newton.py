@@ -1,13 +1,27 @@
 """Newton's method on the dual: its gradient is that of its value, and it takes few steps, whatever
 the robot, beyond reach and from tick to tick."""
 
+import ctypes
+from typing import Any
+
 import numpy as np
 import pytest
 
 from finlab.allocation import Policy
 from finlab.arrays import Array
 from finlab.core.calls import _policy_record
-from tests.core.parts import ROBOTS, Robot, at, functions, robot_of
+from tests.core.parts import (
+    ROBOTS,
+    Beginning,
+    Robot,
+    Set,
+    at,
+    functions,
+    question_of,
+    robot_of,
+    work_struct,
+)
+from tests.core.test_feasible_set import commands_before
 
 NUMBERS = range(2)
 """Of each kind of robot."""
@@ -106,3 +120,74 @@ def test_from_the_multipliers_of_an_answer_nothing_is_left_to_do(name: str) -> N
             assert again["newton_steps"] <= 1
             near = robot.answer(1.001 * wrench, prices=first["prices"].copy())
             assert near["newton_steps"] <= max(4, first["newton_steps"])
+
+
+def asked(robot: Robot, **question: Any) -> tuple[list[Set], Any]:
+    """Sets of a question, and the work area `fl_work` that it prepares."""
+    record, _arrays = question_of(np.zeros(6), question)
+    work = robot.work()
+    place = ctypes.c_void_p(record.ctypes.data)
+    assert functions().fl_prepare_question(at(robot.block), work, place)
+    sets = [Set.from_buffer_copy(one) for one in Beginning.from_buffer(work).set[: robot.n]]
+    return sets, work_struct().from_buffer(work)
+
+
+def largest_power(robot: Robot, i: int, limits: Set) -> float:
+    """Power of the dearest force of a set [W], by a scan of its sizes either way."""
+    ahead = -1.0 if limits.is_flipped else 1.0
+    size = np.linspace(limits.force_min, limits.force_max, 41)
+    power = [robot.power(i, ahead * one) for one in size]
+    if limits.force_max_reverse > 0.0:
+        reverse = np.linspace(0.0, limits.force_max_reverse, 41)
+        power.extend(robot.power(i, -one) for one in reverse)
+    return max(power)
+
+
+def largest_turn_cost(limits: Set) -> float:
+    """What turning to the farthest angle of a set costs [W], by a scan of its arc."""
+    half = limits.sector_half_angle
+    angle = limits.sector_center + half * np.linspace(-1.0, 1.0, 20_001)
+    turn = np.abs(np.angle(np.exp(1j * (angle - limits.turn_origin))))
+    return float(limits.turn_cost / 2.0 * turn.max() ** 2)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_the_largest_cost_is_that_of_the_dearest_forces_and_angles(name: str) -> None:
+    for number in NUMBERS:
+        robot = robot_of(name, number)
+        rng = np.random.default_rng([4, number])
+        lost = np.arange(robot.n) == rng.integers(robot.n)
+        origins = rng.uniform(-3.0, 3.0, robot.n)
+        questions: list[dict[str, Any]] = [
+            {},
+            {"lost": lost.astype(np.uint8)},
+            {"previous": commands_before(robot, rng), "calm": 2.0},
+            {
+                "previous": commands_before(robot, rng),
+                "calm": 2.0,
+                "ticks": 4,
+                "angles_wanted": origins,
+                "lost": lost.astype(np.uint8),
+            },
+        ]
+        foils = robot.actuators["flow_speed"] > 0.0
+        for question in questions:
+            sets, work = asked(robot, **question)
+            works = ~lost if "lost" in question else np.ones(robot.n, bool)
+            dearest = 0.0
+            for i in np.flatnonzero(works).tolist():
+                dearest += largest_power(robot, i, sets[i])
+                dearest += largest_turn_cost(sets[i])
+            # Eq. 13 needs an upper bound; a scan is a little below it.
+            assert work.power_cost_max >= dearest * (1.0 - 1e-12)
+            assert work.power_cost_max <= dearest * (1.0 + 1e-3)
+            has_turn_cost = any(limits.turn_cost > 0.0 for limits in sets)
+            has_forks = any(limits.is_forked or limits.force_max_reverse > 0.0 for limits in sets)
+            has_drag = bool((foils & works).any())
+            has_bands = bool((robot.actuators["dead_band"] > 0.0).any())
+            assert bool(work.has_turn_cost) == has_turn_cost
+            assert bool(work.has_forks) == has_forks
+            assert bool(work.has_drag) == has_drag
+            assert bool(work.is_convex) == (
+                not (has_turn_cost or has_forks or has_drag or has_bands)
+            )
