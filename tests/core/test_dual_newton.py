@@ -169,11 +169,12 @@ def test_the_largest_cost_is_that_of_the_dearest_forces_and_angles(name: str) ->
                 "angles_wanted": origins,
                 "lost": lost.astype(np.uint8),
             },
+            {"lost": (robot.actuators["flow_speed"] > 0.0).astype(np.uint8)},
         ]
         foils = robot.actuators["flow_speed"] > 0.0
         for question in questions:
             sets, work = asked(robot, **question)
-            works = ~lost if "lost" in question else np.ones(robot.n, bool)
+            works = question.get("lost", np.zeros(robot.n)) == 0
             dearest = 0.0
             for i in np.flatnonzero(works).tolist():
                 dearest += largest_power(robot, i, sets[i])
