@@ -242,3 +242,20 @@ def test_pods_either_way_are_among_the_robots() -> None:
     assert (robot.actuators["force_table_reverse"] > 0.0).all() and (
         robot.actuators["command_kind"] == POD
     ).all()
+
+
+@pytest.mark.parametrize("name", ["azimuths", EITHER_WAY])
+def test_an_arc_that_lacks_a_rounding_of_a_turn_is_all_round(name: str) -> None:
+    robot = robot_of(name)
+    for i in np.flatnonzero(robot.actuators["command_kind"] == POD).tolist():
+        for lack, is_whole in ((0.0, True), (3e-10, True), (1e-8, False), (0.3, False)):
+            box = robot.whole_box()
+            half = math.pi - lack
+            box.low[i][0] = 0.4 - half
+            box.high[i][0] = 0.4 + half
+            told = functions().fl_force_range(at(robot.block), i, ctypes.byref(box))
+            assert (told.half == math.pi) == is_whole
+            assert told.half == pytest.approx(half, abs=1e-9)
+            assert told.middle == pytest.approx(0.4, abs=1e-12)
+            assert told.low == box.low[i][1]
+            assert told.high == box.high[i][1]
