@@ -99,3 +99,21 @@ def test_closest_serves_the_nearest_wrench_of_bounded_forces(number: int) -> Non
         least = np.linalg.norm((B / scale).T @ nearest.x - wrench / scale)
         error = np.linalg.norm((given - wrench) / scale)
         assert error == pytest.approx(least, rel=1e-5, abs=1e-7)
+
+
+@pytest.mark.parametrize("number", NUMBERS)
+def test_priority_serves_the_first_group_with_the_least_error(number: int) -> None:
+    robot = convex_robot("thrusters", number)
+    own = robot.actuators
+    scale = robot.head["wrench_scale"]
+    B = (scaled_effectiveness(robot)[:, 0] @ robot.head["basis"].T) * robot.head["axis_scale"]
+    first = np.array(Policy("priority").groups)[0].astype(bool)
+    bounds = (own["force_min"], own["force_max"])
+    for wrench in targets(robot, number):
+        given = served(robot, wrench, "priority")
+        by_force = (B / scale)[:, first].T
+        wanted = (wrench / scale)[first]
+        nearest = lsq_linear(by_force, wanted, bounds, tol=1e-12)
+        least = np.linalg.norm(by_force @ nearest.x - wanted)
+        error = np.linalg.norm(((given - wrench) / scale)[first])
+        assert error == pytest.approx(least, rel=1e-4, abs=1e-6)
