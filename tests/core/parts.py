@@ -111,21 +111,6 @@ class Box(ctypes.Structure):
     _fields_ = [("low", REAL * 3 * MOST), ("high", REAL * 3 * MOST), ("free", ctypes.c_int * MOST)]
 
 
-class State(ctypes.Structure):
-    """Multipliers and what they give: `fl_state`."""
-
-    _fields_ = [
-        ("lambda_reduced", REAL * 6),
-        ("residual", REAL * 6),
-        ("force", REAL * 2 * MOST),
-        ("dy_ds", REAL * 3 * MOST),
-        ("secant", REAL * MOST),
-        ("push_angle", REAL * MOST),
-        ("dual_value", REAL),
-        ("residual_size", REAL),
-    ]
-
-
 @cache
 def work_struct() -> type[ctypes.Structure]:
     """The work area `fl_work` up to what follows from all sets."""

@@ -41,7 +41,10 @@ def test_a_table_with_a_square_answers_as_the_cost_says() -> None:
     for price, found in zip(price_grid(dearer.top)[::64], dearer.force[::64], strict=True):
         best = force[np.argmax(price * force - cost)]
         assert abs(found - best) < 1e-3, price
-    assert dearer.power_at_least == table.power_at_least + weight * 4.0 and dearer.largest == table.largest
+    assert (
+        dearer.power_at_least == table.power_at_least + weight * 4.0
+        and dearer.largest == table.largest
+    )
 
 
 @pytest.mark.parametrize("robust", [1.0, 30.0])
