@@ -2,7 +2,8 @@
 
 Nothing is unpacked, nothing is read beyond its largest size, and no content is believed before its
 checksum fits. What the files mean is known to the rooms that read them: robot and force tables to
-`finlab.layout` and `finlab.physics`, settings to `finlab.allocation`.
+`finlab.layout` and `finlab.physics`, settings to `finlab.allocation`, which makes allocators of
+bundles: so this stands below `finlab.deploy`.
 """
 
 import hashlib

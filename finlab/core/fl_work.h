@@ -125,7 +125,7 @@ struct fl_work {
   fl_state *state_found;        /* which of these it came to */
   fl_real metric[6][6];         /* M of Eq. 8 */
   fl_real hessian_factor[6][6]; /* of quadratic costs, L D L' */
-  fl_real trace_min;            /* trace below which H is singular to rounding */
+  fl_real trace_min;            /* trace below which G_mu of Eq. 8 is singular */
   fl_real power_cost_max;       /* C of Eq. 13 [W] */
   int is_convex;                /* whether no set has a gap or a kink */
   int has_forks;                /* whether one is forked, or pushes either way */

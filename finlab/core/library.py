@@ -44,7 +44,10 @@ PATH = Path(__file__).with_name(f"libfinlab.{_SUFFIX}")
 
 @cache
 def library() -> ctypes.PyDLL:
-    """Returns the library. Its functions keep the interpreter's lock: a call takes microseconds.
+    """Returns the library.
+
+    Its functions keep the interpreter's lock: most calls take microseconds; those of batches and of
+    coupled robots hold it for up to a tenth of a second.
 
     Raises:
         FinlabError: it is missing, does not load here, or was compiled from other C files.

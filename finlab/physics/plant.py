@@ -216,6 +216,7 @@ class Plant:
         Returns:
             (..., n, 3) [N], own frames.
         """
+        # The same as below, without an index and a copy: every tick pays for it.
         if not self.feels_flow and len(self._laws) == 1:
             return np.asarray(self._laws[0][1].force(command))
         inflow = self.inflow(flow)
@@ -286,6 +287,7 @@ class Plant:
         Returns:
             (..., n) [W]; NaN of a lost actuator.
         """
+        # The same as below, without an index and a copy: every tick pays for it.
         if not self.feels_flow and len(self._laws) == 1:
             return np.asarray(self._laws[0][1].power(command))
         inflow = self.inflow(flow)

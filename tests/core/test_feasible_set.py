@@ -159,3 +159,20 @@ def test_what_is_unknown_or_lost_is_no_tick(name: str) -> None:
     ):
         assert getattr(sets[0], field) == getattr(whole[0], field)
     assert sets[1].force_min == sets[1].force_max == sets[1].cost_at_max == 0.0
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_a_number_on_a_free_axis_changes_no_command(name: str) -> None:
+    """Whatever is asked along an axis that may take any wrench, in a tick and outside."""
+    for number in range(2):
+        robot = robot_of(name, number)
+        rng = np.random.default_rng([5, number])
+        free = (np.arange(6) == rng.integers(6)).astype(np.uint8)
+        previous = robot.plant.sample(rng, (1,))[0]
+        given = robot.plant.wrench(robot.plant.sample(rng, (1,))[0])
+        wrench = np.where(free, 0.0, rng.uniform(0.0, 1.0) * given)
+        loud = np.where(free, 1e5, wrench)
+        for asked in ({}, {"previous": previous}):
+            quiet_answer = robot.answer(wrench, free=free, **asked)
+            loud_answer = robot.answer(loud, free=free, **asked)
+            np.testing.assert_array_equal(loud_answer["command"], quiet_answer["command"])

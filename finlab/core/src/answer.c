@@ -146,7 +146,7 @@ static void pass_bands(const real *block, fl_work *work, const fl_question *q, r
   fl_limits_without_tick(block, work);
   wrench_that_counts(&work->span, q, wrench);
   take_off_offset(&work->span, wrench, of_forces);
-  memcpy(work->wrench_target, q->wrench, sizeof work->wrench_target);
+  memcpy(work->wrench_target, wrench, sizeof work->wrench_target);
   find_forces(block, work, of_forces, q->policy, 0, &later);
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);

@@ -165,7 +165,7 @@ void fl_dual_at(const real *block, const fl_work *work, const real *target, cons
   state->residual_size = SQRT(dot(state->residual, state->residual, 6));
 }
 
-/* Has Newton's method be at multipliers. */
+/* Starts Newton's method at given multipliers. */
 void fl_dual_start(const real *block, fl_work *work, const real *target, const real *lambda) {
   work->state_found = work->state;
   fl_dual_at(block, work, target, lambda, work->state);
@@ -388,8 +388,7 @@ int fl_dual_newton(const real *block, fl_work *work, const real *target, const r
     } else {
       mu = mu_after_refused(mu, nu, &result);
       nu *= 2;
-      /* refused steps are not those that gain nothing but rounding: their mu grows to an end
-         of its own */
+      /* A refused step does not count as idle: its growing mu ends the loop. */
       idle--;
     }
   }

@@ -378,8 +378,8 @@ void fl_out_of_reach(const real *block, fl_work *work, const real *wrench, const
   if (!fl_may_have_gaps(block, work, out->force)) return;
 
   real target[6];
-  fl_reduce_wrench(work, out->wrench_served,
-                   target); /* another part of the sets may give it for less */
+  fl_reduce_wrench(work, out->wrench_served, target);
+  /* Another part of the sets may give it for less. */
   const int status = fl_dual_newton(block, work, target, 0, FL_STEPS);
   if (!work->has_drag) {
     cheapen_by_parts(block, work, target, status, out);

@@ -129,9 +129,9 @@ class Pid:
     proportional: float
     """Force [N] per error."""
     integral: float
-    """Per integral of the error over time [s]."""
+    """Force [N] per integral of the error over time [s]."""
     derivative: float
-    """Per rate of the error, which is filtered."""
+    """Force [N] per rate of the error [1/s], which is filtered."""
     max_force: float
     """Largest force [N]."""
     period_s: float = 0.1

@@ -168,7 +168,7 @@ class Hypotheses:
     def _reset_alternatives(self) -> None:
         """All alternatives begin anew, at their prior probabilities."""
         pairs = self.pairs
-        m = len(LEVELS) + 1
+        m = len(LEVELS) + 1  # each level, and the other direction
         level = np.append(LEVELS, 0.0) - self.strength[:, None]
         level[:, -1] = 0.0
         possible = np.abs(level) > LEVEL_DISTANCE_MIN

@@ -195,6 +195,6 @@ def test_the_last_fin_that_works_is_never_called_lost(layout_a: Layout) -> None:
     command = np.full((4, 3), np.nan)
     command[0] = 0.5, 1.5, 0.0  # it should push hard, and the robot stays where it is
     for _ in range(60):
-        verdict = monitor.step(still._replace(velocity=np.zeros(3)), command)
+        verdict = monitor.step(still, command)
     assert verdict.strength[0] < 0.9 or verdict.probability[0] > 0.5, "the case is not hard enough"
     assert layout_a.names[0] not in verdict.damage.lost

@@ -270,5 +270,6 @@ def fresh_batch(settings: DataSettings) -> SampleBatch:
     times = [len(robot["wrench"]) for robot in robots]
     joined = {name: np.stack([robot[name] for robot in robots]) for name in FIELDS}
     once = {name: np.repeat(joined[name], times, axis=0) for name in ROBOT}
-    flat = {name: np.concatenate(joined[name]) for name in FIELDS[5:]}
-    return SampleBatch(*(torch.from_numpy(part) for part in (once | flat).values()))
+    flat = {name: np.concatenate(joined[name]) for name in FIELDS[len(ROBOT) :]}
+    tensors = {name: torch.from_numpy(part) for name, part in (once | flat).items()}
+    return SampleBatch(**tensors)
