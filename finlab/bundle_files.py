@@ -174,6 +174,5 @@ def _check_version(about: bytes | None, source: str) -> None:
     if type(version) is not int or version != VERSION:
         raise DataError(
             f"{source}: is a bundle of version {version!r:.40}, this finlab reads version "
-            f"{VERSION}; "
-            "export it again with `finlab export LAYOUT -o DIR`"
+            f"{VERSION}; export it again with `finlab export LAYOUT -o DIR`"
         )

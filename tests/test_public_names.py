@@ -15,30 +15,24 @@ from finlab.axes import AXES, Axis
 
 NAMES = {
     "finlab": "Allocation Allocator Azimuth Body Damage Fin FinlabError Layout Limits Policy "
-    "PowerLaw "
-    "PowerTable Rudder Thruster Tilt load_layout save_layout",
+    "PowerLaw PowerTable Rudder Thruster Tilt load_layout save_layout",
     "finlab.allocation": "Allocation Allocator BatchAllocation Candidates METHODS MethodName "
     "Policy PolicyName Solution",
     "finlab.analysis": "AXES AttainableSet Authority Bounds GOALS Improvement Loss Progress "
-    "ScoreCard "
-    "attainable_set authority least_power losses mirror_pairs optimize_layout score_card",
+    "ScoreCard attainable_set authority least_power losses mirror_pairs optimize_layout score_card",
     "finlab.swim.control": "CONTROLLERS Completion Controller Diagnosis FaultMonitor Foresighted "
-    "Learner "
-    "Measurement MonitorSettings MotionObserver Setpoint TrackingController VelocityController "
-    "WaypointController gains_for make_controller steerable_loss steers",
+    "Learner Measurement MonitorSettings MotionObserver Setpoint TrackingController "
+    "VelocityController WaypointController gains_for make_controller steerable_loss steers",
     "finlab.exchange": "Exchange FOREIGN convert is_robot_table read_any read_robot",
     "finlab.fit": "FinFit Measurements fit_fin read_measurements write_fin",
     "finlab.swim.hull": "Surface contradicts displaced estimated hull_of lift_of",
     "finlab.layout": "Actuator Azimuth Body Damage Fin FinModelSpec Hull Layout Limits "
-    "MAX_ACTUATORS Rudder "
-    "Servo Thruster Tilt Uncertainty layout_effectiveness layout_to_dict load_layout "
-    "own_effectiveness "
-    "parse_layout save_layout",
+    "MAX_ACTUATORS Rudder Servo Thruster Tilt Uncertainty layout_effectiveness layout_to_dict "
+    "load_layout own_effectiveness parse_layout save_layout",
     "finlab.log": "Judgement Log judge read_log",
     "finlab.physics": "FinLaw Plant TableLaw make_law plant_of read_table write_table",
     "finlab.swim.simulation": "ClosedLoop Fault NOISE_ALONE NO_NOISE RunLog SHIPPED "
-    "SensorSettings Tick "
-    "Trajectory load_log make_trajectory perturbed straight",
+    "SensorSettings Tick Trajectory load_log make_trajectory perturbed straight",
     "finlab.swim.vehicle": "GRAVITY STATE_SIZE Vehicle complete_body ucat_body",
 }
 """Package -> its public names. A change here is one for CHANGELOG.md."""

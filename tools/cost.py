@@ -203,9 +203,8 @@ experiment = Experiment(
     run=run,
     note=(
         "The reference is the cheapest exact end of many starts of `ipopt`, of `sqp` for effort "
-        "and tables: "
-        "solvers that know nothing of how `dual` and `mdn` search. Tracked: "
-        f"error up to {TRACKED_ERROR:g} by the plant. Effort is the paper's J_en."
+        "and tables: solvers that know nothing of how `dual` and `mdn` search. Tracked: error up "
+        f"to {TRACKED_ERROR:g} by the plant. Effort is the paper's J_en."
     ),
 )
 

@@ -271,8 +271,7 @@ class BatchAllocation(Answer[Array]):
         return (
             f"BatchAllocation({len(self)} targets, layout={self.layout.name!r:.60}, "
             f"actuators={len(self.names)}, method={self.method!r}, "
-            f"delivered={int(self.reachable.sum())}, "
-            f"largest err_norm={worst})"
+            f"delivered={int(self.reachable.sum())}, largest err_norm={worst})"
         )
 
 
@@ -389,9 +388,8 @@ class Allocation(Answer[float]):
         effort = "" if self.effort is None else f", effort={self.effort:.3f}"
         return (
             f"Allocation(layout={self.layout.name!r:.60}, actuators={len(self.names)}{lost}, "
-            f"method={self.method!r}, err_norm={self.err_norm:.2e}, "
-            f"power={self.power:.3g} W{effort}, reachable={self.reachable}, "
-            f"solve_ms={self.solve_ms:.1f})"
+            f"method={self.method!r}, err_norm={self.err_norm:.2e}, power={self.power:.3g} "
+            f"W{effort}, reachable={self.reachable}, solve_ms={self.solve_ms:.1f})"
         )
 
     def __str__(self) -> str:

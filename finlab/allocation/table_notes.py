@@ -32,8 +32,8 @@ def beyond_table(law: FinLaw, limits: Limits) -> list[str]:
         low, high = (end + shift for end in limits.zero_direction)
         ends.append(("zero directions", "rad", (low, high)))
     notes = [
-        f"fin {{name}} may be asked for {name} of {low:.3g} to {high:.3g} {unit}, "
-        f"its table holds {covered[0]:.3g} to {covered[1]:.3g}: beyond, its edge is taken"
+        f"fin {{name}} may be asked for {name} of {low:.3g} to {high:.3g} {unit}, its table holds "
+        f"{covered[0]:.3g} to {covered[1]:.3g}: beyond, its edge is taken"
         for (name, unit, (low, high)), covered in zip(ends, law.covers, strict=False)
         if low < covered[0] - BEYOND or high > covered[1] + BEYOND
     ]

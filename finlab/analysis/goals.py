@@ -98,9 +98,8 @@ def make_goal(
         if sum(counts) - max(counts) < len(axis_indices):
             raise LayoutError(
                 f"the goal {name} needs {len(axis_indices)} directions after a loss, and layout "
-                f"{layout.name} has "
-                f"{layout.counted}, which push in {sum(counts)}; none can fail without losing an "
-                "axis"
+                f"{layout.name} has {layout.counted}, which push in {sum(counts)}; none can fail "
+                "without losing an axis"
             )
         return after_worst_failure
     if name == "mission_power":
@@ -131,7 +130,6 @@ def axes_to_raise(layout: Layout, flow: Array | None = None) -> tuple[MotionAxis
     if not reachable:
         raise LayoutError(
             f"layout {layout.name} pushes along no axis alone, so there is nothing to raise; name "
-            "axes, or a "
-            "flow where actuators need one"
+            "axes, or a flow where actuators need one"
         )
     return reachable

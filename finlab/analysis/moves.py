@@ -342,8 +342,7 @@ def _twins_of(layout: Layout, pairs: Sequence[tuple[str, str]]) -> dict[str, str
         if first is second or not is_mirrored(first, second):
             raise LayoutError(
                 f"{first.name} and {second.name} are not each other's mirror image in the plane y "
-                "= 0; "
-                "mirror one of them first, or leave the pair out"
+                "= 0; mirror one of them first, or leave the pair out"
             )
         twins |= {first.name: second.name, second.name: first.name}
     return twins

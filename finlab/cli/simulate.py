@@ -128,8 +128,7 @@ def _excitation(options: Options) -> ClosedLoop:
     if _faults(options) or options.monitor or options.learn or options.controller != "tracking":
         raise FinlabError(
             "--excite: a robot is learned with the fins that it has, by a controller of its own; "
-            "leave "
-            "--controller, --lost, --torn, --stuck, --whole, --monitor and --learn out"
+            "leave --controller, --lost, --torn, --stuck, --whole, --monitor and --learn out"
         )
     seconds = LONGEST_S if options.duration is None else options.duration
     return excitation(robot.without(lost), seconds, **_world(options))
@@ -194,8 +193,8 @@ def summary(log: RunLog) -> str:
     keeps_course = log.controller != "velocity"
     lost = [name for name, works in zip(log.names, log.alive[-1], strict=True) if not works]
     path_line = (
-        f"ATE {row['ate']:.4f} m   RTE over {RTE_DELTA_S:g} s {row['rte']:.4f} m   "
-        f"depth RMSE {row['depth_rmse']:.4f} m   farthest {row['max']:.3f} m"
+        f"ATE {row['ate']:.4f} m   RTE over {RTE_DELTA_S:g} s {row['rte']:.4f} m   depth RMSE "
+        f"{row['depth_rmse']:.4f} m   farthest {row['max']:.3f} m"
     )
     speed_line = (
         f"MAE of the speed {speed_error(log).mean():.4f} m/s   depth RMSE {row['depth_rmse']:.4f} m"

@@ -48,8 +48,8 @@ def check(arguments: argparse.Namespace) -> int:
 
     robot = _robot(arguments)
     print(
-        f"{arguments.bundle}: {robot.layout.name}, {robot.layout.counted}, "
-        f"method {robot.allocator.method}, ready in {time.perf_counter() - arguments.started:.2f} s"
+        f"{arguments.bundle}: {robot.layout.name}, {robot.layout.counted}, method "
+        f"{robot.allocator.method}, ready in {time.perf_counter() - arguments.started:.2f} s"
     )
     findings = [*self_check(robot), extremes(robot)]
     for finding in findings:

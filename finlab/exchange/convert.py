@@ -180,8 +180,8 @@ def _read_lines(text: str, name: str, suffix: str, exchange: Exchange) -> Layout
         n_parameters = len(read_parameters(text, ""))
         if n_parameters > 0:
             names = (
-                "neither CA_ROTOR_COUNT (PX4) nor FRAME_CONFIG (ArduSub), "
-                "by which they name thrusters"
+                "neither CA_ROTOR_COUNT (PX4) nor FRAME_CONFIG (ArduSub), by which they name "
+                "thrusters"
             )
             raise LayoutError(f"holds {n_parameters} parameters of an autopilot, but {names}")
     if suffix in PROGRAMS:

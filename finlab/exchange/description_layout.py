@@ -62,9 +62,8 @@ def read_description(text: str, name: str, exchange: Exchange) -> Layout:
     if not actuators:
         raise LayoutError(
             "has no thruster's plugin of gz-sim or uuv; name the links that are fins (--fins "
-            "LINK...) or "
-            f"thrusters (--thrusters LINK...); a joint moves {_moving_links(description)}; its "
-            f"plugins: {listed(unread)}"
+            "LINK...) or thrusters (--thrusters LINK...); a joint moves "
+            f"{_moving_links(description)}; its plugins: {listed(unread)}"
         )
     if unread:
         exchange.note(f"Plugins that are not read: {listed(unread)}.")

@@ -83,8 +83,8 @@ UPPER_LIMIT = (
 LIMIT_KEYS = f"{LIMITS} {LOWER_LIMIT} {UPPER_LIMIT} {COUNT} {ROW_LABELS}"
 """Keys that are read of a mapping around the thrusters."""
 THRUSTER_KEYS = (
-    f"{NAME} {POSITION} {DIRECTION} {ANGLES} {LIMIT_KEYS} x y z "
-    "px py pz posx posy posz dx dy dz ax ay az nx ny nz ux uy uz dirx diry dirz"
+    f"{NAME} {POSITION} {DIRECTION} {ANGLES} {LIMIT_KEYS} x y z px py pz posx posy posz dx dy dz "
+    "ax ay az nx ny nz ux uy uz dirx diry dirz"
 )
 """Keys that are read of the mapping of one thruster."""
 MAX_LIST_LENGTH = 300

@@ -162,8 +162,8 @@ def _by_axis(header: list[str], rows: Sequence[Row], width: int) -> dict[str, An
         key = axis_of(label) or _LIMIT_LABELS.get(plain(label), "")
         if not key or key in matrix:
             raise LayoutError(
-                f"row {row.line} begins with {label!r:.40}, "
-                "expected Fx to Tz, least, most once each"
+                f"row {row.line} begins with {label!r:.40}, expected Fx to Tz, least, most once "
+                "each"
             )
         matrix[key] = _numbers(row.line, cells, width - 1)
     values: dict[str, Any] = {}

@@ -91,8 +91,7 @@ def find_thrusters(data: Any, exchange: Exchange, is_table: bool) -> ThrusterRec
         hint = f"; its lists of numbers, {shown}, have no key that says so"
     raise LayoutError(
         "has no matrix, expected six rows of numbers (Fx, Fy, Fz, Tx, Ty, Tz) under a key such as "
-        "`tam` or "
-        f"`allocation_matrix`, or a position and a direction of each thruster{hint}"
+        f"`tam` or `allocation_matrix`, or a position and a direction of each thruster{hint}"
     )
 
 

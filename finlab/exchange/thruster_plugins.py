@@ -97,8 +97,8 @@ def _uuv_force_limits(plugin: Element, name: str, exchange: Exchange) -> tuple[f
         )
     else:
         exchange.note(
-            f"uuv_thruster of {name}: no clamps, or conversion {conversion!r:.40}, "
-            "which is not read."
+            f"uuv_thruster of {name}: no clamps, or conversion {conversion!r:.40}, which is not "
+            "read."
         )
     if text_at(plugin, "thrustMin") and text_at(plugin, "thrustMax"):
         low = max(low, number(plugin, "thrustMin"))

@@ -77,8 +77,8 @@ def read_sheets(path: Path, is_header: IsHeader) -> tuple[dict[str, CsvTable], t
         import openpyxl
     except ImportError:
         raise DataError(
-            f"{path}: workbooks are read by openpyxl, which is not installed: "
-            "pip install 'finlab-marine[bench]', or save the sheet as CSV"
+            f"{path}: workbooks are read by openpyxl, which is not installed: pip install "
+            "'finlab-marine[bench]', or save the sheet as CSV"
         ) from None
 
     def max_size_of(name: str) -> int | None:

@@ -147,8 +147,8 @@ def _checked(files: list[Columns], source: str) -> Measurements:
         if np.ptp(columns[name]) < MIN_RANGE:
             raise DataError(
                 f"{source}: column {name} has the one value {columns[name][0]:.4g} {unit}, "
-                "expected several; "
-                "a fin's force cannot be determined from one amplitude or one frequency"
+                "expected several; a fin's force cannot be determined from one amplitude or one "
+                "frequency"
             )
     phi, has_directions = _directions(columns, source, notes)
     if "Fx" not in columns:

@@ -19,8 +19,7 @@ from finlab.fit.columns import Columns, concatenate, named_column, read_columns,
 
 _WORDS = {
     "PWM": "pwm pulse pulse_width pulsewidth pwm_signal pwm_value pwm_input pwm_width signal "
-    "servo_signal "
-    "esc esc_signal esc_pwm esc_input",
+    "servo_signal esc esc_signal esc_pwm esc_input",
     "rpm": "rpm speed motor_speed",
     "input": "input command throttle esc_throttle motor_throttle duty duty_cycle",
     "force": "force thrust thrust_force total_thrust measured_thrust measured_force",

@@ -157,8 +157,7 @@ class Layout(Checked):
                 continue
             raise LayoutError(
                 f"{what} works for {accepted} only, and {actuator.name!r} of layout {self.name} "
-                f"{problem}; "
-                "method dual of `finlab allocate` takes any actuator"
+                f"{problem}; method dual of `finlab allocate` takes any actuator"
             )
 
     @cached_property

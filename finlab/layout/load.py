@@ -40,8 +40,7 @@ VERSION = 2
 """Version of layout files; a reader knows exactly one."""
 OF_VERSION_1 = (
     "version 1, with fins:, is no longer read; write version: 2, actuators: in place of fins:, "
-    "and type: fin "
-    "in each of them"
+    "and type: fin in each of them"
 )
 """What a file of fins, as they were written before there was a release, is refused with."""
 MAX_BYTES = 1_000_000
@@ -118,8 +117,8 @@ def layout_path(layout: str | os.PathLike[str]) -> Path:
         reason = getattr(error, "strerror", None) or error
         raise LayoutError(f"layout {layout[:80]!r} cannot be a path: {reason}") from error
     raise LayoutError(
-        f"layout {layout!r} is neither a file nor a shipped layout; "
-        f"shipped are {', '.join(shipped) or 'none'}"
+        f"layout {layout!r} is neither a file nor a shipped layout; shipped are "
+        f"{', '.join(shipped) or 'none'}"
     )
 
 

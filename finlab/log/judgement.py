@@ -138,9 +138,8 @@ class Judgement:
         return (
             f"{MOTIONS[i].capitalize()} ({self.axis}) was lost for {three(self.lost_s[i])} s of "
             f"{three(self.seconds)} s, in {self.n_spells} spell{'s' * (self.n_spells > 1)}, the "
-            "longest from "
-            f"{longest.start:.1f} to {longest.end:.1f} s: {amount(self.missing, i)} of "
-            f"{amount(self.asked, i)} were missing{why}; {self._remedy(i)}."
+            f"longest from {longest.start:.1f} to {longest.end:.1f} s: {amount(self.missing, i)} "
+            f"of {amount(self.asked, i)} were missing{why}; {self._remedy(i)}."
         )
 
     def _remedy(self, i: int) -> str:

@@ -75,8 +75,8 @@ def judge(log: Log, *, priority: Sequence[Sequence[Axis]] = (), improve: bool = 
     ).max():
         notes.append(
             "With no actuator at a limit the outputs gave another wrench than was asked for: "
-            "forces of the "
-            "robot, or what a setpoint stands for (--scale), differ from those of the log."
+            "forces of the robot, or what a setpoint stands for (--scale), differ from those of "
+            "the log."
         )
     policies = [CLOSEST, Policy("direction"), _priority(priority, axis)]
     replays = [*replay(log.robot, log.demand, span, policies)]

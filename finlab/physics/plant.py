@@ -394,8 +394,8 @@ class Plant:
         values = np.where(is_lost[..., None], 0.0, values)
         if not np.isfinite(values).all():
             raise CommandError(
-                f"the command for layout {self.layout.name} holds NaN or infinite values; "
-                "a lost actuator has NaN in all three entries, any other has none"
+                f"the command for layout {self.layout.name} holds NaN or infinite values; a lost "
+                "actuator has NaN in all three entries, any other has none"
             )
         return values, is_lost
 

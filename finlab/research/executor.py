@@ -108,8 +108,7 @@ def _connected(address: str) -> "Client":
         client.close()
         raise FinlabError(
             f"cluster: expected workers with finlab {_version()}, got "
-            f"{', '.join(sorted(versions))}; install "
-            "the same one on each machine"
+            f"{', '.join(sorted(versions))}; install the same one on each machine"
         )
     return client
 

@@ -92,8 +92,7 @@ def read_archive(source: str, content: bytes, folder: Path) -> Opened:
         if len(layouts) != 1:
             raise LayoutError(
                 f"holds {len(parts)} files, {len(layouts)} of them layouts; expected a bundle, or "
-                "one "
-                "layout file with its force tables",
+                "one layout file with its force tables",
                 source=source,
             )
         (file,) = layouts
@@ -137,8 +136,7 @@ def adopted(layout: Layout, parts: Mapping[str, bytes], folder: Path, source: st
         if (here := came(path)) not in parts:
             raise LayoutError(
                 f"names {Path(path).name!r:.60}, which did not come along; put the layout and its "
-                "tables, or "
-                "its learned interaction, into one ZIP archive, and open that",
+                "tables, or its learned interaction, into one ZIP archive, and open that",
                 source=source,
             )
         is_network = layout.interaction is not None and path == layout.interaction.reads

@@ -17,8 +17,7 @@ CHROMIUM = next(
 )
 MISSING = (
     "NO CHROMIUM: the browser tests were skipped, so nothing checked the app's pages. Install one "
-    "with "
-    "`apt-get install chromium` and run them again."
+    "with `apt-get install chromium` and run them again."
 )
 FLAGS = [
     "--use-angle=swiftshader",

@@ -72,8 +72,8 @@ def button_colors(name: str, colors: Sequence[tuple[str, str]]) -> str:
         colors: background and text colour of each button, as in CSS.
     """
     template = (
-        "[data-fl~={}] + div button:nth-of-type({}) "
-        "{{ background: {}; color: {}; border-color: {}; }}"
+        "[data-fl~={}] + div button:nth-of-type({}) {{ background: {}; color: {}; border-color: "
+        "{}; }}"
     )
     holder = name.removeprefix("fl-")
     rules = []

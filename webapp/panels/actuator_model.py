@@ -182,8 +182,8 @@ def _table_words(fin: Fin, has_doubts: bool) -> str:
     frequency = fin.limits.frequency[1]
     if amplitude > amplitude_range[1] + BEYOND or frequency > frequency_range[1] + BEYOND:
         sentence = (
-            "<div class='missing'>The fin may be asked for {}° and {:.2f} Hz: beyond "
-            "what was measured the force counts as at the edge.</div>"
+            "<div class='missing'>The fin may be asked for {}° and {:.2f} Hz: beyond what was "
+            "measured the force counts as at the edge.</div>"
         )
         warnings.append(html(sentence, degrees(amplitude), frequency))
     fit_note = _note(law, "fitted to ")
@@ -208,8 +208,8 @@ def _covers_words(law: TableLaw) -> str:
     if law.periodic:
         directions = "all round"
     return (
-        f"A {degrees(amplitude[0])}° to {degrees(amplitude[1])}°, "
-        f"f {frequency[0]:.2f} to {frequency[1]:.2f} Hz, {directions}"
+        f"A {degrees(amplitude[0])}° to {degrees(amplitude[1])}°, f {frequency[0]:.2f} to "
+        f"{frequency[1]:.2f} Hz, {directions}"
     )
 
 

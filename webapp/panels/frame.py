@@ -33,8 +33,7 @@ if TYPE_CHECKING:
 
 _VARIABLES = (
     f":root {{ --fl-asked: {css(ASKED)}; --fl-delivered: {css(DELIVERED)}; --fl-missing: "
-    f"{css(MISSING)}; "
-    f"--fl-near: {css(NEARLY)}; --fl-reach: {css(REACH)}; }} "
+    f"{css(MISSING)}; --fl-near: {css(NEARLY)}; --fl-reach: {css(REACH)}; }} "
     f"[data-mantine-color-scheme=dark] {{ --fl-reach: {css(REACH_DARK)}; }}"
 )
 STYLE = html(

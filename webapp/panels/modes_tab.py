@@ -37,8 +37,7 @@ LEARNED = (
 )
 PROPOSED = (
     "The network proposes ways to share the wrench, drawn from its mixture; each is refined to "
-    "the least "
-    "effort near it and made exact by the fins' own laws."
+    "the least effort near it and made exact by the fins' own laws."
 )
 BESIDE = {
     "dual": " The answer, number 1, keeps watts least, and needs no network.",

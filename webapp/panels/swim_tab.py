@@ -127,8 +127,7 @@ SMOOTH_S = 1.0
 """Time over which plotted power is averaged."""
 UNSWUM = (
     "Once a swim is started, its distance from the path, power, wrench, forces and what is found "
-    "broken "
-    "are plotted here over time."
+    "broken are plotted here over time."
 )
 
 

@@ -134,8 +134,7 @@ def _switch(axis: int, counts: bool) -> str:
     )
     return html(
         "<div class='fl-axis fl-axis-{}'><span role='switch' tabindex='0' aria-checked='{}' "
-        "aria-label='{}' "
-        "title='{}' {}></span></div>",
+        "aria-label='{}' title='{}' {}></span></div>",
         axis,
         "true" if counts else "false",
         f"{AXES[axis]} counts",

@@ -147,8 +147,7 @@ def packed(layout: Layout, most: int = MAX_LINK) -> str:
         files, kind = (" with its files", "ZIP") if is_archive else ("", "file")
         raise FinlabError(
             f"{layout.name}{files} needs {len(text):,} characters, a link carries {most:,}; save "
-            "it, "
-            f"and share the {kind}"
+            f"it, and share the {kind}"
         )
     return text
 

@@ -32,8 +32,7 @@ KINDS = (
 )
 SHARED = (
     "The link carries the whole design and the wrench that is asked for. Whoever opens it gets a "
-    "copy, on a "
-    "finlab of their own."
+    "copy, on a finlab of their own."
 )
 
 Take = Callable[[str, bytes], object]

@@ -72,8 +72,7 @@ def read_force_table(path: str | os.PathLike[str]) -> ForceTable:
         if np.diff(axis).min() < LEAST_STEP:
             raise DataError(
                 f"{source}: two values of column {name} are {np.diff(axis).min():.2g} apart, "
-                "expected "
-                f"{LEAST_STEP:g} or more; write equal values with equal digits"
+                f"expected {LEAST_STEP:g} or more; write equal values with equal digits"
             )
     known = rows.shape[1] - 3
     return ForceTable(axes, values[..., :known], periodic, notes, values[..., known:])
@@ -133,8 +132,7 @@ def _read_rows(
     if (rows[:, known:] < 0.0).any():
         raise DataError(
             f"{source}: a column of {', '.join(DEVIATIONS)} has {rows[:, known:].min():.4g}, "
-            "expected "
-            "standard deviations in N from 0"
+            "expected standard deviations in N from 0"
         )
     return rows[:, :known], rows[:, known:], lines, table.notes
 
@@ -169,8 +167,7 @@ def _check_units(rows: Array, source: str) -> None:
     if largest > MOST or thrust < LEAST:
         raise DataError(
             f"{source}: thrust goes up to {thrust:.3g}, the largest force is {largest:.3g}, "
-            "expected "
-            f"{LEAST:g} to {MOST:g} N"
+            f"expected {LEAST:g} to {MOST:g} N"
         )
 
 
@@ -188,8 +185,7 @@ def _grid(rows: Array, lines: NDArray[np.intp], source: str) -> tuple[list[Array
         second = order[repeated[0] + 1]
         raise DataError(
             f"{source}: the same A, f, phi appears in two rows, lines {lines[first]} and "
-            f"{lines[second]}; "
-            "keep one"
+            f"{lines[second]}; keep one"
         )
     if len(flat_index) != math.prod(shape):
         hole = np.flatnonzero(~np.isin(np.arange(math.prod(shape)), flat_index))[0]
@@ -200,8 +196,7 @@ def _grid(rows: Array, lines: NDArray[np.intp], source: str) -> tuple[list[Array
         raise DataError(
             f"{source}: {len(rows)} rows do not fill the grid of {shape[0]} amplitudes, {shape[1]} "
             f"frequencies and {shape[2]} zero directions, expected {math.prod(shape)}; the row "
-            f"{at} is "
-            "missing (write equal values with equal digits)"
+            f"{at} is missing (write equal values with equal digits)"
         )
     values = np.empty((math.prod(shape), rows.shape[1] - 3))
     values[flat_index] = rows[:, 3:]

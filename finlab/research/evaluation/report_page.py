@@ -30,13 +30,10 @@ TABLES = "tables.json"
 SEED = 6143
 ABOUT = (
     "Every answer is scored by the plant: the fins' own laws or tables. All methods but `paper`, "
-    "which has "
-    "learned one fin law from samples, were given these, so errors show how well methods solve, "
-    "not how "
-    "well a model fits a fin in the water. No robot swam and no fin was measured for this report: "
-    "fin laws "
-    "are means over a cycle in still water, bodies, water and sensors are simulated. Methods and "
-    f"controllers were developed on other seeds than {SEED}."
+    "which has learned one fin law from samples, were given these, so errors show how well "
+    "methods solve, not how well a model fits a fin in the water. No robot swam and no fin was "
+    "measured for this report: fin laws are means over a cycle in still water, bodies, water and "
+    f"sensors are simulated. Methods and controllers were developed on other seeds than {SEED}."
 )
 Size = Literal["quick", "full"]
 
@@ -99,7 +96,6 @@ def _end(made: str) -> list[str]:
         f"On {platform.machine()}, python {platform.python_version()}, "
         + ", ".join(f"{name} {module.__version__}" for name, module in versions.items()),
         "Printed figures are those of Y. Hamamatsu, M. Kruusmaa, A. Ristolainen, "
-        "Layout-independent "
-        "actuation allocator for fin-actuated marine robots",
+        "Layout-independent actuation allocator for fin-actuated marine robots",
     ]
     return ["## How this was made", "\n".join(f"- {line}" for line in lines)]

@@ -56,8 +56,7 @@ def parse_checkpoint(files: Mapping[str, bytes], source: str, name: str) -> Trai
     if sha256 != config.get("sha256"):
         raise CheckpointError(
             f"{source}/{WEIGHTS_FILE}: its SHA-256 is not the one in {CONFIG_FILE}; the file was "
-            "changed or "
-            "cut off"
+            "changed or cut off"
         )
     try:
         tensors = load(files[WEIGHTS_FILE])
@@ -173,8 +172,7 @@ def _config(files: Mapping[str, bytes], source: str, needed: tuple[str, ...]) ->
     if type(config.get("version")) is not int or config["version"] != VERSION:
         raise CheckpointError(
             f"{place}: checkpoint version {config.get('version')!r}, this finlab reads version "
-            f"{VERSION}; "
-            "use the finlab that made it, or train again"
+            f"{VERSION}; use the finlab that made it, or train again"
         )
     return config
 

@@ -104,6 +104,5 @@ class LearnedMethod(Method):
         return (
             f"the method does not know these fins: {', '.join(self.unknown_fins)}; checkpoint "
             f"{self.networks.name!r} takes them for fins of model {model.type!r} "
-            f"({', '.join(values)}): trust "
-            "the plant's error or train a surrogate for them",
+            f"({', '.join(values)}): trust the plant's error or train a surrogate for them",
         )

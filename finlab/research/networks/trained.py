@@ -119,8 +119,7 @@ class TrainedWeights:
             has = f"a network that is fed {known.get('features')!r:.40}" if known else "no network"
             raise CheckpointError(
                 f"checkpoint {self.name!r} holds {has}, expected one that is fed "
-                f"{kind.features!r}, as that "
-                f"of the shipped `{kind.shipped}`"
+                f"{kind.features!r}, as that of the shipped `{kind.shipped}`"
             )
         try:
             sizes = kind(

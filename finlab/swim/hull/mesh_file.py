@@ -109,8 +109,7 @@ def read_mesh(name: str, content: bytes, scale: float) -> tuple[Mesh, MeshReport
     if len(mesh.faces) == 0 or loose > OPEN_SHARE * len(edges):
         raise FinlabError(
             f"{name}: is an open sheet, {loose} of its {len(edges)} edges belong to one triangle "
-            "only; "
-            "give it a thickness, or close it"
+            "only; give it a thickness, or close it"
         )
     low = vertices.min(axis=0)
     high = vertices.max(axis=0)

@@ -199,8 +199,8 @@ def _check_time(time: Array, places: Sequence[str]) -> None:
     for k in np.flatnonzero(~((steps > 0.0) & (steps <= LONGEST_GAP_S))).tolist():
         raise DataError(
             f"{places[k + 1]}, column t: {time[k + 1]:g} s after {time[k]:g} s, expected times "
-            "that rise by "
-            f"{LONGEST_GAP_S:g} s at most; sort the rows, or cut the file there and name both parts"
+            f"that rise by {LONGEST_GAP_S:g} s at most; sort the rows, or cut the file there and "
+            "name both parts"
         )
 
 
@@ -226,8 +226,7 @@ def _check_commands(command: Array, places: Sequence[str], layout: Layout) -> No
                 k = int(np.argmax(wrong))
                 raise DataError(
                     f"{places[k]}, column {one.name}.{number.name}, holds {command[k, i, part]:g}, "
-                    "expected "
-                    f"{UNIT_OF[number.name]} from {low:.4g} to {high:.4g}"
+                    f"expected {UNIT_OF[number.name]} from {low:.4g} to {high:.4g}"
                 )
 
 

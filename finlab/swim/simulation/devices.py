@@ -74,8 +74,7 @@ class SensorSettings:
             if not from_0 or sensor.rate_hz == 0.0 or sensor.dropout >= 1.0:
                 raise FinlabError(
                     f"sensors: {name}: expected numbers from 0, a rate above it and a dropout "
-                    "below 1, "
-                    f"got {sensor}"
+                    f"below 1, got {sensor}"
                 )
 
     def each(self, change: Callable[[Sensor], Sensor]) -> "SensorSettings":

@@ -146,9 +146,9 @@ class ExcitingController:
         if bounds_factor > BOUNDS_FACTOR_MAX:
             raise FinlabError(
                 f"--excite: the robot left its bounds at {measurement.time:.1f} s, "
-                f"{math.hypot(*away[:2]):.1f} m off, {abs(away[2]):.1f} m up or down, "
-                f"tilted by {math.degrees(tilt):.0f} deg; check its body, "
-                "above all center_of_buoyancy_m and buoyancy_n"
+                f"{math.hypot(*away[:2]):.1f} m off, {abs(away[2]):.1f} m up or down, tilted by "
+                f"{math.degrees(tilt):.0f} deg; check its body, above all center_of_buoyancy_m and "
+                "buoyancy_n"
             )
         fade = min(1.0, max(0.0, 2.0 - 2.0 * bounds_factor))
         excitation = fade * self.excitation(measurement.time)
@@ -285,8 +285,7 @@ def excitation(
     if layout.by_flow:
         raise FinlabError(
             f"--excite: rudders of layout {layout.name} give nothing on the spot; let it swim a "
-            "wide path, "
-            "such as --trajectory circle --scale 25, and fit that log"
+            "wide path, such as --trajectory circle --scale 25, and fit that log"
         )
     if not SHORTEST_S <= duration_s <= LONGEST_S:
         raise DataError(f"duration: expected {SHORTEST_S:g} to {LONGEST_S:g} s, got {duration_s:g}")

@@ -135,12 +135,9 @@ experiment = Experiment(
     run=run,
     note=(
         "The paper says neither which model scored its table nor whether its normalized error is "
-        "J_norm, the "
-        "squared norm of its equation, or the root: commands are scored twice here, and J_norm "
-        "stands beside "
-        "the printed value. The mean row refines nothing; the random warm start is the best four "
-        "of as many "
-        "uniform draws."
+        "J_norm, the squared norm of its equation, or the root: commands are scored twice here, "
+        "and J_norm stands beside the printed value. The mean row refines nothing; the random "
+        "warm start is the best four of as many uniform draws."
     ),
     quick={"layouts": 5, "targets": 4},
     full={"layouts": 40, "targets": 5},

@@ -171,6 +171,5 @@ ERRORS = (
 ABOUT_ERRORS = (
     "ATE: root mean square distance to the reference, nothing aligned; RTE: of displacements over "
     f"{RTE_DELTA_S:g} s; spread: standard deviation over runs. Inertial power is the paper's sum "
-    "of I alpha "
-    "omega, of its magnitudes."
+    "of I alpha omega, of its magnitudes."
 )

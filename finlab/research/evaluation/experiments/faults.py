@@ -124,11 +124,9 @@ experiment = Experiment(
     ),
     run=run,
     note=f"{ABOUT_ERRORS} Losses are announced. The path is kept where no run was ever farther "
-    "than "
-    f"{LOST_M:g} m away; not swum: the fins that are left cannot give surge, heave and yaw "
+    f"than {LOST_M:g} m away; not swum: the fins that are left cannot give surge, heave and yaw "
     f"independently. Aimed at: one lost fin lets the error grow to at most {ALLOWED} times. The "
-    "paper's "
-    "runs took place in a pool.",
+    "paper's runs took place in a pool.",
     quick={"runs": 1, "methods": ("dual",)},
     printed=_printed,
 )

@@ -243,8 +243,7 @@ class Ridge(_ByDifferences):
 experiment = Experiment(
     name="interaction",
     question="Where jets hit each other and the hull: what do answers miss that know the laws "
-    "alone, a "
-    "formula, a network, or the robot's own samples?",
+    "alone, a formula, a network, or the robot's own samples?",
     columns=(
         Column("robots", "robots", "text"),
         Column("model", "told", "text"),
@@ -258,8 +257,8 @@ experiment = Experiment(
     run=run,
     note=(
         "Error: what the plant's wrench misses of the target, over the robot's wrench scale. "
-        "Targets are wrenches of random commands by the plant. The oracle "
-        "goes on from the network's answer by the plant itself."
+        "Targets are wrenches of random commands by the plant. The oracle goes on from the "
+        "network's answer by the plant itself."
     ),
     quick={"robots": 3, "targets": 2, "layouts": 60, "steps": 100, "own": (100,)},
     full={"robots": 5, "targets": 3, "layouts": 500, "steps": 600, "own": (100, 1000)},

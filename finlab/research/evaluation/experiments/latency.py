@@ -210,12 +210,9 @@ experiment = Experiment(
     run=run,
     note=(
         "Whole calls of allocate, one target each, one after the other. Reach: the most that a "
-        "robot gives "
-        "in the direction of the target; beyond it, methods answer with the nearest wrench. Next "
-        "tick: "
-        f"targets wander at {REACH_SHARE:g} of reach, and the command before is known, whose rates "
-        "`dual` and `mdn` "
-        "alone keep to. Power: where both deliver."
+        "robot gives in the direction of the target; beyond it, methods answer with the nearest "
+        f"wrench. Next tick: targets wander at {REACH_SHARE:g} of reach, and the command before is "
+        "known, whose rates `dual` and `mdn` alone keep to. Power: where both deliver."
     ),
     quick={"robots": ("fins-4", "thrusters-8"), "calls": 20, "budget": 0.5},
     full={

@@ -150,13 +150,10 @@ experiment = Experiment(
     ),
     run=run,
     note=f"{ABOUT_ERRORS} Means over swims; peaks and turns (of a zero direction from tick to "
-    "tick) are the "
-    "largest. Power with the motors' losses. "
-    f"Lost: swims that were ever farther than {LOST_M:g} m away. Out of reach: ticks at "
-    f"which commands miss more than {GAP_N:g} N of what is asked, torques at {LEVER_M:g} m. "
-    "Processor's time "
-    "with the simulation's. What the days are: "
-    "`finlab/research/evaluation/experiments/hard_days.py`.",
+    "tick) are the largest. Power with the motors' losses. Lost: swims that were ever farther "
+    f"than {LOST_M:g} m away. Out of reach: ticks at which commands miss more than {GAP_N:g} N of "
+    f"what is asked, torques at {LEVER_M:g} m. Processor's time with the simulation's. What the "
+    "days are: `finlab/research/evaluation/experiments/hard_days.py`.",
     quick={
         "scenarios": ("nominal", "current", "lost-one"),
         "methods": ("dual", "analytic"),

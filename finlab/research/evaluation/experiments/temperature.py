@@ -100,9 +100,8 @@ experiment = Experiment(
     run=run,
     note=(
         "Diversity, which the paper does not define: the mean distance between two candidates in "
-        "units of "
-        "the command ranges. J: squared error plus weighted effort, by the surrogate, before "
-        "refinement."
+        "units of the command ranges. J: squared error plus weighted effort, by the surrogate, "
+        "before refinement."
     ),
     quick={"layouts": 10, "targets": 1},
     full={"layouts": 60},

@@ -192,18 +192,13 @@ experiment = Experiment(
     run=run,
     note=(
         "Targets lie along the wrenches of uniform commands. Not delivered: clipped, or coupled "
-        "aside. "
-        "Missing: over the robot's wrench scale. The first axes are those that the autopilot means "
-        "to keep "
-        "(PX4: roll and pitch, then heave, yaw, surge and sway; ArduSub: roll, pitch and heave, "
-        "then the "
-        "others); `dual` gets the same order as a priority, and misses more where it does so in "
-        "the first "
-        "group in which the two differ. Power over the least: over the watts that no answer can "
-        "undercut, "
-        "where the target is delivered. Pseudo-inverse: PX4's without desaturation. `surveyed`: a "
-        "BlueROV2 "
-        "with each thruster up to 5 mm out of place."
+        "aside. Missing: over the robot's wrench scale. The first axes are those that the "
+        "autopilot means to keep (PX4: roll and pitch, then heave, yaw, surge and sway; ArduSub: "
+        "roll, pitch and heave, then the others); `dual` gets the same order as a priority, and "
+        "misses more where it does so in the first group in which the two differ. Power over the "
+        "least: over the watts that no answer can undercut, where the target is delivered. "
+        "Pseudo-inverse: PX4's without desaturation. `surveyed`: a BlueROV2 with each thruster up "
+        "to 5 mm out of place."
     ),
     quick={"robots": ("bluerov2_heavy",), "lost": (0, 1), "reach": (0.8, 2.0)},
     full={"layouts": 8},

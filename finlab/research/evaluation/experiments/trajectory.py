@@ -119,8 +119,7 @@ def _printed(rows: Sequence[Row]) -> list[Row]:
 experiment = Experiment(
     name="trajectory",
     question="How closely do the paper's layouts follow a path, whole and with fins lost, by its "
-    "waypoint "
-    "controller and by ours?",
+    "waypoint controller and by ours?",
     columns=(
         Column("layout", "layout"),
         Column("lost", "fins lost", "count"),
@@ -132,10 +131,8 @@ experiment = Experiment(
     ),
     run=run,
     note=f"{ABOUT_ERRORS} The paper's runs on A to D took place in another simulator, those with "
-    "lost fins "
-    "in a pool, on paths that it does not print. Lost are the first fins without which a robot "
-    "can be "
-    "steered.",
+    "lost fins in a pool, on paths that it does not print. Lost are the first fins without which "
+    "a robot can be steered.",
     quick={"layouts": ("A", "C"), "methods": ("dual",), "lost": (0, 1)},
     printed=_printed,
     picture=_picture,

@@ -119,8 +119,7 @@ experiment = Experiment(
     ),
     run=run,
     note="Runs from rest; rows without a speed are over all speeds. Inertial power is the paper's "
-    "sum of I "
-    "alpha omega, of its magnitudes. The paper's runs took place in a pool.",
+    "sum of I alpha omega, of its magnitudes. The paper's runs took place in a pool.",
     quick={"layouts": ("A",), "lost": (0,)},
     full={"layouts": ("A",), "lost": (0,), "runs": 5},
     printed=_printed,

@@ -204,13 +204,10 @@ experiment = Experiment(
     run=run,
     note=(
         "Scored by the plant, the actuators' own laws or tables. Errors in standard deviations of "
-        "the "
-        "wrenches of random layouts; on fins, fins-mixed and tables, on robots of other actuators "
-        "and on a layout of your own, of the robot's wrenches. Intervals: where another seed "
-        "lands, 95 times "
-        "of 100. Time: that of all targets of a layout over their number. Printed: the paper's "
-        "figures, on "
-        "its own layouts and targets."
+        "the wrenches of random layouts; on fins, fins-mixed and tables, on robots of other "
+        "actuators and on a layout of your own, of the robot's wrenches. Intervals: where another "
+        "seed lands, 95 times of 100. Time: that of all targets of a layout over their number. "
+        "Printed: the paper's figures, on its own layouts and targets."
     ),
     quick={"split": HARD[:4], "methods": ("dual", "paper", "sqp"), "layouts": 10, "targets": 5},
     full={

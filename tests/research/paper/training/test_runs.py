@@ -17,8 +17,8 @@ from finlab.research.networks.checkpoint import read_checkpoint
 from tests.terminal import refused
 
 PATIENT = (
-    "import finlab.research.training.loop as loop; loop.SAVE_EVERY_S = 0.1; "
-    "from finlab.cli import main; import sys; "
+    "import finlab.research.training.loop as loop; loop.SAVE_EVERY_S = 0.1; from finlab.cli "
+    "import main; import sys; "
 )
 """A command that saves its state ten times a second."""
 
