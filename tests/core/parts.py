@@ -35,30 +35,41 @@ POINTS = 8
 """Most points of a mixture, FL_POINTS."""
 _LENGTHS = {"FL_MOST": MOST, "FL_POINTS": POINTS}
 """Lengths of arrays in the headers that are macros."""
-_MEMBER = re.compile(r"^\s*(fl_real|fl_wide|int|const fl_tangent \*)\s*([^;]*);", re.M)
+_KINDS: dict[str, Any] = {
+    "fl_real": REAL,
+    "fl_wide": REAL,
+    "int": ctypes.c_int,
+    "unsigned char": ctypes.c_ubyte,
+}
+"""Types of fields in the headers; structs join them below, each once it is read."""
+_MEMBER = re.compile(r"\s*(\*?)(\w+)((?:\[\w+\])*)\s*")
+"""A field: whether it is a pointer, its name, its lengths."""
+
+
+def _fields(declarations: str) -> list[tuple[str, Any]]:
+    """Fields that a header declares, such as `fl_real force[FL_MOST][2];`."""
+    fields = list[tuple[str, Any]]()
+    for declaration in re.sub(r"/\*.*?\*/", "", declarations, flags=re.S).split(";")[:-1]:
+        words = declaration.split()
+        kind = words[0] if words[0] != "unsigned" else "unsigned char"
+        if words[0] == "const":
+            kind = words[1]
+        names = declaration.partition(kind)[2]
+        for member in names.split(","):
+            found = _MEMBER.fullmatch(member)
+            assert found is not None, declaration
+            is_pointer, name, lengths = found.groups()
+            field_type = ctypes.c_void_p if is_pointer else _KINDS[kind]
+            for length in reversed(re.findall(r"\w+", lengths)):
+                field_type = field_type * (_LENGTHS[length] if length in _LENGTHS else int(length))
+            fields.append((name, field_type))
+    return fields
 
 
 def _members(header: str, name: str) -> list[tuple[str, Any]]:
     """Fields of a struct that a header defines, such as `typedef struct { ... } fl_set;`."""
     text = (CORE / header).read_text(encoding="utf-8")
-    body = text[: text.index(f"}} {name};")].rpartition("typedef struct {")[2]
-    body = re.sub(r"/\*.*?\*/", "", body, flags=re.S)
-    kinds: dict[str, Any] = {
-        "fl_real": REAL,
-        "fl_wide": REAL,
-        "int": ctypes.c_int,
-        "const fl_tangent *": ctypes.c_void_p,
-    }
-    fields = list[tuple[str, Any]]()
-    for kind, names in _MEMBER.findall(body):
-        for member in names.split(","):
-            found = re.match(r"\s*(\w+)((?:\[\w+\])*)", member)
-            assert found is not None
-            field_type = kinds[kind]
-            for length in reversed(re.findall(r"\w+", found[2])):
-                field_type = field_type * (_LENGTHS[length] if length in _LENGTHS else int(length))
-            fields.append((found[1], field_type))
-    return fields
+    return _fields(text[: text.index(f"}} {name};")].rpartition("typedef struct {")[2])
 
 
 class Set(ctypes.Structure):
@@ -70,21 +81,7 @@ class Set(ctypes.Structure):
 class Span(ctypes.Structure):
     """What the actuators span: `fl_span`."""
 
-    _fields_ = [
-        ("lost", ctypes.c_ubyte * MOST),
-        ("counts", ctypes.c_ubyte * 6),
-        ("scale", REAL * 6),
-        ("basis", REAL * 6 * 6),
-        ("matrix", REAL * 6 * 2 * MOST),
-        ("beside", REAL * 6),
-        ("range", ctypes.c_int),
-    ]
-
-
-class Beginning(ctypes.Structure):
-    """How a work area begins: `fl_work`."""
-
-    _fields_ = [("span", Span), ("is_whole", ctypes.c_int), ("set", Set * MOST)]
+    _fields_ = _members("fl_work.h", "fl_span")
 
 
 class Tangent(ctypes.Structure):
@@ -108,31 +105,31 @@ class Mixture(ctypes.Structure):
 class Box(ctypes.Structure):
     """Commands that are allowed: `fl_box`."""
 
-    _fields_ = [("low", REAL * 3 * MOST), ("high", REAL * 3 * MOST), ("free", ctypes.c_int * MOST)]
+    _fields_ = _members("fl_work.h", "fl_box")
 
 
-@cache
-def work_struct() -> type[ctypes.Structure]:
-    """The work area `fl_work` up to what follows from all sets."""
+_KINDS |= {
+    "fl_set": Set,
+    "fl_span": Span,
+    "fl_box": Box,
+    "fl_state": State,
+    "fl_settings": ctypes.c_int * (struct("fl_settings").itemsize // 4),
+}
 
-    class Work(ctypes.Structure):
-        _fields_ = [
-            *Beginning._fields_,
-            ("box", Box),
-            ("settings", ctypes.c_int * (struct("fl_settings").itemsize // 4)),
-            ("state", State * 2),
-            ("state_found", ctypes.c_void_p),
-            ("metric", REAL * 6 * 6),
-            ("hessian_factor", REAL * 6 * 6),
-            ("trace_min", REAL),
-            ("power_cost_max", REAL),
-            ("is_convex", ctypes.c_int),
-            ("has_forks", ctypes.c_int),
-            ("has_drag", ctypes.c_int),
-            ("has_turn_cost", ctypes.c_int),
-        ]
 
-    return Work
+def _work_until(last: str) -> list[tuple[str, Any]]:
+    """Fields of the work area, `fl_work`, from the first one to a last one."""
+    text = (CORE / "fl_work.h").read_text(encoding="utf-8")
+    fields = text.partition("struct fl_work {")[2]
+    end = re.search(rf"\b{last}\b[^;]*;", fields)
+    assert end is not None
+    return _fields(fields[: end.end()])
+
+
+class Work(ctypes.Structure):
+    """The work area up to what follows from all sets."""
+
+    _fields_ = _work_until("has_turn_cost")
 
 
 class Response(ctypes.Structure):
@@ -245,9 +242,9 @@ class Robot:
         """The limits of all commands."""
         box = Box()
         for i, own in enumerate(self.actuators):
-            box.low[i][:] = own["command_min"]
-            box.high[i][:] = own["command_max"]
-            box.free[i] = int(own["is_free_angle"] != 0.0)
+            box.command_min[i][:] = own["command_min"]
+            box.command_max[i][:] = own["command_max"]
+            box.is_free_angle[i] = int(own["is_free_angle"] != 0.0)
         return box
 
     def set_of(self, i: int, low: float, high: float, middle: float, half: float) -> Set:
@@ -306,7 +303,7 @@ class Robot:
         work = self.work()
         place = ctypes.c_void_p(question.ctypes.data)
         assert functions().fl_prepare_question(at(self.block), work, place)
-        return [Set.from_buffer_copy(one) for one in Beginning.from_buffer(work).set[: self.n]]
+        return [Set.from_buffer_copy(one) for one in Work.from_buffer(work).set[: self.n]]
 
 
 def question_of(wrench: Array, asked: dict[str, Any]) -> tuple[Record, list[Any]]:

@@ -191,8 +191,12 @@ def boxes_of(robot: Robot, rng: np.random.Generator) -> Box:
     box = robot.whole_box()
     for i, own in enumerate(robot.actuators):
         ends = np.sort(rng.random((2, 3)), axis=0)
-        box.low[i][:] = own["command_min"] + ends[0] * (own["command_max"] - own["command_min"])
-        box.high[i][:] = own["command_min"] + ends[1] * (own["command_max"] - own["command_min"])
+        box.command_min[i][:] = own["command_min"] + ends[0] * (
+            own["command_max"] - own["command_min"]
+        )
+        box.command_max[i][:] = own["command_min"] + ends[1] * (
+            own["command_max"] - own["command_min"]
+        )
     return box
 
 
@@ -219,7 +223,7 @@ def test_a_range_of_forces_holds_what_commands_of_a_box_give_and_no_more(name: s
             own = robot.actuators[i]
             if own["unevenness"] != 0.0 or own["gauge_table"] != 0.0:
                 continue  # the largest force is not the same in all directions
-            low, high = np.array(box.low[i]), np.array(box.high[i])
+            low, high = np.array(box.command_min[i]), np.array(box.command_max[i])
             share = np.stack(np.meshgrid(*3 * [np.linspace(0.0, 1.0, 6)]), axis=-1).reshape(-1, 3)
             size, angle = sizes_and_angles(robot, i, low + share * (high - low))
             told = functions().fl_force_range(at(robot.block), i, ctypes.byref(box))
@@ -251,11 +255,11 @@ def test_an_arc_that_lacks_a_rounding_of_a_turn_is_all_round(name: str) -> None:
         for lack, is_whole in ((0.0, True), (3e-10, True), (1e-8, False), (0.3, False)):
             box = robot.whole_box()
             half = math.pi - lack
-            box.low[i][0] = 0.4 - half
-            box.high[i][0] = 0.4 + half
+            box.command_min[i][0] = 0.4 - half
+            box.command_max[i][0] = 0.4 + half
             told = functions().fl_force_range(at(robot.block), i, ctypes.byref(box))
             assert (told.half == math.pi) == is_whole
             assert told.half == pytest.approx(half, abs=1e-9)
             assert told.middle == pytest.approx(0.4, abs=1e-12)
-            assert told.low == box.low[i][1]
-            assert told.high == box.high[i][1]
+            assert told.low == box.command_min[i][1]
+            assert told.high == box.command_max[i][1]

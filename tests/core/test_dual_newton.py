@@ -10,17 +10,7 @@ import pytest
 from finlab.allocation import Policy
 from finlab.arrays import Array
 from finlab.core.calls import _policy_record
-from tests.core.parts import (
-    ROBOTS,
-    Beginning,
-    Robot,
-    Set,
-    at,
-    functions,
-    question_of,
-    robot_of,
-    work_struct,
-)
+from tests.core.parts import ROBOTS, Robot, Set, Work, at, functions, question_of, robot_of
 from tests.core.test_feasible_set import commands_before
 
 NUMBERS = range(2)
@@ -128,8 +118,8 @@ def asked(robot: Robot, **question: Any) -> tuple[list[Set], Any]:
     work = robot.work()
     place = ctypes.c_void_p(record.ctypes.data)
     assert functions().fl_prepare_question(at(robot.block), work, place)
-    sets = [Set.from_buffer_copy(one) for one in Beginning.from_buffer(work).set[: robot.n]]
-    return sets, work_struct().from_buffer(work)
+    sets = [Set.from_buffer_copy(one) for one in Work.from_buffer(work).set[: robot.n]]
+    return sets, Work.from_buffer(work)
 
 
 def largest_power(robot: Robot, i: int, limits: Set) -> float:

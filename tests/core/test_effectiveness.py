@@ -40,17 +40,17 @@ def columns_of(robot: Robot, lost: Array, free: Array) -> Array:
 def check_span(robot: Robot, span: Span, lost: Array, free: Array) -> None:
     """The basis is orthonormal and spans all columns, by which the matrices are their
     coordinates."""
-    rank = span.range
+    rank = span.rank
     basis = np.array(span.basis)
     np.testing.assert_allclose(basis[:, :rank].T @ basis[:, :rank], np.eye(rank), atol=1e-9)
     assert not basis[:, rank:].any()
-    scale = np.array(span.scale)
+    scale = np.array(span.axis_scale)
     columns = columns_of(robot, lost, free)
     sized = columns * robot.actuators["row_force_max"][..., None]
     size = np.sqrt((sized**2).sum(axis=(0, 1)))
     np.testing.assert_allclose(scale, np.where(size > 1e-8 * size.max(), size, 1.0), rtol=1e-9)
     assert rank == np.linalg.matrix_rank((sized / scale).reshape(-1, 6), tol=1e-6)
-    matrix = np.array(span.matrix)[: robot.n]
+    matrix = np.array(span.effectiveness_reduced)[: robot.n]
     np.testing.assert_allclose(matrix @ basis.T * scale, columns, atol=1e-7 * np.abs(columns).max())
     assert not matrix[lost].any()
 
@@ -65,7 +65,7 @@ def check_span(robot: Robot, span: Span, lost: Array, free: Array) -> None:
                 * robot.head["wrench_scale"]
             )
     counts = ~free & (robot.head["is_commanded"] != 0.0)
-    np.testing.assert_allclose(span.beside, beside * counts, atol=1e-12)
+    np.testing.assert_allclose(span.wrench_offset, beside * counts, atol=1e-12)
 
 
 @pytest.mark.parametrize("name", ROBOTS)

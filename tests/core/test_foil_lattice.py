@@ -14,15 +14,14 @@ from finlab.layout.load import parse_layout
 from tests.core.parts import (
     MOST,
     REAL,
-    Beginning,
     Box,
     Robot,
     Set,
+    Work,
     at,
     functions,
     in_the_core,
     question_of,
-    work_struct,
 )
 from tests.mixed_robots import layout_of, random_flow, random_robot
 
@@ -76,12 +75,12 @@ class Laid:
     @property
     def sets(self) -> list[Set]:
         """What each actuator may give."""
-        return list(Beginning.from_buffer(self.work).set[: self.robot.n])
+        return list(Work.from_buffer(self.work).set[: self.robot.n])
 
     @property
     def power_cost_max(self) -> float:
         """The largest cost of all sets [W]."""
-        return float(work_struct().from_buffer(self.work).power_cost_max)  # type: ignore[attr-defined]
+        return float(Work.from_buffer(self.work).power_cost_max)  # type: ignore[attr-defined]
 
     @property
     def foil(self) -> list[int]:
@@ -151,7 +150,7 @@ def laid(number: int) -> Laid:
 
 def effectiveness(one: Laid) -> Array:
     """Scaled wrench in the basis (n, 2, 6) of a newton along each row."""
-    return np.array(Beginning.from_buffer(one.work).span.matrix)[: one.robot.n]
+    return np.array(Work.from_buffer(one.work).span.effectiveness_reduced)[: one.robot.n]
 
 
 def forces_of_others(one: Laid, wrench: Array) -> tuple[Array, Array]:
@@ -208,7 +207,7 @@ def targets(one: Laid, number: int) -> list[Array]:
 def test_branches_end_where_lift_turns_back_and_at_limits(number: int) -> None:
     one = laid(number)
     own = one.robot.actuators
-    works = np.array(Beginning.from_buffer(one.work).span.lost)[: one.robot.n] == 0
+    works = np.array(Work.from_buffer(one.work).span.is_lost)[: one.robot.n] == 0
     assert one.foil == np.flatnonzero((own["flow_speed"] > 0.0) & works).tolist()
     branches = []
     for f, i in enumerate(one.foil):
@@ -311,8 +310,8 @@ def test_commands_of_a_point_have_its_angles_within_their_branches(number: int) 
                 node = point.node[f]
                 branch = (node - one.lattice.first[f]) // one.lattice.each
                 expected[i, 0] = one.lattice.angle[node]
-                unchanged.low[i][0] = one.lattice.edge[f][branch]
-                unchanged.high[i][0] = one.lattice.edge[f][branch + 1]
-                assert box.low[i][0] < command[i, 0] < box.high[i][0]
+                unchanged.command_min[i][0] = one.lattice.edge[f][branch]
+                unchanged.command_max[i][0] = one.lattice.edge[f][branch + 1]
+                assert box.command_min[i][0] < command[i, 0] < box.command_max[i][0]
             np.testing.assert_allclose(command, expected, atol=1e-6)
             assert bytes(box) == bytes(unchanged)
