@@ -71,7 +71,7 @@ def c_sources(
         )
     water = check_flow(flow)
     method = Dual(layout, DualSettings(), yardstick(layout), None).at(water)
-    block = method.compiled.robot.block
+    block = method.compiled.block
     thin = thinned(block)
     folder = Path(core.__path__[0])
     files = [*folder.glob("*.h"), *folder.glob("src/*.[ch]")]

@@ -322,7 +322,7 @@ def question_of(wrench: Array, asked: dict[str, Any]) -> tuple[Record, list[Any]
 def in_the_core(layout: Layout, flow: Array | None = None) -> Robot:
     """A robot of the default method, in a flow."""
     method = Allocator(layout)._whole.method.at(flow)  # type: ignore[attr-defined]
-    made = method.compiled.robot
+    made = method.compiled
     return Robot(layout, method.plant, made.block.copy(), made.axes)
 
 

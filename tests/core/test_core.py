@@ -24,7 +24,7 @@ NUMBER = constant("FL_BAD_NUMBER")
 
 
 def core_of_layout(layout: Layout) -> Core:
-    return Compiled.of(layout).robot.core
+    return Compiled.of(layout).core
 
 
 @pytest.fixture(scope="module")

@@ -135,7 +135,7 @@ class Dual(Method):
     @cached_property
     def turning_pods(self) -> NDArray[np.bool_]:
         """Which actuators (n,) are pods whose turning costs."""
-        is_pod = self.compiled.robot.is_pod
+        is_pod = self.compiled.is_pod
         return np.asarray(is_pod & np.isfinite(self.layout.rates[:, 0]))
 
     @property
@@ -272,16 +272,16 @@ class Dual(Method):
 
     def _basis_under(self, conditions: Conditions) -> Array:
         """Directions (6, r) of scaled wrenches that the actuators drive, orthonormal."""
-        robot = self.compiled.robot
+        compiled = self.compiled
         if conditions.lost is None and conditions.free is None:
-            return robot.basis
+            return compiled.basis
         works = np.ones(self.layout.n, bool) if conditions.lost is None else ~conditions.lost
         counts = np.ones(6, bool) if conditions.free is None else ~conditions.free
         key = works.tobytes() + counts.tobytes()
         if key not in self._bases:
             while len(self._bases) >= MAX_BASES:
                 self._bases.pop(next(iter(self._bases)), None)
-            self._bases[key] = robot.span(works, counts)
+            self._bases[key] = compiled.span(works, counts)
         return self._bases[key]
 
     def undriven_notes(self, targets: Array, conditions: Conditions) -> set[str]:
@@ -294,9 +294,8 @@ class Dual(Method):
         Returns:
             One sentence, or none.
         """
-        robot = self.compiled.robot
         basis = self._basis_under(conditions)
-        scaled = targets / robot.axis_scale
+        scaled = targets / self.compiled.axis_scale
         if conditions.free is not None:
             scaled = np.where(conditions.free, 0.0, scaled)
         outside_span = np.abs(scaled - (scaled @ basis) @ basis.T)
@@ -316,7 +315,7 @@ class Dual(Method):
 
     def _driven(self, conditions: Conditions) -> NDArray[np.bool_]:
         """Which axes (6,) of the wrench some actuator gives, whatever it gives along others."""
-        effectiveness = np.abs(self.compiled.robot.effectiveness)
+        effectiveness = np.abs(self.compiled.effectiveness)
         if conditions.lost is not None:
             effectiveness = effectiveness[~conditions.lost]
         size = effectiveness.max(axis=(0, 1))
@@ -397,7 +396,7 @@ class Dual(Method):
     @cached_property
     def _least_table_error(self) -> float:
         """By how much [W] tables may be off at the least forces."""
-        return NEARLY * self.compiled.robot.largest_power
+        return NEARLY * self.compiled.largest_power
 
     def _bound_of_measured_tables(
         self, wrench: Array, lam: Array, command: Array, conditions: Conditions
@@ -438,7 +437,7 @@ class Dual(Method):
         Returns:
             Forces, multipliers and commands, by the core's tables.
         """
-        core = self.compiled.robot.core
+        core = self.compiled.core
         if len(targets) == 1:
             return core.answer_one(targets[0], policy, lam, conditions)
         return core.answer_many(targets, policy, conditions)

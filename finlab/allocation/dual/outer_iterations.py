@@ -58,11 +58,10 @@ def coupled_core(plant: Plant, compiled: Compiled) -> CoupledCore:
     """
     interaction = plant.interaction
     assert interaction is not None
-    robot = compiled.robot
     return CoupledCore(
-        robot.block,
+        compiled.block,
         WrenchOffset(
-            frames=robot.axes @ plant.layout.frames,
+            frames=compiled.axes @ plant.layout.frames,
             counts=plant.counts,
             inflow=plant.met_by_all(None),
             core_constants=interaction.core_constants,
@@ -165,7 +164,7 @@ def _best_of_starts(
         is_cheaper = follow_cheapest(one_reversed * best.force, REVERSED_FOLLOWED)
         if not is_cheaper:
             break
-    rotated = _rotated_starts(force_by_laws, method.compiled.robot.is_line).all()
+    rotated = _rotated_starts(force_by_laws, method.compiled.is_line).all()
     follow_cheapest(rotated, ROTATED_FOLLOWED)
     return best
 
