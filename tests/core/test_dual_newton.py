@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from finlab.allocation import Policy
+from finlab.allocation.dual.compiled import core_policy
 from finlab.arrays import Array
-from finlab.core.calls import _policy_record
 from tests.core.parts import ROBOTS, Robot, Set, Work, at, functions, question_of, robot_of
 from tests.core.test_feasible_set import commands_before
 
@@ -82,7 +82,7 @@ def steps_of(name: str) -> tuple[int, int, int]:
             int(robot.answer(wrench)["newton_steps"]) for wrench in wrenches(robot, number, 1.0, 8)
         )
         for policy in ("closest", "direction", "priority"):
-            record = _policy_record(Policy(policy))
+            record = core_policy(Policy(policy))
             for wrench in wrenches(robot, number, 3.0, 4):
                 beyond += int(robot.answer(wrench, policy=record.ctypes.data)["newton_steps"])
         previous = None

@@ -6,7 +6,7 @@ for the commands that give forces.
 """
 
 from copy import copy
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, Self
 
 import numpy as np
@@ -15,9 +15,11 @@ from numpy.typing import NDArray
 from finlab.actuators.kinds import groups_of
 from finlab.actuators.response import Form, Group, Line, Plane, Response, power_of, with_square
 from finlab.allocation.dual.block import BlockContents, block_of
+from finlab.allocation.policy import Policy
 from finlab.allocation.settings import USUAL_PERIOD_S
 from finlab.arrays import NOTHING, ROUNDING, Array
-from finlab.core.calls import NOMINAL, Conditions, Conjugates, Core
+from finlab.core.calls import NOMINAL, Conditions, Conjugates, Core, CoreAnswer, policy_record
+from finlab.core.fields import Record
 from finlab.layout.layout import Layout
 from finlab.physics.objective import yardstick
 from finlab.physics.plant import Plant, plant_of
@@ -226,6 +228,30 @@ class Compiled:
         other._compile()
         return other
 
+    def forces(
+        self,
+        targets: Array,
+        policy: Policy | None,
+        lam: Array | None = None,
+        conditions: Conditions = NOMINAL,
+    ) -> CoreAnswer:
+        """Asks the core for forces of least power, by the laws alone (Eq. 1).
+
+        Args:
+            targets: desired wrenches (N, 6) [N, N m].
+            policy: what to give out of reach; None for nothing else than the targets.
+            lam: multipliers (6,) [W/N, W/(N m)] at which Newton's method begins, for a single
+                target; None for its own.
+            conditions: what holds of the robot.
+
+        Returns:
+            Forces, multipliers and commands, by the core's tables.
+        """
+        record = None if policy is None else core_policy(policy)
+        if len(targets) == 1:
+            return self.core.answer_one(targets[0], record, lam, conditions)
+        return self.core.answer_many(targets, record, conditions)
+
     @cached_property
     def _directions(self) -> Array:
         """Directions (n, 2, 3) of each actuator's forces in its own axes."""
@@ -294,6 +320,12 @@ def _drag(response: Response, flow_speed: float, force: float) -> float:
 def _axes_of(form: Form) -> Array:
     """Axes (3, 3) of a law's forces in the actuator's own ones."""
     return np.eye(3) if form.axes is None else form.axes
+
+
+@lru_cache(maxsize=64)
+def core_policy(policy: Policy) -> Record:
+    """Returns a policy as the core reads it; equal ones have one record."""
+    return policy_record(policy.kind, policy.axis_weights, policy.groups)
 
 
 def _shares_tables(group: Group) -> bool:
