@@ -249,7 +249,7 @@ class Allocator:
         prices: Array | None = None
         reference_of_method: Array | None = None
         if isinstance(previous, Allocation):
-            if method.begins_at_prices and previous.prices is not None:
+            if "prices" in method.reads and previous.prices is not None:
                 prices = previous.prices
             previous = previous.command
         command_previous = None if previous is None else check_previous(previous, state.layout)
@@ -259,7 +259,7 @@ class Allocator:
         if reference is not None:
             wrenches_expected = check_reference(reference)
             target = method.in_time(target, wrenches_expected)
-            if method.looks_ahead:
+            if "reference" in method.reads:
                 reference_of_method = state.with_free_axes(wrenches_expected, 0.0)
         targets = state.with_free_axes(target, 0.0)[None]
         solution = question.solve(
@@ -423,7 +423,7 @@ class Allocator:
     def _make_state(self, damage: Damage, free: NDArray[np.bool_] | None = None) -> RobotState:
         """Prepares the robot with a damage, asked for all axes but some (6,).
 
-        A method that takes losses with the question is that of the state without any: a loss, or a
+        A method that reads losses from the question is that of the state without any: a loss, or a
         free axis, prepares nothing.
         """
         damaged = damage.applied_to(self._layout)
@@ -431,7 +431,7 @@ class Allocator:
         choice = self._choice
         commanded = self._layout.commanded if free is None else self._layout.commanded & ~free
         free_axes = None if commanded.all() else ~commanded
-        if choice.kind.takes_losses and (damage.lost or free is not None):
+        if "losses" in choice.kind.reads and (damage.lost or free is not None):
             without_loss = self._state(replace(damage, lost=()))
             return RobotState(
                 damaged, damage, works, without_loss.method, without_loss.plant, free_axes

@@ -27,9 +27,6 @@ RIDGE = (1e-9, 1e-14)
 those of strong fins on long levers are singular to rounding."""
 FIRST_DAMPING = 1e-6
 """Damping of the first step: nearly that of Newton, for starts are near."""
-FIN_DIRECTION = np.array([False, False, True])
-"""Which number of a fin's command is an angle. It wraps in a narrow arc, too, as proposals of
-networks may lie a turn away; a thruster has nothing there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +73,7 @@ class CommandProblem:
             effectiveness=plant.effectiveness / error_scale,
             lower=plant.lower,
             upper=plant.upper,
-            wraps=plant.turns | FIN_DIRECTION,
+            wraps=plant.wraps,
             no_limits=plant.turns,
             error_scale=error_scale,
         )

@@ -175,8 +175,8 @@ class CheckedQuestion(NamedTuple):
         """The question as the method takes it: of all n actuators with the lost ones and the free
         axes, or of the m that work alone; arguments as of `solve`."""
         state = self.state
-        takes_losses = state.method.takes_losses
-        if previous is not None and not takes_losses:
+        reads_losses = "losses" in state.method.reads
+        if previous is not None and not reads_losses:
             previous = previous[state.works]
         return MethodQuestion(
             targets,
@@ -184,8 +184,8 @@ class CheckedQuestion(NamedTuple):
             previous=previous,
             flow=self.flow,
             seed=self.seed + offset,
-            lost=state.lost if takes_losses else None,
-            free=state.free if takes_losses else None,
+            lost=state.lost if reads_losses else None,
+            free=state.free if reads_losses else None,
             prices=prices,
             reference=reference,
         )

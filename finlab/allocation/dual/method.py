@@ -68,9 +68,7 @@ class Dual(Method):
     # A smaller wrench in the same direction still turns a robot to where it should go; the nearest
     # one may only push it on.
     policy_under_way = "direction"
-    begins_at_prices = True
-    takes_losses = True
-    looks_ahead = True
+    reads = frozenset({"policy", "losses", "prices", "reference"})
     settings_class = DualSettings
     settings: DualSettings
 

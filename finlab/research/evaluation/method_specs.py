@@ -22,7 +22,7 @@ import numpy as np
 
 from finlab.allocation import methods
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.method import Method, MethodQuestion
+from finlab.allocation.method import Method, MethodQuestion, Reads
 from finlab.allocation.solution import Solution
 from finlab.errors import AllocationError, DataError
 from finlab.layout import Layout
@@ -130,7 +130,7 @@ def own_method(name: str) -> type[Method]:
 class _OwnMethod(Method):
     """A function as a method; the rest of a method's errors are its own."""
 
-    every_policy = False
+    reads: ClassVar[frozenset[Reads]] = frozenset()
     function: ClassVar[Callable[..., Any]]
     wanted: ClassVar[tuple[str, ...]]
 
