@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from finlab import PowerTable
-from finlab.allocation import Allocator
-from finlab.allocation.allocation import Allocation, BatchAllocation
+from finlab.allocation import Allocation, Allocator, BatchAllocation
 from finlab.layout import load_layout
 from tests.t200 import t200_rows
 
