@@ -246,11 +246,11 @@ class Allocator:
         question = self._question(damage_of(damage, lost), policy, flow, seed, free)
         state = question.state
         method = state.method
-        prices: Array | None = None
+        multipliers: Array | None = None
         reference_of_method: Array | None = None
         if isinstance(previous, Allocation):
-            if method.begins_at_prices and previous.prices is not None:
-                prices = previous.prices
+            if method.begins_at_multipliers and previous.multipliers is not None:
+                multipliers = previous.multipliers
             previous = previous.command
         command_previous = None if previous is None else check_previous(previous, state.layout)
 
@@ -263,7 +263,7 @@ class Allocator:
                 reference_of_method = state.with_free_axes(wrenches_expected, 0.0)
         targets = state.with_free_axes(target, 0.0)[None]
         solution = question.solve(
-            targets, command_previous, prices=prices, reference=reference_of_method
+            targets, command_previous, multipliers=multipliers, reference=reference_of_method
         )
         solve_ms = (time.perf_counter() - start) * 1e3
 
@@ -275,7 +275,7 @@ class Allocator:
             settings=vars(self.settings).copy(),
             previous=command_previous,
             wrench_expected=None if solution.wrench is None else solution.wrench[0],
-            prices=None if solution.prices is None else solution.prices[0],
+            multipliers=None if solution.multipliers is None else solution.multipliers[0],
         )
 
     def refinement(self, result: Allocation) -> tuple[Candidates, ...]:

@@ -138,7 +138,7 @@ class CoupledCore:
         force: Array | None,
         most_iterations: int,
         policy: PolicyFields | None = None,
-        lam: Array | None = None,
+        multipliers: Array | None = None,
         conditions: Conditions = NOMINAL,
         penalty_least: float = 0.0,
         most_steps: float = math.inf,
@@ -152,7 +152,7 @@ class CoupledCore:
             most_iterations: how many outer iterations; 0 for the nearest forces that give the
                 wrench.
             policy: what to give out of reach; None for nothing else than the wrench.
-            lam: multipliers (6,) [W/N, W/(N m)] at which the first iteration begins.
+            multipliers: lambda (6,) [W/N, W/(N m)] at which the first iteration begins.
             conditions: what holds of the robot.
             penalty_least: what an error as large as the wrench scale counts at least [W].
             most_steps: steps after which no iteration but the first is begun.
@@ -169,7 +169,7 @@ class CoupledCore:
             self._limits["most_steps"] = most_steps
             self._limits["most_iterations"] = most_iterations
             self._question.write_wrench(wrench)
-            self._question.write(policy, lam, conditions)
+            self._question.write(policy, multipliers, conditions)
             raise_refusal(self._settle())
             return OuterResult(
                 answer=self._answer.read() if most_iterations > 0 else None,

@@ -72,8 +72,8 @@ FL_BEGIN(fl_question)
 FL_FIELD(fl_real, wrench, [6], "N, N m",
          "desired; behind it all is zeros where there is nothing to say")
 FL_FIELD(fl_policy_at, policy, , "address", "what to give beyond reach; 0: nothing else")
-FL_FIELD(fl_reals, prices, , "address",
-         "multipliers (6,) of the wrench [W/N, W/(N m)] to begin with; 0 for none")
+FL_FIELD(fl_reals, multipliers, , "address",
+         "lambda (6,) of the wrench [W/N, W/(N m)] to begin with; 0 for none")
 FL_FIELD(fl_reals, previous, , "address",
          "commands (n, 3) of the tick before, NaN for an unknown one; 0 for none")
 FL_FIELD(fl_bytes, lost, , "address", "(n,) which actuators do not work; 0 for none")
@@ -88,7 +88,7 @@ FL_END(fl_question)
 
 FL_BEGIN(fl_answer)
 FL_FIELD(fl_real, force, [FL_MOST][2], "N", "of each actuator's rows")
-FL_FIELD(fl_real, prices, [6], "W/N, W/(N m)", "multipliers lambda of the wrench")
+FL_FIELD(fl_real, multipliers, [6], "W/N, W/(N m)", "lambda of the wrench, Eq. 3")
 FL_FIELD(fl_real, lambda_reduced, [6], "W",
          "the same in reduced coordinates, of what actuators span now")
 FL_FIELD(fl_real, wrench_served, [6], "N, N m",

@@ -49,7 +49,7 @@ def checked(block: Array) -> int:
     ("field", "value", "code"),
     [
         ("magic", 7.0, BLOCK),
-        ("version", 9.0, 2),
+        ("version", constant("FL_VERSION") + 1.0, 2),
         ("length", 1e6, BLOCK),
         ("n", 0.0, BLOCK),
         ("n", 65.0, BLOCK),
@@ -95,13 +95,13 @@ def test_a_block_cut_short_is_refused(heavy: Core) -> None:
 
 def test_what_is_no_number_is_refused(heavy: Core) -> None:
     wrench = np.zeros(6)
-    prices = np.zeros(6)
+    multipliers = np.zeros(6)
     for bad in (np.nan, np.inf):
         with pytest.raises(CommandError, match="not finite or out of range"):
             heavy.answer_one(np.where(np.arange(6) == 2, bad, wrench), None)
-        # Prices are where to begin: those of no use are left out.
+        # Multipliers are where to begin: those of no use are left out.
         assert heavy.answer_one(
-            wrench, None, np.where(np.arange(6) == 2, bad, prices)
+            wrench, None, np.where(np.arange(6) == 2, bad, multipliers)
         ).is_attainable[0]
     with pytest.raises(CommandError, match="not finite or out of range"):
         heavy.answer_one(

@@ -29,7 +29,7 @@ static void begin_answer(const real *block, const real *wrench, fl_answer *out) 
   out->newton_status = FL_MET;
   out->has_foil_commands = 0;
   memset(out->lambda_reduced, 0, sizeof out->lambda_reduced);
-  memset(out->prices, 0, sizeof out->prices);
+  memset(out->multipliers, 0, sizeof out->multipliers);
   memset(out->force, 0, (size_t)COUNT(block) * sizeof out->force[0]);
   memcpy(out->wrench_served, wrench, sizeof out->wrench_served);
 }
@@ -93,15 +93,15 @@ static void find_forces(const real *block, fl_work *work, const real *wrench,
     fl_out_of_reach(block, work, wrench, policy, out);
   }
   for (int k = 0; k < 6; k++) {
-    out->prices[k] = dot(span->basis[k], out->lambda_reduced, span->rank) / span->axis_scale[k];
+    out->multipliers[k] = dot(span->basis[k], out->lambda_reduced, span->rank) / span->axis_scale[k];
   }
 }
 
 /* Reduced multipliers to begin with [W]: those of a question, which go to `lambda`, or those of the
    commands before in a tick; 0 where there are none, or none of use. */
 static const real *first_multipliers(const fl_work *work, const fl_question *q, real *lambda) {
-  if (q->prices) {
-    fl_reduce_lambda(work, q->prices, lambda);
+  if (q->multipliers) {
+    fl_reduce_lambda(work, q->multipliers, lambda);
     if (fl_are_within(lambda, 6, LARGEST)) return lambda;
     return 0;
   }

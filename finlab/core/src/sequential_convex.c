@@ -179,7 +179,7 @@ typedef struct {
   const fl_coupled_robot *robot;
   real *block; /* the linear model */
   fl_work *work;
-  fl_question question; /* whose prices become those of the best answer */
+  fl_question question; /* whose multipliers become those of the best answer */
   real lambda[6];       /* that they point at */
   fl_box box;           /* of the commands by which the block is commanded now */
   real (*force)[2];     /* (n, 2) the best ones [N] */
@@ -269,7 +269,7 @@ static int iterate(outer_search *search, int is_first, fl_answer *out, int *has_
   const int code = answer_linear(search->block, search->work, &search->question, is_first, &answer);
   if (code) return code;
   search->newton_steps += (real)answer.newton_steps;
-  search->penalty = fl_larger(search->penalty, penalty_at(search->block, answer.prices));
+  search->penalty = fl_larger(search->penalty, penalty_at(search->block, answer.multipliers));
   const real merit = merit_of(search);
   if (is_first) *out = answer;
   box_now(search->block, search->work, &search->question, &search->box);
@@ -277,8 +277,8 @@ static int iterate(outer_search *search, int is_first, fl_answer *out, int *has_
   const int is_better = step_to_answer(search, &answer, merit);
   if (is_better) {
     *out = answer;
-    memcpy(search->lambda, answer.prices, sizeof search->lambda);
-    search->question.prices = search->lambda;
+    memcpy(search->lambda, answer.multipliers, sizeof search->lambda);
+    search->question.multipliers = search->lambda;
   }
   const real gain = merit - search->power - search->penalty * search->error;
   *has_ended = !is_better || gain <= CLOSE / 2 * merit;
