@@ -152,7 +152,7 @@ struct fl_work {
   /* Commands. */
   fl_real jacobian[FL_MOST][3][6]; /* J of Eq. 11, on the yardstick, over the widths of the box */
   fl_tangent tangent[FL_MOST];     /* of each foil, at the commands of a step */
-  fl_real wrench_target[6];        /* that the commands are to give [N, N m] */
+  fl_real wrench_wanted[6];        /* that the commands are to give [N, N m] */
   int refine_steps; /* Levenberg-Marquardt steps on commands since whoever asks set it to 0 */
 
   /* Ticks. */

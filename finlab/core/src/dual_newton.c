@@ -38,11 +38,12 @@
 #define SHARE_MOST R(0.7)     /* the largest one */
 
 /* Scaled wrench in the basis. */
-void fl_reduce_wrench(const fl_work *work, const real *wrench, real *target) {
+void fl_reduce_wrench(const fl_work *work, const real *wrench, real *target_reduced) {
   const fl_span *span = &work->span;
   for (int j = 0; j < 6; j++) {
-    target[j] = 0;
-    for (int k = 0; k < 6; k++) target[j] += span->basis[k][j] * (wrench[k] / span->axis_scale[k]);
+    target_reduced[j] = 0;
+    for (int k = 0; k < 6; k++)
+      target_reduced[j] += span->basis[k][j] * (wrench[k] / span->axis_scale[k]);
   }
 }
 
@@ -58,13 +59,13 @@ void fl_reduce_lambda(const fl_work *work, const real *lambda, real *lambda_redu
 }
 
 /* Whether a wrench lies in the range of the effectiveness but for rounding. */
-int fl_is_in_range(const fl_work *work, const real *wrench, const real *target) {
+int fl_is_in_range(const fl_work *work, const real *wrench, const real *target_reduced) {
   const fl_span *span = &work->span;
   real outside_squared = 0;
   real size_squared = 0;
   for (int k = 0; k < 6; k++) {
     const real scaled = wrench[k] / span->axis_scale[k];
-    const real outside = scaled - dot(span->basis[k], target, 6);
+    const real outside = scaled - dot(span->basis[k], target_reduced, 6);
     outside_squared += outside * outside;
     size_squared += scaled * scaled;
   }
@@ -129,8 +130,8 @@ static real length(const fl_actuator *a, const real *vector) {
 
 /* Evaluates the dual at multipliers, for a target in the basis: its value, its gradient and
    the responses. */
-void fl_dual_at(const real *block, const fl_work *work, const real *target, const real *lambda,
-                fl_state *state) {
+void fl_dual_at(const real *block, const fl_work *work, const real *target_reduced,
+                const real *lambda, fl_state *state) {
   real wrench[6] = {0}; /* sum B y */
   real conjugate = 0;   /* sum c*(s) */
   for (int i = 0; i < COUNT(block); i++) {
@@ -159,16 +160,17 @@ void fl_dual_at(const real *block, const fl_work *work, const real *target, cons
   }
   for (int j = 0; j < 6; j++) {
     state->lambda_reduced[j] = lambda[j];
-    state->residual[j] = target[j] - wrench[j]; /* Eq. 6 */
+    state->residual[j] = target_reduced[j] - wrench[j]; /* Eq. 6 */
   }
-  state->dual_value = dot(lambda, target, 6) - conjugate; /* Eq. 3 */
+  state->dual_value = dot(lambda, target_reduced, 6) - conjugate; /* Eq. 3 */
   state->residual_size = SQRT(dot(state->residual, state->residual, 6));
 }
 
 /* Starts Newton's method at given multipliers. */
-void fl_dual_start(const real *block, fl_work *work, const real *target, const real *lambda) {
+void fl_dual_start(const real *block, fl_work *work, const real *target_reduced,
+                   const real *lambda) {
   work->state_found = work->state;
-  fl_dual_at(block, work, target, lambda, work->state);
+  fl_dual_at(block, work, target_reduced, lambda, work->state);
 }
 
 /* Largest force [N] of a line at prices of this sign, and its secant there [N^2/W]. */
@@ -186,12 +188,12 @@ static void secant_of_line(const real *block, const fl_actuator *a, real s, real
 /* Multipliers to begin with: those at which actuators whose costs are ~ T^1.5 give a target,
    each with its force over price at what it gives where costs are quadratic. Also the first
    mu. */
-void fl_first_lambda(const real *block, const fl_work *work, const real *target, real *lambda,
-                     real *mu) {
+void fl_first_lambda(const real *block, const fl_work *work, const real *target_reduced,
+                     real *lambda, real *mu) {
   /* Multipliers of quadratic costs without limits. C99 cannot pass the factor as const; it
      is only read. */
   real lambda_quadratic[6];
-  fl_solve((real(*)[6])work->hessian_factor, target, lambda_quadratic);
+  fl_solve((real(*)[6])work->hessian_factor, target_reduced, lambda_quadratic);
   real H[6][6] = {{0}};
   *mu = NEARLY;
   for (int i = 0; i < COUNT(block); i++) {
@@ -217,10 +219,10 @@ void fl_first_lambda(const real *block, const fl_work *work, const real *target,
   const real trace = fl_trace(H);
   for (int j = 0; j < 6; j++) H[j][j] += NOTHING * trace; /* regular behind the range, too */
   if (fl_factor(H)) {
-    fl_solve(H, target, lambda);
+    fl_solve(H, target_reduced, lambda);
     return;
   }
-  for (int j = 0; j < 6; j++) lambda[j] = target[j] / trace;
+  for (int j = 0; j < 6; j++) lambda[j] = target_reduced[j] / trace;
 }
 
 /* Adds B D B' to the lower triangle of H, of a plane: B = (bx, by), D = (xx, xy; xy, yy). */
@@ -327,7 +329,7 @@ static real mu_after_refused(real mu, real nu, const step_result *result) {
 
 /* Newton's method from multipliers on, or from its own first ones where there are none;
    work->state_found is what it comes to. Returns FL_MET, FL_BEYOND or FL_STUCK. */
-int fl_dual_newton(const real *block, fl_work *work, const real *target, const real *lambda,
+int fl_dual_newton(const real *block, fl_work *work, const real *target_reduced, const real *lambda,
                    int most_steps) {
   /* No forces cost more than C: a larger value proves that none add up to the target, Eq. 13. */
   const real beyond = work->power_cost_max * (1 + NOTHING) + NOTHING;
@@ -335,10 +337,10 @@ int fl_dual_newton(const real *block, fl_work *work, const real *target, const r
   real nu = 2; /* growth of mu after a refused step; doubles with each in a row (Nielsen) */
   real lambda_first[6];
   if (!lambda) {
-    fl_first_lambda(block, work, target, lambda_first, &mu);
+    fl_first_lambda(block, work, target_reduced, lambda_first, &mu);
     lambda = lambda_first;
   }
-  fl_dual_start(block, work, target, lambda);
+  fl_dual_start(block, work, target_reduced, lambda);
   fl_state *at = work->state;
   fl_state *trial = work->state + 1;
   real best_value = at->dual_value; /* when it last got better by more than rounding */
@@ -370,7 +372,7 @@ int fl_dual_newton(const real *block, fl_work *work, const real *target, const r
     }
     real lambda_next[6];
     for (int j = 0; j < 6; j++) lambda_next[j] = at->lambda_reduced[j] + step[j];
-    fl_dual_at(block, work, target, lambda_next, trial);
+    fl_dual_at(block, work, target_reduced, lambda_next, trial);
     if (work->has_turn_cost && jumps_between(block, work, at, trial, step, 0)) {
       jumps++;
       if (jumps >= JUMPS) {

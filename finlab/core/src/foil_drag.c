@@ -82,30 +82,30 @@ static int are_few(const real *block, const fl_work *work, const fl_box *box) {
   return free < work->span.rank;
 }
 
-/* Steps towards work->wrench_target, of which so many in a row have to halve the error: most starts
+/* Steps towards work->wrench_wanted, of which so many in a row have to halve the error: most starts
    end soon. */
 static void approach(const real *block, fl_work *work, const fl_box *box, real command[][3],
                      int steps) {
   real error = NONE;
   for (int k = 0; k < APPROACH_STEPS; k += steps) {
     const real before = error;
-    error = fl_refine_commands(block, work, box, work->wrench_target, command, steps);
+    error = fl_refine_commands(block, work, box, work->wrench_wanted, command, steps);
     if (error <= EXACT || error > before / 2) return;
   }
 }
 
-/* Whether so many Levenberg-Marquardt steps make commands within a box give work->wrench_target,
+/* Whether so many Levenberg-Marquardt steps make commands within a box give work->wrench_wanted,
    to an error on the yardstick and to rounding. Where that is what tables leave, steps on their
    error end soon. */
 static int come_to_give(const real *block, fl_work *work, const fl_box *box, real command[][3],
                         int steps, real most_error) {
   real size = 0;
-  for (int k = 0; k < 6; k++) size += FABS(work->wrench_target[k]) / HEAD(block)->wrench_scale[k];
+  for (int k = 0; k < 6; k++) size += FABS(work->wrench_wanted[k]) / HEAD(block)->wrench_scale[k];
   if (most_error > EXACT) {
     approach(block, work, box, command, APPROACH_ROUND);
     steps = 0;
   }
-  const real error = fl_refine_commands(block, work, box, work->wrench_target, command, steps);
+  const real error = fl_refine_commands(block, work, box, work->wrench_wanted, command, steps);
   return error <= most_error + ROUNDING * size;
 }
 
@@ -128,16 +128,17 @@ static void draw_tangents(const real *block, fl_work *work, const fl_box *box, c
 }
 
 /* Makes commands cheaper, from their forces and cost [W] on, by steps of sequential quadratic
-   programming that keep giving work->wrench_target; `lambda` becomes that of the last step.
+   programming that keep giving work->wrench_wanted; `lambda` becomes that of the last step.
    Their cost. */
-static real cheapen(const real *block, fl_work *work, const fl_box *box, const real *target,
+static real cheapen(const real *block, fl_work *work, const fl_box *box, const real *target_reduced,
                     real most_error, real cost, real *lambda, real command[][3], real force[][2]) {
   real share = 1;
   int has_moved = 1;
   for (int k = 0; k < FL_FOIL_STEPS; k++) {
     if (has_moved) draw_tangents(block, work, box, lambda, command);
     fl_prepare_sets(block, work);
-    if (has_moved && fl_dual_newton(block, work, target, lambda, FL_STEPS_AT_KINK) == FL_MET) {
+    if (has_moved &&
+        fl_dual_newton(block, work, target_reduced, lambda, FL_STEPS_AT_KINK) == FL_MET) {
       memcpy(lambda, work->state_found->lambda_reduced, sizeof work->state_found->lambda_reduced);
     }
     real stepped[FL_MOST][3];
@@ -161,10 +162,10 @@ static real cheapen(const real *block, fl_work *work, const fl_box *box, const r
   return cost;
 }
 
-/* Makes commands give work->wrench_target, in the basis `target`, to an error on the yardstick, and
+/* Makes commands give work->wrench_wanted, in the basis `target_reduced`, to an error on the yardstick, and
    then cheaper; `lambda` becomes that of the last step. Their forces along the rows, and
    their cost [W]; NONE where they do not come to give it. */
-static real settle(const real *block, fl_work *work, const real *target, real most_error,
+static real settle(const real *block, fl_work *work, const real *target_reduced, real most_error,
                    real *lambda, real command[][3], real force[][2]) {
   fl_box box = work->box;
   fl_set before[FL_MOST];
@@ -174,20 +175,20 @@ static real settle(const real *block, fl_work *work, const real *target, real mo
   real cost = NONE;
   if (come_to_give(block, work, &box, command, EXACT_STEPS, most_error)) {
     cost = fl_power_of_commands(block, work, command, force);
-    cost = cheapen(block, work, &box, target, most_error, cost, lambda, command, force);
+    cost = cheapen(block, work, &box, target_reduced, most_error, cost, lambda, command, force);
   }
   fl_restore_sets(block, work, before);
   return cost;
 }
 
 /* Remembers what commands and multipliers lead to, where it costs less than the best so far. */
-static void improve_from(const real *block, fl_work *work, const real *target, const real *lambda,
-                         real command[][3], real *best_cost) {
+static void improve_from(const real *block, fl_work *work, const real *target_reduced,
+                         const real *lambda, real command[][3], real *best_cost) {
   const real most_error = error_allowed(block, work, &work->box);
   real force[FL_MOST][2];
   real lambda_near[6];
   memcpy(lambda_near, lambda, sizeof lambda_near);
-  const real cost = settle(block, work, target, most_error, lambda_near, command, force);
+  const real cost = settle(block, work, target_reduced, most_error, lambda_near, command, force);
   if (!(cost < *best_cost)) return;
   *best_cost = cost;
   memcpy(work->best_command, command, sizeof work->best_command);
@@ -196,11 +197,12 @@ static void improve_from(const real *block, fl_work *work, const real *target, c
 }
 
 /* The same of the forces and multipliers that Newton's method came to. */
-void fl_improve_commands(const real *block, fl_work *work, const real *target, real *best_cost) {
+void fl_improve_commands(const real *block, fl_work *work, const real *target_reduced,
+                         real *best_cost) {
   real command[FL_MOST][3];
   fl_commands_for_forces(block, &work->box, work->state_found->force, work->command_previous,
                          command);
-  improve_from(block, work, target, work->state_found->lambda_reduced, command, best_cost);
+  improve_from(block, work, target_reduced, work->state_found->lambda_reduced, command, best_cost);
 }
 
 /* Whether a foil may stall at one end (0, 1) of its angles, which is then the command. */
@@ -253,12 +255,12 @@ static real proved_value(const real *block, const fl_work *work, real *most_cost
   return value;
 }
 
-/* Commands at a point, after steps towards work->wrench_target: first some that leave the foils on
+/* Commands at a point, after steps towards work->wrench_wanted: first some that leave the foils on
    their branches. */
 static void begin_at(const real *block, fl_work *work, const fl_lattice *lattice,
-                     const real *target, const fl_lattice_point *point, real command[][3]) {
+                     const real *target_reduced, const fl_lattice_point *point, real command[][3]) {
   fl_box branches = work->box;
-  fl_commands_of_point(block, work, lattice, target, point, &branches, command);
+  fl_commands_of_point(block, work, lattice, target_reduced, point, &branches, command);
   approach(block, work, &branches, command, APPROACH_ROUND);
   approach(block, work, &work->box, command, APPROACH_ROUND);
 }
@@ -278,17 +280,17 @@ static const fl_lattice_point *next_point(const fl_lattice_point *points, int co
 /* Improves on the best commands by what steps from a lattice come to: first exact commands
    from many points, then the cheapest of these are made cheaper, but for those that cost
    half as much again as the best so far. */
-static void improve_from_lattice(const real *block, fl_work *work, const real *target,
+static void improve_from_lattice(const real *block, fl_work *work, const real *target_reduced,
                                  const real *lambda, real enough, real *best_cost) {
   const real most_error = error_allowed(block, work, &work->box);
   fl_lattice lattice;
   fl_lattice_point points[FL_LATTICE_STARTS];
   real command[FL_MOST][3];
   fl_lay_lattice(block, work, &lattice);
-  const int count = fl_cheapest_points(block, work, &lattice, target, points);
+  const int count = fl_cheapest_points(block, work, &lattice, target_reduced, points);
   for (int k = 0; k < count; k++) {
     real unused[FL_MOST][2];
-    begin_at(block, work, &lattice, target, points + k, command);
+    begin_at(block, work, &lattice, target_reduced, points + k, command);
     points[k].cost = NONE;
     if (come_to_give(block, work, &work->box, command, 0, most_error)) {
       points[k].cost = fl_power_of_commands(block, work, command, unused);
@@ -299,13 +301,13 @@ static void improve_from_lattice(const real *block, fl_work *work, const real *t
     const fl_lattice_point *next = next_point(points, count, last_cost);
     if (!next || !(next->cost < fl_smaller(*best_cost * WITHIN_BEST, NONE))) return;
     last_cost = next->cost;
-    begin_at(block, work, &lattice, target, next, command);
-    improve_from(block, work, target, lambda, command, best_cost);
+    begin_at(block, work, &lattice, target_reduced, next, command);
+    improve_from(block, work, target_reduced, lambda, command, best_cost);
   }
 }
 
 /* Improves on the best commands from those with one foil at a limit where it stalls. */
-static void improve_from_stalls(const real *block, fl_work *work, const real *target,
+static void improve_from_stalls(const real *block, fl_work *work, const real *target_reduced,
                                 const real *lambda, real start[][3], real *best_cost) {
   real command[FL_MOST][3];
   for (int i = 0; i < COUNT(block); i++) {
@@ -317,14 +319,15 @@ static void improve_from_stalls(const real *block, fl_work *work, const real *ta
       else
         memcpy(command, start, sizeof command);
       command[i][0] = angle;
-      improve_from(block, work, target, lambda, command, best_cost);
+      improve_from(block, work, target_reduced, lambda, command, best_cost);
     }
   }
 }
 
 /* The same as fl_improve_commands of several starts, as steps from a cheap one may end
    early: each has its own valley. */
-void fl_improve_from_starts(const real *block, fl_work *work, const real *target, real *best_cost) {
+void fl_improve_from_starts(const real *block, fl_work *work, const real *target_reduced,
+                            real *best_cost) {
   real most_cost;
   const real proved = proved_value(block, work, &most_cost);
   const real enough = proved * (1 + CLOSE);
@@ -333,16 +336,16 @@ void fl_improve_from_starts(const real *block, fl_work *work, const real *target
   memcpy(lambda, work->state_found->lambda_reduced, sizeof lambda);
   fl_commands_for_forces(block, &work->box, work->state_found->force, work->command_previous,
                          start);
-  fl_improve_commands(block, work, target, best_cost);
+  fl_improve_commands(block, work, target_reduced, best_cost);
   if (*best_cost <= enough) return;
-  improve_from_stalls(block, work, target, lambda, start, best_cost);
+  improve_from_stalls(block, work, target_reduced, lambda, start, best_cost);
   if (*best_cost <= enough) return;
   real unused;
-  fl_first_lambda(block, work, target, lambda, &unused);
-  fl_dual_start(block, work, target, lambda);
-  fl_improve_commands(block, work, target, best_cost);
+  fl_first_lambda(block, work, target_reduced, lambda, &unused);
+  fl_dual_start(block, work, target_reduced, lambda);
+  fl_improve_commands(block, work, target_reduced, best_cost);
   if (*best_cost > enough && proved <= most_cost) {
-    improve_from_lattice(block, work, target, lambda, enough, best_cost);
+    improve_from_lattice(block, work, target_reduced, lambda, enough, best_cost);
   }
 }
 
@@ -391,12 +394,12 @@ void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, 
     real ray_share = most_by_dual * (1 - below_most);
     if (has_found) ray_share = (found + most) / 2;
     real wrench_served[6]; /* by forces */
-    real target[6];
+    real target_reduced[6];
     for (int j = 0; j < 6; j++) {
-      work->wrench_target[j] = ray_share * (wrench[j] + work->span.wrench_offset[j]);
-      wrench_served[j] = work->wrench_target[j] - work->span.wrench_offset[j];
+      work->wrench_wanted[j] = ray_share * (wrench[j] + work->span.wrench_offset[j]);
+      wrench_served[j] = work->wrench_wanted[j] - work->span.wrench_offset[j];
     }
-    fl_reduce_wrench(work, wrench_served, target);
+    fl_reduce_wrench(work, wrench_served, target_reduced);
     real command[FL_MOST][3];
     real lambda[6];
     int is_met = 0;
@@ -409,7 +412,7 @@ void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, 
         memcpy(command, start, sizeof command);
       memcpy(lambda, out->lambda_reduced, sizeof lambda);
       real force[FL_MOST][2];
-      is_met = settle(block, work, target, EXACT, lambda, command, force) < NONE;
+      is_met = settle(block, work, target_reduced, EXACT, lambda, command, force) < NONE;
     }
     if (!is_met) {
       most = ray_share;

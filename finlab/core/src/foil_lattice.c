@@ -117,10 +117,10 @@ static real held_force(const fl_actuator *a, const fl_set *set, real *force) {
    all cost there: watts as force^1.5, and MISS_WEIGHT times those of all actuators for a miss
    of one scaled wrench. */
 static real cost_at_point(const real *block, const fl_work *work, const fl_lattice *lattice,
-                          const real *target, const unsigned char *node, real force[][2]) {
+                          const real *target_reduced, const unsigned char *node, real force[][2]) {
   real cost = 0;
   real left[6]; /* of the target, by the other actuators */
-  memcpy(left, target, sizeof left);
+  memcpy(left, target_reduced, sizeof left);
   for (int f = 0; f < lattice->foils; f++) {
     cost += lattice->cost[node[f]];
     for (int j = 0; j < 6; j++) left[j] -= lattice->wrench[node[f]][j];
@@ -165,7 +165,7 @@ static int put_in_order(fl_lattice_point *points, int count, const fl_lattice_po
 
 /* The cheapest point of the lattice on one choice of branches, numbered in mixed radix. */
 static fl_lattice_point cheapest_of_choice(const real *block, const fl_work *work,
-                                           const fl_lattice *lattice, const real *target,
+                                           const fl_lattice *lattice, const real *target_reduced,
                                            int choice, int points) {
   fl_lattice_point best = {{0}, 0};
   fl_lattice_point tried = {{0}, 0};
@@ -180,7 +180,7 @@ static fl_lattice_point cheapest_of_choice(const real *block, const fl_work *wor
       node_digits /= lattice->each;
     }
     real unused[FL_MOST][2];
-    tried.cost = cost_at_point(block, work, lattice, target, tried.node, unused);
+    tried.cost = cost_at_point(block, work, lattice, target_reduced, tried.node, unused);
     if (k == 0 || tried.cost < best.cost) best = tried;
   }
   return best;
@@ -189,7 +189,7 @@ static fl_lattice_point cheapest_of_choice(const real *block, const fl_work *wor
 /* The cheapest point of each choice of branches, and of these the cheapest ones
    (FL_LATTICE_STARTS,); how many there are. */
 int fl_cheapest_points(const real *block, const fl_work *work, const fl_lattice *lattice,
-                       const real *target, fl_lattice_point *points) {
+                       const real *target_reduced, fl_lattice_point *points) {
   int choices = 1;
   int points_of_choice = 1;
   for (int f = 0; f < lattice->foils; f++) {
@@ -199,7 +199,7 @@ int fl_cheapest_points(const real *block, const fl_work *work, const fl_lattice 
   int count = 0;
   for (int choice = 0; choice < choices; choice++) {
     const fl_lattice_point best =
-        cheapest_of_choice(block, work, lattice, target, choice, points_of_choice);
+        cheapest_of_choice(block, work, lattice, target_reduced, choice, points_of_choice);
     count = put_in_order(points, count, &best);
   }
   return count;
@@ -214,10 +214,10 @@ void fl_lay_lattice(const real *block, const fl_work *work, fl_lattice *lattice)
 /* Commands (n, 3) at a point for a target; the limits of the foils in `box` become the ends of the
    branches on which they lie. */
 void fl_commands_of_point(const real *block, const fl_work *work, const fl_lattice *lattice,
-                          const real *target, const fl_lattice_point *point, fl_box *box,
+                          const real *target_reduced, const fl_lattice_point *point, fl_box *box,
                           real command[][3]) {
   real force[FL_MOST][2];
-  cost_at_point(block, work, lattice, target, point->node, force);
+  cost_at_point(block, work, lattice, target_reduced, point->node, force);
   fl_commands_for_forces(block, &work->box, force, work->command_previous, command);
   for (int f = 0; f < lattice->foils; f++) {
     const int node = point->node[f];

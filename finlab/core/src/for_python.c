@@ -68,9 +68,9 @@ const char *fl_fields(void) {
 #undef FL_END
 
 int fl_answer_many(const real *block, fl_work *work, const fl_question *question,
-                   const real *wrench, int count, real *force, real *multipliers, real *wrench_served,
-                   real *gap_power_bound, real *command, unsigned char *is_attainable,
-                   real *error) {
+                   const real *wrench, int count, real *force, real *multipliers,
+                   real *wrench_served, real *gap_power_bound, real *command,
+                   unsigned char *is_attainable, real *error) {
   const size_t n = (size_t)COUNT(block);
   int is_truncated = 0;
   fl_question q = *question;
@@ -100,9 +100,9 @@ int fl_answer_many(const real *block, fl_work *work, const fl_question *question
 real fl_dual_value(const real *block, fl_work *work, const real *wrench, const real *lambda_reduced,
                    real *force) {
   fl_state *state = work->state;
-  real target[6];
-  fl_reduce_wrench(work, wrench, target);
-  fl_dual_at(block, work, target, lambda_reduced, state);
+  real target_reduced[6];
+  fl_reduce_wrench(work, wrench, target_reduced);
+  fl_dual_at(block, work, target_reduced, lambda_reduced, state);
   memcpy(force, state->force, (size_t)COUNT(block) * sizeof state->force[0]);
   return state->dual_value;
 }
@@ -131,8 +131,8 @@ static fl_actuator_conjugate conjugate_at(const real *block, int i, const fl_set
   return result;
 }
 
-int fl_conjugates(const real *block, fl_work *work, const fl_question *question, const real *multipliers,
-                  int count, fl_actuator_conjugate *conjugates) {
+int fl_conjugates(const real *block, fl_work *work, const fl_question *question,
+                  const real *multipliers, int count, fl_actuator_conjugate *conjugates) {
   fl_question q = *question;
   q.calm = 0; /* turning is no power */
   if (!fl_prepare_question(block, work, &q)) return FL_BAD_NUMBER;

@@ -176,16 +176,17 @@ int fl_prepare_question(const real *block, fl_work *work, const fl_question *q);
 /* dual_newton.c: Newton's method on the dual, Eq. 8 */
 void fl_prepare_sets(const real *block, fl_work *work);
 void fl_restore_sets(const real *block, fl_work *work, const fl_set *set);
-void fl_dual_start(const real *block, fl_work *work, const real *target, const real *lambda);
-void fl_dual_at(const real *block, const fl_work *work, const real *target, const real *lambda,
-                fl_state *state);
-void fl_first_lambda(const real *block, const fl_work *work, const real *target, real *lambda,
-                     real *mu);
-int fl_dual_newton(const real *block, fl_work *work, const real *target, const real *lambda,
+void fl_dual_start(const real *block, fl_work *work, const real *target_reduced,
+                   const real *lambda);
+void fl_dual_at(const real *block, const fl_work *work, const real *target_reduced,
+                const real *lambda, fl_state *state);
+void fl_first_lambda(const real *block, const fl_work *work, const real *target_reduced,
+                     real *lambda, real *mu);
+int fl_dual_newton(const real *block, fl_work *work, const real *target_reduced, const real *lambda,
                    int most_steps);
-void fl_reduce_wrench(const fl_work *work, const real *wrench, real *target);
+void fl_reduce_wrench(const fl_work *work, const real *wrench, real *target_reduced);
 void fl_reduce_lambda(const fl_work *work, const real *lambda, real *lambda_reduced);
-int fl_is_in_range(const fl_work *work, const real *wrench, const real *target);
+int fl_is_in_range(const fl_work *work, const real *wrench, const real *target_reduced);
 void fl_wrench_of_forces(const real *block, const fl_work *work, real force[][2], real *wrench);
 
 /* set_gaps.c: sets with gaps */
@@ -204,8 +205,9 @@ void fl_take_side(const real *block, fl_work *work, const fl_node *node, int sid
 fl_node *fl_last_open_cut(const real *block, fl_work *work, int *depth);
 
 /* gap_search.c: least power where sets have gaps */
-int fl_search_gaps(const real *block, fl_work *work, const real *target, int status, real *bound);
-int fl_answer_with_drag(const real *block, fl_work *work, const real *target, int status,
+int fl_search_gaps(const real *block, fl_work *work, const real *target_reduced, int status,
+                   real *bound);
+int fl_answer_with_drag(const real *block, fl_work *work, const real *target_reduced, int status,
                         fl_answer *out);
 
 /* foil_tangent.c: a foil near to a command */
@@ -241,14 +243,15 @@ typedef struct {
 } fl_lattice_point;
 void fl_lay_lattice(const real *block, const fl_work *work, fl_lattice *lattice);
 int fl_cheapest_points(const real *block, const fl_work *work, const fl_lattice *lattice,
-                       const real *target, fl_lattice_point *points);
+                       const real *target_reduced, fl_lattice_point *points);
 void fl_commands_of_point(const real *block, const fl_work *work, const fl_lattice *lattice,
-                          const real *target, const fl_lattice_point *point, fl_box *box,
+                          const real *target_reduced, const fl_lattice_point *point, fl_box *box,
                           real command[][3]);
 
 /* foil_drag.c: commands of robots whose foils drag */
-void fl_improve_commands(const real *block, fl_work *work, const real *target, real *best);
-void fl_improve_from_starts(const real *block, fl_work *work, const real *target, real *best);
+void fl_improve_commands(const real *block, fl_work *work, const real *target_reduced, real *best);
+void fl_improve_from_starts(const real *block, fl_work *work, const real *target_reduced,
+                            real *best);
 int fl_are_forces_sure(const real *block, fl_work *work);
 void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, real found,
                           real most, fl_answer *out);
@@ -269,8 +272,8 @@ static inline void add(wide *to, wide times, const wide *other) {
 wide fl_out_of_range(const real *block, const fl_work *work, const real *inner, int axis);
 void fl_weigh_axes(const real *block, fl_work *work, const wide *weight);
 void fl_point_of_forces(const real *block, const fl_work *work, wide force[][2], wide *point);
-wide fl_nearest_point(const real *block, const fl_work *work, const wide *target, wide close,
-                      wide apart, fl_mixture *m);
+wide fl_nearest_point(const real *block, const fl_work *work, const wide *target_weighted,
+                      wide close, wide apart, fl_mixture *m);
 wide fl_farthest_along_ray(const real *block, const fl_work *work, const wide *from,
                            const wide *ray, wide least, wide most, wide close, fl_mixture *m,
                            wide *plane);

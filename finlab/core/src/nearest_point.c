@@ -137,7 +137,7 @@ static void extend_basis(fl_mixture *m, int j) {
 
 /* Shares, which add up to 1, of the points that come nearest to a target, within their
    affine hull; a point that depends on those before it gets 0. */
-static void affine_shares(fl_mixture *m, const wide *target, wide *share) {
+static void affine_shares(fl_mixture *m, const wide *target_weighted, wide *share) {
   int begin = m->basis_count;
   if (begin < 1) begin = 1;
   for (int j = begin; j < m->count; j++) extend_basis(m, j);
@@ -145,7 +145,7 @@ static void affine_shares(fl_mixture *m, const wide *target, wide *share) {
 
   wide right[FL_POINTS];
   wide left[6];
-  memcpy(left, target, sizeof left);
+  memcpy(left, target_weighted, sizeof left);
   add(left, -1, m->point[0]);
   for (int j = 1; j < m->count; j++) {
     right[j] = product(m->q[j], left, 6);
@@ -175,11 +175,11 @@ static wide step_to_edge(const fl_mixture *m, const wide *wanted, int *is_inside
 
 /* Shares of the points whose mixture is nearest to a target; points without a share are left
    out. */
-static void mix(fl_mixture *m, const wide *target) {
+static void mix(fl_mixture *m, const wide *target_weighted) {
   while (m->count > 1) {
     wide wanted[FL_POINTS];
     int is_inside;
-    affine_shares(m, target, wanted);
+    affine_shares(m, target_weighted, wanted);
     const wide step = step_to_edge(m, wanted, &is_inside);
     if (is_inside) {
       memcpy(m->weight, wanted, sizeof wanted);
@@ -195,18 +195,18 @@ static void mix(fl_mixture *m, const wide *target) {
 }
 
 /* Sets the miss of a mixture: the way from its point to a target. Its length. */
-static wide find_miss(fl_mixture *m, const wide *target) {
-  memcpy(m->miss, target, sizeof m->miss);
+static wide find_miss(fl_mixture *m, const wide *target_weighted) {
+  memcpy(m->miss, target_weighted, sizeof m->miss);
   for (int p = 0; p < m->count; p++) add(m->miss, -m->weight[p], m->point[p]);
   return length_of(m->miss);
 }
 
 /* What the point behind those of a mixture lies beyond the mixture along the miss, over no
    length. */
-static wide gain_of_last(const fl_mixture *m, const wide *target) {
+static wide gain_of_last(const fl_mixture *m, const wide *target_weighted) {
   wide way[6];
   memcpy(way, m->point[m->count], sizeof way);
-  add(way, -1, target);
+  add(way, -1, target_weighted);
   add(way, 1, m->miss);
   return product(way, m->miss, 6);
 }
@@ -215,28 +215,28 @@ static wide gain_of_last(const fl_mixture *m, const wide *target) {
    has points. Up to the distance `close` a point is the nearest one; `apart` is the share of
    a miss to be proved. Where there is a miss, what is farthest along it follows the
    mixture's points. Returns the miss. */
-wide fl_nearest_point(const real *block, const fl_work *work, const wide *target, wide close,
-                      wide apart, fl_mixture *m) {
+wide fl_nearest_point(const real *block, const fl_work *work, const wide *target_weighted,
+                      wide close, wide apart, fl_mixture *m) {
   wide last_miss = 1e300;
   if (m->count == 0) {
-    append_farthest(block, work, target, m);
+    append_farthest(block, work, target_weighted, m);
     m->count = 1;
     m->basis_count = 0;
     m->weight[0] = 1;
   }
   for (int k = 1;; k++) {
-    const wide miss = find_miss(m, target);
+    const wide miss = find_miss(m, target_weighted);
     if (miss <= close) return miss;
     if (m->count == FL_POINTS) drop(m, least_share(m)); /* more than an affine basis */
     append_farthest(block, work, m->miss, m);
-    const wide gain = gain_of_last(m, target);
+    const wide gain = gain_of_last(m, target_weighted);
     const int is_proved = gain <= larger_wide(close, apart * miss) * miss;
     const int has_stalled = miss >= last_miss * (1 - BARELY);
     if (is_proved || has_stalled || k == MOST_POINTS) return miss;
     last_miss = miss;
     m->weight[m->count] = 0;
     m->count++;
-    mix(m, target);
+    mix(m, target_weighted);
   }
 }
 
@@ -266,11 +266,11 @@ wide fl_farthest_along_ray(const real *block, const fl_work *work, const wide *f
       size = larger_wide(bound, least);
       memcpy(plane, normal, sizeof m->miss);
     }
-    wide target[6];
-    memcpy(target, from, sizeof target);
-    add(target, size, ray);
+    wide target_weighted[6];
+    memcpy(target_weighted, from, sizeof target_weighted);
+    add(target_weighted, size, ray);
     if (m->count < 1) m->count = 1;
-    const wide miss = fl_nearest_point(block, work, target, close, PROOF_OF_SHARE, m);
+    const wide miss = fl_nearest_point(block, work, target_weighted, close, PROOF_OF_SHARE, m);
     const int has_stalled = size >= last_size;
     if (size == least || miss <= 2 * close || (has_stalled && miss <= 1)) break;
     if (has_stalled) size -= miss / (2 * length_of(ray));
