@@ -39,7 +39,7 @@ from finlab.axes import Axis, axes_in
 from finlab.errors import AllocationError
 from finlab.layout.damage import WHOLE, Damage
 from finlab.layout.layout import Layout
-from finlab.physics.objective import yardstick
+from finlab.physics.objective import wrench_scale_of
 from finlab.physics.plant import plant_of
 
 MAX_STATES = 32
@@ -139,7 +139,7 @@ class Allocator:
         """Prepares the undamaged robot; all constructors end here."""
         self._layout = layout
         self._choice = choice
-        self._scale = yardstick(layout)
+        self._scale = wrench_scale_of(layout)
         self._whole = self._make_state(WHOLE)
         self._states: dict[object, RobotState] = {}
         """States that were asked for, by damage and free axes; the one asked for last is last."""

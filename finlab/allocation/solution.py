@@ -137,8 +137,8 @@ class Solution(NamedTuple):
     samples: Callable[[], Candidates] | None = None
     """Gives the raw candidates before refinement, for a single target."""
     multipliers: Array | None = None
-    """Multipliers (N, 6) [W/N, W/(N m)] of the wrenches, what one more unit of each axis costs; None
-    where the method has none."""
+    """Multipliers (N, 6) [W/N, W/(N m)] of the wrenches, what one more unit of each axis costs;
+    None where the method has none."""
     notes: tuple[str, ...] = ()
     """Sentences about these answers."""
 

@@ -188,8 +188,8 @@ int fl_answer_one(const fl_real *block, fl_work *work, const fl_question *questi
    @param gap_power_bound  (count,) power that gaps are proved to need [W]
    @param command          (count, n, 3)
    @param is_attainable    (count,) whether a wrench is within reach
-   @param error            (count,) distance of the commands' wrench from the one served, on the
-                           yardstick
+   @param error            (count,) distance of the commands' wrench from the one served, over the
+                           wrench scale
    @return                 FL_OK, FL_TRUNCATED, or the error code of fl_answer_one */
 int fl_answer_many(const fl_real *block, fl_work *work, const fl_question *question,
                    const fl_real *wrench, int count, fl_real *force, fl_real *multipliers,

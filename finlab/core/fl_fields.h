@@ -15,7 +15,7 @@ FL_FIELD(fl_real, length, , "1", "numbers in the block")
 FL_FIELD(fl_real, n, , "1", "actuators")
 FL_FIELD(fl_real, rank, , "1", "r, rank of the effectiveness")
 FL_FIELD(fl_real, axis_scale, [6], "N, N m", "wrench = axis_scale * scaled wrench")
-FL_FIELD(fl_real, wrench_scale, [6], "N, N m", "sigma, the yardstick of errors")
+FL_FIELD(fl_real, wrench_scale, [6], "N, N m", "sigma, by which errors are normalized")
 FL_FIELD(fl_real, is_commanded, [6], "1", "1 of an axis that the robot commands, else 0")
 FL_FIELD(fl_real, wrench_offset, [6], "N, N m", "o, wrench beside that of the forces")
 FL_FIELD(fl_real, basis, [6][6], "1", "6 x r: directions of scaled wrenches that are driven")
@@ -42,7 +42,7 @@ FL_FIELD(fl_real, row_force_max, [2], "N", "largest force of each row")
 FL_FIELD(fl_real, effectiveness_reduced, [2][6], "1/N",
          "columns of B: scaled wrench in the basis per newton of each row")
 FL_FIELD(fl_real, effectiveness_normalized, [3][6], "1/N",
-         "B / sigma: wrench on the yardstick per newton along each axis of the law")
+         "B / sigma: wrench over the wrench scale per newton along each axis of the law")
 FL_FIELD(fl_real, command_kind, , "1", "how forces become commands: FL_THRUSTER ...")
 FL_FIELD(fl_real, command_min, [3], "command", "least command; unused numbers 0")
 FL_FIELD(fl_real, command_max, [3], "command", "largest command; unused numbers 0")
@@ -95,7 +95,7 @@ FL_FIELD(fl_real, wrench_served, [6], "N, N m",
          "wrench that the forces give, out of reach by the policy")
 FL_FIELD(fl_real, gap_power_bound, , "W", "power that gaps are proved to need")
 FL_FIELD(fl_real, error, , "1",
-         "distance of the commands' wrench from wrench_served, on the yardstick, by law grids")
+         "distance of the commands' wrench from wrench_served, over the wrench scale, by law grids")
 FL_FIELD(fl_real, command, [FL_MOST][3], "command", "of each actuator")
 FL_FIELD(int, newton_status, , "1", "how Newton's method ended: FL_MET ...")
 FL_FIELD(int, is_attainable, , "1", "1 where the target is within reach")
@@ -135,7 +135,8 @@ FL_FIELD(fl_real, axis_counts, [6], "1", "1 of axes that count, else 0")
 FL_END(fl_coupled_robot)
 
 FL_BEGIN(fl_settle_limits)
-FL_FIELD(fl_real, penalty_least, , "W", "what an error as large as the yardstick counts at least")
+FL_FIELD(fl_real, penalty_least, , "W",
+         "what an error as large as the wrench scale counts at least")
 FL_FIELD(fl_real, most_steps, , "1",
          "steps after which no iteration but the first is begun, infinity for no limit")
 FL_FIELD(int, most_iterations, , "1",
@@ -144,7 +145,8 @@ FL_END(fl_settle_limits)
 
 FL_BEGIN(fl_settle_result)
 FL_FIELD(fl_real, power, , "W", "of the forces that the iterations come to")
-FL_FIELD(fl_real, penalty, , "W", "what an error as large as the yardstick counted last")
-FL_FIELD(fl_real, error, , "1", "distance of the wrench from the one desired, on the yardstick")
+FL_FIELD(fl_real, penalty, , "W", "what an error as large as the wrench scale counted last")
+FL_FIELD(fl_real, error, , "1",
+         "distance of the wrench from the one desired, over the wrench scale")
 FL_FIELD(fl_real, steps, , "1", "steps of Newton's method and on commands")
 FL_END(fl_settle_result)

@@ -23,7 +23,7 @@ from finlab.axes import AXES
 from finlab.deploy.thin_block import tables_of, thinned
 from finlab.errors import AllocationError
 from finlab.layout import Layout
-from finlab.physics.objective import yardstick
+from finlab.physics.objective import wrench_scale_of
 from finlab.whole_file import write_folder
 
 SAMPLES = 24
@@ -70,7 +70,7 @@ def c_sources(
             "without"
         )
     water = check_flow(flow)
-    method = Dual(layout, DualSettings(), yardstick(layout), None).at(water)
+    method = Dual(layout, DualSettings(), wrench_scale_of(layout), None).at(water)
     block = method.compiled.robot.block
     thin = thinned(block)
     folder = Path(core.__path__[0])

@@ -107,7 +107,7 @@ class Laid:
         return np.array(list(product(*nodes)))
 
     def target(self, wrench: Array) -> Array:
-        """A wrench (6,) on the yardstick, in the basis of driven directions (6,)."""
+        """A wrench (6,) over the wrench scale, in the basis of driven directions (6,)."""
         reduced = np.zeros(6)
         functions().fl_reduce_wrench(self.work, at(np.ascontiguousarray(wrench)), at(reduced))
         return reduced

@@ -19,7 +19,7 @@ from finlab.allocation.settings import USUAL_PERIOD_S
 from finlab.arrays import ROUNDING, Array
 from finlab.core.calls import NOMINAL, Conditions, Conjugates
 from finlab.layout.layout import Layout
-from finlab.physics.objective import yardstick
+from finlab.physics.objective import wrench_scale_of
 from finlab.physics.plant import Plant, plant_of
 
 
@@ -83,7 +83,7 @@ class Compiled:
         Raises:
             DataError: a force table cannot be read.
         """
-        return cls(layout, plant_of(layout).counting(layout.commanded), yardstick(layout))
+        return cls(layout, plant_of(layout).counting(layout.commanded), wrench_scale_of(layout))
 
     def _compile(self) -> None:
         """Makes the robot of the core from the responses of all groups."""

@@ -8,7 +8,7 @@
 #define LARGEST R(1e12) /* wrench, price or command of a question */
 #define MOST_CALM 1000
 #define STEPS_BY_LAWS 12 /* on commands, to a wrench a little beyond the tables */
-/* Error on the yardstick, beyond reach, up to which the laws may yet meet the target. */
+/* Error over the wrench scale, beyond reach, up to which the laws may yet meet the target. */
 #define BEYOND_TABLES (10 * CLOSE)
 /* A drive that passes a dead band stays within it by this share of the band. */
 #define INSIDE_BAND (1 - 10 * NEARLY)

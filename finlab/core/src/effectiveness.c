@@ -13,7 +13,7 @@
 #define LEFT_OVER fl_larger(NOTHING, 10 * ROUNDING)
 #define DEPENDENT (LEFT_OVER * LEFT_OVER) /* the squared length */
 
-/* A wrench on the yardstick per newton of a row, as the laws have it: thrusters may be
+/* A wrench over the wrench scale per newton of a row, as the laws have it: thrusters may be
    commanded against their force. */
 static const real *law_axis(const fl_actuator *a, int row) {
   if (is_plane(a)) return a->effectiveness_normalized[1 + row];

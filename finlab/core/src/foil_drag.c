@@ -95,8 +95,8 @@ static void approach(const real *block, fl_work *work, const fl_box *box, real c
 }
 
 /* Whether so many Levenberg-Marquardt steps make commands within a box give work->wrench_wanted,
-   to an error on the yardstick and to rounding. Where that is what tables leave, steps on their
-   error end soon. */
+   to an error over the wrench scale and to rounding. Where that is what tables leave, steps on
+   their error end soon. */
 static int come_to_give(const real *block, fl_work *work, const fl_box *box, real command[][3],
                         int steps, real most_error) {
   real size = 0;
@@ -109,7 +109,7 @@ static int come_to_give(const real *block, fl_work *work, const fl_box *box, rea
   return error <= most_error + ROUNDING * size;
 }
 
-/* Largest error on the yardstick of commands that are said to give a wrench: what tables
+/* Largest error over the wrench scale of commands that are said to give a wrench: what tables
    leave where these are few. */
 static real error_allowed(const real *block, const fl_work *work, const fl_box *box) {
   if (are_few(block, work, box)) return FINE;
@@ -162,11 +162,11 @@ static real cheapen(const real *block, fl_work *work, const fl_box *box, const r
   return cost;
 }
 
-/* Makes commands give work->wrench_wanted, in the basis `target_reduced`, to an error on the yardstick, and
-   then cheaper; `lambda` becomes that of the last step. Their forces along the rows, and
-   their cost [W]; NONE where they do not come to give it. */
-static real settle(const real *block, fl_work *work, const real *target_reduced, real most_error,
-                   real *lambda, real command[][3], real force[][2]) {
+/* Makes commands give work->wrench_wanted, in the basis `target_reduced`, to an error over the
+   wrench scale, and then cheaper; `lambda` becomes that of the last step. Their forces along the
+   rows, and their cost [W]; NONE where they do not come to give it. */
+static real meet_and_cheapen(const real *block, fl_work *work, const real *target_reduced,
+                             real most_error, real *lambda, real command[][3], real force[][2]) {
   fl_box box = work->box;
   fl_set before[FL_MOST];
   memcpy(before, work->set, sizeof before);
@@ -188,7 +188,8 @@ static void improve_from(const real *block, fl_work *work, const real *target_re
   real force[FL_MOST][2];
   real lambda_near[6];
   memcpy(lambda_near, lambda, sizeof lambda_near);
-  const real cost = settle(block, work, target_reduced, most_error, lambda_near, command, force);
+  const real cost =
+      meet_and_cheapen(block, work, target_reduced, most_error, lambda_near, command, force);
   if (!(cost < *best_cost)) return;
   *best_cost = cost;
   memcpy(work->best_command, command, sizeof work->best_command);
@@ -412,7 +413,7 @@ void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, 
         memcpy(command, start, sizeof command);
       memcpy(lambda, out->lambda_reduced, sizeof lambda);
       real force[FL_MOST][2];
-      is_met = settle(block, work, target_reduced, EXACT, lambda, command, force) < NONE;
+      is_met = meet_and_cheapen(block, work, target_reduced, EXACT, lambda, command, force) < NONE;
     }
     if (!is_met) {
       most = ray_share;

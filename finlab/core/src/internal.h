@@ -22,7 +22,7 @@ typedef fl_wide wide;
 #define ENOUGH R(1e-4)
 #define IDLE 6
 #define ROUNDING R(1e-6)
-#define EXACT R(2e-6) /* error of commands, on the yardstick, that needs no further step */
+#define EXACT R(2e-6) /* error of commands, over the wrench scale, that needs no further step */
 #define TINY R(1e-30)
 #else
 #define R(x) x
@@ -44,7 +44,8 @@ typedef fl_wide wide;
 #define PI R(3.14159265358979323846)
 #define LARGEST_NUMBER R(1e30) /* of a block or an answer */
 #define NOTHING R(1e-9)
-#define CLOSE_BY NOTHING /* distance, on the yardstick, up to which a point is the nearest one */
+/* distance, over the wrench scale, up to which a point is the nearest one */
+#define CLOSE_BY NOTHING
 #define NEARLY R(1e-6)
 #define FINE R(1e-5)
 #define CLOSE R(1e-4)

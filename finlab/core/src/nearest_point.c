@@ -22,7 +22,7 @@ static wide larger_wide(wide a, wide b) {
   return b;
 }
 
-/* An axis of a scaled wrench in the basis, on the yardstick. */
+/* An axis of a scaled wrench in the basis, over the wrench scale. */
 wide fl_out_of_range(const real *block, const fl_work *work, const real *reduced, int axis) {
   const fl_span *span = &work->span;
   wide sum = 0;
@@ -30,7 +30,7 @@ wide fl_out_of_range(const real *block, const fl_work *work, const real *reduced
   return sum * (wide)span->axis_scale[axis] / (wide)HEAD(block)->wrench_scale[axis];
 }
 
-/* Sets the wrench on the yardstick, in weighted axes, that each force gives per newton. */
+/* Sets the wrench over the wrench scale, in weighted axes, that each force gives per newton. */
 void fl_weigh_axes(const real *block, fl_work *work, const wide *weight) {
   for (int i = 0; i < COUNT(block); i++) {
     work->polygon_offset[i] = 0;

@@ -10,7 +10,7 @@
 #define REACH_PARTS 96     /* parts that a policy may look at, of any robot */
 #define REACH_PARTS_EACH 8 /* the same, for each of its actuators */
 
-/* Distance, on the yardstick, up to which the point of a part is the nearest one. */
+/* Distance, over the wrench scale, up to which the point of a part is the nearest one. */
 #define ROUGHLY (NEARLY / 10)
 #define HELD 1e3  /* weight of an axis that is held over one of the group that is served */
 #define PULL 2e-3 /* miss of a group for which held axes give way by a millionth at a curved rim */
@@ -31,7 +31,7 @@ static int are_same(const void *one, const void *other, size_t size) {
 
 static real rounded(real value) { return FLOOR(value / NEARLY + R(0.5)) * NEARLY; }
 
-static wide on_yardstick(const real *block, const real *wrench, int k) {
+static wide over_wrench_scale(const real *block, const real *wrench, int k) {
   return (wide)wrench[k] / (wide)HEAD(block)->wrench_scale[k];
 }
 
@@ -41,7 +41,7 @@ static void serve_closest(const real *block, fl_work *work, const real *wrench,
   wide target_weighted[6];
   for (int k = 0; k < 6; k++) {
     weight[k] = fl_larger(policy->axis_weight[k], CLOSE);
-    target_weighted[k] = weight[k] * on_yardstick(block, wrench, k);
+    target_weighted[k] = weight[k] * over_wrench_scale(block, wrench, k);
   }
   fl_weigh_axes(block, work, weight);
   work->mixture.count = 0;
@@ -50,7 +50,7 @@ static void serve_closest(const real *block, fl_work *work, const real *wrench,
   score[0] = rounded((real)miss);
 }
 
-/* The ray of a wrench, on the yardstick, within the range of the effectiveness. */
+/* The ray of a wrench, over the wrench scale, within the range of the effectiveness. */
 static void ray_of(const real *block, const fl_work *work, const real *wrench, wide *ray) {
   real along[6];
   real target_reduced[6];
@@ -86,7 +86,7 @@ static void serve_direction(const real *block, fl_work *work, const real *wrench
   wide from[6];
   wide ray[6];
   wide plane[6];
-  for (int k = 0; k < 6; k++) from[k] = -on_yardstick(block, work->span.wrench_offset, k);
+  for (int k = 0; k < 6; k++) from[k] = -over_wrench_scale(block, work->span.wrench_offset, k);
   ray_of(block, work, wrench, ray);
   fl_weigh_axes(block, work, weight);
   wide ray_share =
@@ -107,7 +107,7 @@ static void remake_points(const real *block, const fl_work *work, fl_mixture *m)
   for (int p = 0; p < m->count; p++) fl_point_of_forces(block, work, m->force[p], m->point[p]);
 }
 
-/* Serves one group of axes, for a wrench on the yardstick, while those before it are held;
+/* Serves one group of axes, for a wrench over the wrench scale, while those before it are held;
    `missing` becomes what it lacks. Its length. A group that wants more than there is pulls
    at the held axes: then it weighs so much less that these give way by as little as they do
    for a miss of `PULL`. */
@@ -139,8 +139,8 @@ static wide serve_group(const real *block, fl_work *work, const wide *wanted,
 static void serve_priority(const real *block, fl_work *work, const real *wrench,
                            const fl_policy *policy, real *score) {
   unsigned char held[6] = {0};
-  wide wanted[6]; /* on the yardstick; of held axes what they have got */
-  for (int k = 0; k < 6; k++) wanted[k] = on_yardstick(block, wrench, k);
+  wide wanted[6]; /* over the wrench scale; of held axes what they have got */
+  for (int k = 0; k < 6; k++) wanted[k] = over_wrench_scale(block, wrench, k);
   work->mixture.count = 0;
   for (int g = 0; g < policy->group_count; g++) {
     const unsigned char *group = policy->group[g];

@@ -9,7 +9,7 @@
 #define MODEL_STEPS 4  /* steps on commands that make them exact on the whole model */
 #define TRIALS 4       /* shares of a step that are tried in one iteration */
 #define SHORTEN R(0.3) /* a step that gets no better is shortened to this share */
-/* Error on the yardstick that commands on the way may leave. */
+/* Error over the wrench scale that commands on the way may leave. */
 #define EXACT_ON_WAY (NEARLY / 10)
 
 /* Forces of commands along the laws' axes, and in the body frame, where a foil's drag at
@@ -34,7 +34,7 @@ static void forces_of_commands(const fl_coupled_robot *robot, const real *block,
 
 /* Makes the wrench of a block linear at commands: its effectiveness becomes that of the laws
    and the slope of what the actuators do to each other, its offset what is left. Their
-   residual from a wrench, on the yardstick; its size. */
+   residual from a wrench, over the wrench scale; its size. */
 static real linearize_at(const fl_coupled_robot *robot, real *block, fl_work *work,
                          const real *wrench, real command[][3], real *residual) {
   const fl_span *span = &work->span;
@@ -158,7 +158,7 @@ static int answer_linear(real *block, fl_work *work, const fl_question *q, int i
   return code;
 }
 
-/* What an error as large as the yardstick is worth [W] at multipliers of the wrench: twice
+/* What an error as large as the wrench scale is worth [W] at multipliers of the wrench: twice
    that makes an exact penalty. */
 static real penalty_at(const real *block, const real *lambda) {
   real scaled[6];
@@ -184,8 +184,8 @@ typedef struct {
   fl_box box;           /* of the commands by which the block is commanded now */
   real (*force)[2];     /* (n, 2) the best ones [N] */
   real power;           /* of these [W] */
-  real penalty;         /* what an error as large as the yardstick counts [W] */
-  real error;           /* of the wrench, on the yardstick */
+  real penalty;         /* what an error as large as the wrench scale counts [W] */
+  real error;           /* of the wrench, over the wrench scale */
   real newton_steps;
 } outer_search;
 
