@@ -251,9 +251,9 @@ fl_real fl_dual_value(const fl_real *block, fl_work *work, const fl_real *wrench
                     these commands; untouched where most_iterations is 0
    @param result    becomes what the iterations end with
    @return          as fl_answer_one */
-int fl_settle(const fl_coupled_robot *robot, fl_real *block, fl_work *work,
-              const fl_question *question, const fl_settle_limits *limits, fl_real *force,
-              fl_answer *answer, fl_settle_result *result);
+int fl_outer_iterations(const fl_coupled_robot *robot, fl_real *block, fl_work *work,
+                        const fl_question *question, const fl_outer_limits *limits, fl_real *force,
+                        fl_answer *answer, fl_outer_result *result);
 
 /* The wrench offset of jets, an fl_offset_at.
 

@@ -134,19 +134,19 @@ FL_FIELD(fl_reals, frames, , "address",
 FL_FIELD(fl_real, axis_counts, [6], "1", "1 of axes that count, else 0")
 FL_END(fl_coupled_robot)
 
-FL_BEGIN(fl_settle_limits)
+FL_BEGIN(fl_outer_limits)
 FL_FIELD(fl_real, penalty_least, , "W",
          "what an error as large as the wrench scale counts at least")
 FL_FIELD(fl_real, most_steps, , "1",
          "steps after which no iteration but the first is begun, infinity for no limit")
 FL_FIELD(int, most_iterations, , "1",
          "outer iterations at most; 0 for commands of the nearest forces that give the wrench")
-FL_END(fl_settle_limits)
+FL_END(fl_outer_limits)
 
-FL_BEGIN(fl_settle_result)
+FL_BEGIN(fl_outer_result)
 FL_FIELD(fl_real, power, , "W", "of the forces that the iterations come to")
 FL_FIELD(fl_real, penalty, , "W", "what an error as large as the wrench scale counted last")
 FL_FIELD(fl_real, error, , "1",
          "distance of the wrench from the one desired, over the wrench scale")
 FL_FIELD(fl_real, steps, , "1", "steps of Newton's method and on commands")
-FL_END(fl_settle_result)
+FL_END(fl_outer_result)

@@ -25,7 +25,7 @@ SIGNATURES = {
     "fl_conjugates": "ippppip",
     "fl_reach": "vpppppirppp",
     "fl_jets": "vppipppp",
-    "fl_settle": "ipppppppp",
+    "fl_outer_iterations": "ipppppppp",
 }
 """What each function returns and takes: i int, r real, p pointer, s text, v nothing."""
 _TYPES = {

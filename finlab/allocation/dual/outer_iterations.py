@@ -4,9 +4,9 @@ at the last forces.
 With y the forces and o(y) the wrench offset that they cause (Eq. 18), an iteration takes o(y) for
 its value and slope at the last forces. Its answer is exact and cheapest on that linear model;
 Levenberg-Marquardt steps make it exact on the whole one, and shorter steps are taken where it is
-no cheaper. Where the iterations settle, the gradient of the power lies in the range of the slope
+no cheaper. Where the iterations converge, the gradient of the power lies in the range of the slope
 of the whole model: the conditions of Karush, Kuhn and Tucker hold there (sequential convex
-programming). The iterations themselves are in finlab/core/src/sequential_convex.c. Here is where
+programming). The iterations themselves are in finlab/core/src/outer_iterations.c. Here is where
 they begin: the whole model is not convex, so several starts are tried.
 """
 

@@ -1,6 +1,6 @@
 /* Answers where actuators act on each other, Eq. 18, in outer iterations: the dual of the model
    made linear at the last forces, then Levenberg-Marquardt steps on the whole model (sequential
-   convex programming). finlab/allocation/dual/outer_iterations.py says why they settle. */
+   convex programming). finlab/allocation/dual/outer_iterations.py says where they converge. */
 #include "internal.h"
 
 /* Parts of sets with gaps that are looked at after the first iteration, which begins near
@@ -297,9 +297,9 @@ static void finish_search(outer_search *search, fl_answer *out) {
   fl_clip_commands(search->block, &search->box, out->command);
 }
 
-int fl_settle(const fl_coupled_robot *robot, real *block, fl_work *work,
-              const fl_question *question, const fl_settle_limits *limits, real *force,
-              fl_answer *answer, fl_settle_result *result) {
+int fl_outer_iterations(const fl_coupled_robot *robot, real *block, fl_work *work,
+                        const fl_question *question, const fl_outer_limits *limits, real *force,
+                        fl_answer *answer, fl_outer_result *result) {
   outer_search search = {0};
   search.robot = robot;
   search.block = block;
