@@ -157,7 +157,7 @@ static void pass_bands(const real *block, fl_work *work, const fl_question *q, r
     if (size_of(later.force[i]) < most) continue;
     real wanted[3];
     fl_command_for_force(block, i, &box, later.force[i], q->previous + 3 * i, wanted);
-    wanted[k] = fl_clipped(wanted[k], -most, most);
+    wanted[k] = clipped(wanted[k], -most, most);
     memcpy(command[i], wanted, sizeof wanted);
   }
   work->box = box;

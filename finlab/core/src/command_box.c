@@ -24,7 +24,7 @@ real fl_clip_number(const fl_box *box, int i, int k, int angle, real value) {
   const real high = box->command_max[i][k];
   const real middle = (low + high) / 2;
   if (k == angle) value = middle + fl_wrap_angle(value - middle);
-  return fl_clipped(value, low, high);
+  return clipped(value, low, high);
 }
 
 /* Whether a command lies in the dead band of its actuator, where it gives no force; on its
@@ -84,7 +84,7 @@ void fl_clip_commands(const real *block, const fl_box *box, real command[][3]) {
         const real middle = (a->command_min[k] + a->command_max[k]) / 2;
         value = middle + fl_wrap_angle(value - middle);
       }
-      command[i][k] = fl_clipped(value, a->command_min[k], a->command_max[k]);
+      command[i][k] = clipped(value, a->command_min[k], a->command_max[k]);
     }
   }
 }

@@ -89,7 +89,7 @@ static void weights_at(const grid_axis *axis, real x, int has_slope, knot_weight
     end = begin + axis->period;
     x -= axis->period * FLOOR((x - begin) / axis->period);
   }
-  const real held = fl_clipped(x, begin, end);
+  const real held = clipped(x, begin, end);
   const int cell = cell_of(knot, cells, end, held);
   const real from = knot[cell];
   real to = end;
@@ -300,7 +300,7 @@ static real on_curve(const real *curve, real value) {
   }
   const real width = row[2 * high] - row[2 * low];
   real t = 0;
-  if (width > 0) t = fl_clipped((value - row[2 * low]) / width, 0, 1);
+  if (width > 0) t = clipped((value - row[2 * low]) / width, 0, 1);
   return row[2 * low + 1] + t * (row[2 * high + 1] - row[2 * low + 1]);
 }
 
@@ -308,7 +308,7 @@ static real on_curve(const real *curve, real value) {
    (j / k)^2. */
 static void beat_at(const real *beat, real share, real *command) {
   const int cells = (int)beat[0];
-  const real position = SQRT(fl_clipped(share, 0, 1)) * (real)cells;
+  const real position = SQRT(clipped(share, 0, 1)) * (real)cells;
   int cell = (int)position;
   if (cell > cells - 1) cell = cells - 1;
   const real *row = beat + 1 + 2 * cell;
@@ -339,7 +339,7 @@ static void fin_command(const real *block, int i, const fl_box *box, const real 
     if (k == 1) break;
     real delivered[3];
     fl_force_of_command(block, i, command, delivered, 0);
-    wanted = fl_larger(wanted + size - size_of(delivered + 1), 0);
+    wanted = larger(wanted + size - size_of(delivered + 1), 0);
     if (gauge && size > 0) angle += fl_wrap_angle(direction - ATAN2(delivered[2], delivered[1]));
   }
 }
@@ -423,8 +423,8 @@ static void sizes_in(const real *block, int i, const fl_box *box, real *least, r
   const fl_actuator *a = ACTUATOR(block, i);
   const real *low = box->command_min[i];
   const real *high = box->command_max[i];
-  *least = R(1e30);
-  *largest = -R(1e30);
+  *least = LARGEST_NUMBER;
+  *largest = -LARGEST_NUMBER;
   *direction = 0;
   for (int j = 0; j < PROBES * PROBES; j++) {
     real command[3] = {0, 0, (low[2] + high[2]) / 2};
@@ -439,8 +439,8 @@ static void sizes_in(const real *block, int i, const fl_box *box, real *least, r
     real size = force[0];
     if (a->command_kind != FL_FOIL) size = size_of(force + 1);
     if (size > *largest) *direction = ATAN2(force[2], force[1]);
-    *least = fl_smaller(*least, size);
-    *largest = fl_larger(*largest, size);
+    *least = smaller(*least, size);
+    *largest = larger(*largest, size);
   }
 }
 

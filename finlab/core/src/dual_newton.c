@@ -69,7 +69,7 @@ int fl_is_in_range(const fl_work *work, const real *wrench, const real *target_r
     outside_squared += outside * outside;
     size_squared += scaled * scaled;
   }
-  const real rounding = fl_larger(NEARLY, 10 * ROUNDING);
+  const real rounding = larger(NEARLY, 10 * ROUNDING);
   return SQRT(outside_squared) <= rounding * (R(1e-3) + SQRT(size_squared));
 }
 
@@ -90,7 +90,7 @@ void fl_wrench_of_forces(const real *block, const fl_work *work, real force[][2]
 static real largest_cost(const fl_set *set) {
   real reverse_cost = 0;
   if (set->force_max_reverse > 0) reverse_cost = set->cost_at_max_reverse;
-  return fl_larger(fl_larger(set->cost_at_min, set->cost_at_max), reverse_cost);
+  return larger(larger(set->cost_at_min, set->cost_at_max), reverse_cost);
 }
 
 /* Sets what follows from all sets: the largest cost, and which kinds of sets there are. */
@@ -106,7 +106,7 @@ void fl_prepare_sets(const real *block, fl_work *work) {
     work->power_cost_max += largest_cost(set);
     if (set->turn_cost > 0) {
       const real farthest =
-          fl_smaller(FABS(set->sector_center - set->turn_origin) + set->sector_half_angle, PI);
+          smaller(FABS(set->sector_center - set->turn_origin) + set->sector_half_angle, PI);
       work->power_cost_max += set->turn_cost / 2 * farthest * farthest;
       work->has_turn_cost = 1;
     }
@@ -152,7 +152,7 @@ void fl_dual_at(const real *block, const fl_work *work, const real *target_reduc
     state->secant[i] = 0;
     if (!work->has_drag) { /* |y| / |s| of S, Eq. 9; near rest that of quadratic costs */
       const real price_quadratic = a->row_force_max[0] / a->secant[0];
-      state->secant[i] = size_y / fl_larger(size_s, price_quadratic);
+      state->secant[i] = size_y / larger(size_s, price_quadratic);
     }
     conjugate += answer.conjugate;
     const real(*B)[6] = work->span.effectiveness_reduced[i];
@@ -210,7 +210,7 @@ void fl_first_lambda(const real *block, const fl_work *work, const real *target_
     const real share = size_y / most;
     if (share > NEAR_LIMIT) *mu = SATURATED;
     /* Force over price of a cost ~ T^1.5 is the root of the share; at a limit the force stays. */
-    real weight = SQRT(fl_clipped(share, CLOSE, 1));
+    real weight = SQRT(clipped(share, CLOSE, 1));
     if (share > 1 && !work->has_drag) weight = 1 / share;
     for (int row = 0; row < (int)a->rows; row++) {
       fl_add_square(H, work->span.effectiveness_reduced[i][row], weight * secant[row]);
@@ -252,7 +252,7 @@ static int newton_step(const real *block, const fl_work *work, const fl_state *a
   }
   real c = SATURATED;
   if (work->has_drag) c = 1; /* S is left out there */
-  const real trace = fl_larger(fl_trace(H), work->trace_min);
+  const real trace = larger(fl_trace(H), work->trace_min);
   const real weight = c * mu * trace; /* of M */
   for (int row = 0; row < 6; row++) {
     for (int col = 0; col <= row; col++) H[row][col] += weight * work->metric[row][col];
@@ -296,7 +296,7 @@ static step_result judged_step(const real *step, const fl_state *from, const fl_
   step_result result;
   result.slope_begin = dot(step, from->residual, 6);
   result.slope_end = dot(step, to->residual, 6);
-  result.slope_left = result.slope_end / fl_larger(result.slope_begin, TINY);
+  result.slope_left = result.slope_end / larger(result.slope_begin, TINY);
   result.rise = to->dual_value - from->dual_value;
   return result;
 }
@@ -310,9 +310,9 @@ static int is_kept(const step_result *result, const fl_state *from, const fl_sta
 }
 
 static real mu_after_kept(real mu, const step_result *result) {
-  real factor = fl_clipped(FABS(result->slope_left) / 2, MU_KEPT_LEAST, 1);
+  real factor = clipped(FABS(result->slope_left) / 2, MU_KEPT_LEAST, 1);
   if (result->slope_left > R(0.5)) factor = MU_KEPT_EARLY;
-  return fl_larger(mu * factor, ROUNDING);
+  return larger(mu * factor, ROUNDING);
 }
 
 /* Divides mu by the share of the step where the cubic along it, of both values and slopes,
@@ -323,8 +323,8 @@ static real mu_after_refused(real mu, real nu, const step_result *result) {
   const real discriminant = b * b - 4 * a * result->slope_begin;
   real share = R(0.5);
   if (discriminant > 0) share = 2 * result->slope_begin / (SQRT(discriminant) - b);
-  const real factor = fl_larger(nu, 1 / fl_clipped(share, SHARE_LEAST, SHARE_MOST));
-  return fl_larger(mu * factor, ROUNDING);
+  const real factor = larger(nu, 1 / clipped(share, SHARE_LEAST, SHARE_MOST));
+  return larger(mu * factor, ROUNDING);
 }
 
 /* Newton's method from multipliers on, or from its own first ones where there are none;

@@ -10,7 +10,7 @@
 /* Length of a column, over that of the longest one, below which nothing is left of the columns: ten
    times their rounding in single precision, where a lost actuator would else leave a direction
    that is rounding. */
-#define LEFT_OVER fl_larger(NOTHING, 10 * ROUNDING)
+#define LEFT_OVER larger(NOTHING, 10 * ROUNDING)
 #define DEPENDENT (LEFT_OVER * LEFT_OVER) /* the squared length */
 
 /* A wrench over the wrench scale per newton of a row, as the laws have it: thrusters may be
@@ -49,7 +49,7 @@ static void scale_of(const real *block, fl_span *span) {
       }
     }
   }
-  for (int k = 0; k < 6; k++) most = fl_larger(most, size[k]);
+  for (int k = 0; k < 6; k++) most = larger(most, size[k]);
   for (int k = 0; k < 6; k++) {
     span->axis_scale[k] = 1;
     if (size[k] > DEPENDENT * most) span->axis_scale[k] = SQRT(size[k]);
@@ -147,7 +147,7 @@ static int prepare_newton(const real *block, fl_work *work) {
   const real trace = fl_trace(H);
   for (int j = 0; j < 6; j++) {
     for (int k = 0; k <= j; k++) {
-      work->metric[j][k] = H[j][k] * (real)span->rank / fl_larger(trace, TINY);
+      work->metric[j][k] = H[j][k] * (real)span->rank / larger(trace, TINY);
     }
     work->metric[j][j] += NEARLY;
   }

@@ -39,9 +39,9 @@ static void box_after(const real *block, fl_box *box, int i, const real *before,
     real center = before[k];
     /* an angle of an arc may be told a whole turn off */
     if (is_angle) center = middle + fl_wrap_angle(center - middle);
-    center = fl_clipped(center, a->command_min[k], a->command_max[k]);
-    box->command_min[i][k] = fl_larger(center - step, a->command_min[k]);
-    box->command_max[i][k] = fl_smaller(center + step, a->command_max[k]);
+    center = clipped(center, a->command_min[k], a->command_max[k]);
+    box->command_min[i][k] = larger(center - step, a->command_min[k]);
+    box->command_max[i][k] = smaller(center + step, a->command_max[k]);
   }
 }
 
@@ -58,7 +58,7 @@ static real power_at(const real *block, int i, const real *command, real *price)
     const real direction = ATAN2(force[2], force[1]);
     size /= fl_gauge_radius(block + (int)a->gauge_table, direction);
   }
-  const real within = fl_clipped(size, a->force_min, a->force_max);
+  const real within = clipped(size, a->force_min, a->force_max);
   const real power = fl_power_and_price(block, i, within, price);
   if (size < 0) *price = -*price;
   return power;
@@ -79,7 +79,7 @@ static real mean_power(const real *block, const fl_work *work, const real *previ
     if (fl_is_known_command(before)) power += power_at(block, i, before, price + i);
   }
   if (count == 0) count = 1;
-  return fl_larger(power, LEAST_POWER * full) / (real)count;
+  return larger(power, LEAST_POWER * full) / (real)count;
 }
 
 /* Adds to the normal equations H lambda = right that a newton along a direction b (6,) in the basis
@@ -158,8 +158,8 @@ static void tick_set(const real *block, fl_work *work, int i, real angle, real k
   fl_set *set = work->set + i;
   const int is_costly = kappa > 0;
   const force_range range = range_of_tick(block, work, i, is_costly);
-  const real low = fl_clipped(range.low, a->force_min, a->force_max);
-  const real high = fl_clipped(range.high, a->force_min, a->force_max);
+  const real low = clipped(range.low, a->force_min, a->force_max);
+  const real high = clipped(range.high, a->force_min, a->force_max);
   fl_limit_set(block, i, set, low, high, range.middle, range.half);
   if (!is_costly) return;
   real at = angle;
@@ -254,7 +254,7 @@ int fl_prepare(const real *block, fl_work *work) {
     if (a->command_kind == FL_POD) work->slope_max[i] = fl_largest_slope(block, i);
     const real power_high = fl_power_of_force(block, i, a->force_max);
     const real power_low = fl_power_of_force(block, i, a->force_min);
-    work->power_max[i] = fl_larger(power_high, power_low);
+    work->power_max[i] = larger(power_high, power_low);
   }
   for (int k = 0; k < 6; k++) work->span.axis_counts[k] = HEAD(block)->is_commanded[k] != 0;
   if (!fl_prepare_span(block, work, 1)) return FL_BAD_NUMBER;

@@ -18,7 +18,6 @@
 #define SURE_STEPS 12             /* the same from forces that the dual is sure of */
 #define STALL_SAMPLES 12          /* angles of a stalled foil that are looked at for its worth */
 #define CHEAPER (R(0.1) * NEARLY) /* share of the cost below which a gain ends the steps */
-#define NONE R(1e30)              /* cost where no commands give a wrench */
 #define STEP_SHORTER R(0.25)      /* a step that is no cheaper is shortened to this share */
 /* commands that cost more than this times the best are left alone */
 #define WITHIN_BEST R(1.5)
@@ -46,8 +45,8 @@ static void take_sides(const real *block, fl_work *work, fl_box *box, real comma
       low = -set->force_max;
       high = -set->force_min;
     }
-    box->command_min[i][0] = fl_larger(box->command_min[i][0], low);
-    box->command_max[i][0] = fl_smaller(box->command_max[i][0], high);
+    box->command_min[i][0] = larger(box->command_min[i][0], low);
+    box->command_max[i][0] = smaller(box->command_max[i][0], high);
     command[i][0] = fl_clip_number(box, i, 0, -1, command[i][0]);
   }
 }
@@ -59,9 +58,9 @@ static void take_step(const real *block, const fl_work *work, const fl_box *box,
     if (work->span.is_lost[i]) continue;
     const real *answer = work->state_found->force[i];
     const real change[2] = {share * (answer[0] - force[i][0]), share * (answer[1] - force[i][1])};
-    if (fl_is_foil(ACTUATOR(block, i))) { /* the angle whose tangent comes nearest to the change */
+    if (is_foil(ACTUATOR(block, i))) { /* the angle whose tangent comes nearest to the change */
       const real *slope = work->tangent[i].force_slope;
-      const real turn = dot(change, slope, 2) / fl_larger(dot(slope, slope, 2), TINY);
+      const real turn = dot(change, slope, 2) / larger(dot(slope, slope, 2), TINY);
       command[i][0] = fl_clip_number(box, i, 0, -1, command[i][0] + turn);
       continue;
     }
@@ -86,7 +85,7 @@ static int are_few(const real *block, const fl_work *work, const fl_box *box) {
    end soon. */
 static void approach(const real *block, fl_work *work, const fl_box *box, real command[][3],
                      int steps) {
-  real error = NONE;
+  real error = LARGEST_NUMBER;
   for (int k = 0; k < APPROACH_STEPS; k += steps) {
     const real before = error;
     error = fl_refine_commands(block, work, box, work->wrench_wanted, command, steps);
@@ -120,7 +119,7 @@ static real error_allowed(const real *block, const fl_work *work, const fl_box *
 static void draw_tangents(const real *block, fl_work *work, const fl_box *box, const real *lambda,
                           real command[][3]) {
   for (int i = 0; i < COUNT(block); i++) {
-    if (!fl_is_foil(ACTUATOR(block, i)) || work->span.is_lost[i]) continue;
+    if (!is_foil(ACTUATOR(block, i)) || work->span.is_lost[i]) continue;
     real s[2];
     actuator_price(work, i, lambda, s);
     fl_draw_tangent(block, i, box, command[i][0], s, work->tangent + i, work->set + i);
@@ -145,7 +144,7 @@ static real cheapen(const real *block, fl_work *work, const fl_box *box, const r
     real force_stepped[FL_MOST][2];
     memcpy(stepped, command, sizeof stepped);
     take_step(block, work, box, force, share, stepped);
-    real gain = -NONE;
+    real gain = -INFEASIBLE_COST;
     if (come_to_give(block, work, box, stepped, EXACT_STEPS, most_error)) {
       gain = cost - fl_power_of_commands(block, work, stepped, force_stepped);
     }
@@ -164,7 +163,7 @@ static real cheapen(const real *block, fl_work *work, const fl_box *box, const r
 
 /* Makes commands give work->wrench_wanted, in the basis `target_reduced`, to an error over the
    wrench scale, and then cheaper; `lambda` becomes that of the last step. Their forces along the
-   rows, and their cost [W]; NONE where they do not come to give it. */
+   rows, and their cost [W]; INFEASIBLE_COST where they do not come to give it. */
 static real meet_and_cheapen(const real *block, fl_work *work, const real *target_reduced,
                              real most_error, real *lambda, real command[][3], real force[][2]) {
   fl_box box = work->box;
@@ -172,7 +171,7 @@ static real meet_and_cheapen(const real *block, fl_work *work, const real *targe
   memcpy(before, work->set, sizeof before);
   fl_power_of_commands(block, work, command, force);
   take_sides(block, work, &box, command, force);
-  real cost = NONE;
+  real cost = INFEASIBLE_COST;
   if (come_to_give(block, work, &box, command, EXACT_STEPS, most_error)) {
     cost = fl_power_of_commands(block, work, command, force);
     cost = cheapen(block, work, &box, target_reduced, most_error, cost, lambda, command, force);
@@ -211,7 +210,7 @@ static int may_stall(const real *block, const fl_work *work, int i, int end, rea
   const fl_actuator *a = ACTUATOR(block, i);
   *command = work->box.command_min[i][0];
   if (end) *command = work->box.command_max[i][0];
-  if (!fl_is_foil(a) || work->span.is_lost[i]) return 0;
+  if (!is_foil(a) || work->span.is_lost[i]) return 0;
   const real stall_angle = fl_lift_end(block, a)[1];
   return FABS(*command - a->zero_lift_angle) > stall_angle;
 }
@@ -232,7 +231,7 @@ static real worth_of_stall(const real *block, const fl_work *work, int i, int en
     fl_tangent tangent;
     fl_foil_at(block, i, begin + (limit - begin) * (real)k / STALL_SAMPLES, &tangent);
     const real conjugate = dot(s, tangent.force, 2) - tangent.cost;
-    more = fl_larger(more, conjugate - known.conjugate);
+    more = larger(more, conjugate - known.conjugate);
   }
   return more;
 }
@@ -258,8 +257,8 @@ static real proved_value(const real *block, const fl_work *work, real *most_cost
 
 /* Commands at a point, after steps towards work->wrench_wanted: first some that leave the foils on
    their branches. */
-static void begin_at(const real *block, fl_work *work, const fl_lattice *lattice,
-                     const real *target_reduced, const fl_lattice_point *point, real command[][3]) {
+static void begin_at(const real *block, fl_work *work, const foil_lattice *lattice,
+                     const real *target_reduced, const lattice_point *point, real command[][3]) {
   fl_box branches = work->box;
   fl_commands_of_point(block, work, lattice, target_reduced, point, &branches, command);
   approach(block, work, &branches, command, APPROACH_ROUND);
@@ -268,9 +267,8 @@ static void begin_at(const real *block, fl_work *work, const fl_lattice *lattice
 
 /* The cheapest point that costs more than the last one followed: commands that cost the same
    are the same; 0 for none. */
-static const fl_lattice_point *next_point(const fl_lattice_point *points, int count,
-                                          real last_cost) {
-  const fl_lattice_point *next = 0;
+static const lattice_point *next_point(const lattice_point *points, int count, real last_cost) {
+  const lattice_point *next = 0;
   for (int k = 0; k < count; k++) {
     const int is_new = points[k].cost > last_cost * (1 + NEARLY);
     if (is_new && (!next || points[k].cost < next->cost)) next = points + k;
@@ -284,23 +282,23 @@ static const fl_lattice_point *next_point(const fl_lattice_point *points, int co
 static void improve_from_lattice(const real *block, fl_work *work, const real *target_reduced,
                                  const real *lambda, real enough, real *best_cost) {
   const real most_error = error_allowed(block, work, &work->box);
-  fl_lattice lattice;
-  fl_lattice_point points[FL_LATTICE_STARTS];
+  foil_lattice lattice;
+  lattice_point points[LATTICE_STARTS];
   real command[FL_MOST][3];
   fl_lay_lattice(block, work, &lattice);
   const int count = fl_cheapest_points(block, work, &lattice, target_reduced, points);
   for (int k = 0; k < count; k++) {
     real unused[FL_MOST][2];
     begin_at(block, work, &lattice, target_reduced, points + k, command);
-    points[k].cost = NONE;
+    points[k].cost = INFEASIBLE_COST;
     if (come_to_give(block, work, &work->box, command, 0, most_error)) {
       points[k].cost = fl_power_of_commands(block, work, command, unused);
     }
   }
   real last_cost = 0;
   for (int tried = 0; tried < FL_LATTICE_FOLLOWED && *best_cost > enough; tried++) {
-    const fl_lattice_point *next = next_point(points, count, last_cost);
-    if (!next || !(next->cost < fl_smaller(*best_cost * WITHIN_BEST, NONE))) return;
+    const lattice_point *next = next_point(points, count, last_cost);
+    if (!next || !(next->cost < smaller(*best_cost * WITHIN_BEST, INFEASIBLE_COST))) return;
     last_cost = next->cost;
     begin_at(block, work, &lattice, target_reduced, next, command);
     improve_from(block, work, target_reduced, lambda, command, best_cost);
@@ -315,7 +313,7 @@ static void improve_from_stalls(const real *block, fl_work *work, const real *ta
     for (int end = 0; end < 2; end++) {
       real angle;
       if (!may_stall(block, work, i, end, &angle)) continue;
-      if (*best_cost < NONE)
+      if (*best_cost < INFEASIBLE_COST)
         memcpy(command, work->best_command, sizeof command);
       else
         memcpy(command, start, sizeof command);
@@ -357,7 +355,7 @@ int fl_are_forces_sure(const real *block, fl_work *work) {
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
     if (a->uncertainty_cost > 0) return 0;
-    if (!fl_is_foil(a)) continue;
+    if (!is_foil(a)) continue;
     const real largest_lift = a->pressure_area * (1 - NOTHING) * fl_lift_end(block, a)[0];
     if (FABS(state->force[i][0]) >= largest_lift) return 0;
   }
@@ -387,7 +385,7 @@ void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, 
   /* how far below the most a share is tried, over it, until one is found */
   real below_most = NEARLY;
   real start[FL_MOST][3];
-  if (may_any_stall(block, work)) most = fl_smaller(most_by_dual * (1 + STALLED_MORE), 1);
+  if (may_any_stall(block, work)) most = smaller(most_by_dual * (1 + STALLED_MORE), 1);
   fl_commands_for_forces(block, &work->box, out->force, work->command_previous, start);
   for (int k = 0; k < FL_RAY_SHARES; k++) {
     if (!(below_most < 1 && most - found > NEARLY / 4 * most_by_dual)) return;
@@ -413,7 +411,8 @@ void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, 
         memcpy(command, start, sizeof command);
       memcpy(lambda, out->lambda_reduced, sizeof lambda);
       real force[FL_MOST][2];
-      is_met = meet_and_cheapen(block, work, target_reduced, EXACT, lambda, command, force) < NONE;
+      is_met = meet_and_cheapen(block, work, target_reduced, EXACT, lambda, command, force) <
+               INFEASIBLE_COST;
     }
     if (!is_met) {
       most = ray_share;

@@ -2,7 +2,6 @@
    gives on each side of a cut. */
 #include "internal.h"
 
-#define NONE R(1e30) /* cost where no part meets the target */
 /* an answer below this share of the least force is no answer of an arc */
 #define HOLLOW_FORCE R(0.9)
 
@@ -94,7 +93,7 @@ static int cheaper_side(const real *block, fl_work *work, const real *target_red
     fl_take_side(block, work, node, side[k]);
     status[k] = fl_dual_newton(block, work, target_reduced, lambda_begin, FL_STEPS_AT_KINK);
     cost[k] = work->state_found->dual_value;
-    if (status[k] == FL_BEYOND) cost[k] = NONE;
+    if (status[k] == FL_BEYOND) cost[k] = INFEASIBLE_COST;
     memcpy(lambda[k], work->state_found->lambda_reduced, sizeof lambda[k]);
   }
   const int cheaper = cost[1] < cost[0];
@@ -132,7 +131,7 @@ static fl_node *last_cheaper_cut(const real *block, fl_work *work, int *depth, r
     fl_node *node = fl_last_open_cut(block, work, depth);
     if (!node) return 0;
     if (node->score[0] < best_cost * (1 - CLOSE)) return node;
-    *bound = fl_smaller(*bound, node->score[0]);
+    *bound = smaller(*bound, node->score[0]);
   }
 }
 
@@ -143,8 +142,8 @@ int fl_search_gaps(const real *block, fl_work *work, const real *target_reduced,
                    real *bound) {
   const int most_parts = most_parts_of(work);
   const int status_begin = status;
-  real best_cost = NONE;
-  real least_bound = NONE;
+  real best_cost = INFEASIBLE_COST;
+  real least_bound = INFEASIBLE_COST;
   real lambda_begin[6];
   int depth = 0;
   int parts = 0;
@@ -165,7 +164,7 @@ int fl_search_gaps(const real *block, fl_work *work, const real *target_reduced,
     int open = is_open(block, work, target_reduced, status, gap, &best_cost);
     if (open && gap < 0) { /* hollow: at their least forces */
       dive_and_return(block, work, target_reduced, status, &best_cost);
-      least_bound = fl_smaller(least_bound, dual_value);
+      least_bound = smaller(least_bound, dual_value);
       status = FL_BEYOND;
       open = 0;
     }
@@ -180,7 +179,7 @@ int fl_search_gaps(const real *block, fl_work *work, const real *target_reduced,
       continue;
     }
     work->is_truncated |= can_cut;
-    if (status != FL_BEYOND) least_bound = fl_smaller(least_bound, dual_value);
+    if (status != FL_BEYOND) least_bound = smaller(least_bound, dual_value);
     node = last_cheaper_cut(block, work, &depth, best_cost, &least_bound);
     if (!node) break;
     fl_take_side(block, work, node, -node->first_side);
@@ -188,7 +187,7 @@ int fl_search_gaps(const real *block, fl_work *work, const real *target_reduced,
   }
   fl_restore_sets(block, work, work->set_before);
   *bound = least_bound;
-  return best_cost < NONE;
+  return best_cost < INFEASIBLE_COST;
 }
 
 /* Commands that give work->wrench_wanted, from what Newton's method came to; 0 where none are

@@ -1,4 +1,8 @@
-/* What the files of the core share. */
+/* What the files of the core share.
+
+   Functions that one file defines and others call have the prefix fl_, as the linker sees them, and
+   so has all that finlab.h and fl_work.h declare. What stands here alone has none: static inline
+   functions, types, constants. */
 #ifndef FL_INTERNAL_H
 #define FL_INTERNAL_H
 #include "finlab.h"
@@ -42,7 +46,8 @@ typedef fl_wide wide;
 #define TINY 1e-300
 #endif
 #define PI R(3.14159265358979323846)
-#define LARGEST_NUMBER R(1e30) /* of a block or an answer */
+#define LARGEST_NUMBER R(1e30)  /* of a block or an answer */
+#define INFEASIBLE_COST R(1e30) /* [W] where no forces or commands meet a target */
 #define NOTHING R(1e-9)
 /* distance, over the wrench scale, up to which a point is the nearest one */
 #define CLOSE_BY NOTHING
@@ -56,19 +61,17 @@ typedef fl_wide wide;
 #define ACTUATOR(block, i) ((const fl_actuator *)((block) + sizeof(fl_head) / sizeof(real)) + (i))
 #define COUNT(block) ((int)HEAD(block)->n)
 
-static inline real fl_larger(real a, real b) {
+static inline real larger(real a, real b) {
   if (a > b) return a;
   return b;
 }
 
-static inline real fl_smaller(real a, real b) {
+static inline real smaller(real a, real b) {
   if (a < b) return a;
   return b;
 }
 
-static inline real fl_clipped(real x, real low, real high) {
-  return fl_smaller(fl_larger(x, low), high);
-}
+static inline real clipped(real x, real low, real high) { return smaller(larger(x, low), high); }
 
 /* linear_algebra.c: linear algebra of 6 x 6 matrices */
 static inline real dot(const real *a, const real *b, int n) {
@@ -82,11 +85,16 @@ static inline real size_of(const real *force) {
 
 /* Whether an actuator pushes in a plane. */
 static inline int is_plane(const fl_actuator *a) { return a->rows == 2 && a->flow_speed == 0; }
+
+/* Whether an actuator is a foil in a flow, whose drag counts. */
+static inline int is_foil(const fl_actuator *a) { return a->flow_speed > 0; }
+
 /* Prices s = B' lambda of an actuator's force along its rows, Eq. 4. */
 static inline void actuator_price(const fl_work *work, int i, const real *lambda, real *s) {
   s[0] = dot(work->span.effectiveness_reduced[i][0], lambda, 6);
   s[1] = dot(work->span.effectiveness_reduced[i][1], lambda, 6);
 }
+
 real fl_wrap_angle(real angle);
 void fl_add_square(real H[6][6], const real *b, real weight);
 real fl_trace(real H[6][6]);
@@ -212,8 +220,6 @@ int fl_answer_with_drag(const real *block, fl_work *work, const real *target_red
                         fl_answer *out);
 
 /* foil_tangent.c: a foil near to a command */
-/* Whether an actuator is a foil in a flow, whose drag counts. */
-static inline int fl_is_foil(const fl_actuator *a) { return a->flow_speed > 0; }
 const real *fl_lift_end(const real *block, const fl_actuator *a);
 void fl_foil_at(const real *block, int i, real angle, fl_tangent *tangent);
 void fl_draw_tangent(const real *block, int i, const fl_box *box, real angle, const real *s,
@@ -222,31 +228,31 @@ real fl_power_of_commands(const real *block, const fl_work *work, real command[]
                           real force[][2]);
 
 /* foil_lattice.c: where searches for commands of foils may begin */
-enum { FL_BRANCHES = 4 };   /* of a foil's lift */
-#define FL_LATTICE_FOILS 6  /* foils on the lattice at most; others begin at rest */
-#define FL_LATTICE_NODES 48 /* nodes of all foils at most, angles of which a point has one a foil */
-#define FL_LATTICE_STARTS 60 /* points at which steps on the commands begin */
+enum { BRANCHES = 4 };    /* of a foil's lift */
+#define LATTICE_FOILS 6   /* foils on the lattice at most; others begin at rest */
+#define LATTICE_NODES 48  /* nodes of all foils at most, angles of which a point has one a foil */
+#define LATTICE_STARTS 60 /* points at which steps on the commands begin */
 typedef struct {
-  int foils;                                    /* how many there are */
-  int foil[FL_LATTICE_FOILS];                   /* which actuators these are */
-  int branches[FL_LATTICE_FOILS];               /* of each foil */
-  int first[FL_LATTICE_FOILS];                  /* its first node */
-  int each;                                     /* nodes on a branch */
-  real edge[FL_LATTICE_FOILS][FL_BRANCHES + 1]; /* ends of the branches [rad] */
-  real angle[FL_LATTICE_NODES];                 /* of each node [rad] */
-  real cost[FL_LATTICE_NODES];                  /* of each node [W] */
-  real wrench[FL_LATTICE_NODES][6];             /* of each node, in the basis */
-  real row[FL_MOST][2][6]; /* of other actuators: force by a wrench in the basis */
-} fl_lattice;
+  int foils;                              /* how many there are */
+  int foil[LATTICE_FOILS];                /* which actuators these are */
+  int branches[LATTICE_FOILS];            /* of each foil */
+  int first[LATTICE_FOILS];               /* its first node */
+  int each;                               /* nodes on a branch */
+  real edge[LATTICE_FOILS][BRANCHES + 1]; /* ends of the branches [rad] */
+  real angle[LATTICE_NODES];              /* of each node [rad] */
+  real cost[LATTICE_NODES];               /* of each node [W] */
+  real wrench[LATTICE_NODES][6];          /* of each node, in the basis */
+  real row[FL_MOST][2][6];                /* of other actuators: force by a wrench in the basis */
+} foil_lattice;
 typedef struct {
-  unsigned char node[FL_LATTICE_FOILS]; /* of each foil */
-  real cost;                            /* [W], with the price of a miss */
-} fl_lattice_point;
-void fl_lay_lattice(const real *block, const fl_work *work, fl_lattice *lattice);
-int fl_cheapest_points(const real *block, const fl_work *work, const fl_lattice *lattice,
-                       const real *target_reduced, fl_lattice_point *points);
-void fl_commands_of_point(const real *block, const fl_work *work, const fl_lattice *lattice,
-                          const real *target_reduced, const fl_lattice_point *point, fl_box *box,
+  unsigned char node[LATTICE_FOILS]; /* of each foil */
+  real cost;                         /* [W], with the price of a miss */
+} lattice_point;
+void fl_lay_lattice(const real *block, const fl_work *work, foil_lattice *lattice);
+int fl_cheapest_points(const real *block, const fl_work *work, const foil_lattice *lattice,
+                       const real *target_reduced, lattice_point *points);
+void fl_commands_of_point(const real *block, const fl_work *work, const foil_lattice *lattice,
+                          const real *target_reduced, const lattice_point *point, fl_box *box,
                           real command[][3]);
 
 /* foil_drag.c: commands of robots whose foils drag */
@@ -258,16 +264,16 @@ void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, 
                           real most, fl_answer *out);
 
 /* nearest_point.c: points near to a wrench beyond reach */
-static inline wide product(const wide *a, const wide *b, int n) {
+static inline wide dot_wide(const wide *a, const wide *b, int n) {
   wide sum = 0;
   for (int k = 0; k < n; k++) sum += a[k] * b[k];
   return sum;
 }
 
-static inline wide length_of(const wide *a) { return sqrt(product(a, a, 6)); }
+static inline wide norm_wide(const wide *a) { return sqrt(dot_wide(a, a, 6)); }
 
-/* Adds a vector (6,) so many times. */
-static inline void add(wide *to, wide times, const wide *other) {
+/* Adds a vector (6,) times a number. */
+static inline void add_scaled(wide *to, wide times, const wide *other) {
   for (int k = 0; k < 6; k++) to[k] += times * other[k];
 }
 wide fl_out_of_range(const real *block, const fl_work *work, const real *inner, int axis);

@@ -46,7 +46,7 @@ void fl_weigh_axes(const real *block, fl_work *work, const wide *weight) {
 /* The corner of a polygon, a count and pairs, that is farthest along prices s. */
 static void farthest_corner(const real *polygon, const real *s, wide *force) {
   const int count = (int)polygon[0];
-  real farthest = -R(1e30);
+  real farthest = -LARGEST_NUMBER;
   for (int k = 0; k < count; k++) {
     const real *corner = polygon + 1 + 2 * k;
     const real distance = dot(s, corner, 2);
@@ -62,7 +62,7 @@ void fl_point_of_forces(const real *block, const fl_work *work, wide force[][2],
   memset(point, 0, sizeof work->effectiveness_weighted[0][0]);
   for (int i = 0; i < COUNT(block); i++) {
     for (int q = 0; q < (int)ACTUATOR(block, i)->rows; q++) {
-      add(point, force[i][q], work->effectiveness_weighted[i][q]);
+      add_scaled(point, force[i][q], work->effectiveness_weighted[i][q]);
     }
   }
 }
@@ -75,7 +75,7 @@ static void append_farthest(const real *block, const fl_work *work, const wide *
   wide(*force)[2] = m->force[last];
   for (int i = 0; i < COUNT(block); i++) {
     const wide(*column)[6] = work->effectiveness_weighted[i];
-    const real s[2] = {(real)product(column[0], normal, 6), (real)product(column[1], normal, 6)};
+    const real s[2] = {(real)dot_wide(column[0], normal, 6), (real)dot_wide(column[1], normal, 6)};
     if (work->polygon_offset[i] > 0)
       farthest_corner(block + work->polygon_offset[i], s, force[i]);
     else
@@ -83,9 +83,9 @@ static void append_farthest(const real *block, const fl_work *work, const wide *
   }
   fl_point_of_forces(block, work, force, m->point[last]);
   m->ray_share[last] = 0;
-  if (work->ray && product(work->ray, normal, 6) < 0) {
+  if (work->ray && dot_wide(work->ray, normal, 6) < 0) {
     m->ray_share[last] = 1;
-    add(m->point[last], -1, work->ray);
+    add_scaled(m->point[last], -1, work->ray);
   }
 }
 
@@ -111,11 +111,11 @@ static int least_share(const fl_mixture *m) {
 /* Takes from vector j of the basis what lies along those before it; what is left of its length. */
 static wide orthogonalize(fl_mixture *m, int j) {
   for (int i = 1; i < j; i++) {
-    const wide along = product(m->q[i], m->q[j], 6);
+    const wide along = dot_wide(m->q[i], m->q[j], 6);
     m->r[i][j] += along;
-    add(m->q[j], -along, m->q[i]);
+    add_scaled(m->q[j], -along, m->q[i]);
   }
-  return length_of(m->q[j]);
+  return norm_wide(m->q[j]);
 }
 
 /* Extends the basis of a mixture by the difference of point j from the first one: by
@@ -124,9 +124,9 @@ static wide orthogonalize(fl_mixture *m, int j) {
 static void extend_basis(fl_mixture *m, int j) {
   wide *q = m->q[j];
   memcpy(q, m->point[j], sizeof m->q[j]);
-  add(q, -1, m->point[0]);
+  add_scaled(q, -1, m->point[0]);
   for (int i = 1; i < j; i++) m->r[i][j] = 0;
-  const wide size = length_of(q);
+  const wide size = norm_wide(q);
   wide left = orthogonalize(m, j);
   if (!(left > NEARLY_DEPENDENT * size)) left = orthogonalize(m, j);
   wide inverse = 0;
@@ -146,14 +146,14 @@ static void affine_shares(fl_mixture *m, const wide *target_weighted, wide *shar
   wide right[FL_POINTS];
   wide left[6];
   memcpy(left, target_weighted, sizeof left);
-  add(left, -1, m->point[0]);
+  add_scaled(left, -1, m->point[0]);
   for (int j = 1; j < m->count; j++) {
-    right[j] = product(m->q[j], left, 6);
-    add(left, -right[j], m->q[j]);
+    right[j] = dot_wide(m->q[j], left, 6);
+    add_scaled(left, -right[j], m->q[j]);
   }
   share[0] = 1;
   for (int j = m->count - 1; j > 0; j--) {
-    const wide behind = product(m->r[j] + j + 1, share + j + 1, m->count - j - 1);
+    const wide behind = dot_wide(m->r[j] + j + 1, share + j + 1, m->count - j - 1);
     share[j] = m->r[j][j] * (right[j] - behind);
     share[0] -= share[j];
   }
@@ -197,8 +197,8 @@ static void mix(fl_mixture *m, const wide *target_weighted) {
 /* Sets the miss of a mixture: the way from its point to a target. Its length. */
 static wide find_miss(fl_mixture *m, const wide *target_weighted) {
   memcpy(m->miss, target_weighted, sizeof m->miss);
-  for (int p = 0; p < m->count; p++) add(m->miss, -m->weight[p], m->point[p]);
-  return length_of(m->miss);
+  for (int p = 0; p < m->count; p++) add_scaled(m->miss, -m->weight[p], m->point[p]);
+  return norm_wide(m->miss);
 }
 
 /* What the point behind those of a mixture lies beyond the mixture along the miss, over no
@@ -206,9 +206,9 @@ static wide find_miss(fl_mixture *m, const wide *target_weighted) {
 static wide gain_of_last(const fl_mixture *m, const wide *target_weighted) {
   wide way[6];
   memcpy(way, m->point[m->count], sizeof way);
-  add(way, -1, target_weighted);
-  add(way, 1, m->miss);
-  return product(way, m->miss, 6);
+  add_scaled(way, -1, target_weighted);
+  add_scaled(way, 1, m->miss);
+  return dot_wide(way, m->miss, 6);
 }
 
 /* Makes a mixture the point nearest to a target (6,); it begins at the mixture, where that
@@ -256,11 +256,11 @@ wide fl_farthest_along_ray(const real *block, const fl_work *work, const wide *f
   append_farthest(block, work, ray, m);
   for (int k = 0; k < MOST_SHARES; k++) {
     const wide *normal = m->miss;
-    const wide across = product(normal, ray, 6);
+    const wide across = dot_wide(normal, ray, 6);
     wide bound = least;
     if (across > 0) {
       const wide *farthest = m->point[m->count];
-      bound = (product(farthest, normal, 6) - product(from, normal, 6)) / across;
+      bound = (dot_wide(farthest, normal, 6) - dot_wide(from, normal, 6)) / across;
     }
     if (bound < size) {
       size = larger_wide(bound, least);
@@ -268,12 +268,12 @@ wide fl_farthest_along_ray(const real *block, const fl_work *work, const wide *f
     }
     wide target_weighted[6];
     memcpy(target_weighted, from, sizeof target_weighted);
-    add(target_weighted, size, ray);
+    add_scaled(target_weighted, size, ray);
     if (m->count < 1) m->count = 1;
     const wide miss = fl_nearest_point(block, work, target_weighted, close, PROOF_OF_SHARE, m);
     const int has_stalled = size >= last_size;
     if (size == least || miss <= 2 * close || (has_stalled && miss <= 1)) break;
-    if (has_stalled) size -= miss / (2 * length_of(ray));
+    if (has_stalled) size -= miss / (2 * norm_wide(ray));
     last_size = size;
   }
   return size;

@@ -16,7 +16,6 @@
 #define PULL 2e-3 /* miss of a group for which held axes give way by a millionth at a curved rim */
 /* Scaled wrench by which an answer at the rim may be off: what it gives is then what is served. */
 #define AT_RIM (R(0.1) * NEARLY)
-#define NONE R(1e30) /* power that no answer reaches */
 
 /* Whether so many bytes are the same, one of which was copied from the other. Not memcmp:
    WebAssembly has no library. */
@@ -40,7 +39,7 @@ static void serve_closest(const real *block, fl_work *work, const real *wrench,
   wide weight[6];
   wide target_weighted[6];
   for (int k = 0; k < 6; k++) {
-    weight[k] = fl_larger(policy->axis_weight[k], CLOSE);
+    weight[k] = larger(policy->axis_weight[k], CLOSE);
     target_weighted[k] = weight[k] * over_wrench_scale(block, wrench, k);
   }
   fl_weigh_axes(block, work, weight);
@@ -92,9 +91,9 @@ static void serve_direction(const real *block, fl_work *work, const real *wrench
   wide ray_share =
       fl_farthest_along_ray(block, work, from, ray, 0, 1, work->distance_enough, m, plane);
   /* What misses along the ray is a smaller share; what is across it counts more. */
-  const wide less = product(m->miss, ray, 6) / (product(ray, ray, 6) + 1e-300);
-  add(m->miss, -less, ray);
-  score[0] = rounded((real)length_of(m->miss));
+  const wide less = dot_wide(m->miss, ray, 6) / (dot_wide(ray, ray, 6) + 1e-300);
+  add_scaled(m->miss, -less, ray);
+  score[0] = rounded((real)norm_wide(m->miss));
   score[1] = (real)(1 - ray_share + less);
   if (ray_share > 0 || !(score[0] > 0)) return;
   ray_share = nearest_to_ray(block, work, from, ray, score);
@@ -131,7 +130,7 @@ static wide serve_group(const real *block, fl_work *work, const wide *wanted,
     for (int k = 0; k < 6; k++) {
       if (group[k]) missing[k] = m->miss[k] / weight[k];
     }
-    missed = length_of(missing);
+    missed = norm_wide(missing);
   }
   return missed;
 }
@@ -223,7 +222,7 @@ static void cheapest_forces(const real *block, fl_work *work, real force[][2], c
   memcpy(out->force, force, (size_t)COUNT(block) * sizeof out->force[0]);
   memcpy(out->wrench_served, given, sizeof given);
   const real distance_inside = scaled_distance(work, given, inside);
-  real most_power = NONE;
+  real most_power = INFEASIBLE_COST;
   int first = WANTED;
   if (are_same(wanted, given, sizeof given)) first = GIVEN;
   for (int trial = first; trial < TRIALS; trial++) {
@@ -231,13 +230,13 @@ static void cheapest_forces(const real *block, fl_work *work, real force[][2], c
     real target_reduced[6];
     for (int k = 0; k < 6; k++) {
       const real share = (trial == INSIDE) * NEARLY;
-      wrench[k] = given[k] + share * (inside[k] - given[k]) / fl_larger(1, distance_inside);
+      wrench[k] = given[k] + share * (inside[k] - given[k]) / larger(1, distance_inside);
       if (trial == WANTED) wrench[k] = wanted[k];
     }
     fl_reduce_wrench(work, wrench, target_reduced);
     fl_dual_newton(block, work, target_reduced, 0, FL_STEPS_AT_KINK);
     const real dual_value = work->state_found->dual_value;
-    const int has_met = !(work->state_found->residual_size > fl_larger(AT_RIM, ENOUGH));
+    const int has_met = !(work->state_found->residual_size > larger(AT_RIM, ENOUGH));
     if (!has_met || dual_value > most_power) continue;
     take_answer(block, work, wrench, out);
     most_power = (1 - FINE) * dual_value;

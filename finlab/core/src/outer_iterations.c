@@ -269,7 +269,7 @@ static int iterate(outer_search *search, int is_first, fl_answer *out, int *has_
   const int code = answer_linear(search->block, search->work, &search->question, is_first, &answer);
   if (code) return code;
   search->newton_steps += (real)answer.newton_steps;
-  search->penalty = fl_larger(search->penalty, penalty_at(search->block, answer.multipliers));
+  search->penalty = larger(search->penalty, penalty_at(search->block, answer.multipliers));
   const real merit = merit_of(search);
   if (is_first) *out = answer;
   box_now(search->block, search->work, &search->question, &search->box);
