@@ -41,7 +41,7 @@ class CoreAnswer(NamedTuple):
     """Distance (N,) of what the commands give from `wrench_served`, over the wrench scale, by the
     grids of the laws."""
     is_truncated: bool
-    """Whether a search ended at its limit of steps before it was done."""
+    """Whether a search for one of them ended at its limit of steps before it was done."""
 
 
 class Conjugates(NamedTuple):
@@ -336,6 +336,7 @@ class Core:
         command = np.empty((count, self._count, 3))
         is_attainable = np.empty(count, np.bool_)
         error = np.empty(count)
+        is_truncated = np.empty(count, np.bool_)
         with self._lock:
             self._question.write(policy, None, conditions)
             code = self._core.fl_answer_many(
@@ -351,10 +352,9 @@ class Core:
                 command.ctypes.data,
                 is_attainable.ctypes.data,
                 error.ctypes.data,
+                is_truncated.ctypes.data,
             )
-        is_truncated = code == constant("FL_TRUNCATED")
-        if not is_truncated:
-            raise_refusal(code)
+        raise_refusal(code)
         return CoreAnswer(
             force,
             multipliers,
@@ -363,7 +363,7 @@ class Core:
             is_attainable,
             command,
             error,
-            is_truncated,
+            bool(is_truncated.any()),
         )
 
     def commands(self, force: Array, previous: Array | None = None) -> Array:

@@ -112,13 +112,12 @@ enum {
 
 /* What functions return; fl_error_text has a sentence for each. */
 enum {
-  FL_TRUNCATED = -1, /* all is answered, but a search ended at its bound of parts or steps */
-  FL_OK,             /* all is well */
-  FL_BAD_BLOCK,      /* no robot of this library */
-  FL_BAD_VERSION,    /* a block of another FL_VERSION */
-  FL_BAD_NUMBER,     /* of a robot: not finite, or out of its range */
-  FL_BAD_ARGUMENT,   /* of a question or of settings: the same */
-  FL_ERRORS          /* how many codes there are from FL_OK on */
+  FL_OK,           /* all is well */
+  FL_BAD_BLOCK,    /* no robot of this library */
+  FL_BAD_VERSION,  /* a block of another FL_VERSION */
+  FL_BAD_NUMBER,   /* of a robot: not finite, or out of its range */
+  FL_BAD_ARGUMENT, /* of a question or of settings: the same */
+  FL_ERRORS        /* how many codes there are */
 };
 
 /* Everything that changes while a question is answered; see fl_work.h. */
@@ -190,11 +189,12 @@ int fl_answer_one(const fl_real *block, fl_work *work, const fl_question *questi
    @param is_attainable    (count,) whether a wrench is within reach
    @param error            (count,) distance of the commands' wrench from the one served, over the
                            wrench scale
-   @return                 FL_OK, FL_TRUNCATED, or the error code of fl_answer_one */
+   @param is_truncated     (count,) whether a search ended at its bound of parts or steps
+   @return                 as fl_answer_one, of the first wrench that has no answer */
 int fl_answer_many(const fl_real *block, fl_work *work, const fl_question *question,
                    const fl_real *wrench, int count, fl_real *force, fl_real *multipliers,
                    fl_real *wrench_served, fl_real *gap_power_bound, fl_real *command,
-                   unsigned char *is_attainable, fl_real *error);
+                   fl_byte *is_attainable, fl_real *error, fl_byte *is_truncated);
 
 /* Finds commands for forces.
 

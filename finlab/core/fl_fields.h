@@ -100,7 +100,9 @@ FL_FIELD(fl_real, command, [FL_MOST][3], "command", "of each actuator")
 FL_FIELD(int, newton_status, , "1", "how Newton's method ended: FL_MET ...")
 FL_FIELD(int, is_attainable, , "1", "1 where the target is within reach")
 FL_FIELD(int, newton_steps, , "1", "Newton's steps")
-FL_FIELD(int, is_truncated, , "1", "1 where a search ended at its bound of steps")
+FL_FIELD(int, is_truncated, , "1",
+         "1 where a search ended at its bound: all limits hold, but the power may not be least; "
+         "most_parts of fl_settings is that bound")
 FL_FIELD(int, has_foil_commands, , "1", "1 where the commands are those of a search, for foils")
 FL_END(fl_answer)
 

@@ -19,7 +19,7 @@ SIGNATURES = {
     "fl_check": "ipi",
     "fl_prepare": "ipp",
     "fl_answer_one": "ipppp",
-    "fl_answer_many": "ippppippppppp",
+    "fl_answer_many": "ippppipppppppp",
     "fl_commands": "vpppipp",
     "fl_dual_value": "rppppp",
     "fl_conjugates": "ippppip",

@@ -34,7 +34,10 @@ MAX_BASES = 32
 """States of losses and free axes of which the basis of what is driven is kept."""
 TABLE_ERROR = 10.0 * CLOSE
 """Share of a power by which the core's tables may be off."""
-_TRUNCATED = "the search for a better answer was ended by its limit of steps"
+_TRUNCATED = (
+    "the search for a better answer was ended by its limit of steps: the power may be above the "
+    "least, by no more than it is above bound"
+)
 """Note of an answer whose search ended early."""
 
 

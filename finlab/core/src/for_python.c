@@ -25,7 +25,6 @@ static const constant CONSTANTS[] = {
     CONSTANT(FL_CLOSEST),
     CONSTANT(FL_DIRECTION),
     CONSTANT(FL_PRIORITY),
-    CONSTANT(FL_TRUNCATED),
     CONSTANT(FL_OK),
     CONSTANT(FL_BAD_BLOCK),
     CONSTANT(FL_BAD_VERSION),
@@ -70,9 +69,8 @@ const char *fl_fields(void) {
 int fl_answer_many(const real *block, fl_work *work, const fl_question *question,
                    const real *wrench, int count, real *force, real *multipliers,
                    real *wrench_served, real *gap_power_bound, real *command,
-                   unsigned char *is_attainable, real *error) {
+                   fl_byte *is_attainable, real *error, fl_byte *is_truncated) {
   const size_t n = (size_t)COUNT(block);
-  int is_truncated = 0;
   fl_question q = *question;
   fl_answer out;
   for (int k = 0; k < count; k++) {
@@ -89,11 +87,10 @@ int fl_answer_many(const real *block, fl_work *work, const fl_question *question
     wrench_served += 6;
     command += 3 * n;
     gap_power_bound[k] = out.gap_power_bound;
-    is_attainable[k] = (unsigned char)out.is_attainable;
+    is_attainable[k] = (fl_byte)out.is_attainable;
     error[k] = out.error;
-    is_truncated |= out.is_truncated;
+    is_truncated[k] = (fl_byte)out.is_truncated;
   }
-  if (is_truncated) return FL_TRUNCATED;
   return FL_OK;
 }
 
