@@ -101,7 +101,13 @@ typedef void (*fl_offset_at)(const fl_real *constants, const fl_real *force, int
 #undef FL_END
 
 /* Kinds of commands: fl_actuator.command_kind. */
-enum { FL_THRUSTER, FL_POD, FL_FIN, FL_FOIL };
+enum {
+  FL_THRUSTER, /* a force */
+  FL_POD,      /* an angle and a force */
+  FL_FIN,      /* amplitude, frequency and direction of a beat */
+  FL_FOIL,     /* an angle */
+  FL_KINDS     /* how many kinds there are */
+};
 
 /* What to give for a wrench beyond reach: fl_policy.policy. */
 enum {

@@ -115,7 +115,7 @@ static const real *first_multipliers(const fl_work *work, const fl_question *q, 
 static int may_pass_bands(const real *block, const fl_work *work, real command[][3]) {
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
-    const int k = fl_force_number(a);
+    const int k = fl_form_of(a)->force_number;
     if (work->span.is_lost[i] || !fl_is_in_dead_band(a, command[i])) continue;
     const int is_limited_below = work->box.command_min[i][k] > a->command_min[k];
     const int is_limited_above = work->box.command_max[i][k] < a->command_max[k];
@@ -151,7 +151,7 @@ static void pass_bands(const real *block, fl_work *work, const fl_question *q, r
   find_forces(block, work, of_forces, q->policy, 0, &later);
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
-    const int k = fl_force_number(a);
+    const int k = fl_form_of(a)->force_number;
     const real most = a->dead_band * INSIDE_BAND;
     if (work->span.is_lost[i] || !fl_is_in_dead_band(a, command[i])) continue;
     if (size_of(later.force[i]) < most) continue;

@@ -64,7 +64,7 @@ static void find_jacobian(const real *block, fl_work *work, const fl_box *box, r
 /* Whether a step takes number c of a command out of its limits. */
 static int leaves_box(const real *block, const fl_box *box, int i, int c, const real *command,
                       real step) {
-  if (c == fl_angle_number(ACTUATOR(block, i)) && box->is_free_angle[i]) return 0;
+  if (c == fl_form_of(ACTUATOR(block, i))->angle_number && box->is_free_angle[i]) return 0;
   if (step < 0) return command[c] <= box->command_min[i][c] + NOTHING;
   if (step > 0) return command[c] >= box->command_max[i][c] - NOTHING;
   return 0;
@@ -124,7 +124,7 @@ static void step_within(const real *block, fl_work *work, const fl_box *box, rea
 static void take_step(const real *block, const fl_box *box, real command[][3], real step[][3],
                       real stepped[][3]) {
   for (int i = 0; i < COUNT(block); i++) {
-    const int angle = fl_angle_number(ACTUATOR(block, i));
+    const int angle = fl_form_of(ACTUATOR(block, i))->angle_number;
     for (int c = 0; c < 3; c++) {
       real change = 0;
       if (!leaves_box(block, box, i, c, command[i], step[i][c])) change = step[i][c];

@@ -25,8 +25,7 @@ static void column_of(const real *block, const fl_span *span, int i, int row, re
   const fl_actuator *a = ACTUATOR(block, i);
   const real *sigma = HEAD(block)->wrench_scale;
   const real *axis = law_axis(a, row);
-  real sign = 1;
-  if (a->command_kind == FL_THRUSTER) sign = a->command_sign;
+  real sign = a->command_sign;
   if ((real)row >= a->rows) sign = 0;
   if (span->is_lost[i]) sign = 0;
   for (int k = 0; k < 6; k++) {
@@ -122,7 +121,7 @@ void fl_offset_wrench(const real *block, fl_span *span) {
     real sum = h->wrench_offset[k];
     for (int i = 0; i < COUNT(block); i++) {
       const fl_actuator *a = ACTUATOR(block, i);
-      const int has_no_drag = span->is_lost[i] && a->command_kind == FL_FOIL;
+      const int has_no_drag = span->is_lost[i] && fl_form_of(a)->has_drag;
       if (has_no_drag)
         sum -= a->pressure_area * a->zero_lift_drag * a->effectiveness_normalized[1][k] *
                h->wrench_scale[k];

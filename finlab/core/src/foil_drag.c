@@ -38,16 +38,18 @@ static void take_sides(const real *block, fl_work *work, fl_box *box, real comma
     if (has_gap(a, set)) {
       fl_narrow_set(block, i, set, force[i], fl_nearer_side(block, i, set, force[i]));
     }
-    if (a->command_kind != FL_THRUSTER || !(a->dead_band > 0)) continue;
+    const int k = fl_form_of(a)->force_number;
+    const int has_dead_band = k != NO_NUMBER && a->dead_band > 0;
+    if (!has_dead_band || fl_aims_force(a)) continue;
     real low = set->force_min;
     real high = set->force_max;
     if (!(a->command_sign > 0)) {
       low = -set->force_max;
       high = -set->force_min;
     }
-    box->command_min[i][0] = larger(box->command_min[i][0], low);
-    box->command_max[i][0] = smaller(box->command_max[i][0], high);
-    command[i][0] = fl_clip_number(box, i, 0, -1, command[i][0]);
+    box->command_min[i][k] = larger(box->command_min[i][k], low);
+    box->command_max[i][k] = smaller(box->command_max[i][k], high);
+    command[i][k] = fl_clip_number(box, i, k, NO_NUMBER, command[i][k]);
   }
 }
 
@@ -61,7 +63,7 @@ static void take_step(const real *block, const fl_work *work, const fl_box *box,
     if (is_foil(ACTUATOR(block, i))) { /* the angle whose tangent comes nearest to the change */
       const real *slope = work->tangent[i].force_slope;
       const real turn = dot(change, slope, 2) / larger(dot(slope, slope, 2), TINY);
-      command[i][0] = fl_clip_number(box, i, 0, -1, command[i][0] + turn);
+      command[i][0] = fl_clip_number(box, i, 0, NO_NUMBER, command[i][0] + turn);
       continue;
     }
     const real wanted[2] = {force[i][0] + change[0], force[i][1] + change[1]};

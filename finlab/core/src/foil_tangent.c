@@ -84,7 +84,7 @@ real fl_power_of_commands(const real *block, const fl_work *work, real command[]
       cost += tangent.cost;
       continue;
     }
-    if (a->command_kind == FL_POD && command[i][1] < 0) size = -size;
+    if (fl_is_in_reverse(a, command[i])) size = -size;
     cost += fl_power_of_force(block, i, size);
   }
   return cost;

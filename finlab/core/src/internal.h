@@ -151,14 +151,27 @@ void fl_offset_wrench(const real *block, fl_span *span);
 int fl_span_of_question(const real *block, fl_work *work, const unsigned char *lost,
                         const unsigned char *free);
 
+/* command_form.c: what the numbers of each kind of command are */
+enum { NO_NUMBER = -1 };
+enum { NO_TABLE, BEAT_TABLE, CURVE_TABLE }; /* kinds of command tables, see fl_work.h */
+typedef struct {
+  int numbers;       /* how many of the three a command uses, from the first one on */
+  int angle_number;  /* which one is an angle that wraps, or NO_NUMBER */
+  int force_number;  /* which one is a force, which may have a dead band, or NO_NUMBER */
+  int command_table; /* what fl_actuator.command_table is: BEAT_TABLE ... */
+  int has_law_grid;  /* whether the law is a grid */
+  int has_drag;      /* whether the second axis of the law is drag */
+} command_form;
+const command_form *fl_form_of(const fl_actuator *a);
+int fl_aims_force(const fl_actuator *a);
+int fl_is_in_reverse(const fl_actuator *a, const real *command);
+
 /* command_box.c: commands within their limits */
 int fl_is_known_command(const real *command);
 void fl_clip_commands(const real *block, const fl_box *box, real command[][3]);
-int fl_angle_number(const fl_actuator *a);
 real fl_clip_number(const fl_box *box, int i, int k, int angle, real value);
 void fl_leave_dead_bands(const real *block, real force[][2], real command[][3]);
 void fl_rest_in_dead_bands(const real *block, const fl_box *box, real command[][3]);
-int fl_force_number(const fl_actuator *a);
 int fl_is_in_dead_band(const fl_actuator *a, const real *command);
 
 /* command_law.c: forces of commands and commands for forces */

@@ -25,7 +25,7 @@ static void forces_of_commands(const fl_coupled_robot *robot, const real *block,
     if (!fl_is_in_dead_band(a, command[i])) fl_force_of_command(block, i, command[i], force[i], 0);
     for (int c = 0; c < 3; c++) {
       real along = force[i][c];
-      if (a->command_kind == FL_FOIL && c == 1) along += a->pressure_area * a->zero_lift_drag;
+      if (fl_form_of(a)->has_drag && c == 1) along += a->pressure_area * a->zero_lift_drag;
       const real *axis = robot->frames + 9 * i + 3 * c;
       for (int b = 0; b < 3; b++) body[i][b] += along * axis[b];
     }
