@@ -38,7 +38,7 @@ from finlab.axes import Axis, axes_in
 from finlab.errors import AllocationError
 from finlab.layout.damage import WHOLE, Damage
 from finlab.layout.layout import Layout
-from finlab.physics.objective import yardstick
+from finlab.physics.objective import wrench_scale_of
 from finlab.physics.plant import plant_of
 
 MAX_STATES = 32
@@ -138,7 +138,7 @@ class Allocator:
         """Prepares the undamaged robot; all constructors end here."""
         self._layout = layout
         self._choice = choice
-        self._scale = yardstick(layout)
+        self._scale = wrench_scale_of(layout)
         self._whole = self._make_state(WHOLE)
         self._states: dict[object, RobotState] = {}
         """States that were asked for, by damage and free axes; the one asked for last is last."""
@@ -244,11 +244,11 @@ class Allocator:
         wrench_asked = check_target(wrench)
         state, question = self._question(damage_of(damage, lost), policy, flow, seed, free)
         method = state.method
-        prices: Array | None = None
+        multipliers: Array | None = None
         reference_of_method: Array | None = None
         if isinstance(previous, Allocation):
-            if "prices" in method.reads and previous.prices is not None:
-                prices = previous.prices
+            if "multipliers" in method.reads and previous.multipliers is not None:
+                multipliers = previous.multipliers
             previous = previous.command
         command_previous = None if previous is None else check_previous(previous, state.layout)
 
@@ -262,7 +262,7 @@ class Allocator:
         question = question._replace(
             targets=state.with_free_axes(target, 0.0)[None],
             previous=command_previous,
-            prices=prices,
+            multipliers=multipliers,
             reference=reference_of_method,
         )
         solution = state.solve(question)
@@ -276,7 +276,7 @@ class Allocator:
             settings=vars(self.settings).copy(),
             previous=command_previous,
             wrench_expected=None if solution.wrench is None else solution.wrench[0],
-            prices=None if solution.prices is None else solution.prices[0],
+            multipliers=None if solution.multipliers is None else solution.multipliers[0],
         )
 
     def refinement(self, result: Allocation) -> tuple[Candidates, ...]:

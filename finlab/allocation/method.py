@@ -29,11 +29,11 @@ if TYPE_CHECKING:
 
 Takes = Literal["any actuator", "fins", "horizontal fins", "thrusters"]
 """What a method's robot may have."""
-Reads = Literal["policy", "losses", "prices", "reference"]
+Reads = Literal["policy", "losses", "multipliers", "reference"]
 """What `Method.solve` may read of a question, beside targets, the command before, flow and seed.
 
 `policy`: more than the least plain error may be asked for. `losses`: `lost` actuators and `free`
-axes; a method that does not read them is made for a robot without them. `prices`: those of an
+axes; a method that does not read them is made for a robot without them. `multipliers`: those of an
 earlier answer, to begin there. `reference`: wrenches of the next ticks.
 """
 
@@ -74,7 +74,7 @@ class MethodQuestion(NamedTuple):
     """Which actuators (n,) do not work, for methods that read losses; None where all do."""
     free: NDArray[np.bool_] | None = None
     """Which axes (6,) may take any wrench, for methods that read losses; None for none."""
-    prices: Array | None = None
+    multipliers: Array | None = None
     """Multipliers (6,) [W/N, W/(N m)] of an earlier answer, for a single target and methods that
     read them; None for their own."""
     reference: Array | None = None
@@ -95,8 +95,8 @@ class Method(ABC):
     takes: ClassVar[Takes] = "any actuator"
     """What the robot may have."""
     reads: ClassVar[frozenset[Reads]] = frozenset({"policy"})
-    """What `solve` reads of a question that not every method does: of policies, losses, prices and
-    a reference. What is not named here, it is not given."""
+    """What `solve` reads of a question that not every method does: of policies, losses, multipliers
+    and a reference. What is not named here, it is not given."""
     needs_networks: ClassVar[bool] = False
     """Whether it is made with trained networks, of a checkpoint."""
     networks: Networks | None

@@ -1,6 +1,7 @@
 """The core as Python calls it: sizes of both languages, damaged blocks, arguments, one answer and
 many."""
 
+import ctypes
 import re
 from concurrent.futures import ThreadPoolExecutor
 
@@ -50,7 +51,7 @@ def checked(block: Array) -> int:
     ("field", "value", "code"),
     [
         ("magic", 7.0, BLOCK),
-        ("version", 9.0, 2),
+        ("version", constant("FL_VERSION") + 1.0, 2),
         ("length", 1e6, BLOCK),
         ("n", 0.0, BLOCK),
         ("n", 65.0, BLOCK),
@@ -96,13 +97,13 @@ def test_a_block_cut_short_is_refused(heavy: Core) -> None:
 
 def test_what_is_no_number_is_refused(heavy: Core) -> None:
     wrench = np.zeros(6)
-    prices = np.zeros(6)
+    multipliers = np.zeros(6)
     for bad in (np.nan, np.inf):
         with pytest.raises(CommandError, match="not finite or out of range"):
             heavy.answer_one(np.where(np.arange(6) == 2, bad, wrench), None)
-        # Prices are where to begin: those of no use are left out.
+        # Multipliers are where to begin: those of no use are left out.
         assert heavy.answer_one(
-            wrench, None, np.where(np.arange(6) == 2, bad, prices)
+            wrench, None, np.where(np.arange(6) == 2, bad, multipliers)
         ).is_attainable[0]
     with pytest.raises(CommandError, match="not finite or out of range"):
         heavy.answer_one(
@@ -125,6 +126,21 @@ def test_one_and_many_are_the_same(kind: str) -> None:
         np.testing.assert_array_equal(many.command[row], single.command[0])
         np.testing.assert_array_equal(many.wrench_served[row], single.wrench_served[0])
         assert many.is_attainable[row] == single.is_attainable[0]
+
+
+def test_one_and_many_say_which_searches_were_truncated() -> None:
+    core = core_of_layout(load(random_robot("fins", 1, 3)))
+    settings = np.zeros(1, struct("fl_settings"))  # no part of a set with a gap is looked at
+    use_settings = library().fl_use_settings
+    use_settings.argtypes = [ctypes.c_void_p, ctypes.c_void_p]
+    assert use_settings(core._work_address, settings.ctypes.data) == 0
+    plant = random_plant("fins", 1, 3)
+    targets = np.array([within(plant, np.random.default_rng([3, k])) for k in range(8)])
+    truncated = [core.answer_one(target, None).is_truncated for target in targets]
+    assert any(truncated) and not all(truncated)
+    for target, is_truncated in zip(targets, truncated, strict=True):
+        assert core.answer_many(target[None], None).is_truncated == is_truncated
+    assert core.answer_many(targets, None).is_truncated
 
 
 def test_threads_share_one_robot(heavy: Core) -> None:

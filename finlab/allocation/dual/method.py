@@ -32,7 +32,10 @@ MAX_BASES = 32
 """States of losses and free axes of which the basis of what is driven is kept."""
 TABLE_ERROR = 10.0 * CLOSE
 """Share of a power by which the core's tables may be off."""
-_TRUNCATED = "the search for a better answer was ended by its limit of steps"
+_TRUNCATED = (
+    "the search for a better answer was ended by its limit of steps: the power may be above the "
+    "least, by no more than it is above bound"
+)
 """Note of an answer whose search ended early."""
 
 
@@ -68,7 +71,7 @@ class Dual(Method):
     # A smaller wrench in the same direction still turns a robot to where it should go; the nearest
     # one may only push it on.
     policy_under_way = "direction"
-    reads = frozenset({"policy", "losses", "prices", "reference"})
+    reads = frozenset({"policy", "losses", "multipliers", "reference"})
     settings_class = DualSettings
     settings: DualSettings
 
@@ -128,7 +131,9 @@ class Dual(Method):
             conditions = conditions_ahead(
                 method.compiled, method.turn_rates, method.period_s, reference, conditions
             )
-        return method.solve_under(conditions, question.targets, question.policy, question.prices)
+        return method.solve_under(
+            conditions, question.targets, question.policy, question.multipliers
+        )
 
     @cached_property
     def turn_rates(self) -> Array:
@@ -148,7 +153,11 @@ class Dual(Method):
         return target if self.turns_ahead else super().in_time(target, reference)
 
     def solve_under(
-        self, conditions: Conditions, targets: Array, policy: Policy, lam: Array | None = None
+        self,
+        conditions: Conditions,
+        targets: Array,
+        policy: Policy,
+        multipliers: Array | None = None,
     ) -> Solution:
         """Solves for targets in the flow of this method.
 
@@ -156,15 +165,15 @@ class Dual(Method):
             conditions: rates, losses and free axes.
             targets: desired wrenches (N, 6), at least one [N, N m].
             policy: what to give out of reach.
-            lam: multipliers (6,) [W/N, W/(N m)] at which Newton's method begins, for a single
+            multipliers: lambda (6,) [W/N, W/(N m)] at which Newton's method begins, for a single
                 target; None for its own.
 
         Returns:
             Commands, with the lower bound of their power.
         """
         if self.plant.interaction is not None:
-            return self._solve_coupled(conditions, targets, policy, lam)
-        answer = self.compiled.forces(targets, policy, lam, conditions)
+            return self._solve_coupled(conditions, targets, policy, multipliers)
+        answer = self.compiled.forces(targets, policy, multipliers, conditions)
         problem = self.problem_under(conditions)
         command = exact_commands(problem, answer)
         # A search of bytes takes a third of the time of numpy's `all`, and every tick pays for it.
@@ -178,18 +187,18 @@ class Dual(Method):
                 notes |= keep_on_rays(self.compiled, problem, conditions, targets, answer, command)
             notes |= self.undriven_notes(targets[~answer.is_attainable], conditions)
         return self.solution(
-            command, wrench_served, answer.lam, answer.gap_power_bound, notes, conditions
+            command, wrench_served, answer.multipliers, answer.gap_power_bound, notes, conditions
         )
 
     def _solve_coupled(
-        self, conditions: Conditions, targets: Array, policy: Policy, lam: Array | None
+        self, conditions: Conditions, targets: Array, policy: Policy, multipliers: Array | None
     ) -> Solution:
         """Solves as `solve_under`, for a robot whose actuators act on each other."""
         from finlab.allocation.dual.outer_iterations import outer_answers
 
         problem = self.problem_under(conditions)
         answer = outer_answers(
-            self.coupled, self.compiled, problem, targets, policy, conditions, lam
+            self.coupled, self.compiled, problem, targets, policy, conditions, multipliers
         )
         notes: set[str] = set()
         for target in targets[~answer.is_attainable]:
@@ -197,7 +206,7 @@ class Dual(Method):
         return self.solution(
             answer.command,
             answer.wrench_served,
-            answer.lam,
+            answer.multipliers,
             answer.gap_power_bound,
             notes,
             conditions,
@@ -207,7 +216,7 @@ class Dual(Method):
         self,
         command: Array,
         wrench_served: Array,
-        lam: Array,
+        multipliers: Array,
         gap_power_bound: Array,
         notes: set[str],
         conditions: Conditions,
@@ -217,7 +226,7 @@ class Dual(Method):
         Args:
             command: (N, n, 3); its rows of lost actuators become NaN.
             wrench_served: (N, 6) [N, N m] that the commands give.
-            lam: multipliers (N, 6) [W/N, W/(N m)], which prove the bound.
+            multipliers: lambda (N, 6) [W/N, W/(N m)], which prove the bound.
             gap_power_bound: power (N,) [W] that gaps are proved to need.
             notes: sentences, of which empty ones are left out.
             conditions: under which the commands were found.
@@ -228,13 +237,13 @@ class Dual(Method):
         if conditions.lost is not None:
             command[:, conditions.lost] = np.nan
         bound: Callable[[Array], Array] = partial(
-            self.bound, wrench_served, lam, gap_power_bound, conditions
+            self.bound, wrench_served, multipliers, gap_power_bound, conditions
         )
         return Solution(
             command,
             bound=None if self.has_no_bound else bound,
             calm_power=partial(self.calm_power, conditions) if conditions.calm > 0.0 else None,
-            prices=lam,
+            multipliers=multipliers,
             notes=tuple(sorted(notes - {""})),
         )
 
@@ -338,7 +347,7 @@ class Dual(Method):
     def bound(
         self,
         wrench_served: Array,
-        lam: Array,
+        multipliers: Array,
         gap_power_bound: Array,
         conditions: Conditions,
         command: Array,
@@ -347,7 +356,7 @@ class Dual(Method):
 
         Args:
             wrench_served: (N, 6) [N, N m] for which the core found forces.
-            lam: its multipliers (N, 6) [W/N, W/(N m)].
+            multipliers: its lambda (N, 6) [W/N, W/(N m)].
             gap_power_bound: power (N,) [W] that gaps of the actuators' sets are proved to need for
                 these wrenches, by the core's tables.
             conditions: under which they were found.
@@ -363,11 +372,11 @@ class Dual(Method):
         wrench = wrench_of_forces(force, self.plant.effectiveness)
         if conditions.free is not None:  # its multiplier is 0
             wrench = np.where(conditions.free, 0.0, wrench)
-        is_finite = np.isfinite(lam).all(axis=-1, keepdims=True)
-        lam = np.where(is_finite, lam, 0.0)
+        is_finite = np.isfinite(multipliers).all(axis=-1, keepdims=True)
+        multipliers = np.where(is_finite, multipliers, 0.0)
         power = self.plant.power(command)[:, works].sum(axis=-1)
 
-        bound = self._bound_by_laws(wrench, lam, conditions)
+        bound = self._bound_by_laws(wrench, multipliers, conditions)
         if not self._reads_tables:
             is_served = norms((wrench - wrench_served) / self.scale) <= NEARLY
             with_gaps = np.maximum(bound, self._bound_of_gaps(gap_power_bound, power))
@@ -376,7 +385,7 @@ class Dual(Method):
             # The multipliers are those of the smooth shapes that stand for measured tables.
             low = np.flatnonzero(bound < (1.0 - TABLE_ERROR) * power)
             by_measurements = self._bound_of_measured_tables(
-                wrench[low], lam[low], command[low], conditions
+                wrench[low], multipliers[low], command[low], conditions
             )
             bound[low] = np.maximum(bound[low], by_measurements)
 
@@ -385,13 +394,13 @@ class Dual(Method):
         bound = np.where(bound > largest_by_tables, 0.0, np.clip(bound, 0.0, power))
         return np.asarray(bound * (1.0 - ROUNDING))
 
-    def _bound_by_laws(self, wrench: Array, lam: Array, conditions: Conditions) -> Array:
+    def _bound_by_laws(self, wrench: Array, multipliers: Array, conditions: Conditions) -> Array:
         """Lower bounds (N,) [W] by the laws' conjugates: at multipliers (N, 6), or at 0 where that
         proves more."""
         # The last row is the multiplier 0, which proves for any wrench what all take at rest.
-        multipliers = np.concatenate([lam, np.zeros((1, 6))])
+        multipliers_and_zero = np.concatenate([multipliers, np.zeros((1, 6))])
         wrenches = np.concatenate([wrench, np.zeros((1, 6))])
-        bounds = power_bound(self.compiled, wrenches, multipliers, conditions)
+        bounds = power_bound(self.compiled, wrenches, multipliers_and_zero, conditions)
         return np.asarray(np.maximum(bounds[:-1], bounds[-1]))
 
     def _bound_of_gaps(self, gap_power_bound: Array, power: Array) -> Array:
@@ -406,7 +415,7 @@ class Dual(Method):
         return NEARLY * self.compiled.largest_power
 
     def _bound_of_measured_tables(
-        self, wrench: Array, lam: Array, command: Array, conditions: Conditions
+        self, wrench: Array, multipliers: Array, command: Array, conditions: Conditions
     ) -> Array:
         """Lower bounds (R,) [W] for wrenches (R, 6) of commands (R, n, 3), at multipliers (R, 6)
         that are raised by the measured tables themselves."""
@@ -416,7 +425,7 @@ class Dual(Method):
             return np.empty(0)
         raised = [
             raised_multipliers(self.plant, self.scale, *row)
-            for row in zip(wrench, lam, command, strict=True)
+            for row in zip(wrench, multipliers, command, strict=True)
         ]
         return power_bound(self.compiled, wrench, np.stack(raised), conditions)
 

@@ -4,9 +4,9 @@ at the last forces.
 With y the forces and o(y) the wrench offset that they cause (Eq. 18), an iteration takes o(y) for
 its value and slope at the last forces. Its answer is exact and cheapest on that linear model;
 Levenberg-Marquardt steps make it exact on the whole one, and shorter steps are taken where it is
-no cheaper. Where the iterations settle, the gradient of the power lies in the range of the slope
+no cheaper. Where the iterations converge, the gradient of the power lies in the range of the slope
 of the whole model: the conditions of Karush, Kuhn and Tucker hold there (sequential convex
-programming). The iterations themselves are in finlab/core/src/sequential_convex.c. Here is where
+programming). The iterations themselves are in finlab/core/src/outer_iterations.c. Here is where
 they begin: the whole model is not convex, so several starts are tried.
 """
 
@@ -75,7 +75,7 @@ def outer_answers(
     targets: Array,
     policy: Policy,
     conditions: Conditions,
-    lam: Array | None,
+    multipliers: Array | None,
 ) -> CoreAnswer:
     """Answers targets, one after the other, by outer iterations.
 
@@ -86,19 +86,19 @@ def outer_answers(
         targets: desired wrenches (N, 6) [N, N m], at least one.
         policy: what to give out of reach.
         conditions: what holds of the robot.
-        lam: multipliers (6,) [W/N, W/(N m)] at which Newton's method begins; None for its own.
+        multipliers: lambda (6,) [W/N, W/(N m)] at which Newton's method begins; None for its own.
 
     Returns:
         Answers of the last iterations, with commands that are exact by the laws. A target is
         attainable where its command gives it; nothing is proved of gaps.
     """
     answers = [
-        _outer_answer(coupled, compiled, problem, target, policy, conditions, lam)
+        _outer_answer(coupled, compiled, problem, target, policy, conditions, multipliers)
         for target in targets
     ]
     return CoreAnswer(
         force=np.concatenate([answer.force for answer in answers]),
-        lam=np.concatenate([answer.lam for answer in answers]),
+        multipliers=np.concatenate([answer.multipliers for answer in answers]),
         wrench_served=np.concatenate([answer.wrench_served for answer in answers]),
         gap_power_bound=np.zeros(len(targets)),
         is_attainable=np.concatenate([answer.is_attainable for answer in answers]),
@@ -115,10 +115,12 @@ def _outer_answer(
     target: Array,
     policy: Policy,
     conditions: Conditions,
-    lam: Array | None,
+    multipliers: Array | None,
 ) -> CoreAnswer:
     """The answer to one target (6,); arguments as of `outer_answers`."""
-    answer = _best_of_starts(coupled, compiled, problem, target, policy, conditions, lam).answer
+    answer = _best_of_starts(
+        coupled, compiled, problem, target, policy, conditions, multipliers
+    ).answer
     assert answer is not None  # all starts that are kept were followed by iterations
     command = exact_commands(problem, answer)
     wrench_served = answer.wrench_served
@@ -137,19 +139,25 @@ def _best_of_starts(
     target: Array,
     policy: Policy,
     conditions: Conditions,
-    lam: Array | None,
+    multipliers: Array | None,
 ) -> OuterResult:
     """What outer iterations come to for one target (6,): in a tick from the command before, else
     from the forces by the laws alone and, where the whole model takes more power, from others."""
     record = core_policy(policy)
     if conditions.command_previous is not None:
-        return coupled.iterate(target, None, ITERATIONS_IN_TICK, record, lam, conditions)
-    by_laws = compiled.core.answer_one(target, record, lam, conditions)
+        return coupled.iterate(target, None, ITERATIONS_IN_TICK, record, multipliers, conditions)
+    by_laws = compiled.core.answer_one(target, record, multipliers, conditions)
     force_by_laws = by_laws.force[0]
-    lam_by_laws = by_laws.lam[0]
+    multipliers_by_laws = by_laws.multipliers[0]
     steps_left = MAX_WORK / len(force_by_laws)
     best = coupled.iterate(
-        target, force_by_laws, ROUNDS, record, lam_by_laws, conditions, most_steps=steps_left
+        target,
+        force_by_laws,
+        ROUNDS,
+        record,
+        multipliers_by_laws,
+        conditions,
+        most_steps=steps_left,
     )
     steps_left -= best.steps
 
@@ -172,7 +180,7 @@ def _best_of_starts(
                 tried[k].force,
                 ROUNDS,
                 record,
-                lam_by_laws,
+                multipliers_by_laws,
                 conditions,
                 most_steps=steps_left,
             )

@@ -148,7 +148,7 @@ def test_iterations_settle_in_few_steps_at_the_conditions_of_a_minimum() -> None
                 laws.force[0],
                 ROUNDS,
                 core_policy(CLOSEST),
-                laws.lam[0],
+                laws.multipliers[0],
                 NOMINAL,
                 most_steps=1e6,
             )
@@ -185,7 +185,7 @@ def test_starts_that_make_nothing_cheaper_are_reversed_in_one_round_alone() -> N
     n = 6
     coupled = _ConstantIterations()
     laws = SimpleNamespace(
-        force=np.ones((1, n, 2)), lam=np.zeros((1, 6)), command=np.zeros((1, n, 3))
+        force=np.ones((1, n, 2)), multipliers=np.zeros((1, 6)), command=np.zeros((1, n, 3))
     )
     compiled = SimpleNamespace(
         core=SimpleNamespace(answer_one=lambda *_: laws), is_line=np.zeros(n, bool)
