@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.arrays import NOTHING, AnyArray, Array, solve
+from finlab.arrays import NOTHING, AnyArray, Array, solve_or_nan
 from finlab.axes import feasible
 from finlab.physics.plant import Plant
 
@@ -271,4 +271,4 @@ def _smallest_change(jacobian: AnyArray, residual: AnyArray, damping: AnyArray) 
     # again, or rises from rest.
     trace = np.einsum("ri->r", diagonal)
     diagonal += (damping + RIDGE[0] + RIDGE[1] * trace)[:, None]
-    return np.asarray(jacobian @ solve(gram, residual))
+    return np.asarray(jacobian @ solve_or_nan(gram, residual))

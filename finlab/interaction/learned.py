@@ -14,7 +14,7 @@ import numpy as np
 from msgspec import Meta
 
 from finlab.arrays import AnyArray, Array
-from finlab.bundle_files import file_stamp, named_content
+from finlab.bundle_files import file_stamp, read_named_file
 from finlab.errors import CheckpointError
 from finlab.interaction.interaction import (
     InteractionModel,
@@ -211,7 +211,7 @@ def read_network(path: str) -> tuple[Weights, float]:
     from safetensors import SafetensorError
     from safetensors.numpy import load
 
-    content = named_content(path, MAX_BYTES, WHAT, CheckpointError)
+    content = read_named_file(path, MAX_BYTES, WHAT, CheckpointError)
     try:
         weights = {name: array.astype(np.float64) for name, array in load(content).items()}
         trust = float(weights.pop("trust")[0])

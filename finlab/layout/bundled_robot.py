@@ -7,8 +7,8 @@ from typing import Annotated, Any
 
 from msgspec import Meta, Struct
 
-from finlab.bundle_files import ROBOT, TABLES, Files
-from finlab.errors import LayoutError, under
+from finlab.bundle_files import ROBOT_FILE, TABLE_FOLDER, Files
+from finlab.errors import LayoutError, layout_errors_at
 from finlab.files import parse_json
 from finlab.files.guarded import decoded
 from finlab.files.schema import Name, checked
@@ -51,13 +51,13 @@ def robot_of(files: Files, source: str, parse: Callable[..., Layout]) -> Robot:
         LayoutError: there is no layout, or one that names a force table or a network outside the
             bundle, or its self-test has commands for another number of actuators.
     """
-    place = f"{source}/{ROBOT}"
+    place = f"{source}/{ROBOT_FILE}"
     folder = Path(os.path.abspath(source))
-    values = parse_json(decoded(files[ROBOT], place, "JSON", LayoutError), place, LayoutError)
+    values = parse_json(decoded(files[ROBOT_FILE], place, "JSON", LayoutError), place, LayoutError)
     robot = checked(values, Robot, source=place)
     layout: Layout = parse(robot.layout, f"{place}: layout", folder, may_open=False)
-    tables = {str(folder / name) for name in files if name.startswith(TABLES)}
-    with under(source=place):
+    tables = {str(folder / name) for name in files if name.startswith(TABLE_FOLDER)}
+    with layout_errors_at(source=place):
         layout.indices(robot.lost)
         for fin in layout.fins:
             if fin.model.values().get("path", "") not in {"", *tables}:

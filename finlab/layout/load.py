@@ -29,7 +29,7 @@ from finlab.actuators.actuator import Actuator
 from finlab.actuators.kinds import KINDS
 from finlab.assets import shipped_layouts
 from finlab.axes import AXES
-from finlab.errors import LayoutError, under
+from finlab.errors import LayoutError, layout_errors_at
 from finlab.files import parse_json, parse_yaml
 from finlab.files.guarded import read_text
 from finlab.files.schema import Checked, Part, checked, form, shown
@@ -89,7 +89,7 @@ def layout_in(
     if is_graph(data):
         from finlab.layout.graph_file import layout_in_graph
 
-        with under(source=source):
+        with layout_errors_at(source=source):
             data = layout_in_graph(data)
     return parse_layout(data, source, folder, may_open=may_open)
 
@@ -253,7 +253,7 @@ class Reader:
         if isinstance(part, list | tuple):
             items = []
             for i, item in enumerate(part):
-                with under(f"[{i}]"):
+                with layout_errors_at(f"[{i}]"):
                     items.append(self.value(item))
             return tuple(items)
         if not isinstance(part, Struct):
@@ -262,7 +262,7 @@ class Reader:
         for field in structs.fields(part):
             value = getattr(part, field.name)
             if value is not None:
-                with under(field.encode_name):
+                with layout_errors_at(field.encode_name):
                     values[field.name] = self.value(value)
         for key in {"path", "mesh"} & set(values):
             values[key] = os.path.normpath((self.folder or Path.cwd()) / values[key])
@@ -294,13 +294,13 @@ def parse_layout(
         may_open: whether tables of thrust that it names may be opened; those of fins, and meshes,
         are not.
     """
-    with under(source=source), naming_actuators(data):
+    with layout_errors_at(source=source), naming_actuators(data):
         _check_version(data)
         file = checked(data, form_for(data))
         reader = Reader(folder, may_open)
         values = {}
         for name in ("actuators", "body", "interaction"):
-            with under(name):
+            with layout_errors_at(name):
                 values[name] = reader.value(getattr(file, name))
         return Layout(
             name=file.name,
@@ -327,7 +327,7 @@ def naming_actuators(data: Any) -> Iterator[None]:
             raise
         kind = part.get("type")
         known = kind if isinstance(kind, str) and kind in KINDS else "actuator"
-        raise error.about(f"{known} {part['name']!r:.66}") from None
+        raise error.with_actuator(f"{known} {part['name']!r:.66}") from None
 
 
 def _check_version(data: Any) -> None:

@@ -16,7 +16,7 @@ from finlab.actuators.thrust_model import PowerTable
 from finlab.allocation.baselines.autopilots import ArduSub, Px4
 from finlab.allocation.solution import PlainData
 from finlab.arrays import Array
-from finlab.assets import install
+from finlab.assets import install_command
 from finlab.axes import AXES
 from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.files.guarded import read_file
@@ -104,7 +104,9 @@ def read_log(
     try:
         record = _read_record(file, demand, outputs)
     except ModuleNotFoundError as error:
-        raise DataError(f"{file}: {error.name} is not installed; run: {install('logs')}") from None
+        raise DataError(
+            f"{file}: {error.name} is not installed; run: {install_command('logs')}"
+        ) from None
     except FinlabError:
         raise
     except Exception as problem:  # of many kinds, by a file that is damaged

@@ -26,7 +26,7 @@ from finlab.display.figures import figure_bytes, panels
 from finlab.errors import DataError
 from finlab.research.networks.trained import Shapes, State
 from finlab.research.training.device import Workplace
-from finlab.whole_file import make_folder, sweep_parts, write_whole
+from finlab.whole_file import make_folder, remove_temporary_files, write_whole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -136,7 +136,7 @@ class Training:
         """Steps, and the time that they took, with all that went before them."""
         self.rows = list[dict[str, float]]()
         if place.rank == 0:
-            sweep_parts(folder)
+            remove_temporary_files(folder)
 
     @property
     def shipped(self) -> State:
