@@ -87,7 +87,7 @@ class LayoutError(FinlabError):
             prefix += "."
         return LayoutError(self.problem, prefix + self.key, source or self.source, self.actuator)
 
-    def with_actuator(self, actuator: str) -> "LayoutError":
+    def for_actuator(self, actuator: str) -> "LayoutError":
         """Returns the same error with the actuator that it is about, unless that is known
         already."""
         return LayoutError(self.problem, self.key, self.source, self.actuator or actuator)

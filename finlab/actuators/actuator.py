@@ -257,7 +257,7 @@ class Actuator(Checked, ABC):
             super().__post_init__()
             self.check_together()
         except LayoutError as error:
-            raise error.with_actuator(f"{self.type} {self.name!r:.66}") from None
+            raise error.for_actuator(f"{self.type} {self.name!r:.66}") from None
 
     def check_together(self) -> None:
         """Checks arguments against each other, each being right by itself, and makes axes exactly

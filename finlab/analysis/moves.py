@@ -306,7 +306,9 @@ class Moves:
         position, frames = self.geometry(vector[None])
         result = self.layout
         for i in self.layout.indices(self.names):
-            result = result.with_part(self.layout.actuators[i].turned(frames[0, i], position[0, i]))
+            result = result.with_actuator(
+                self.layout.actuators[i].turned(frames[0, i], position[0, i])
+            )
         return result
 
 

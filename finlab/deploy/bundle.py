@@ -25,7 +25,7 @@ from finlab.files.guarded import packed
 from finlab.interaction.learned import MAX_BYTES as LARGEST_NETWORK
 from finlab.interaction.learned import NETWORK_SUFFIX, WHAT
 from finlab.layout import Layout
-from finlab.layout.bundled_robot import Robot
+from finlab.layout.bundled_robot import BundledRobot
 from finlab.layout.save import layout_to_dict
 from finlab.whole_file import TEMPORARY_SUFFIX, write_folder, write_whole
 
@@ -103,7 +103,7 @@ def make_bundle(allocator: Allocator, lost: tuple[str, ...] = ()) -> Bundle:
     embedded, tables = with_tables_inside(layout)
     sha256, networks = method_class(allocator.method).networks_for_bundle(allocator.networks)
     files = {
-        bundle_files.ROBOT_FILE: _robot_bytes(Robot(embedded, lost, sha256, cases)),
+        bundle_files.ROBOT_FILE: _robot_bytes(BundledRobot(embedded, lost, sha256, cases)),
         bundle_files.MANIFEST_FILE: _settings_bytes(allocator),
         **tables,
         **{bundle_files.CHECKPOINT_FOLDER + name: content for name, content in networks.items()},
@@ -117,7 +117,7 @@ def make_bundle(allocator: Allocator, lost: tuple[str, ...] = ()) -> Bundle:
     return Bundle({**files, bundle_files.CHECKSUM_FILE: bundle_files.checksums(files)})
 
 
-def _robot_bytes(robot: Robot) -> bytes:
+def _robot_bytes(robot: BundledRobot) -> bytes:
     """The content of the file of the robot."""
     values = {**to_builtins(robot, builtin_types=(Layout,)), "layout": layout_to_dict(robot.layout)}
     return (json.dumps(values, indent=1, allow_nan=False, ensure_ascii=False) + "\n").encode()

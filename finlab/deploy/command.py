@@ -48,7 +48,7 @@ def check(arguments: argparse.Namespace) -> int:
 
     robot = _robot(arguments)
     print(
-        f"{arguments.bundle}: {robot.layout.name}, {robot.layout.counted}, method "
+        f"{arguments.bundle}: {robot.layout.name}, {robot.layout.counts_in_words}, method "
         f"{robot.allocator.method}, ready in {time.perf_counter() - arguments.started:.2f} s"
     )
     findings = [*self_check(robot), extremes(robot)]

@@ -152,7 +152,7 @@ def _motor_signs(log_robot: Layout | None, robot: Layout) -> Array:
         return np.ones(robot.n)
     if log_robot.n != robot.n:
         raise LayoutError(
-            f"layout {robot.name!r:.60} has {robot.counted}, and the log's parameters have "
+            f"layout {robot.name!r:.60} has {robot.counts_in_words}, and the log's parameters have "
             f"{log_robot.n} motors"
         )
     cosine = np.einsum("nk,nk->n", _axes_of(log_robot), _axes_of(robot))
@@ -338,10 +338,10 @@ def commands_of(record: LogRecord, outputs: Array, robot: Layout, signs: Array) 
     if k < n or (k != n and record.form == "ros"):
         or_commands = "" if record.of_shares else f" or {3 * n}"
         raise LayoutError(
-            f"layout {robot.name!r:.60} has {robot.counted}, and the log {k} outputs, not "
+            f"layout {robot.name!r:.60} has {robot.counts_in_words}, and the log {k} outputs, not "
             f"{n}{or_commands}"
         )
-    robot.only("a log with one output for each actuator", "thruster")
+    robot.require_kind("a log with one output for each actuator", "thruster")
     values = outputs[:, :n] * signs
     command = np.zeros((len(values), n, 3))
     low = robot.lower[:, 0]

@@ -28,7 +28,7 @@ from finlab.interaction.learned import NETWORK_SUFFIX
 from finlab.layout import FinModelSpec, Layout
 from finlab.layout.body import MESH_SUFFIXES
 from finlab.layout.bundled_robot import robot_of
-from finlab.layout.load import A_LAYOUT, MAX_BYTES, layout_in, parse_layout
+from finlab.layout.load import EXPECTED_LAYOUT_FILE, MAX_BYTES, parse_layout, parse_layout_text
 from finlab.swim.hull.mesh_file import MAX_FACES, read_mesh, simplified, stl_of
 from finlab.whole_file import make_folder, write_whole
 
@@ -122,8 +122,8 @@ def read_design(source: str, content: bytes, folder: Path) -> Opened:
 def layout_of(source: str, content: bytes, folder: Path | None = None) -> Layout:
     """The layout in the content of a file; what it names is taken to be in `folder`, and not looked
     at. Raises LayoutError: it is no text, or no layout."""
-    text = decoded(content, source, A_LAYOUT, LayoutError)
-    return layout_in(text, Path(source).suffix, source, folder, may_open=False)
+    text = decoded(content, source, EXPECTED_LAYOUT_FILE, LayoutError)
+    return parse_layout_text(text, Path(source).suffix, source, folder, may_open=False)
 
 
 def adopted(layout: Layout, parts: Mapping[str, bytes], folder: Path, source: str) -> Opened:
