@@ -22,8 +22,7 @@ from finlab.bundle_files import read_named_file
 from finlab.deploy.deployed_robot import self_tests
 from finlab.errors import AllocationError, DataError
 from finlab.files.guarded import packed
-from finlab.interaction.learned import MAX_BYTES as LARGEST_NETWORK
-from finlab.interaction.learned import NETWORK_SUFFIX, WHAT
+from finlab.interaction.learned import EXPECTED_NETWORK_FILE, MAX_NETWORK_BYTES, NETWORK_SUFFIX
 from finlab.layout import Layout
 from finlab.layout.bundled_robot import BundledRobot
 from finlab.layout.save import layout_to_dict
@@ -153,7 +152,7 @@ def with_tables_inside(layout: Layout) -> tuple[Layout, dict[str, bytes]]:
     interaction = layout.interaction
     for path in layout.files:
         if interaction is not None and path == interaction.reads:
-            content = read_named_file(path, LARGEST_NETWORK, WHAT)
+            content = read_named_file(path, MAX_NETWORK_BYTES, EXPECTED_NETWORK_FILE)
             suffix = NETWORK_SUFFIX
         else:
             table = "a table of forces for a bundle"
