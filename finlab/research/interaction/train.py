@@ -21,7 +21,7 @@ from finlab.interaction.interaction import JetGeometry
 from finlab.interaction.learned import LAYERS, MEMBERS, LearnedInteraction
 from finlab.interaction.messages import ROW_SIZES, JetPairs, pack_hull_rows, unpack_rows
 from finlab.layout.jet_geometry import jet_geometry_of
-from finlab.research.networks.trained import State
+from finlab.research.networks.trained import ArraysByName
 from finlab.research.training.device import workplace
 from finlab.research.training.loop import LoopSettings, Training, seeded_generator
 from finlab.whole_file import write_whole
@@ -159,7 +159,7 @@ def train(
             total = total + (error**2).mean()
         return {"loss": total / MEMBERS}
 
-    def save(shipped: State, made: dict[str, Any]) -> None:
+    def save(shipped: ArraysByName, made: dict[str, Any]) -> None:
         write_network(folder / WEIGHTS_FILE, shipped, 1.0)
 
     with workplace("cpu", settings.batch_size) as place:
@@ -210,7 +210,7 @@ def first_weights(seed: int) -> dict[str, Tensor]:
     return weights
 
 
-def write_network(path: Path, weights: State, trust: float) -> None:
+def write_network(path: Path, weights: ArraysByName, trust: float) -> None:
     """Writes the file of a learned interaction; a `DataError` where it cannot be written."""
     from safetensors.numpy import save
 

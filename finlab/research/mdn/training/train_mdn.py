@@ -33,7 +33,7 @@ from finlab.research.networks.checkpoint import (
     resolve_checkpoint,
     write_checkpoint,
 )
-from finlab.research.networks.trained import State, TrainedWeights, sizes_for_file
+from finlab.research.networks.trained import ArraysByName, TrainedWeights, sizes_for_file
 from finlab.research.training.device import Workplace
 from finlab.research.training.loop import STATE_FILE, LoopSettings, Terms, Training, first_weights
 from finlab.whole_file import make_folder, remove_temporary_files
@@ -107,7 +107,7 @@ def train_mdn(
         **{name: asdict(part) for name, part in parts.items()},
     }
 
-    def save(network: State, progress: dict[str, Any]) -> None:
+    def save(network: ArraysByName, progress: dict[str, Any]) -> None:
         trained = TrainedWeights(out.name, normalization, sizes_for_file(recipe.network), network)
         write_checkpoint(
             out, replace(trained, preset=preset, training={"mdn": identity | progress})
