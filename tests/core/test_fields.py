@@ -34,7 +34,7 @@ for name in ("A", "bluerov2_heavy", "catamaran"):
 np.savez(folder / "commands.npz", fields=struct("fl_actuator").names, **commands)
 """
 LAYOUTS = Path(finlab.__file__).parents[1] / "layouts"
-FLAGS = ["-std=c99", "-O1", "-ffp-contract=off", "-Wall", "-Wextra", "-Wno-cpp", "-Werror"]
+FLAGS = ["-std=c99", "-O0", "-ffp-contract=off", "-Wall", "-Wextra", "-Wno-cpp", "-Werror"]
 
 
 def copied(folder: Path) -> Path:
