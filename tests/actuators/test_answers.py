@@ -20,6 +20,7 @@ from finlab.arrays import Array
 from finlab.layout.effectiveness import own_effectiveness
 from finlab.layout.layout import Layout
 from finlab.physics.plant import Plant
+from tests.core.parts import dual_function
 from tests.t200 import t200_rows
 
 TABLE = PowerTable(t200_rows(16), "us")
@@ -72,9 +73,10 @@ def prepared(group: Group, wrench: Array, low: Array, high: Array) -> DualRobot:
 
 def answer(robot: DualRobot, price: Array) -> tuple[Array, float]:
     """Forces (m, 2) at multipliers (6,) of the wrench, and what they are worth less their power."""
-    inner = robot.basis.T @ (robot.axis_scale * price)
-    force, value = robot.core.dual_value(np.zeros(6), np.pad(inner, (0, 6 - len(inner))))
-    return force, -value
+    spanned = robot.basis.T @ (robot.axis_scale * price)
+    lambda_reduced = np.pad(spanned, (0, 6 - len(spanned)))
+    force, dual_value = dual_function(robot.block, np.zeros(6), lambda_reduced)
+    return force, -dual_value
 
 
 def check(

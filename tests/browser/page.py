@@ -8,7 +8,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from webapp.session.looking import DRAWERS, TASKS
+from webapp.session.looking import DRAWERS, TASKS, Desk, SearchRequest
+from webapp.session.swim_plan import SwimSettings
 from webapp.viser_internals import run_script
 
 WAIT_MS = 120_000
@@ -80,8 +81,13 @@ class Page:
         done = threading.Event()
 
         def restart() -> None:
-            self.session.start_over()
-            self.session.forget_view(self._display)
+            session = self.session
+            session.start_over()
+            # What `start_over` keeps for a user, so that no test sees what another one looked at.
+            session.display = self._display
+            session.desk = Desk()
+            session.draft = SearchRequest()
+            session.swim = SwimSettings()
             self.view.jobs.improver.forget()
             self.view.scenery.end_swim()
             self.view.scenery.robot.look_from("3D")

@@ -197,6 +197,23 @@ def at(values: Array) -> ctypes.c_void_p:
     return ctypes.c_void_p(values.ctypes.data)
 
 
+def prepared_work(block: Array) -> Any:
+    """A work area that is prepared for a robot's block."""
+    work = ctypes.create_string_buffer(constant("sizeof fl_work"))
+    assert functions().fl_prepare(at(block), work) == 0
+    return work
+
+
+def dual_function(block: Array, wrench: Array, lambda_reduced: Array) -> tuple[Array, float]:
+    """Responses (n, 2) [N] (Eq. 5) and the dual value [W] (Eq. 3) of a robot that is whole, for a
+    wrench (6,) [N, N m] at multipliers (6,) [W] in the basis of what its actuators span."""
+    force = np.zeros((len(actuators_of(block)), 2))
+    value = functions().fl_dual_value(
+        at(block), prepared_work(block), at(wrench), at(lambda_reduced), at(force)
+    )
+    return force, float(value)
+
+
 @dataclass(frozen=True)
 class Robot:
     """A robot in the core, and what judges it."""
@@ -234,9 +251,7 @@ class Robot:
 
     def work(self) -> Any:
         """A work area that is prepared."""
-        made = ctypes.create_string_buffer(constant("sizeof fl_work"))
-        assert functions().fl_prepare(at(self.block), made) == 0
-        return made
+        return prepared_work(self.block)
 
     def whole_box(self) -> Box:
         """The limits of all commands."""
