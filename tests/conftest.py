@@ -74,6 +74,7 @@ def untrained_mdn(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def layout_a() -> Layout:
+    """Robot A of the paper, four fins."""
     return load_layout(shipped_layouts()["A"])
 
 

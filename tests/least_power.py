@@ -194,6 +194,7 @@ def fin_costs(actuator: OwnActuator) -> tuple[Array, Array]:
 
 @cache
 def _sets(plant: OwnPlant) -> tuple[OwnSet, ...]:
+    """What each actuator of a robot may give."""
     return tuple(OwnSet(each) for each in plant.actuators)
 
 
@@ -367,6 +368,7 @@ def farthest(plant: OwnPlant, wrench: Array, count: int = 257) -> float:
 
 @cache
 def _corners(each: OwnSet, count: int) -> list[Array]:
+    """Points on the edges of what an actuator may give, of a wide sector in two halves."""
     edge = edge_forces(each.actuator, count)
     if not each.wide:
         return [edge]
@@ -402,6 +404,7 @@ def _hulls(plant: OwnPlant, corners: tuple[Array, ...]) -> tuple[Array, Array]:
 
 
 def _farthest(plant: OwnPlant, corners: tuple[Array, ...], wrench: Array) -> float:
+    """How many times a wrench a robot can give, by a linear program over corners."""
     columns, ones = _hulls(plant, corners)
     columns = np.hstack([columns, -(wrench / plant.scales)[:, None]])
     ones = np.hstack([ones, np.zeros((len(ones), 1))])

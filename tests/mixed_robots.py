@@ -17,7 +17,7 @@ from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.layout.load import parse_layout
 from tests.least_power import farthest
-from tests.own_plant import LIMITS, NOMINAL, OwnPlant, edge_forces
+from tests.own_plant import LIMIT_KEYS, NOMINAL, OwnPlant, edge_forces
 
 DOMAIN = 0x3A11
 """Leads the seed of every robot."""
@@ -74,7 +74,7 @@ def fins_with_a_tail(number: int, seed: int) -> dict[str, Any]:
         fins.append(_any_fin(rng, f"a{i + 1}", model, None))
         fins[-1]["position_m"] = (rng.uniform(-1.0, 1.0, 3) * [0.3, 0.3, 0.1]).tolist()
         nominal = [list(ends) for ends in NOMINAL]
-        fins[-1]["limits"] = dict(zip(LIMITS, nominal, strict=True))
+        fins[-1]["limits"] = dict(zip(LIMIT_KEYS, nominal, strict=True))
     return layout_of("tail", fins)
 
 
@@ -127,11 +127,13 @@ def layout_of(name: str, actuators: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def _condition(layout: Mapping[str, Any]) -> float:
+    """Condition number of a robot's scaled effectiveness."""
     plant = OwnPlant(layout)
     return float(np.linalg.cond(plant.effectiveness / plant.scales[:, None]))
 
 
 Maker = Callable[[np.random.Generator, str, float], dict[str, Any]]
+"""Makes an actuator of a layout file of a generator, a name and a scale of forces."""
 
 
 def _makers(kind: str, rng: np.random.Generator) -> list[Maker]:
@@ -160,11 +162,13 @@ def _makers(kind: str, rng: np.random.Generator) -> list[Maker]:
 
 
 def _position(rng: np.random.Generator) -> list[float]:
+    """A random position [m]."""
     place: list[float] = (rng.uniform(-1.0, 1.0, 3) * [0.3, 0.3, 0.15]).tolist()
     return place
 
 
 def _unit(rng: np.random.Generator) -> Array:
+    """A random direction (3,)."""
     drawn = rng.normal(size=3)
     return np.asarray(drawn / np.linalg.norm(drawn))
 
@@ -177,6 +181,7 @@ def _plane(rng: np.random.Generator) -> tuple[list[float], list[float]]:
 
 
 def _law(rng: np.random.Generator) -> dict[str, Any]:
+    """A random law of power over force."""
     exponent = float(rng.choice([1.5, rng.uniform(1.2, 2.5)]))
     forward = float(10.0 ** rng.uniform(-0.5, 0.5)) * 20.0 ** (1.5 - exponent)
     return {
@@ -187,6 +192,7 @@ def _law(rng: np.random.Generator) -> dict[str, Any]:
 
 
 def _thruster(rng: np.random.Generator, name: str, scale: float) -> dict[str, Any]:
+    """A random thruster."""
     high = float(scale * rng.uniform(4.0, 30.0))
     low = -high * float(rng.choice([0.0, 1.0, rng.uniform(0.2, 1.2)], p=[0.1, 0.1, 0.8]))
     spec: dict[str, Any] = {"name": name, "type": "thruster", "position_m": _position(rng)}
@@ -220,6 +226,7 @@ def with_rates(layout: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _azimuth(rng: np.random.Generator, name: str, scale: float) -> dict[str, Any]:
+    """A random pod."""
     axis, zero = _plane(rng)
     spec: dict[str, Any] = {
         "name": name,
@@ -238,6 +245,7 @@ def _azimuth(rng: np.random.Generator, name: str, scale: float) -> dict[str, Any
 
 
 def _rudder(rng: np.random.Generator, name: str, scale: float) -> dict[str, Any]:
+    """A random rudder."""
     around = rng.uniform(-math.pi, math.pi)
     zero = [1.0, 0.0, 0.0]
     shaft = [0.0, math.cos(around), math.sin(around)]
@@ -253,12 +261,14 @@ def _rudder(rng: np.random.Generator, name: str, scale: float) -> dict[str, Any]
 
 
 def _arc(rng: np.random.Generator, least: float, most: float) -> list[float]:
+    """A random arc [deg] of a width between two."""
     width = float(rng.uniform(least, most))
     start = float(rng.uniform(-180.0, 180.0 - width))
     return [start, start + width]
 
 
 def _fin_model(rng: np.random.Generator, uneven: float = 0.0) -> dict[str, Any]:
+    """A random model of a fin, with an unevenness where one is given."""
     kind = ("drag", "lighthill", "soft")[rng.integers(3)] if not uneven else "soft"
 
     def log(low: float, high: float) -> float:
@@ -279,12 +289,14 @@ def _fin_model(rng: np.random.Generator, uneven: float = 0.0) -> dict[str, Any]:
 
 
 def _fin(rng: np.random.Generator, name: str, scale: float) -> dict[str, Any]:
+    """A random fin with its shaft across the hull, two of five with an arc."""
     return _any_fin(
         rng, name, _fin_model(rng), _arc(rng, 30.0, 170.0) if rng.random() < 0.4 else None
     )
 
 
 def _shaft_fin(rng: np.random.Generator, name: str, scale: float) -> dict[str, Any]:
+    """A random fin with its shaft in any direction."""
     spec = _fin(rng, name, scale)
     del spec["mounting_angle_deg"]
     spec["shaft"], spec["zero"] = _plane(rng)
@@ -292,10 +304,12 @@ def _shaft_fin(rng: np.random.Generator, name: str, scale: float) -> dict[str, A
 
 
 def _uneven_fin(rng: np.random.Generator, name: str, scale: float) -> dict[str, Any]:
+    """A random fin whose force is not the same in all directions."""
     return _any_fin(rng, name, _fin_model(rng, float(rng.uniform(0.02, 0.2))), None)
 
 
 def _wide_fin(rng: np.random.Generator, name: str, scale: float) -> dict[str, Any]:
+    """A random fin with an arc beyond half a circle."""
     return _any_fin(rng, name, _fin_model(rng), _arc(rng, 190.0, 340.0))
 
 
@@ -318,6 +332,7 @@ def _restless_fin(rng: np.random.Generator, name: str, scale: float) -> dict[str
 def _any_fin(
     rng: np.random.Generator, name: str, model: dict[str, Any], arc: list[float] | None
 ) -> dict[str, Any]:
+    """A fin with a model, and in an arc [deg] or all round."""
     directions = [-math.pi, math.pi] if arc is None else np.radians(arc).tolist()
     limits = {
         "amplitude_rad": [0.05, float(rng.uniform(0.4, 0.8))],

@@ -18,7 +18,9 @@ from scipy.special import j1
 from finlab.arrays import Array
 
 DENSITY = 1000.0
-LIMITS = ("amplitude_rad", "frequency_hz", "zero_direction_rad")
+"""Density of water [kg/m3]."""
+LIMIT_KEYS = ("amplitude_rad", "frequency_hz", "zero_direction_rad")
+"""Keys of a fin's limits in a layout file, in the order of its command."""
 NOMINAL = ((0.05, 0.6), (0.1, 2.1), (-math.pi, math.pi))
 """Limits of a fin, where a file gives none."""
 SERVO = {"amplitude_rate_rad_s": 1.0, "frequency_rate_hz_s": 3.0, "direction_rate_rad_s": 5.0}
@@ -28,6 +30,7 @@ FIN_DEFAULTS: Mapping[str, Mapping[str, float]] = {
     "lighthill": {"length": 0.2, "width": 0.1},
     "soft": {"k": 3.6, "p": 1.0, "x0": 1.3, "q": 5.0, "e": 0.0, "phi_e": 0.0, "d": 0.0},
 }
+"""Kind of fin model -> constants that a layout file may leave out."""
 
 
 class OwnActuator:
@@ -56,6 +59,7 @@ class OwnActuator:
         """Wrench (6, 1 or 2) of 1 N along the own directions."""
 
     def _plane(self) -> tuple[Array, Array]:
+        """Directions (3,) of zero and of a quarter turn, in which the actuator pushes."""
         spec = self.spec
         if self.kind == "thruster":
             return np.array(spec["axis"], np.float64), np.zeros(3)
@@ -68,6 +72,7 @@ class OwnActuator:
         return zero, across
 
     def _column(self, direction: Array) -> Array:
+        """Wrench (6,) of a newton in a direction (3,)."""
         reaction = float(self.spec.get("torque_per_newton_m", 0.0))
         return np.concatenate(
             [direction, np.cross(self.position, direction) + reaction * direction]
@@ -109,6 +114,7 @@ class OwnActuator:
     # ---- fins
     # -----------------------------------------------------------------------------------------
     def _of(self, key: str) -> float:
+        """A constant of the fin's model."""
         return float(self.model.get(key, FIN_DEFAULTS[self.model["type"]][key]))
 
     def thrust(self, amplitude: ArrayLike, frequency: ArrayLike) -> Array:
@@ -392,6 +398,7 @@ COMMAND_KEYS = {
     "azimuth": ("angle", "force"),
     "rudder": ("deflection",),
 }
+"""Kind of actuator -> names of its command's numbers, in their order."""
 
 
 def edge_forces(actuator: OwnActuator, count: int) -> Array:

@@ -84,11 +84,13 @@ LEVEL = {
 
 
 def _sources(package: str) -> list[Path]:
+    """Files of Python in a package."""
     return sorted((ROOT / package).rglob("*.py"))
 
 
 @cache
 def _tree(path: Path) -> ast.Module:
+    """Syntax tree of a file."""
     return ast.parse(path.read_text(encoding="utf-8"))
 
 
@@ -121,10 +123,12 @@ def _room(module: str) -> str | None:
 
 
 def _wing(room: str) -> str:
+    """The wing of a room, or the core."""
     return "app" if room == "webapp" else LEVEL[room][0]
 
 
 def _module_of(path: Path, root: Path = ROOT) -> str:
+    """Dotted name of a module's file."""
     parts = path.relative_to(root).with_suffix("").parts
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 

@@ -13,6 +13,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 @pytest.fixture(scope="module")
 def graph() -> ImportGraph:
+    """The graph of imports of this tree."""
     return ImportGraph(ROOT)
 
 

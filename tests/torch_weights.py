@@ -6,4 +6,5 @@ from finlab.research.networks.trained import State
 
 
 def arrays_of(weights: dict[str, torch.Tensor]) -> State:
+    """Weights as arrays."""
     return {name: value.detach().numpy() for name, value in weights.items()}

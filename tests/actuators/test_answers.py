@@ -23,12 +23,15 @@ from finlab.physics.plant import Plant
 from tests.core.parts import dual_function
 from tests.t200 import t200_rows
 
-TABLE = PowerTable(t200_rows(16), "us")
+T200 = PowerTable(t200_rows(16), "us")
+"""A measured thruster at 16 V, whose input is a width of pulse [us]."""
 UP = (0.0, 0.0, 1.0)
 AHEAD = (1.0, 0.0, 0.0)
 
 
 def thruster(force: tuple[float, float], model: Any, **more: Any) -> Thruster:
+    """A thruster with limits of force [N] and a law, in a direction that no axis of the body
+    has."""
     return Thruster(
         f"t{force}{model.type}{more}"[:60], (0.1, 0.2, 0.3), (0.0, 0.6, 0.8), force, model, **more
     )
@@ -38,27 +41,32 @@ THRUSTERS = [
     thruster((-39.0, 51.0), PowerLaw(0.997, 1.449)),
     thruster((0.0, 5.0), PowerLaw(2.0, exponent=2.0)),
     thruster((-8.0, 0.0), PowerLaw(2.0, 3.0, 1.3)),
-    thruster((-39.0, 51.0), TABLE),
-    thruster((-2.0, 0.0), TABLE, torque_per_newton=0.02),
+    thruster((-39.0, 51.0), T200),
+    thruster((-2.0, 0.0), T200, torque_per_newton=0.02),
 ]
+"""Either way and one way only, by a law and by a table."""
 AZIMUTHS = [
     Azimuth("full", (0, 0, 0), UP, AHEAD, (0.0, 40.0), PowerLaw(1.0)),
-    Azimuth("arc", (0, 0.2, 0), AHEAD, UP, (0.0, 20.0), TABLE, arc=(-0.2, 1.1)),
+    Azimuth("arc", (0, 0.2, 0), AHEAD, UP, (0.0, 20.0), T200, arc=(-0.2, 1.1)),
     Azimuth("runs", (0.3, 0, 0), UP, AHEAD, (2.0, 20.0), PowerLaw(1.0), arc=(1.0, 1.5)),
 ]
+"""Any angle; an arc and a table; an arc and a least force that is above zero."""
 RUDDERS = [
     Rudder("wide", (-0.6, 0, 0), UP, AHEAD, 0.01, (-0.5, 0.5), aspect_ratio=2.21),
     Rudder(
         "one side", (-0.6, 0, 0), (0, 1, 0), AHEAD, 0.02, (0.0, 0.3), aspect_ratio=1.0, stall=0.6
     ),
 ]
+"""Deflections either way, and to one side only with a stall of its own."""
 
 
-def columns(actuators: Sequence[Any]) -> Array:
+def effectiveness_of(actuators: Sequence[Any]) -> Array:
+    """Effectiveness (m, 3, 6) of actuators, along their own axes."""
     return own_effectiveness(Layout("robot", tuple(actuators)))
 
 
-def prices_of(group: Group, top: float) -> Array:
+def random_multipliers(group: Group, top: float) -> Array:
+    """Multipliers (6, 40) of the wrench, with a standard deviation of `top` [W/N, W/(N m)]."""
     return np.random.default_rng(0).normal(0.0, top, (6, 40))
 
 
@@ -84,7 +92,7 @@ def check(
 ) -> None:
     """No command is worth more at random multipliers (6, N) than the answer, and its own command
     gives it."""
-    multipliers = prices_of(group, 5.0)
+    multipliers = random_multipliers(group, 5.0)
     m = len(group.responses)
     robot = prepared(group, wrench, low, high)
     force = np.array([answer(robot, price)[0] for price in multipliers.T])
@@ -103,14 +111,14 @@ def check(
 
 def test_thrusters_answer_with_what_is_worth_most() -> None:
     for part in THRUSTERS:
-        wrench = columns([part])
+        wrench = effectiveness_of([part])
         group = ThrusterGroup([part], wrench)
         check(group, ThrusterLaw([part]), wrench, np.array([part.lower]), np.array([part.upper]))
 
 
 def test_thrusters_of_one_model_answer_together() -> None:
     parts = [THRUSTERS[i] for i in (0, 1, 2)]
-    wrench = columns(parts)
+    wrench = effectiveness_of(parts)
     group = ThrusterGroup(parts, wrench)
     low, high = (np.array([getattr(part, end) for part in parts]) for end in ("lower", "upper"))
     check(group, ThrusterLaw(parts), wrench, low, high)
@@ -120,7 +128,7 @@ def test_thrusters_of_one_model_answer_together() -> None:
 
 def test_azimuths_answer_with_what_is_worth_most() -> None:
     for part in AZIMUTHS:
-        wrench = columns([part])
+        wrench = effectiveness_of([part])
         group = AzimuthGroup([part], wrench)
         check(group, AzimuthLaw([part]), wrench, np.array([part.lower]), np.array([part.upper]))
 
@@ -131,7 +139,7 @@ def test_azimuths_answer_with_what_is_worth_most() -> None:
 def test_rudders_answer_with_a_lift_that_their_deflections_give(
     flow: tuple[float, float, float],
 ) -> None:
-    wrench = columns(RUDDERS)
+    wrench = effectiveness_of(RUDDERS)
     frames = np.array([part.frame for part in RUDDERS])
     inflow = frames @ np.array(flow)
     group = RudderGroup(RUDDERS, wrench).at(inflow)
@@ -158,7 +166,7 @@ def test_rudders_answer_with_a_lift_that_their_deflections_give(
 def test_a_rudder_answers_a_price_with_the_lift_whose_drag_it_pays() -> None:
     part = RUDDERS[0]
     inflow = np.array([[0.0, 1.5, 0.1]])
-    wrench = columns([part])
+    wrench = effectiveness_of([part])
     law = RudderLaw([part])
     group = RudderGroup([part], wrench).at(inflow)
     robot = prepared(group, wrench, *(np.array([end]) for end in (part.lower, part.upper)))
@@ -177,7 +185,7 @@ def test_a_rudder_answers_a_price_with_the_lift_whose_drag_it_pays() -> None:
 def test_a_price_of_drag_counts_in_the_answer_of_a_rudder() -> None:
     part = RUDDERS[0]
     inflow = np.array([[0.0, 1.5, 0.1]])
-    wrench = columns([part])
+    wrench = effectiveness_of([part])
     law = RudderLaw([part])
     multipliers = np.array([2.0, 3.0, 0.0, 0.0, 0.0, 0.5])
     group = RudderGroup([part], wrench).at(inflow)
@@ -193,16 +201,16 @@ def test_a_price_of_drag_counts_in_the_answer_of_a_rudder() -> None:
 
 
 def test_a_rudder_at_rest_offers_nothing() -> None:
-    group = RudderGroup(RUDDERS, columns(RUDDERS))
+    group = RudderGroup(RUDDERS, effectiveness_of(RUDDERS))
     lines = [line for line in group.responses if isinstance(line, Line)]
     assert [(line.low, line.high) for line in lines] == [(0.0, 0.0)] * 2
     assert not group.beside_of(np.zeros((3, 2, 2))).any()
 
 
 def test_an_azimuth_keeps_its_angle_where_no_force_is_asked_for() -> None:
-    group = AzimuthGroup(AZIMUTHS, columns(AZIMUTHS))
+    group = AzimuthGroup(AZIMUTHS, effectiveness_of(AZIMUTHS))
     low, high = (np.array([getattr(part, end) for part in AZIMUTHS]) for end in ("lower", "upper"))
-    core = prepared(group, columns(AZIMUTHS), low, high).core
+    core = prepared(group, effectiveness_of(AZIMUTHS), low, high).core
     rest = np.zeros((1, 3, 2))
     before = np.array([[3.0, 5.0, 0.0], [0.9, 0.0, 0.0], [1.2, 2.0, 0.0]])
     for previous, angles in (

@@ -20,32 +20,39 @@ from finlab.physics.plant import Plant
 from tests.t200 import t200_rows
 
 LAW = PowerLaw(0.997, 1.449)
-TABLE = PowerTable(t200_rows(16), "us")
-REMUS = {"area": 6.65e-3, "deflection": (-0.24, 0.24)}
+"""Power of a T200 thruster at 16 V, as a law: P = 0.997 F^1.449."""
+T200 = PowerTable(t200_rows(16), "us")
+"""The same thruster as its maker measured it."""
+REMUS_RUDDER = {"area": 6.65e-3, "deflection": (-0.24, 0.24)}
+"""Area [m2] and deflections [rad] of a rudder of the REMUS, as Prestero (2001) gives them."""
 
 
 def thruster(name: str = "t", model: Any = LAW, **changes: Any) -> Thruster:
+    """A thruster with some of its fields changed."""
     told = {"position": (0.1, 0.2, 0.3), "axis": (0.0, 0.6, 0.8), "force": (-39.0, 51.0), **changes}
     return Thruster(name=name, model=model, **told)
 
 
 def azimuth(name: str = "a", model: Any = LAW, **changes: Any) -> Azimuth:
+    """A pod with some of its fields changed."""
     told = {"turn_axis": (0.0, 0.0, 1.0), "zero": (1.0, 0.0, 0.0), "force": (0.0, 40.0), **changes}
     return Azimuth(name=name, position=(-0.5, 0.1, 0.0), model=model, **told)
 
 
 def rudder(name: str = "r", **changes: Any) -> Rudder:
+    """A rudder of the REMUS with some of its fields changed."""
     told = {
         "shaft": (0.0, 0.0, 1.0),
         "zero": (1.0, 0.0, 0.0),
         "aspect_ratio": 2.21,
-        **REMUS,
+        **REMUS_RUDDER,
         **changes,
     }
     return Rudder(name=name, position=(-0.638, 0.0, 0.0), **told)
 
 
 def random_commands(low: Array, high: Array) -> Array:
+    """Commands (50, ...) between limits."""
     rng = np.random.default_rng(3)
     return low + rng.uniform(size=(50, *low.shape)) * (high - low)
 
@@ -56,12 +63,12 @@ def random_commands(low: Array, high: Array) -> Array:
         (ThrusterLaw, [thruster(), thruster(force=(0.0, 5.0))]),
         (
             ThrusterLaw,
-            [thruster(model=TABLE), thruster(model=PowerTable(t200_rows(12)), force=(-20.0, 30.0))],
+            [thruster(model=T200), thruster(model=PowerTable(t200_rows(12)), force=(-20.0, 30.0))],
         ),
         (AzimuthLaw, [azimuth(), azimuth(force=(3.0, 20.0))]),
-        (AzimuthLaw, [azimuth(model=TABLE)] * 2),
+        (AzimuthLaw, [azimuth(model=T200)] * 2),
         (AzimuthLaw, [azimuth(force=(-30.0, 40.0), dead_band=15.0), azimuth(dead_band=8.0)]),
-        (ThrusterLaw, [thruster(dead_band=20.0), thruster(model=TABLE, dead_band=6.0)]),
+        (ThrusterLaw, [thruster(dead_band=20.0), thruster(model=T200, dead_band=6.0)]),
         (RudderLaw, [rudder(deflection=(-1.2, 1.2)), rudder(drag=0.1, stall=0.3)]),
     ],
 )
@@ -131,7 +138,7 @@ def test_power_laws_of_the_t200_meet_its_tables(
 
 
 def test_a_table_answers_a_price_with_the_force_whose_marginal_cost_it_is() -> None:
-    curve = TableCurves(TABLE).sides[0].curve
+    curve = TableCurves(T200).sides[0].curve
     price = np.linspace(0.0, 13.0, 300)
     size = curve.response(price)
     power, marginal_cost = curve.power_and_marginal_cost(size)
@@ -216,12 +223,13 @@ def test_a_foil_stalls_as_its_source_says() -> None:
 
 
 def hybrid() -> Layout:
+    """A robot that has every kind of actuator."""
     parts = (
         thruster("up", torque_per_newton=0.02),
         rudder(),
         Fin("fin", (0.2, 0.1, 0.0), 0.5),
         azimuth(torque_per_newton=-0.01),
-        thruster("table", model=TABLE, axis=(1.0, 0.0, 0.0)),
+        thruster("table", model=T200, axis=(1.0, 0.0, 0.0)),
     )
     return Layout("hybrid", parts)
 

@@ -47,6 +47,7 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 
 @pytest.fixture(scope="module")
 def boat(home: Path) -> Layout:
+    """Two water jets astern, for surge and yaw, of the page's kind; `home` is its folder."""
     jets = [(f"jet_{side}", (-0.6, y, 0.0)) for side, y in (("left", 0.3), ("right", -0.3))]
     parts = tuple(KINDS["water_jet"](n, p, (0, 0, 1), (1, 0, 0)) for n, p in jets)  # type: ignore[call-arg]
     return Layout("jetboat", parts, axes=("Fx", "Tz"))

@@ -18,8 +18,10 @@ from finlab.physics import Plant
 from tests.allocation.quick import OF_FINS, quick_allocator
 from tests.any_robot import AnyRobot
 
-SURGE = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
-FAR = [40.0, 5.0, -30.0, 1.0, 2.0, 3.0]
+WRENCH = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
+"""A wrench within reach of robot A: surge, heave and yaw [N, N m]."""
+WRENCH_OUT_OF_REACH = [40.0, 5.0, -30.0, 1.0, 2.0, 3.0]
+"""A wrench that no robot here can give [N, N m]."""
 
 pytestmark = pytest.mark.skipif(
     not {"default", "paper"} <= set(shipped_checkpoints()),
@@ -27,12 +29,13 @@ pytestmark = pytest.mark.skipif(
 )
 
 
-def round_trips(result: Allocation) -> list[Allocation]:
+def copies(result: Allocation) -> list[Allocation]:
+    """An answer after each way of copying it."""
     return [pickle.loads(pickle.dumps(result)), copy.copy(result), copy.deepcopy(result)]
 
 
 def test_every_field_counts_but_the_time() -> None:
-    result = AnyRobot("mdn").allocate(load_layout("A"), SURGE)
+    result = AnyRobot("mdn").allocate(load_layout("A"), WRENCH)
     assert replace(result, solve_ms=1e3) == result
     assert result.candidates is not None
     for changed in (
@@ -75,11 +78,11 @@ def test_nan_equals_nan_and_kinds_differ() -> None:
 def test_an_answer_cannot_be_written_to_nor_what_comes_after_it() -> None:
     layout = load_layout("A")
     search = AnyRobot("mdn")
-    first, second = (search.allocate(layout, SURGE) for _ in range(2))
+    first, second = (search.allocate(layout, WRENCH) for _ in range(2))
     assert first.candidates is not None and first.candidates.command.base is not first.command
     with pytest.raises(ValueError, match="read-only"):
         first.command[:] = 0.0
-    assert search.allocate(layout, SURGE) == second
+    assert search.allocate(layout, WRENCH) == second
     assert first.candidates == second.candidates
 
 
@@ -87,16 +90,16 @@ def test_an_answer_cannot_be_written_to_nor_what_comes_after_it() -> None:
 def test_the_short_form_is_short(n_fins: int, search: AnyRobot) -> None:
     fins = tuple(Fin(f"{'long' * 14}_{i}", (0.1, 0.01 * i, 0.0), 0.3 * i) for i in range(n_fins))
     layout = Layout("the longest name of a layout that " + "x" * 30, fins)
-    result = search.allocate(layout, SURGE, lost=[fin.name for fin in fins[: n_fins // 2]])
+    result = search.allocate(layout, WRENCH, lost=[fin.name for fin in fins[: n_fins // 2]])
     assert len(repr(result)) <= 400 and "err_norm=" in repr(result)
-    batch = search.allocate_batch(layout, [SURGE] * 5)
+    batch = search.allocate_batch(layout, [WRENCH] * 5)
     assert len(repr(batch)) <= 400 and "5 targets" in repr(batch)
     assert "0 targets" in repr(search.allocate_batch(layout, np.empty((0, 6))))
 
 
 def test_another_command_is_judged_anew(search: AnyRobot) -> None:
     layout = load_layout("A")
-    result = search.allocate(layout, SURGE, lost=["front_left"])
+    result = search.allocate(layout, WRENCH, lost=["front_left"])
     least = np.where(np.isnan(result.command), np.nan, layout.lower)
     other = result.with_command(least)
     np.testing.assert_allclose(other.wrench, Plant(layout).wrench(least), atol=1e-12)
@@ -113,13 +116,13 @@ def test_a_method_that_does_not_know_the_fins_blames_no_limit() -> None:
     strange = replace(
         layout, actuators=tuple(replace(f, model=FinModelSpec("lighthill")) for f in layout.fins)
     )
-    result = quick_allocator("paper").allocate(strange, SURGE)
+    result = quick_allocator("paper").allocate(strange, WRENCH)
     assert not result.reachable and result.binding == () and result.unknown_fins == layout.names
     assert "not reached" not in str(
         result
     ) and "the method does not know these fins: front_right" in str(result)
     for method in ("dual", "sqp"):
-        known = Allocator(strange, method).allocate(SURGE)
+        known = Allocator(strange, method).allocate(WRENCH)
         assert known.reachable and known.unknown_fins == ()
 
 
@@ -134,7 +137,9 @@ def test_without_its_force_table_no_method_answers(method: str, tmp_path: Path) 
         lambda *asked, **how: allocator.allocate_batch(*asked, **how),
     ):
         with pytest.raises(DataError, match=r"gone\.csv: no such file, expected a CSV table"):
-            answer(tables, SURGE if answer == allocator.allocate else [SURGE], lost=["front_left"])
+            answer(
+                tables, WRENCH if answer == allocator.allocate else [WRENCH], lost=["front_left"]
+            )
 
 
 def test_an_axis_that_nothing_drives_is_told_where_it_is_asked_for() -> None:
@@ -151,6 +156,7 @@ POLICIES = (
     Policy(axis_weights=(1.0, 1.0, 10.0, 1.0, 1.0, 0.1)),
     Policy("priority", order=(("Tz",), ("Fx", "Fz"))),
 )
+"""A policy of each kind, and weights of axes."""
 
 
 def wrenches(n: int = 6) -> np.ndarray:

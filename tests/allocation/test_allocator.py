@@ -27,7 +27,9 @@ ROBOT = Layout(
         Fin("stern", (-0.2, 0.0, 0.05), -1.0),
     ),
 )
+"""A robot of few fins, for which the method `Drawn` answers."""
 SURGE = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+"""A wrench straight ahead [N, N m]."""
 
 
 class Drawn(LeastErrorMethod):
@@ -49,6 +51,7 @@ class Drawn(LeastErrorMethod):
 
 @pytest.fixture
 def method() -> AnyRobot:
+    """The method `Drawn`, which has not been asked yet."""
     Drawn.asked.clear()
     return AnyRobot(Drawn)
 

@@ -19,6 +19,7 @@ from tests.mixed_robots import layout_of
 from tests.own_plant import OwnPlant
 
 POLICIES = ("closest", "direction", "priority")
+"""The kinds of policy."""
 
 
 @pytest.mark.parametrize("policy", POLICIES)
@@ -62,6 +63,7 @@ def test_a_free_axis_takes_what_the_cheapest_answer_gives() -> None:
 
 
 def _three_thrusters() -> list[dict[str, object]]:
+    """Three thrusters side by side, each with another law, as a layout file says them."""
     laws = [0.5, 1.0, 2.0]
     return [
         {"name": f"m{k}", "type": "thruster", "position_m": [0.0, y, 0.0], "axis": [1.0, 0.0, 0.0]}

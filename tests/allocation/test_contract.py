@@ -30,8 +30,10 @@ from tests.own_plant import OwnPlant
 
 SEED = 58
 """Of the robots; another one than that of the tests of the default method."""
-DAMAGE = ("whole", "lost", "weak", "torn", "stuck", "running")
+DAMAGE_KINDS = ("whole", "lost", "weak", "torn", "stuck", "running")
+"""What may be wrong with an actuator, as the keywords of `Damage`, and "whole"."""
 POLICIES = ("closest", "direction", "priority")
+"""The kinds of policy."""
 REACHES = (0.0, 1.0, 30.0)
 """How large wrenches are, in that of a command within limits: at 1 it can be delivered."""
 EXTREMES = (1e-6, 1e4)
@@ -97,7 +99,7 @@ def cases_of(method: str) -> list[Any]:
     always = list[Any]()
     others = list[Any]()
     for kind in KINDS:
-        for word in DAMAGE:
+        for word in DAMAGE_KINDS:
             if not fits(method, kind) or damaged(robot_of(kind).layout, word) is None:
                 continue
             case = pytest.param(method, kind, word, id=f"{method}-{kind.replace(' ', '_')}-{word}")
@@ -107,6 +109,7 @@ def cases_of(method: str) -> list[Any]:
 
 
 CASES = [case for method in METHODS for case in cases_of(method)]
+"""Method, kind of robot and kind of damage of every case."""
 
 
 @dataclass(frozen=True)

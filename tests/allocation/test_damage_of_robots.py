@@ -17,10 +17,12 @@ from tests.any_robot import AnyRobot
 from tests.terminal import refused
 
 TARGET = [1.0, 0.3, 1.0, 0.0, 0.05, 0.1]
+"""A wrench within reach of five fins that are whole [N, N m]."""
 
 
 @pytest.fixture(scope="module")
 def penta() -> Layout:
+    """Five fins."""
     return load_layout(shipped_layouts()["penta"])
 
 

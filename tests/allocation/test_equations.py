@@ -10,6 +10,7 @@ CITED = re.compile(r"\bEqs?\. (?P<first>\d+)(?: (?P<word>to|and) (?P<last>\d+))?
 
 
 def numbers_of_page() -> list[int]:
+    """Numbers of the equations of docs/theory/method.md, in the order in which they stand there."""
     page = (ROOT / "docs" / "theory" / "method.md").read_text()
     return [int(number) for number in re.findall(r"\\tag\{(\d+)\}", page)]
 

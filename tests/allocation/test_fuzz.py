@@ -17,11 +17,15 @@ from tests.exhaustive import sampled
 from tests.hostile_robots import hostile_robot
 
 N_CASES = 400
+"""How many random robots there are; each day a share of them is asked."""
 METHODS = ("dual", "dual", "mdn", "analytic", "qp", "sqp", "paper")
+"""Methods to draw from; the default one twice as often."""
 
 
 @cache
-def method(name: str) -> Allocator:
+def quick_method(name: str) -> Allocator:
+    """A method by its name, or `sqp-power` with its objective, with settings that answer
+    quickly."""
     kind, _, objective = name.partition("-")
     options: dict[str, Any] = {"objective": objective} if objective else {}
     if kind == "paper":
@@ -31,25 +35,28 @@ def method(name: str) -> Allocator:
     return AnyRobot(kind, **options)
 
 
-def pick(rng: np.random.Generator, values: Any) -> Any:
+def choose(rng: np.random.Generator, values: Any) -> Any:
+    """One of some values."""
     return values[int(rng.integers(len(values)))]
 
 
-def policy(rng: np.random.Generator) -> Policy:
-    kind = pick(rng, ("closest", "closest", "direction", "priority"))
-    weights = pick(
+def random_policy(rng: np.random.Generator) -> Policy:
+    """A policy with weights that differ by many orders of magnitude, or of another kind."""
+    kind = choose(rng, ("closest", "closest", "direction", "priority"))
+    weights = choose(
         rng, ((1.0,) * 6, (1.0, 0.0, 1e-6, 1.0, 1e6, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 1.0))
     )
     return Policy(kind, axis_weights=weights if kind == "closest" else (1.0,) * 6)
 
 
-def damage(rng: np.random.Generator, robot: Layout) -> dict[str, Any]:
+def random_damage(rng: np.random.Generator, robot: Layout) -> dict[str, Any]:
+    """Arguments `lost` and `damage` of a question, each of them in three of ten."""
     names = [str(name) for name in rng.permutation(robot.names)]
     asked: dict[str, Any] = {}
     if len(names) > 1 and rng.random() < 0.3:
         asked["lost"] = names[: int(rng.integers(1, len(names)))]
     if rng.random() < 0.3:
-        kind = pick(rng, ("weak", "stuck", "running", "torn"))
+        kind = choose(rng, ("weak", "stuck", "running", "torn"))
         value = {"weak": 1e-3, "stuck": 0.7, "running": (0.3, 1.0, 0.5), "torn": 1e-3}[kind]
         asked["damage"] = Damage(**{kind: {names[-1]: value}})
     return asked
@@ -58,7 +65,7 @@ def damage(rng: np.random.Generator, robot: Layout) -> dict[str, Any]:
 def question(rng: np.random.Generator, robot: Layout) -> dict[str, Any]:
     """What is asked of a robot, other than the wrench."""
     plant = plant_of(robot)
-    asked = damage(rng, robot)
+    asked = random_damage(rng, robot)
     way = rng.integers(6)
     if way == 0:
         asked["previous"] = plant.sample(rng, (1,))[0]
@@ -74,10 +81,10 @@ def question(rng: np.random.Generator, robot: Layout) -> dict[str, Any]:
 def ask(seed: int) -> None:
     """Ask a drawn robot, and look at what it answers."""
     rng = np.random.default_rng([2026, seed])
-    name = pick(rng, METHODS)
+    name = choose(rng, METHODS)
     robot = hostile_robot(seed, 2026)
-    allocator = method(name)
-    how = policy(rng)
+    allocator = quick_method(name)
+    how = random_policy(rng)
     if name not in ("dual", "mdn") and not how.is_plain:
         how = Policy()
     plant = plant_of(robot)
@@ -85,7 +92,9 @@ def ask(seed: int) -> None:
     reached = plant.wrench(plant.sample(rng, (1,)))[0]
     anywhere = rng.normal(size=6) * 10.0 ** rng.uniform(-12, 6)
     target = np.clip(
-        pick(rng, (reached, 0.5 * reached, 2.0 * reached, anywhere, np.zeros(6), 1e-12 * reached)),
+        choose(
+            rng, (reached, 0.5 * reached, 2.0 * reached, anywhere, np.zeros(6), 1e-12 * reached)
+        ),
         -1e6,
         1e6,
     )

@@ -24,7 +24,9 @@ ROOMS = (
 )
 """Where the glossary's names are looked for."""
 QUOTED = re.compile(r"`([^`]+)`")
+"""Code in a cell of a table."""
 NAME_COLUMN = "name in code"
+"""Head of the column that is checked."""
 NO_CODE_IN_C = re.compile(r'/\*.*?\*/|//[^\n]*|"(?:\\.|[^"\\])*"', re.DOTALL)
 """Comments and strings of C."""
 FORBIDDEN = {

@@ -7,7 +7,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 ROW = re.compile(r"^\| `(\w+)` \| ([^|]+) \| `([^`|]+)` \| ([^|]+) \|$", re.MULTILINE)
 """A row of the page's table: name, value, file, reason."""
-PYTHON = [
+PYTHON_FILES = [
     ROOT / "finlab/arrays.py",
     ROOT / "finlab/allocation/levenberg_marquardt.py",
     *sorted((ROOT / "finlab/allocation/dual").glob("*.py")),
@@ -17,9 +17,11 @@ PYTHON = [
     ),
     *(ROOT / "finlab/actuators" / f"{name}.py" for name in ("rudder", "thrust_power", "kinds")),
 ]
+"""Files of the default method in Python whose constants the page has to have."""
 
 
-CORE = sorted((ROOT / "finlab/core").rglob("*.[ch]"))
+C_FILES = sorted((ROOT / "finlab/core").rglob("*.[ch]"))
+"""Files of the core whose constants the page has to have."""
 DEFINED = re.compile(r"^#define (\w+) (?:R\()?([\d.]+(?:e-?\d+)?)\b", re.MULTILINE)
 """A constant in C: name, value."""
 SINGLE = re.compile(r"^#ifdef FL_SINGLE\n.*?^#else\n", re.MULTILINE | re.DOTALL)
@@ -59,10 +61,10 @@ def test_the_page_has_every_number_with_a_reason() -> None:
     rows = ROW.findall((ROOT / "docs" / "theory" / "numbers.md").read_text())
     on_page = {(file, name): ast.literal_eval(value) for name, value, file, _ in rows}
     in_code: dict[tuple[str, str], object] = {}
-    for path in PYTHON:
+    for path in PYTHON_FILES:
         for name, value in numbers(path).items():
             in_code[str(path.relative_to(ROOT)), name] = value
-    for path in CORE:
+    for path in C_FILES:
         for name, text in DEFINED.findall(SINGLE.sub("", path.read_text())):
             same = [value for (_, other), value in in_code.items() if other == name]
             if same:  # said in both languages

@@ -21,7 +21,8 @@ from tests.any_robot import AnyRobot, normalized_error
 
 FAR = (30.0, 5.0, 20.0, 1.0, 1.0, 1.0)
 """A wrench that robots of up to six such fins do not deliver."""
-HEAVY = (0.0, 0.0, 20.0, 3.0, 0.0, 0.0)
+HEAVE_AND_ROLL = (0.0, 0.0, 20.0, 3.0, 0.0, 0.0)
+"""A wrench out of reach of fins, in heave and roll alone [N, N m]."""
 SHALLOW = (30.0, 0.0, 6.0, 0.0, 0.0, 0.0)
 """Its heave alone can be delivered, the whole cannot."""
 PATIENT = ("trf", "slsqp", "ipopt", "sqp")
@@ -29,6 +30,7 @@ PATIENT = ("trf", "slsqp", "ipopt", "sqp")
 
 
 def shipped(name: str) -> Layout:
+    """A shipped robot by its name."""
     return load_layout(shipped_layouts()[name])
 
 
@@ -78,7 +80,8 @@ def cosine(result: Allocation) -> float:
 
 
 @pytest.mark.parametrize(
-    ("name", "target"), [("A", FAR), ("pair", FAR), ("restricted", HEAVY), ("restricted", FAR)]
+    ("name", "target"),
+    [("A", FAR), ("pair", FAR), ("restricted", HEAVE_AND_ROLL), ("restricted", FAR)],
 )
 def test_closest_is_no_worse_than_least_squares_on_the_plant(
     name: str, target: tuple[float, ...], search: AnyRobot
@@ -127,7 +130,9 @@ def test_equal_weights_change_nothing(search: AnyRobot) -> None:
     np.testing.assert_array_equal(weighted.command, plain.command)
 
 
-@pytest.mark.parametrize(("name", "target"), [("A", HEAVY), ("pair", SHALLOW), ("penta", FAR)])
+@pytest.mark.parametrize(
+    ("name", "target"), [("A", HEAVE_AND_ROLL), ("pair", SHALLOW), ("penta", FAR)]
+)
 def test_direction_is_kept_at_the_largest_scale(
     name: str, target: tuple[float, ...], search: AnyRobot
 ) -> None:

@@ -14,6 +14,7 @@ import finlab
 
 ROOT = Path(__file__).resolve().parents[2]
 ROW = re.compile(r"^\| `(finlab/[\w/]+\.(?:py|c))` \| `([\w.]+)` \|", re.MULTILINE)
+"""A row of the tables: a file and its function."""
 Step = tuple[str, str]
 """A file and a function."""
 

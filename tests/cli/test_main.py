@@ -24,7 +24,9 @@ from tests.fit.cell import columns_of, commands, measured, soft, write
 from tests.terminal import refused
 
 FINLAB = [sys.executable, "-m", "finlab"]
+"""The command line, as a process of its own."""
 WRENCH = ["--wrench", "1", "0", "0.5", "0", "0", "0.1"]
+"""Options of a wrench within reach of robot A."""
 
 
 def verbs(app: SubcommandApp, *words: str) -> Iterator[str]:
@@ -75,6 +77,7 @@ def still(app: SubcommandApp, seen: list[str]) -> None:
 ALL_EXAMPLES = [
     line for verb in verbs(_command_line(["eval", "--help"])) for line in examples(verb.split())
 ]
+"""Lines of the examples that the help pages show."""
 
 
 @pytest.mark.parametrize("line", list(dict.fromkeys(ALL_EXAMPLES)))
@@ -143,6 +146,7 @@ def test_interrupt_exits_with_130(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 RUNTIME = [sys.executable, "-m", "finlab.deploy.command"]
+"""The command of the robot, `finlab-runtime`, as a process of its own."""
 
 
 @pytest.mark.parametrize(

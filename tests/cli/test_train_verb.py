@@ -28,6 +28,7 @@ sys.exit(main(sys.argv[1:]))
 """
 """A command line on a machine where PyTorch is not installed."""
 SMOKE = ["--preset", "smoke", "--steps", "3"]
+"""Options of a training of three steps."""
 
 
 def test_trains_the_network_over_forces_and_allocates_with_it(

@@ -24,13 +24,16 @@ from finlab.layout.load import parse_layout
 from finlab.physics.plant import Plant
 from tests.mixed_robots import KINDS, random_flow, random_robot, with_dead_bands, with_rates
 
-CORE = Path(core.__path__[0])
+CORE_FOLDER = Path(core.__path__[0])
+"""Where the headers stand."""
 REAL = ctypes.c_double
+"""`fl_real` and `fl_wide` of the library in this package."""
 MOST = 64
 """Most actuators of a robot."""
 FIN = constant("FL_FIN")
+"""Form of a fin's command, FL_FIN."""
 POD = constant("FL_POD")
-"""Forms of commands, FL_FIN and FL_POD."""
+"""Form of a pod's command, FL_POD."""
 POINTS = 8
 """Most points of a mixture, FL_POINTS."""
 _LENGTHS = {"FL_MOST": MOST, "FL_POINTS": POINTS}
@@ -68,7 +71,7 @@ def _fields(declarations: str) -> list[tuple[str, Any]]:
 
 def _members(header: str, name: str) -> list[tuple[str, Any]]:
     """Fields of a struct that a header defines, such as `typedef struct { ... } fl_set;`."""
-    text = (CORE / header).read_text(encoding="utf-8")
+    text = (CORE_FOLDER / header).read_text(encoding="utf-8")
     return _fields(text[: text.index(f"}} {name};")].rpartition("typedef struct {")[2])
 
 
@@ -119,7 +122,7 @@ _KINDS |= {
 
 def _work_until(last: str) -> list[tuple[str, Any]]:
     """Fields of the work area, `fl_work`, from the first one to a last one."""
-    text = (CORE / "fl_work.h").read_text(encoding="utf-8")
+    text = (CORE_FOLDER / "fl_work.h").read_text(encoding="utf-8")
     fields = text.partition("struct fl_work {")[2]
     end = re.search(rf"\b{last}\b[^;]*;", fields)
     assert end is not None
@@ -368,6 +371,7 @@ def pods_either_way(seed: int) -> Layout:
 
 
 EITHER_WAY = "pods either way"
+"""Name of the robots whose pods push either way."""
 ROBOTS = (*KINDS, EITHER_WAY)
 """Names of robots: kinds, and pods that push either way."""
 

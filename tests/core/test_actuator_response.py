@@ -10,7 +10,8 @@ import pytest
 from finlab.arrays import Array
 from tests.core.parts import POD, ROBOTS, LineResponse, Robot, Set, Tangent, at, functions, robot_of
 
-ANGLES = 361
+N_ANGLES = 361
+"""How many angles of a sector are scanned."""
 SIZES = 121
 """Denser towards both ends, where prices rise most."""
 BLEND = 1e-5
@@ -36,12 +37,12 @@ def forces_of(robot: Robot, i: int, limits: Set) -> tuple[Array, Array]:
         angle = (
             limits.sector_center
             + turned
-            + limits.sector_half_angle * np.linspace(-1.0, 1.0, ANGLES)
+            + limits.sector_half_angle * np.linspace(-1.0, 1.0, N_ANGLES)
         )
         radius = np.array([robot.radius(i, one) for one in angle])
         direction = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
         force.append((size[:, None, None] * direction).reshape(-1, 2))
-        power.append(np.repeat(cost, ANGLES))
+        power.append(np.repeat(cost, N_ANGLES))
     return np.concatenate(force), np.concatenate(power)
 
 
@@ -256,7 +257,7 @@ def turned_worth(
     for least, most, sign, way in ways:
         size = np.linspace(least, most, 121)
         cost = np.array([robot.power(i, sign * one) for one in size])
-        for angle in np.linspace(low, high, ANGLES):
+        for angle in np.linspace(low, high, N_ANGLES):
             along = way * (price[0] * math.cos(angle) + price[1] * math.sin(angle))
             found.append(
                 float((along * size - cost).max())

@@ -11,6 +11,7 @@ from finlab.arrays import Array
 from tests.core.parts import FIN, POD, ROBOTS, Robot, Set, robot_of
 
 PERIOD_S = 0.1
+"""Length of a tick [s]."""
 LEAST_POWER = 1e-3
 """Share of full power that counts as mean power at least."""
 

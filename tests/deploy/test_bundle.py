@@ -34,6 +34,7 @@ from finlab.layout import Layout
 from tests.any_robot import AnyRobot
 
 WRENCH = [1, 0, 0.5, 0, 0, 0.1]
+"""A wrench within reach of robot A: surge, heave and yaw [N, N m]."""
 
 
 @pytest.fixture(scope="module")
@@ -246,6 +247,7 @@ def test_a_force_table_outside_the_bundle_is_refused(
 
 
 def archive_of(path: Path, **files: bytes) -> Path:
+    """Write files by their names into a zip archive."""
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in files.items():
             archive.writestr(name, content)

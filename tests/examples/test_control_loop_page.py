@@ -11,6 +11,7 @@ import finlab
 from finlab.allocation import Allocator
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "howto" / "control-loop.md"
+"""The page whose blocks are run."""
 
 
 def test_the_page_runs_and_its_thousand_ticks_stay_within_the_drives(

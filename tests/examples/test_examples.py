@@ -18,9 +18,11 @@ from nbformat.v4 import new_code_cell
 from tests.exhaustive import sampled
 
 EXAMPLES = sorted((Path(__file__).resolve().parents[2] / "examples").glob("[0-9]*.py"))
+"""Files of the examples, by their numbers."""
 NOTEBOOKS = [path for path in EXAMPLES if "# %%" in path.read_text()]
 """`make docs` runs all of them."""
 stem = attrgetter("stem")
+"""Name of a test's case: that of the file without its ending."""
 PATIENCE_S = 20.0
 """What a notebook may take."""
 

@@ -7,8 +7,11 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 BLOCKS = re.findall(r"```(\w*)\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
+"""Blocks of code of the README: language and text."""
 NUMBER = re.compile(r"-?\d+\.?\d*(?:e-?\d+)?")
+"""A number in printed text, which need not be the same."""
 PAGES = [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("checkpoints/**/*.md")]
+"""All pages of the tree."""
 
 
 def test_python_gives_output_of_the_printed_form(

@@ -12,6 +12,7 @@ from tests.mixed_robots import T200, T200_FORCE, layout_of, load
 from tests.own_plant import OwnPlant
 
 PATH = Path(__file__).resolve().parents[2] / "examples" / "12_three_actuators.py"
+"""The example under test."""
 ROBOT = layout_of(
     "three",
     [
@@ -38,6 +39,7 @@ ROBOT = layout_of(
         | {"zero": [1.0, 0.0, 0.0], "force_n": [0.0, T200_FORCE[1]], "model": T200},
     ],
 )
+"""The three actuators of the example, as a layout file says them."""
 
 
 @pytest.mark.parametrize("seed", range(10))

@@ -15,11 +15,18 @@ from finlab.exchange.motor_factors import FRAMES, factors_of
 from finlab.layout import Layout, Thruster, own_effectiveness, save_layout
 from tests.mixed_robots import load, random_robot
 
-D = np.sqrt(0.5)
-DIRECTIONS = [(-D, -D, 0), (-D, D, 0), (D, -D, 0), (D, D, 0), *[(0, 0, -1)] * 4]
+DIAGONAL = np.sqrt(0.5)
+"""Part of a unit vector along each of two axes, between which it lies."""
+DIRECTIONS = [
+    (-DIAGONAL, -DIAGONAL, 0),
+    (-DIAGONAL, DIAGONAL, 0),
+    (DIAGONAL, -DIAGONAL, 0),
+    (DIAGONAL, DIAGONAL, 0),
+    *[(0, 0, -1)] * 4,
+]
 """Force of each thruster of a BlueROV2 Heavy for a positive output of ArduSub, x forward, y left, z
 up."""
-SCRIPT = """#!/bin/sh
+AIRFRAME_SCRIPT = """#!/bin/sh
 # @name Some robot, with motors in x forward, y right, z down
 . ${R}etc/init.d/rc.uuv_defaults
 param set-default CA_AIRFRAME 7
@@ -37,9 +44,11 @@ param set CA_ROTOR1_AZ 1.0
 param set CA_ROTOR1_PY -.5
 param set-default CA_ROTOR2_KM -0.02
 """
+"""A start script of PX4, with parameters and with lines that are none."""
 
 
 def thrusters(number: int) -> Layout:
+    """A random robot of thrusters."""
     return load(random_robot("thrusters", number, 7))
 
 
@@ -60,18 +69,18 @@ def wrenches(layout: Layout) -> Array:
 
 def test_px4_rotors_push_and_turn_as_its_formula_says(tmp_path: Path) -> None:
     path = tmp_path / "60999_some_robot"
-    path.write_text(SCRIPT)
+    path.write_text(AIRFRAME_SCRIPT)
     layout = read_any(str(path), Exchange())
     first, second, third = layout.actuators
     assert isinstance(third, Thruster)
     np.testing.assert_allclose(
-        (first.position, first.frame[0]), [(0.5, -0.3, -0.2), (D, D, 0)], atol=1e-15
+        (first.position, first.frame[0]), [(0.5, -0.3, -0.2), (DIAGONAL, DIAGONAL, 0)], atol=1e-15
     )
     np.testing.assert_allclose([part.lower[0] for part in layout.actuators], [-40.0, -6.5, 0.0])
     np.testing.assert_allclose([part.upper[0] for part in layout.actuators], [40.0, 6.5, 6.5])
     # CT (p x a - KM a) in x forward, y right, z down; the usual axis is -z, the usual KM 0.05.
     for part, place, axis, km in (
-        (first, (0.5, 0.3, 0.2), (D, -D, 0.0), 0.0),
+        (first, (0.5, 0.3, 0.2), (DIAGONAL, -DIAGONAL, 0.0), 0.0),
         (second, (0.0, -0.5, 0.0), (0.0, 0.0, 1.0), 0.05),
         (third, (0.0, 0.0, 0.0), (0.0, 0.0, -1.0), -0.02),
     ):

@@ -41,9 +41,12 @@ from webapp.session.files import read_layout, unpacked
 
 ROOT = Path(__file__).parents[2]
 PAIR = load_layout("pair")
-ODD = [b"\xff", b"\0", b"9" * 30, b"\n- ", b"&a *a", b"", b"\n", b" ", b"\r"]
-ODD += b"1e999 NaN -1 0 1e-300 1e300 1e6 1.5 65536 [ { \" ' null , - # <".split()
+"""The robot of the logs: two fins."""
+INSERTED_BYTES = [b"\xff", b"\0", b"9" * 30, b"\n- ", b"&a *a", b"", b"\n", b" ", b"\r"]
+"""What is put into a file, or in place of a part of it."""
+INSERTED_BYTES += b"1e999 NaN -1 0 1e-300 1e300 1e6 1.5 65536 [ { \" ' null , - # <".split()
 NUMBER = re.compile(rb"-?\d+(\.\d+)?")
+"""A number in a file, in place of which others are written."""
 
 
 def changed(rng: np.random.Generator, content: bytes) -> bytes:
@@ -62,10 +65,10 @@ def changed(rng: np.random.Generator, content: bytes) -> bytes:
         elif kind == 2:
             content[place:place] = content[place : place + int(rng.integers(1, 200))]
         elif kind == 3:
-            content[place:place] = ODD[rng.integers(len(ODD))]
+            content[place:place] = INSERTED_BYTES[rng.integers(len(INSERTED_BYTES))]
         elif kind == 4 and numbers:
             begin, end = numbers[rng.integers(len(numbers))]
-            content[begin:end] = ODD[rng.integers(len(ODD))]
+            content[begin:end] = INSERTED_BYTES[rng.integers(len(INSERTED_BYTES))]
         elif rng.random() < 0.2:
             del content[place:]
     return bytes(content)
@@ -90,11 +93,13 @@ def forged(parts: dict[str, bytes]) -> dict[str, bytes]:
 
 
 def parts_of(archive: bytes) -> dict[str, bytes]:
+    """Files of a zip archive by their names."""
     with zipfile.ZipFile(io.BytesIO(archive)) as file:
         return {name: file.read(name) for name in file.namelist()}
 
 
 def packed(parts: dict[str, bytes]) -> bytes:
+    """A zip archive of files by their names."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as file:
         for name, content in parts.items():
@@ -112,6 +117,7 @@ class Kind(NamedTuple):
 
 
 def swim_log(path: Path) -> Path:
+    """A log of a swim of two fins, written to a path."""
     rng = np.random.default_rng(0)
     sizes = {"position": 3, "quaternion": 4, "motion": 6, "flow": 3, "measured": 12, "reference": 3}
     sizes |= {name: 6 for name in ("asked", "allocated", "delivered")}
@@ -132,6 +138,7 @@ def swim_log(path: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def kinds(tmp_path_factory: pytest.TempPathFactory, untrained_mdn: Path) -> list[Kind]:
+    """A whole file of every kind that is read, and how it is read."""
     place = tmp_path_factory.mktemp("whole")
     os.environ["XDG_CACHE_HOME"] = str(tmp_path_factory.mktemp("cache"))
     grid = np.linspace(0.05, 0.6, 4), np.linspace(0.1, 2.1, 4), np.linspace(-np.pi, np.pi, 7)

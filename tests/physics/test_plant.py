@@ -37,6 +37,7 @@ def wrench_by_hand(layout, command):
 
 
 def random_commands(layout, n, seed=0):
+    """Commands (n, ...) within the limits of a robot."""
     lower = layout.lower
     upper = layout.upper
     return np.random.default_rng(seed).uniform(lower, upper, (n, *lower.shape))

@@ -30,7 +30,9 @@ from webapp.viser_internals import start_server, stop_server
 
 BEFORE, OPENED, AFTER = (load_layout(shipped_layouts()[name]) for name in ("A", "B", "ucat"))
 DISPLAY = Display(frozen=True, drawn="forces")
-WORDS = "out of order"
+"""Switches of a page that draws most."""
+FAULT_TEXT = "out of order"
+"""Text of the exception that is raised."""
 
 COMPUTED = (
     "webapp.tasks.solver.Solver.solve",
@@ -77,6 +79,8 @@ class Tab:
         self.settle()
 
     def on_loop(self, act: Callable[[], Any]) -> Any:
+        """Call something on the server's loop, and return its result."""
+
         async def run() -> Any:
             return act()
 
@@ -97,10 +101,12 @@ class Tab:
             self.on_loop(partial(self.view.do, act))
 
     def open(self, layout: Any) -> None:
+        """Open a layout, and wait for its answer."""
         self.on_loop(lambda: self.view.do(lambda: self.view.session.open_layout(layout)))
         self.settle()
 
     def settle(self) -> None:
+        """Wait until all is answered and drawn."""
         end = time.monotonic() + 60
         while not self.on_loop(lambda: self.view.is_settled):
             assert time.monotonic() < end
@@ -130,11 +136,13 @@ class Tab:
         }
 
     def close(self) -> None:
+        """Close the page and the server."""
         self.on_loop(self.view.close)
         stop_server(self.server)
 
 
 def _html(container: Any, hidden: list[Any]) -> Iterator[str]:
+    """Blocks of HTML that are shown."""
     for child in container._children.values():
         if getattr(child, "visible", True) and child not in hidden:
             if hasattr(child, "_children"):
@@ -145,6 +153,7 @@ def _html(container: Any, hidden: list[Any]) -> Iterator[str]:
 
 @pytest.fixture(scope="module")
 def workers() -> Iterator[Pools]:
+    """Pools for pages that answer at once."""
     workers = Pools()
     with (
         pytest.MonkeyPatch.context() as patch
@@ -167,7 +176,7 @@ def tab(workers: Pools) -> Iterator[Tab]:
     ("place", "fault"),
     sampled(
         [
-            pytest.param(place, kind(WORDS))
+            pytest.param(place, kind(FAULT_TEXT))
             for kind, places in (
                 (RuntimeError, COMPUTED + DRAWN),
                 (FinlabError, (COMPUTED[0], DRAWN[2])),
@@ -193,7 +202,7 @@ def test_no_figure_of_the_robot_before_stays(
         tab.open(OPENED)
         shown = tab.figures()
         told = " ".join([*shown, *tab.client.notes])
-        assert WORDS in told or "cannot be analysed" in told
+        assert FAULT_TEXT in told or "cannot be analysed" in told
         assert "<h1>B</h1>" in told or "shown of B" in told
         fresh = Tab(workers, OPENED)
         assert shown == fresh.figures()

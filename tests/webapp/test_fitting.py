@@ -30,6 +30,7 @@ from webapp.tasks.fitting import Fitting
 from webapp.tasks.slot import Pool
 
 LAW = soft(k=4.0, p=1.4, x0=0.9, q=4.0, e=0.15, phi_e=1.0, d=0.12)
+"""The law of the fin that is measured."""
 
 
 @pytest.fixture(autouse=True)

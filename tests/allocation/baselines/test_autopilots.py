@@ -22,6 +22,7 @@ from finlab.physics import plant_of
 from finlab.physics.objective import yardstick
 
 HEAVY = load_layout("bluerov2_heavy")
+"""Eight thrusters, for which PX4's results were worked out by hand."""
 GOLDEN = {
     (20, 0, 0, 0, 0, 0): (-7.0711, -7.0711, 7.0711, 7.0711, 0.4661, 0.4661, -0.4661, -0.4661),
     (0, 20, 0, 0, 0, 0): (-7.2202, 7.2202, -6.9219, 6.9219, -0.2558, 0.2558, -0.2558, 0.2558),
@@ -35,10 +36,12 @@ GOLDEN = {
 
 
 def px4(layout: Layout, desaturation: str = "airmode 0") -> Px4:
+    """PX4's method of a robot, with the way in which it gives up axes."""
     return Px4(layout, Px4Settings(desaturation), yardstick(layout))
 
 
 def forces(layout: Layout, method: str, target: Array, **settings: str) -> Array:
+    """Forces (n,) [N] that a method gives for a wrench."""
     found: Array = Allocator(layout, method, **settings).allocate(target).command[:, 0]
     return found
 

@@ -21,9 +21,11 @@ from tests.mixed_robots import load, random_flow, random_plant, random_robot, wi
 
 casadi = pytest.importorskip("casadi", reason="method ipopt is an optional extra")
 UNEVEN = FinModelSpec("soft", (("d", 0.12), ("e", 0.15), ("p", 1.5), ("phi_e", 0.4)))
+"""A soft fin whose force is not the same in all directions."""
 
 
-def targets_of(layout: Layout, count: int = 3) -> np.ndarray:
+def reachable_wrenches(layout: Layout, count: int = 3) -> np.ndarray:
+    """Wrenches (count, 6), 0.6 times those of random commands of a robot."""
     plant = plant_of(layout)
     return 0.6 * plant.wrench(plant.sample(np.random.default_rng(1), (count,)))
 
@@ -39,7 +41,7 @@ def answered(
 @pytest.mark.parametrize("name", sampled(["ucat", "hexa", "restricted"], 3))
 def test_it_agrees_with_the_search_on_shipped_robots(name: str) -> None:
     layout = load_layout(name)
-    targets = targets_of(layout)
+    targets = reachable_wrenches(layout)
     least, _ = answered(AnyRobot(), layout, targets)
     power, error = answered(AnyRobot("ipopt"), layout, targets)
     assert error.max() < 1e-3
@@ -60,7 +62,7 @@ def test_it_agrees_with_the_search_on_any_fin_and_arc(
     drawn = random_layout(np.random.default_rng(5), n_fins=5)
     fins = [replace(fin, model=model, limits=Limits(zero_direction=arc)) for fin in drawn.fins]
     layout = replace(drawn, actuators=(*fins[:2], replace(fins[2], limits=Limits()), *fins[3:]))
-    targets = targets_of(layout)
+    targets = reachable_wrenches(layout)
     least, missed = answered(AnyRobot(), layout, targets)
     power, error = answered(AnyRobot("ipopt"), layout, targets)
     exact = missed < 1e-4
@@ -103,7 +105,7 @@ def test_it_keeps_watts_least_and_nothing_else() -> None:
 
 def test_out_of_reach_it_comes_as_near_as_the_search() -> None:
     layout = load_layout("ucat")
-    far = 20.0 * targets_of(layout)
+    far = 20.0 * reachable_wrenches(layout)
     _, nearest = answered(AnyRobot(), layout, far)
     _, error = answered(AnyRobot("ipopt"), layout, far)
     np.testing.assert_allclose(error, nearest, rtol=1e-3, atol=1e-3)

@@ -68,7 +68,8 @@ def test_many_wrenches_at_once_are_answered_as_one_by_one() -> None:
     np.testing.assert_allclose(together.power, alone, rtol=1e-9)
 
 
-AHEAD = np.array([1.5, 0.0, 0.0, 0.0, 0.0, 0.0])
+FLOW_FROM_AHEAD = np.array([1.5, 0.0, 0.0, 0.0, 0.0, 0.0])
+"""Flow of a robot that moves straight ahead: (6,) [m/s, rad/s]."""
 
 
 def frame_of_foils(rng: np.random.Generator) -> Layout:
@@ -117,11 +118,13 @@ def test_what_foils_at_work_give_is_found_at_no_more_power(seed: int) -> None:
     plant = Plant(layout)
     for _ in range(5):
         command = at_work(layout, plant, rng)
-        wrench = plant.wrench(command, flow=AHEAD)
-        answer = allocator.allocate(wrench, flow=AHEAD)
+        wrench = plant.wrench(command, flow=FLOW_FROM_AHEAD)
+        answer = allocator.allocate(wrench, flow=FLOW_FROM_AHEAD)
         assert answer.reachable and answer.err_norm <= 1e-6
-        np.testing.assert_allclose(plant.wrench(answer.command, flow=AHEAD), wrench, atol=1e-4)
-        assert answer.power <= 1.01 * plant.power(command, flow=AHEAD).sum()
+        np.testing.assert_allclose(
+            plant.wrench(answer.command, flow=FLOW_FROM_AHEAD), wrench, atol=1e-4
+        )
+        assert answer.power <= 1.01 * plant.power(command, flow=FLOW_FROM_AHEAD).sum()
         assert answer.bound is not None and answer.bound <= answer.power
 
 
@@ -152,7 +155,7 @@ def test_a_torpedo_that_loses_actuators_has_an_answer_and_a_bound_below_it(polic
     rng = np.random.default_rng(3)
     names = [part.name for part in layout.actuators]
     for lost in [(), *[(name,) for name in names], tuple(names[:-1]), tuple(names[1:])]:
-        for flow in (None, AHEAD):
+        for flow in (None, FLOW_FROM_AHEAD):
             asked = rng.normal(size=6) * [60.0, 20.0, 20.0, 5.0, 20.0, 20.0]
             previous = Plant(layout).sample(rng, ()) if rng.random() < 0.5 else None
             answer = allocator.allocate(
@@ -167,12 +170,12 @@ def test_a_foil_whose_drag_is_welcome_answers_with_the_dearest_lift() -> None:
     rudder = Rudder("r", (-0.5, 0, 0), (0, 0, 1), (1, 0, 0), 0.05, (-0.3, 0.3), 2.0)
     layout = Layout("rudder", (rudder,))
     plant = Plant(layout)
-    compiled = Compiled.of(layout).at(plant.at(AHEAD).inflow(None))
+    compiled = Compiled.of(layout).at(plant.at(FLOW_FROM_AHEAD).inflow(None))
     group = compiled.groups[0][1]
     turned = np.linspace(-0.3, 0.3, 20_001)[:, None, None] * [1.0, 0.0, 0.0]
-    given = plant.wrench(turned, flow=AHEAD)
-    power = plant.power(turned, flow=AHEAD).sum(axis=-1)
-    rest = plant.wrench(np.zeros((1, 3)), flow=AHEAD)
+    given = plant.wrench(turned, flow=FLOW_FROM_AHEAD)
+    power = plant.power(turned, flow=FLOW_FROM_AHEAD).sum(axis=-1)
+    rest = plant.wrench(np.zeros((1, 3)), flow=FLOW_FROM_AHEAD)
     for price in np.random.default_rng(0).normal(size=(40, 6)) * [6.0, 2.0, 2.0, 2.0, 2.0, 2.0]:
         worth = ((given - rest) @ price - power).max()
         assert group.conjugate_bound(price[None])[0, 0] == pytest.approx(worth, rel=1e-6, abs=1e-6)

@@ -14,7 +14,7 @@ from finlab.assets import shipped_layouts
 from finlab.layout import Fin, FinModelSpec, Layout, load_layout
 from finlab.physics import Plant, make_law, write_table
 from finlab.research.random_layouts import random_layout
-from tests.allocation.test_levenberg_marquardt import HOSTILE as SIMPLE
+from tests.allocation.test_levenberg_marquardt import HOSTILE_LAYOUTS as SIMPLE_LAYOUTS
 from tests.any_robot import AnyRobot, normalized_error
 
 GOOD = 1e-5
@@ -29,7 +29,8 @@ def reachable(layout: Layout, n: int, seed: int = 0) -> np.ndarray:
     return Plant(layout).wrench(lower + share * (upper - lower))
 
 
-def keeps_limits(layout: Layout, command: np.ndarray) -> bool:
+def is_within_limits(layout: Layout, command: np.ndarray) -> bool:
+    """Whether commands (..., n, 3) are finite and within the limits of a robot."""
     within = (command >= layout.lower).all() and (command <= layout.upper).all()
     return bool(np.isfinite(command).all() and within)
 
@@ -37,7 +38,7 @@ def keeps_limits(layout: Layout, command: np.ndarray) -> bool:
 def errors(method: Allocator, layout: Layout, targets: np.ndarray) -> np.ndarray:
     """Normalized errors by the plant; commands must keep their limits to the last bit."""
     command = method.allocate_batch(layout, targets).command
-    assert keeps_limits(layout, command)
+    assert is_within_limits(layout, command)
     return normalized_error(method.normalization, Plant(layout).wrench(command), targets)
 
 
@@ -73,26 +74,27 @@ def test_exact_after_the_loss_of_any_fin(name: str, search: AnyRobot) -> None:
             assert np.isnan(result.command[layout.index(fin)]).all()
 
 
-HOSTILE = {
-    **SIMPLE,
+HOSTILE_LAYOUTS = {
+    **SIMPLE_LAYOUTS,
     "far out": Layout("far", (Fin("a", (10.0, 10.0, 10.0), 0.0), Fin("b", (-10.0, 0.0, 0.0), 1.0))),
     "sixteen": Layout(
         "many", tuple(Fin(f"f{i}", (0.1, 0.02 * i, 0.0), 0.4 * i) for i in range(16))
     ),
 }
+"""Robots on which solvers stumble: singular, far out, with ranges of no width."""
 
 
 @pytest.mark.parametrize(
     "name", ["one fin", "two at one place", "all parallel", "may rest", "sixteen"]
 )
 def test_hostile_layouts_still_get_what_they_can_do(name: str, search: AnyRobot) -> None:
-    layout = HOSTILE[name]
+    layout = HOSTILE_LAYOUTS[name]
     error = errors(search, layout, reachable(layout, 10))
     assert error.max() < GOOD
 
 
 def test_what_cannot_be_done_is_done_as_far_as_possible(search: AnyRobot) -> None:
-    result = search.allocate(HOSTILE["one fin"], [0.0, 50.0, 0.0, 0.0, 0.0, 0.0])
+    result = search.allocate(HOSTILE_LAYOUTS["one fin"], [0.0, 50.0, 0.0, 0.0, 0.0, 0.0])
     np.testing.assert_allclose(result.command[0], [0.6, 2.1, 0.0], atol=1e-2)
     assert result.unallocated[1] > 40.0
 

@@ -17,8 +17,10 @@ from finlab.physics.plant import Plant
 
 FLOW = np.array([1.5, 0.1, 0.05, 0.0, 0.0, 0.0])
 """A velocity through the water [m/s, rad/s]."""
-ROBOTS = 50
-EACH = 4
+N_ROBOTS = 50
+"""How many random robots there are in each test."""
+N_WRENCHES = 4
+"""How many wrenches are asked of each robot."""
 
 
 def robot(rng: np.random.Generator, limit: float) -> Layout:
@@ -42,11 +44,11 @@ def questions(seed: int, limit: float, turned: float) -> Iterator[tuple[Allocato
     """Robots whose foils turn by a limit, wrenches (6,) of deflections up to `turned` [deg], their
     power."""
     rng = np.random.default_rng(seed)
-    for _ in range(ROBOTS):
+    for _ in range(N_ROBOTS):
         layout = robot(rng, math.radians(limit))
         allocator = Allocator(layout)
         plant = Plant(layout)
-        for _ in range(EACH):
+        for _ in range(N_WRENCHES):
             command = plant.sample(rng, ())
             for i, part in enumerate(layout.actuators):
                 if isinstance(part, Rudder):

@@ -11,14 +11,15 @@ from finlab.arrays import Array
 from finlab.layout import load_layout
 from finlab.physics import Plant
 
-DRAWN = 400
+N_COMMANDS = 400
+"""How many random commands bound from above what multipliers can prove."""
 
 
 def commands_around(plant: Plant, command: Array, rng: np.random.Generator) -> Array:
     """Commands (DRAWN, n, 3) near a command and anywhere within the limits."""
     low, high = plant.layout.lower, plant.layout.upper
-    spread = np.geomspace(1e-3, 1.0, DRAWN)[:, None, None] * rng.uniform(
-        -1.0, 1.0, (DRAWN, *command.shape)
+    spread = np.geomspace(1e-3, 1.0, N_COMMANDS)[:, None, None] * rng.uniform(
+        -1.0, 1.0, (N_COMMANDS, *command.shape)
     )
     drawn = np.clip(command + spread * (high - low), low, high)
     drawn[0] = command

@@ -18,7 +18,9 @@ from webapp.tasks.modes import force_sizes, mode_signature, same_signature
 GOOD = 1e-5
 """Normalized error below which an answer counts as exact here."""
 SEEDS = st.integers(0, 2**32 - 1)
+"""Seeds of random robots."""
 LIMITS = st.sampled_from(["nominal", "varied"])
+"""Whether all fins of a random robot have the same limits."""
 MIRROR = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
 """What becomes of a wrench when y changes its sign."""
 
@@ -38,20 +40,23 @@ def drawn(seed: int, limits: str = "nominal") -> tuple[Layout, np.ndarray]:
     """A layout and a wrench of one of its commands."""
     rng = np.random.default_rng(seed)
     layout = random_layout(rng, limits=limits)  # type: ignore[arg-type]
-    return layout, reachable(layout, rng)
+    return layout, reachable_wrench(layout, rng)
 
 
-def reachable(layout: Layout, rng: np.random.Generator) -> np.ndarray:
+def reachable_wrench(layout: Layout, rng: np.random.Generator) -> np.ndarray:
+    """The wrench (6,) of a random command."""
     lower = layout.lower
     upper = layout.upper
     return Plant(layout).wrench(lower + rng.uniform(size=lower.shape) * (upper - lower))
 
 
-def same_power(one: Allocation, other: Allocation, share: float) -> bool:
+def is_same_power(one: Allocation, other: Allocation, share: float) -> bool:
+    """Whether two answers take as much power, but for a share of it."""
     return abs(one.power - other.power) <= share * one.power
 
 
 def wrapped(angle: float) -> float:
+    """An angle [rad] in [-pi, pi)."""
     return (angle + math.pi) % (2.0 * math.pi) - math.pi
 
 
@@ -65,7 +70,7 @@ def test_the_order_of_the_fins_does_not_matter(search: AnyRobot, seed: int) -> N
     other = search.allocate(shuffled, target)
     assert one.err_norm < GOOD and other.err_norm < GOOD
     assert normalized_error(search.normalization, one.wrench, other.wrench) < GOOD
-    assert same_power(one, other, 0.002)
+    assert is_same_power(one, other, 0.002)
 
 
 @few(20)
@@ -89,7 +94,7 @@ def test_a_turned_robot_gets_the_turned_answer(
     one = search.allocate(layout, target)
     other = search.allocate(turned, np.concatenate([rotation @ target[:3], rotation @ target[3:]]))
     assert one.err_norm < GOOD and other.err_norm < GOOD
-    assert same_power(one, other, 0.002)
+    assert is_same_power(one, other, 0.002)
 
 
 @few(20)
@@ -111,7 +116,7 @@ def test_a_mirrored_robot_gets_the_mirrored_answer(
     one = search.allocate(layout, target)
     other = search.allocate(replace(layout, actuators=tuple(fins)), MIRROR * target)
     assert one.err_norm < GOOD and other.err_norm < GOOD
-    assert same_power(one, other, 0.002)
+    assert is_same_power(one, other, 0.002)
 
 
 @few(15)
@@ -154,7 +159,7 @@ def test_a_small_change_of_the_layout_changes_the_answer_little(
     # Fins that hardly span a wrench make the least power itself sensitive: then both are proved to
     # be least.
     is_least = [answer.power <= (1.0 + 1e-4) * answer.bound for answer in (one, other)]
-    assert same_power(one, other, 0.002) or all(is_least)
+    assert is_same_power(one, other, 0.002) or all(is_least)
     ways = [mode_signature(a.command, force_sizes(a.layout, a.command)) for a in (one, other)]
     if same_signature(*ways):
         np.testing.assert_allclose(one.forces, other.forces, atol=0.05)

@@ -19,13 +19,16 @@ from tests.exhaustive import crossed, sampled
 from tests.random_fins import KINDS, random_robot_of_fins
 
 Array = NDArray[np.float64]
-LAWS = KINDS[:3]
-AXES = np.concatenate(
+FORMULAS = KINDS[:3]
+"""Kinds of fin whose law is a formula, not a table."""
+AXIS_WRENCHES = np.concatenate(
     [np.diag([1.0, 1.0, 1.0, 0.1, 0.1, 0.1]), -np.diag([1.0, 1.0, 1.0, 0.1, 0.1, 0.1])]
 )
+"""A wrench (6,) [N, N m] either way along each axis."""
 
 
-def reachable(layout: Layout, n: int, seed: int = 0) -> Array:
+def reachable_wrenches(layout: Layout, n: int, seed: int = 0) -> Array:
+    """Wrenches (n, 6) of random commands."""
     plant = Plant(layout)
     return plant.wrench(plant.sample(np.random.default_rng(seed), (n,)))
 
@@ -42,7 +45,7 @@ def with_arcs(name: str, arcs: dict[int, tuple[float, float]]) -> Layout:
     ("limits", "kinds"),
     crossed(
         ["nominal", "varied"],
-        [("drag",), ("lighthill",), ("soft",), LAWS, ("table",), KINDS],
+        [("drag",), ("lighthill",), ("soft",), FORMULAS, ("table",), KINDS],
         every=7,
     ),
 )
@@ -52,7 +55,7 @@ def test_exact_on_any_fin(kinds: tuple[str, ...], limits: str, tmp_path: Path) -
         layout = random_robot_of_fins(
             np.random.default_rng(seed), kinds, tmp_path, limits=limits, n_fins=(2, 7)
         )
-        batch = method.allocate_batch(layout, reachable(layout, 12, seed))
+        batch = method.allocate_batch(layout, reachable_wrenches(layout, 12, seed))
         lower = layout.lower
         upper = layout.upper
         assert (batch.command >= lower).all() and (batch.command <= upper).all()
@@ -64,8 +67,8 @@ def test_no_more_than_brute_force_finds() -> None:
     method = AnyRobot()
     ratio = []
     for seed in range(2):
-        layout = random_robot_of_fins(np.random.default_rng(seed), LAWS, n_fins=(2, 4))
-        for target in reachable(layout, 2, seed) * [[1.0], [0.5]]:
+        layout = random_robot_of_fins(np.random.default_rng(seed), FORMULAS, n_fins=(2, 4))
+        for target in reachable_wrenches(layout, 2, seed) * [[1.0], [0.5]]:
             answer = method.allocate(layout, target)
             if answer.err_norm < 1e-5:
                 least = least_cost(
@@ -76,7 +79,7 @@ def test_no_more_than_brute_force_finds() -> None:
     assert np.max(ratio) < 1.001
 
 
-@pytest.mark.parametrize("target", AXES, ids=str)
+@pytest.mark.parametrize("target", AXIS_WRENCHES, ids=str)
 def test_robots_with_stops_are_as_cheap(target: Array) -> None:
     """Fins that start outside their arcs must come back to where they are pulled."""
     layout = load_layout(shipped_layouts()["restricted"])
@@ -89,7 +92,7 @@ def test_robots_with_stops_are_as_cheap(target: Array) -> None:
 def test_arcs_wider_than_half_a_turn_are_as_cheap(axis: int) -> None:
     """Which side of the gap each fin takes is no convex question."""
     layout = with_arcs("A", dict.fromkeys(range(4), (-2.4, 2.4)))
-    target = AXES[axis]
+    target = AXIS_WRENCHES[axis]
     answer = Allocator(layout).allocate(target)
     least = least_cost(layout, target, answer.scale, "power", n_starts=6, also=answer.command)
     assert answer.err_norm < 1e-5 and answer.power < 1.002 * least
@@ -99,7 +102,7 @@ def test_arcs_wider_than_half_a_turn_are_as_cheap(axis: int) -> None:
 def test_pure_axes_of_symmetric_robots(name: str) -> None:
     layout = load_layout(shipped_layouts()[name])
     method = AnyRobot()
-    for target in AXES[[0, 2, 5, 6]]:
+    for target in AXIS_WRENCHES[[0, 2, 5, 6]]:
         answer = method.allocate(layout, target)
         assert answer.err_norm < 1e-5
 
@@ -133,7 +136,7 @@ def test_tiny_fins_are_as_exact_beside_their_own_strength(area: float) -> None:
     model = FinModelSpec("drag", (("area", area),))
     tiny = replace(layout, actuators=tuple(replace(fin, model=model) for fin in layout.fins))
     method = AnyRobot()
-    for target in reachable(tiny, 6):
+    for target in reachable_wrenches(tiny, 6):
         answer = method.allocate(tiny, target)
         assert answer.err_norm < 1e-4 * 1.0
 

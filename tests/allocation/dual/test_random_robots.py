@@ -20,10 +20,12 @@ from tests.exhaustive import sampled
 from tests.least_power import conic_optimum, farthest, least_known, least_miss, lower_bound
 from tests.own_plant import OwnPlant
 
-REACHED = 1e-3
+ERROR_LIMIT = 1e-3
+"""Largest error of a wrench that counts as served, in units of the wrench scale."""
 
 
-def missing(plant: OwnPlant, commands: Array, wrench: Array) -> float:
+def relative_error(plant: OwnPlant, commands: Array, wrench: Array) -> float:
+    """The error of commands, in units of the judge's wrench scale."""
     return float(np.linalg.norm((plant.wrench(commands) - wrench) / plant.scales))
 
 
@@ -34,7 +36,7 @@ def test_a_heavy_takes_the_watts_of_clarabel() -> None:
     for _ in range(10):
         wrench = mixed_robots.within(plant, rng)
         commands = plant.commands_of(allocator.allocate(wrench))
-        assert missing(plant, commands, wrench) <= 1e-6
+        assert relative_error(plant, commands, wrench) <= 1e-6
         assert plant.excess(commands) == 0.0
         assert plant.power(commands) <= 1.00001 * conic_optimum(plant, wrench)[0]
 
@@ -47,9 +49,9 @@ def test_a_heavy_beyond_reach_keeps_the_direction_or_comes_nearest() -> None:
         wrench = mixed_robots.beyond(plant, rng, times)
         along = plant.commands_of(allocator.allocate(wrench, policy="direction"))
         most = farthest(plant, wrench)
-        assert missing(plant, along, most * wrench) <= 2e-3
+        assert relative_error(plant, along, most * wrench) <= 2e-3
         near = plant.commands_of(allocator.allocate(wrench))
-        assert missing(plant, near, wrench) <= 1.0005 * least_miss(plant, wrench)
+        assert relative_error(plant, near, wrench) <= 1.0005 * least_miss(plant, wrench)
 
 
 @pytest.mark.parametrize("number", sampled(range(3)))
@@ -63,7 +65,7 @@ def test_exact_within_limits_at_the_least_watts(kind: str, number: int) -> None:
         wrench = mixed_robots.within(plant, rng)
         result = allocator.allocate(wrench, flow=plant.flow)
         commands = plant.commands_of(result)
-        assert missing(plant, commands, wrench) <= REACHED
+        assert relative_error(plant, commands, wrench) <= ERROR_LIMIT
         assert plant.excess(commands) == 0.0
         watts = plant.power(commands)
         assert result.power == pytest.approx(watts, rel=1e-6)
@@ -81,7 +83,7 @@ def test_a_random_robot_beyond_reach_keeps_the_direction(kind: str) -> None:
     for times in (1.2, 3.0):
         wrench = mixed_robots.beyond(plant, rng, times)
         commands = plant.commands_of(allocator.allocate(wrench, policy="direction"))
-        assert missing(plant, commands, wrench / times) <= 2e-3
+        assert relative_error(plant, commands, wrench / times) <= 2e-3
 
 
 def test_fins_of_mixed_laws_have_no_dear_answers() -> None:
@@ -92,7 +94,7 @@ def test_fins_of_mixed_laws_have_no_dear_answers() -> None:
         commands = plant.commands_of(
             finlab.Allocator(mixed_robots.load(plant.layout)).allocate(wrench)
         )
-        assert missing(plant, commands, wrench) <= REACHED
+        assert relative_error(plant, commands, wrench) <= ERROR_LIMIT
         assert plant.power(commands) <= 1.01 * lower_bound(plant, wrench)
 
 
@@ -114,18 +116,20 @@ def test_ticks_of_a_wandering_wrench(kind: str, period: float) -> None:
         assert plant.excess(commands) == 0.0
         if before is not None:
             assert plant.rate_excess(before, commands, period) <= 1e-9
-            error = missing(plant, commands, wrench)
+            error = relative_error(plant, commands, wrench)
             near = plant.after(before, period)
-            if error > REACHED and error > least_miss(near, wrench, 33) + 2e-3:
+            if error > ERROR_LIMIT and error > least_miss(near, wrench, 33) + 2e-3:
                 most = min(farthest(near, wrench, 33), 1.0)
-                assert missing(plant, commands, most * wrench) <= 1e-2 * np.linalg.norm(
+                assert relative_error(plant, commands, most * wrench) <= 1e-2 * np.linalg.norm(
                     wrench / plant.scales
                 )
         before = commands
 
 
-ROBOTS = range(24)
-LAW = {"type": "power_law", "forward": 1.0, "reverse": 1.5, "exponent": 1.5}
+ROBOT_NUMBERS = range(24)
+"""Numbers of the random robots."""
+THRUST_LAW = {"type": "power_law", "forward": 1.0, "reverse": 1.5, "exponent": 1.5}
+"""Power over force of the thrusters made by hand, as a layout file says it."""
 
 
 @cache
@@ -151,7 +155,7 @@ def _robot(number: int) -> tuple[Allocator, Array, Array, Array]:
                 "axis": axis.tolist(),
             }
             | {"force_n": ends[-1], "torque_per_newton_m": turn}
-            | {"model": LAW}
+            | {"model": THRUST_LAW}
         )
     allocator = Allocator(parse_layout(mixed_robots.layout_of(f"r{number}", parts)))
     return allocator, np.array(columns).T, *np.array(ends).T
@@ -166,7 +170,7 @@ def _targets(number: int, allocator: Allocator, by: Array, low: Array, high: Arr
     return np.concatenate([some, own]) * 10.0 ** rng.uniform(0.0, 1.5, (4, 1))
 
 
-@pytest.mark.parametrize("number", ROBOTS)
+@pytest.mark.parametrize("number", ROBOT_NUMBERS)
 def test_direction_gives_the_share_of_the_linear_programme_and_nothing_beside(number: int) -> None:
     allocator, by, low, high = robot = _robot(number)
     scale = allocator.scale
@@ -183,7 +187,7 @@ def test_direction_gives_the_share_of_the_linear_programme_and_nothing_beside(nu
         assert answer.share >= 0.998 * best.x[-1] - 1e-6
 
 
-@pytest.mark.parametrize("number", ROBOTS)
+@pytest.mark.parametrize("number", ROBOT_NUMBERS)
 def test_closest_and_the_first_group_miss_no_more_than_least_squares(number: int) -> None:
     allocator, by, low, high = robot = _robot(number)
     for target in _targets(number, *robot):
@@ -201,7 +205,7 @@ def test_closest_and_the_first_group_miss_no_more_than_least_squares(number: int
 
 @pytest.mark.parametrize("policy", ["closest", "direction", "priority"])
 def test_one_code_one_answer_whose_bound_is_below_its_power(policy: str) -> None:
-    for number in ROBOTS:
+    for number in ROBOT_NUMBERS:
         allocator, *_ = robot = _robot(number)
         targets = np.concatenate([_targets(number, *robot), 0.05 * _targets(number, *robot)])
         batch = allocator.allocate_batch(targets, policy=policy)
@@ -223,7 +227,7 @@ def test_a_command_inside_a_dead_band_is_neutral() -> None:
         "name": "t",
         "type": "thruster",
         "force_n": [-40.0, 50.0],
-        "model": LAW,
+        "model": THRUST_LAW,
         "dead_band_n": 3.0,
     }
     for number in range(12):

@@ -23,6 +23,7 @@ TICKS = np.arange(150) * 0.1
 SLOW_PATH = np.array([0.98, 0.98, 1.4, 0.175, 0.175, 0.175])
 """Amplitudes of the path [N, N m], about 0.7 standard deviations of what random commands give."""
 TARGET = [1.0, 0.5, 2.0, 0.0, 0.1, 0.1]
+"""A wrench that the robots are asked for [N, N m]."""
 STEP = np.array([0.1, 0.3, 0.5])
 """What the usual servo's commands change by in a tick [rad, Hz, rad]."""
 
@@ -45,7 +46,9 @@ class Drive(NamedTuple):
         return np.abs(change)
 
 
-def drive(method: AnyRobot, layout: Layout, path: np.ndarray, *, bound: bool) -> Drive:
+def answers_along(method: AnyRobot, layout: Layout, path: np.ndarray, *, bound: bool) -> Drive:
+    """Answers to the wrenches of a path; with `bound`, each within the rates from the one
+    before."""
     previous = None
     results = []
     for wrench in path:
@@ -69,22 +72,26 @@ def smooth_path(seed: int) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def penta() -> Layout:
+    """Five fins."""
     return load_layout("penta")
 
 
 @pytest.fixture(scope="module")
 def method() -> AnyRobot:
+    """The default method."""
     return AnyRobot()
 
 
 @pytest.fixture(scope="module")
 def free(method: AnyRobot, penta: Layout) -> Drive:
-    return drive(method, penta, smooth_path(0), bound=False)
+    """Answers along a path with no regard for rates."""
+    return answers_along(method, penta, smooth_path(0), bound=False)
 
 
 @pytest.fixture(scope="module")
 def steady(method: AnyRobot, penta: Layout) -> Drive:
-    return drive(method, penta, smooth_path(0), bound=True)
+    """Answers along the same path, each within the rates from the one before."""
+    return answers_along(method, penta, smooth_path(0), bound=True)
 
 
 def test_no_command_changes_faster_than_its_servo(free: Drive, steady: Drive) -> None:
@@ -103,7 +110,7 @@ def test_rates_are_those_of_each_fin(search: AnyRobot, penta: Layout) -> None:
         penta.fins[0], servo=replace(penta.fins[0].servo, frequency_rate=0.5, direction_rate=1.0)
     )
     other = replace(penta, actuators=(first, *penta.fins[1:]))
-    ride = drive(search, other, smooth_path(1)[:60], bound=True)
+    ride = answers_along(search, other, smooth_path(1)[:60], bound=True)
     assert (ride.change[:, 0] <= np.array([0.1, 0.05, 0.1]) + 1e-9).all()
     assert (ride.change[:, 1:, 2] > 0.1).any()
 
@@ -136,7 +143,7 @@ def test_a_fin_follows_a_turning_force_over_the_seam(search: AnyRobot) -> None:
 
 def test_arcs_are_kept(search: AnyRobot) -> None:
     layout = load_layout("restricted")
-    ride = drive(search, layout, smooth_path(1)[:60], bound=True)
+    ride = answers_along(search, layout, smooth_path(1)[:60], bound=True)
     assert ((ride.command >= layout.lower) & (ride.command <= layout.upper)).all()
 
 
@@ -184,15 +191,19 @@ def test_a_target_that_needs_a_turn_is_reached_tick_by_tick(
 
 
 PERIOD_S = 0.1
+"""Length of a tick [s]."""
 RISING = np.outer(np.arange(1.0, 41.0), [1.0, 0.0, 0.5, 0.0, 0.0, 0.1])
 """What is asked for grows by a newton a tick."""
 
 
 def in_time(robot: Layout, target: Array, reference: Array) -> Array:
+    """The wrench (6,) that a robot whose drives lag is asked for, so that it gives `target` in
+    time."""
     return Allocator(robot)._whole.method.in_time(target, reference)
 
 
 def with_pole(pole: float) -> Layout:
+    """Robot A, one of whose fins follows its direction with a pole [1/s]."""
     robot = load_layout("A")
     slow = replace(robot.fins[0], servo=Servo(direction_pole=pole))
     return replace(robot, actuators=(slow, *robot.fins[1:]))

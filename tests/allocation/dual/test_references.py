@@ -20,6 +20,7 @@ from tests.mixed_robots import KINDS, bluerov2_heavy, random_plant, within
 from tests.own_plant import OwnPlant
 
 HEAVY = OwnPlant(bluerov2_heavy())
+"""The judge's model of a BlueROV2 Heavy."""
 
 
 @pytest.mark.parametrize(

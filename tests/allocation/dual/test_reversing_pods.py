@@ -18,12 +18,17 @@ from finlab.layout.save import save_layout
 from finlab.physics.plant import Plant
 from tests.exhaustive import sampled
 
-HALF = math.radians(45.0)
-LEAST = -100.0
-MOST = 250.0
+ARC_HALF_ANGLE = math.radians(45.0)
+"""Half of the arc that a pod can turn within [rad]."""
+FORCE_MIN = -100.0
+"""Force of a pod in reverse [N]."""
+FORCE_MAX = 250.0
+"""Force of a pod ahead [N]."""
 
 
-def table(forward: float, reverse: float, least: float = LEAST, most: float = MOST) -> PowerTable:
+def table(
+    forward: float, reverse: float, least: float = FORCE_MIN, most: float = FORCE_MAX
+) -> PowerTable:
     """A table of watts over F^1.5, with another factor in reverse."""
     force = np.concatenate(
         [least * np.linspace(1.0, 0.02, 50), [0.0], most * np.linspace(0.02, 1.0, 50)]
@@ -35,8 +40,8 @@ def table(forward: float, reverse: float, least: float = LEAST, most: float = MO
 def pair(model: PowerLaw | PowerTable) -> Layout:
     """Two pods at the stern, within 45 degrees of ahead."""
     sides = (("left", 0.5), ("right", -0.5))
-    ends = (LEAST, MOST)
-    arc = (-HALF, HALF)
+    ends = (FORCE_MIN, FORCE_MAX)
+    arc = (-ARC_HALF_ANGLE, ARC_HALF_ANGLE)
     return Layout(
         "pair",
         tuple(
@@ -49,13 +54,13 @@ def scanned(wrench: Array, factors: tuple[float, float]) -> float:
     """Least power of the pair for surge, sway and yaw, over the sway of the left pod."""
     surge, sway, yaw = wrench[[0, 1, 5]]
     apart = -(sway + yaw) / 0.5  # yaw = -sway - (left's surge - right's surge) / 2
-    left = np.linspace(-MOST, MOST, 400_001)
+    left = np.linspace(-FORCE_MAX, FORCE_MAX, 400_001)
     total = np.zeros(len(left))
     for ahead, aside in ((0.5 * (surge + apart), left), (0.5 * (surge - apart), sway - left)):
         size = np.hypot(ahead, aside)
         least = np.full(len(left), np.inf)
-        for sign, most, factor in ((1.0, MOST, factors[0]), (-1.0, -LEAST, factors[1])):
-            inside = (np.abs(np.arctan2(sign * aside, sign * ahead)) <= HALF + 1e-9) & (
+        for sign, most, factor in ((1.0, FORCE_MAX, factors[0]), (-1.0, -FORCE_MIN, factors[1])):
+            inside = (np.abs(np.arctan2(sign * aside, sign * ahead)) <= ARC_HALF_ANGLE + 1e-9) & (
                 size <= most
             )
             least = np.where(inside, np.minimum(least, factor * size**1.5), least)
@@ -162,7 +167,7 @@ def searched(
 def test_beyond_reach_pods_give_as_much_as_forward_and_reverse_allow(policy: str) -> None:
     allocator = Allocator(pair(PowerLaw(0.05, 0.11)))
     answer = allocator.allocate([-900.0, 0, 0, 0, 0, 0], policy=policy)
-    np.testing.assert_allclose(answer.wrench, [2.0 * LEAST, 0, 0, 0, 0, 0], atol=1e-3)
+    np.testing.assert_allclose(answer.wrench, [2.0 * FORCE_MIN, 0, 0, 0, 0, 0], atol=1e-3)
 
 
 def test_from_tick_to_tick_a_pod_goes_through_rest_to_reverse() -> None:

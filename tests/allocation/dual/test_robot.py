@@ -16,7 +16,8 @@ from finlab.layout import Azimuth, Layout, load_layout
 from tests.any_robot import AnyRobot
 from tests.mixed_robots import T200, T200_FORCE, bluerov2_heavy, layout_of, load
 
-DENSE = np.linspace(0.0, 2.0 * math.pi, 20_001)
+FINE_ANGLES = np.linspace(0.0, 2.0 * math.pi, 20_001)
+"""Angles of a scan [rad], so fine that its best one is as good as exact."""
 
 
 def uneven(direction: Array) -> Array:
@@ -34,8 +35,8 @@ def test_the_support_function_of_a_gauge_and_its_derivative() -> None:
     for place, angle in enumerate(np.arange(POINTS) * 2.0 * math.pi / POINTS):
         # h(angle) = max over psi of rho(psi) cos(angle - psi); h' = -rho sin(angle - psi) at the
         # best psi.
-        worth = uneven(DENSE) * np.cos(angle - DENSE)
-        first = DENSE[int(worth.argmax())]
+        worth = uneven(FINE_ANGLES) * np.cos(angle - FINE_ANGLES)
+        first = FINE_ANGLES[int(worth.argmax())]
         ends = (first - 1e-3, first + 1e-3)
         best = minimize_scalar(
             lambda psi, angle=angle: -float(uneven(psi) * math.cos(angle - psi)),

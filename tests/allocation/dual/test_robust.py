@@ -16,6 +16,7 @@ from finlab.physics import plant_of
 from tests.mixed_robots import load, random_flow, random_robot
 
 HEAVY = load_layout("bluerov2_heavy")
+"""Eight thrusters, to whose forces the tests give standard deviations."""
 
 
 def doubtful(layout: Layout, shares: Array) -> Layout:

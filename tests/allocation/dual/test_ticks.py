@@ -27,7 +27,9 @@ from tests.mixed_robots import (
 )
 
 PERIOD_S = 0.1
+"""Length of a tick [s]."""
 POLICIES = ("closest", "direction", "priority")
+"""The kinds of policy."""
 
 
 def beyond_what_is_allowed(robot: Layout, before: Array, after: Array) -> float:
@@ -142,6 +144,7 @@ def turned(answers: list[Allocation]) -> float:
 
 
 def pods_in_waves(calm: float) -> list[Allocation]:
+    """Answers of a catamaran to a wrench that swings, 120 ticks one after the other."""
     allocator = Allocator(load_layout("catamaran"), period_s=PERIOD_S, calm=calm)
     scale = allocator.scale
     answers = list[Allocation]()

@@ -19,7 +19,8 @@ from finlab.research.evaluation.splits import (
     make_split,
 )
 
-N = 60
+N_CASES = 60
+"""How many cases of a split are made."""
 FINS = {"ood-fins": (6, 8), "many-fins": (9, 12)}
 """Least and most fins where they are not two and five."""
 ROBOTS = {
@@ -36,10 +37,12 @@ QUICK = [split for split in SPLITS if split != "tables" and split not in ROBOTS]
 
 @cache
 def _cases(split: str) -> list[SplitCase]:
-    return make_split(split, N, 2, 1234)
+    """Cases of a split."""
+    return make_split(split, N_CASES, 2, 1234)
 
 
 def _outside(case: SplitCase) -> bool:
+    """Whether a fin of a case is outside of the box of the other splits."""
     return any((np.abs(fin.position) > (0.3, 0.3, 0.1)).any() for fin in case.layout.fins)
 
 

@@ -21,15 +21,18 @@ from finlab.research.random_layouts import random_layout
 from tests.any_robot import AnyRobot
 
 TARGET = [0.5, -0.3, 1.0, 0.05, -0.02, 0.1]
+"""A wrench within reach of the robots here [N, N m]."""
 
 
 @pytest.fixture(scope="module")
 def untrained(untrained_mdn: Path) -> AnyRobot:
+    """The method with weights that nobody trained."""
     return AnyRobot("mdn", checkpoint=untrained_mdn)
 
 
 @pytest.fixture(scope="module")
 def shipped() -> AnyRobot:
+    """The method with the checkpoint in the tree."""
     return AnyRobot("mdn")
 
 
@@ -38,7 +41,8 @@ def plant_force(layout: Layout, command: np.ndarray) -> np.ndarray:
     return np.asarray(Plant(layout).force(command))
 
 
-def reachable(layout: Layout, count: int, seed: int = 0) -> np.ndarray:
+def reachable_wrenches(layout: Layout, count: int, seed: int = 0) -> np.ndarray:
+    """Wrenches (count, 6) of random commands."""
     plant = Plant(layout)
     return plant.wrench(plant.sample(np.random.default_rng(seed), (count,)))
 
@@ -47,14 +51,14 @@ def reachable(layout: Layout, count: int, seed: int = 0) -> np.ndarray:
 def test_answers_are_exact_even_where_nothing_was_learned(n: int, untrained: AnyRobot) -> None:
     layout = random_layout(np.random.default_rng(n), n_fins=n, limits="varied")
     layout = layout.replace_actuator("fin_1", model=FinModelSpec("soft", (("e", 0.2), ("d", 0.1))))
-    targets = reachable(layout, 20)
+    targets = reachable_wrenches(layout, 20)
     answer = untrained.allocate_batch(layout, targets)
     error = answer.err_norm
     assert np.mean(error < 1e-4) >= 0.95 and error.max() < 0.05
 
 
 def test_a_batch_costs_what_single_calls_do(shipped: AnyRobot, layout_a: Layout) -> None:
-    targets = reachable(layout_a, 6)
+    targets = reachable_wrenches(layout_a, 6)
     together = shipped.allocate_batch(layout_a, targets)
     np.testing.assert_allclose(Plant(layout_a).wrench(together.command), targets, atol=1e-4)
     alone = [shipped.allocate(layout_a, target).effort for target in targets]

@@ -31,6 +31,7 @@ from tests.research.paper.asked_in_torch import wrench_in_torch
 from tests.torch_weights import arrays_of
 
 TARGET = [0.5, -0.3, 1.0, 0.05, -0.02, 0.1]
+"""A wrench within reach of the robots here [N, N m]."""
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +62,8 @@ def robot() -> Layout:
     return layout.replace_actuator(first, limits=arc).replace_actuator(second, limits=stiff)
 
 
-def keeps_limits(layout: Layout, command: np.ndarray) -> bool:
+def is_within_limits(layout: Layout, command: np.ndarray) -> bool:
+    """Whether commands (..., n, 3) are finite and within the limits of a robot."""
     lower = layout.lower
     upper = layout.upper
     return bool(
@@ -79,6 +81,7 @@ ABLATIONS: list[dict[str, object]] = [
     {"n_candidates": 1},
     {"temperature": 1.0, "n_refined": 100},
 ]
+"""Settings that leave out parts of the method."""
 
 
 @pytest.mark.parametrize("options", ABLATIONS)
@@ -89,11 +92,11 @@ def test_every_variant_keeps_the_limits_bit_for_bit(
     targets = np.random.default_rng(0).normal(size=(6, 6)) * np.array(
         [[1.0], [1], [1], [50], [0], [1e5]]
     )
-    assert keeps_limits(robot, method.allocate_batch(robot, targets).command)
+    assert is_within_limits(robot, method.allocate_batch(robot, targets).command)
     result = method.allocate(robot, TARGET, seed=1)
-    assert keeps_limits(robot, result.command)
+    assert is_within_limits(robot, result.command)
     assert result.candidates is not None and result.samples is not None
-    assert keeps_limits(robot, result.candidates.command) and keeps_limits(
+    assert is_within_limits(robot, result.candidates.command) and is_within_limits(
         robot, result.samples.command
     )
 
@@ -179,7 +182,8 @@ def test_refuses_a_checkpoint_without_network(checkpoint: TrainedWeights) -> Non
         AnyRobot("paper", alone).on(load_layout("A"))
 
 
-def place_of(robot: Layout) -> list[torch.Tensor]:
+def tensors_of_robot(robot: Layout) -> list[torch.Tensor]:
+    """Positions, angles and limits of a robot as tensors."""
     layout = (robot.position, robot.mounting_angle, robot.lower, robot.upper)
     return [torch.tensor(part, dtype=torch.float32) for part in layout]
 
@@ -193,7 +197,7 @@ def test_adam_goes_where_torch_goes(checkpoint: TrainedWeights, robot: Layout) -
     target = np.array(TARGET) * 0.3
     start = before.allocate(robot, target).candidates
     assert start is not None
-    layout = place_of(robot)
+    layout = tensors_of_robot(robot)
     std = torch.tensor(method.normalization.std, dtype=torch.float32)
     wanted = torch.tensor(target, dtype=torch.float32)
     lower, upper = layout[2:]

@@ -18,10 +18,12 @@ from tests.any_robot import AnyRobot
 
 @pytest.fixture(scope="module")
 def robot() -> Layout:
+    """Robot A, four fins."""
     return load_layout("A")
 
 
 def first_wrench(robot: Layout, setpoint: Setpoint, yaw: float = 0.0) -> np.ndarray:
+    """Wrench (6,) of a new controller for a robot at rest."""
     still = Measurement(
         0.0, np.array([0.0, 0.0, -1.0]), yaw, np.zeros(3), 1.0, np.zeros(3), 0.0, 0.0
     )

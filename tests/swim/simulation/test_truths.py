@@ -16,6 +16,7 @@ from tests.any_robot import AnyRobot
 
 @pytest.fixture(scope="module")
 def robot() -> Layout:
+    """Robot A as it is drawn."""
     return load_layout("A")
 
 

@@ -20,13 +20,18 @@ from webapp.tasks.modes import (
     signature_difference,
 )
 
-LOWER = np.tile([0.05, 0.1, -math.pi], (2, 1))
-UPPER = np.tile([0.6, 2.1, math.pi], (2, 1))
-PUSH = (0.4, 1.5, 0.0)
-REST = (0.05, 0.1, 0.0)
+COMMAND_MIN = np.tile([0.05, 0.1, -math.pi], (2, 1))
+"""Lower limits (2, 3) of two fins."""
+COMMAND_MAX = np.tile([0.6, 2.1, math.pi], (2, 1))
+"""Their upper limits."""
+PUSH_COMMAND = (0.4, 1.5, 0.0)
+"""A command of a fin that pushes."""
+REST_COMMAND = (0.05, 0.1, 0.0)
+"""A command of a fin that rests."""
 
 
-def candidates(*commands: list[tuple[float, ...]]) -> Candidates:
+def candidates_of(*commands: list[tuple[float, ...]]) -> Candidates:
+    """Candidates by the commands of their fins, the cheaper ones first."""
     command = np.array(commands)
     k = len(command)
     return Candidates(
@@ -53,23 +58,27 @@ def signature_of(command: np.ndarray) -> ModeSignature:
 def test_a_fin_rests_by_its_own_law() -> None:
     """The same beat is rest for a small fin beside a large one; nothing rests where nothing
     pushes."""
-    command = np.array([PUSH, PUSH, (math.nan,) * 3])
+    command = np.array([PUSH_COMMAND, PUSH_COMMAND, (math.nan,) * 3])
     force = np.array([(2.0, 0.2, 0.0), (2.0, 0.0, 0.0), (0.0, 0.0, 0.0)])
     resting = mode_signature(np.array([command] * 3), force).resting
     assert resting.tolist() == [[False, True, False], [False, True, False], [False] * 3]
 
 
 def test_the_same_fins_at_rest_are_the_same_mode_whatever_they_do_there() -> None:
-    told = candidates([PUSH, REST], [PUSH, (0.05, 0.1, 2.0)], [REST, PUSH])
-    modes = find_modes(told, drag(told.command), LOWER, UPPER)
+    told = candidates_of(
+        [PUSH_COMMAND, REST_COMMAND], [PUSH_COMMAND, (0.05, 0.1, 2.0)], [REST_COMMAND, PUSH_COMMAND]
+    )
+    modes = find_modes(told, drag(told.command), COMMAND_MIN, COMMAND_MAX)
     assert [mode.resting for mode in modes] == [(1,), (0,)]
     assert modes[1].effort == 3.0 and modes[1].power == 9.0 and modes[0].saturation < 1.0
 
 
 def test_angles_are_compared_the_shorter_way_round() -> None:
-    one = signature_of(np.array([PUSH, (0.4, 1.5, math.pi - 0.05)]))
-    assert same_signature(one, signature_of(np.array([PUSH, (0.4, 1.5, 0.05 - math.pi)])))
-    assert not same_signature(one, signature_of(np.array([PUSH, (0.4, 1.5, 0.6 - math.pi)])))
+    one = signature_of(np.array([PUSH_COMMAND, (0.4, 1.5, math.pi - 0.05)]))
+    assert same_signature(one, signature_of(np.array([PUSH_COMMAND, (0.4, 1.5, 0.05 - math.pi)])))
+    assert not same_signature(
+        one, signature_of(np.array([PUSH_COMMAND, (0.4, 1.5, 0.6 - math.pi)]))
+    )
 
 
 def test_modes_of_an_answer_deliver_the_wrench_in_different_ways() -> None:
@@ -137,5 +146,5 @@ def test_what_counts_as_different() -> None:
 
 def test_groups_are_led_by_their_first() -> None:
     """The third differs from the first, though not from the second: it leads a group of its own."""
-    ways = np.array([[PUSH, (0.4, 1.5, angle)] for angle in (0.0, 0.3, 0.6, 0.1, 0.7)])
+    ways = np.array([[PUSH_COMMAND, (0.4, 1.5, angle)] for angle in (0.0, 0.3, 0.6, 0.1, 0.7)])
     assert cluster(signature_of(ways)) == [[0, 1, 3], [2, 4]]

@@ -12,20 +12,22 @@ from finlab.research.mdn.descent import realize, wrench
 from finlab.research.mdn.training import teacher
 from finlab.research.random_layouts import FIN_COUNTS, WIDE, random_fin_kinds, random_fin_robot
 
-STD = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
+WRENCH_SCALE = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
+"""Scale of errors in the six axes [N, N m]."""
 
 
-def told() -> tuple[EffortRobot, np.ndarray, teacher.Minima]:
+def robot_targets_and_minima() -> tuple[EffortRobot, np.ndarray, teacher.Minima]:
+    """A robot, targets of it, and the local minima that the teacher finds."""
     rng = np.random.default_rng(6)
     layout = random_fin_robot(rng, random_fin_kinds(rng, 2), 6)
-    robot = effort_robot(Plant(layout), STD)
+    robot = effort_robot(Plant(layout), WRENCH_SCALE)
     target = teacher.random_targets(rng, robot, 12)
     return robot, target, teacher.local_minima(rng, robot.forces, target)
 
 
 @pytest.fixture(scope="module")
 def effort() -> tuple[EffortRobot, np.ndarray, teacher.Minima]:
-    return told()
+    return robot_targets_and_minima()
 
 
 def test_ways_deliver_the_target_at_the_cost_that_is_told(
@@ -73,6 +75,7 @@ def test_roots_of_shares_keep_the_direction() -> None:
 
 @pytest.fixture(scope="module")
 def robots() -> list[Layout]:
+    """Sixty robots as training draws them."""
     rng = np.random.default_rng(1)
     kinds = random_fin_kinds(rng, 3)
     return [random_fin_robot(rng, kinds, int(rng.choice(list(FIN_COUNTS)))) for _ in range(60)]

@@ -21,10 +21,12 @@ from finlab.research.training import loop
 from finlab.research.training.loop import first_weights
 
 SMOKE = RECIPES["smoke"]
+"""The recipe of a training of seconds."""
 
 
 @pytest.fixture(scope="module")
 def shard(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A file of the teacher's answers."""
     return write_answers(tmp_path_factory.mktemp("answers"), SMOKE.answers, 0, 0)
 
 
@@ -73,6 +75,7 @@ def test_the_loss_is_per_fin_and_rewards_components_that_are_used(shard: Path) -
 
 @pytest.fixture(scope="module")
 def trained(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of a training that is done."""
     folder = tmp_path_factory.mktemp("trained")
     train_mdn("smoke", folder)
     return folder
