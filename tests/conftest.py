@@ -8,7 +8,7 @@ from hypothesis import settings
 
 from finlab.assets import shipped_layouts
 from finlab.layout import Layout, load_layout
-from tests.any_robot import AnyRobot
+from tests.allocator_cache import AllocatorCache
 
 # Machines that run tests also run browsers and trainings: an example that takes long is no failure.
 settings.register_profile("finlab", deadline=None)
@@ -79,7 +79,7 @@ def layout_a() -> Layout:
 
 
 @pytest.fixture(scope="session")
-def analytic() -> AnyRobot:
+def analytic() -> AllocatorCache:
     """The quickest method; it takes only the normalization from a checkpoint."""
 
-    return AnyRobot("analytic")
+    return AllocatorCache("analytic")

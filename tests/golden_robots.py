@@ -17,9 +17,9 @@ from finlab.allocation.dual.compiled import Compiled
 from finlab.arrays import Array
 from finlab.core.fields import head_of
 from finlab.deploy.thin_block import thinned
-from tests.least_power import conic_optimum, farthest, least_miss, lower_bound
-from tests.mixed_robots import bluerov2_heavy, load, random_robot, with_rates, within
-from tests.own_plant import OwnPlant
+from tests.oracle_optima import conic_optimum, farthest, least_miss, lower_bound
+from tests.oracle_plant import OraclePlant
+from tests.random_robots import bluerov2_heavy, load, random_robot, with_rates, within
 
 TEST_FOLDER = Path(core.__path__[0]) / "tests"
 """Where the core's tests in C stand."""
@@ -44,7 +44,7 @@ class Question(NamedTuple):
     """Least distance from it, over the wrench scale."""
 
 
-def _question(plant: OwnPlant, rng: np.random.Generator) -> Question:
+def _question(plant: OraclePlant, rng: np.random.Generator) -> Question:
     """A random question with what the oracles say to it."""
     wrench = within(plant, rng, 0.2, 0.9)
     if all(actuator.kind == "thruster" for actuator in plant.actuators):
@@ -82,7 +82,7 @@ def header(name: str, layout: dict[str, Any], seed: int) -> str:
         layout: mapping of its layout file.
         seed: of its questions.
     """
-    plant = OwnPlant(layout)
+    plant = OraclePlant(layout)
     has_no_gaps = not any(actuator.kind == "fin" for actuator in plant.actuators)
     rng = np.random.default_rng(seed)
     block = thinned(Compiled.of(load(layout)).robot.block)

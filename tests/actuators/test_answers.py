@@ -20,7 +20,7 @@ from finlab.arrays import Array
 from finlab.layout.effectiveness import own_effectiveness
 from finlab.layout.layout import Layout
 from finlab.physics.plant import Plant
-from tests.core.parts import dual_function
+from tests.core.internal_functions import dual_function
 from tests.t200 import t200_rows
 
 T200 = PowerTable(t200_rows(16), "us")

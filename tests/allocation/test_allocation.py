@@ -15,8 +15,8 @@ from finlab.assets import shipped_checkpoints
 from finlab.errors import AllocationError, DataError
 from finlab.layout import Damage, Fin, FinModelSpec, Layout, load_layout
 from finlab.physics import Plant
-from tests.allocation.quick import OF_FINS, quick_allocator
-from tests.any_robot import AnyRobot
+from tests.allocation.quick_allocator import OF_FINS, quick_allocator
+from tests.allocator_cache import AllocatorCache
 
 WRENCH = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
 """A wrench within reach of robot A: surge, heave and yaw [N, N m]."""
@@ -35,7 +35,7 @@ def copies(result: Allocation) -> list[Allocation]:
 
 
 def test_every_field_counts_but_the_time() -> None:
-    result = AnyRobot("mdn").allocate(load_layout("A"), WRENCH)
+    result = AllocatorCache("mdn").allocate(load_layout("A"), WRENCH)
     assert replace(result, solve_ms=1e3) == result
     assert result.candidates is not None
     for changed in (
@@ -77,7 +77,7 @@ def test_nan_equals_nan_and_kinds_differ() -> None:
 
 def test_an_answer_cannot_be_written_to_nor_what_comes_after_it() -> None:
     layout = load_layout("A")
-    search = AnyRobot("mdn")
+    search = AllocatorCache("mdn")
     first, second = (search.allocate(layout, WRENCH) for _ in range(2))
     assert first.candidates is not None and first.candidates.command.base is not first.command
     with pytest.raises(ValueError, match="read-only"):
@@ -87,7 +87,7 @@ def test_an_answer_cannot_be_written_to_nor_what_comes_after_it() -> None:
 
 
 @pytest.mark.parametrize("n_fins", [1, 4, 16])
-def test_the_short_form_is_short(n_fins: int, search: AnyRobot) -> None:
+def test_the_short_form_is_short(n_fins: int, search: AllocatorCache) -> None:
     fins = tuple(Fin(f"{'long' * 14}_{i}", (0.1, 0.01 * i, 0.0), 0.3 * i) for i in range(n_fins))
     layout = Layout("the longest name of a layout that " + "x" * 30, fins)
     result = search.allocate(layout, WRENCH, lost=[fin.name for fin in fins[: n_fins // 2]])
@@ -97,7 +97,7 @@ def test_the_short_form_is_short(n_fins: int, search: AnyRobot) -> None:
     assert "0 targets" in repr(search.allocate_batch(layout, np.empty((0, 6))))
 
 
-def test_another_command_is_judged_anew(search: AnyRobot) -> None:
+def test_another_command_is_judged_anew(search: AllocatorCache) -> None:
     layout = load_layout("A")
     result = search.allocate(layout, WRENCH, lost=["front_left"])
     least = np.where(np.isnan(result.command), np.nan, layout.lower)
@@ -166,7 +166,7 @@ def wrenches(n: int = 6) -> np.ndarray:
 
 
 def test_a_batch_errs_as_little_as_single_calls() -> None:
-    allocator = AnyRobot()
+    allocator = AllocatorCache()
     layout = load_layout("A")
     targets = wrenches(20)
     batch = allocator.allocate_batch(layout, targets)
@@ -175,7 +175,7 @@ def test_a_batch_errs_as_little_as_single_calls() -> None:
 
 
 def test_weights_move_the_error_off_the_heavy_axis() -> None:
-    allocator = AnyRobot()
+    allocator = AllocatorCache()
     layout = load_layout("A")
     targets = wrenches(20)
     batch = allocator.allocate_batch(layout, targets)
@@ -212,7 +212,7 @@ def test_batches_carry_the_note_about_unknown_fins(method: str) -> None:
 
 
 def test_a_method_that_does_not_know_the_policy_says_so_at_once() -> None:
-    allocator = AnyRobot("analytic")
+    allocator = AllocatorCache("analytic")
     layout = load_layout("A")
     for policy in ("priority", Policy(axis_weights=(2.0, 1.0, 1.0, 1.0, 1.0, 1.0))):
         with pytest.raises(AllocationError, match="minimizes the plain error"):

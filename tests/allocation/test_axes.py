@@ -14,9 +14,9 @@ from finlab.errors import CommandError, LayoutError
 from finlab.layout import Layout, load_layout
 from finlab.layout.load import parse_layout
 from finlab.layout.save import layout_to_dict
-from tests.least_power import lower_bound
-from tests.mixed_robots import layout_of
-from tests.own_plant import OwnPlant
+from tests.oracle_optima import lower_bound
+from tests.oracle_plant import OraclePlant
+from tests.random_robots import layout_of
 
 POLICIES = ("closest", "direction", "priority")
 """The kinds of policy."""
@@ -53,7 +53,7 @@ def test_an_axis_is_freed_by_name_for_one_question(policy: str) -> None:
 
 
 def test_a_free_axis_takes_what_the_cheapest_answer_gives() -> None:
-    plant = OwnPlant(parts := layout_of("r", _three_thrusters()))
+    plant = OraclePlant(parts := layout_of("r", _three_thrusters()))
     answer = Allocator(parse_layout(parts)).allocate([12.0, 0.0, 0.0, 0.0, 0.0, 9.0], free=("Tz",))
     watts = [
         lower_bound(plant, np.array([12.0, 0, 0, 0, 0, yaw])) for yaw in np.linspace(-6, 6, 121)

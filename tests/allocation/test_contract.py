@@ -1,7 +1,7 @@
 """What every method promises of every answer: kinds of robot, damage, policies and ticks in one
 table.
 
-The judge is `tests/own_plant.py`, a second set of laws, for robots that are whole or have lost
+The judge is `tests/oracle_plant.py`, a second set of laws, for robots that are whole or have lost
 actuators; of others the limits that damage leaves are checked.
 """
 
@@ -23,10 +23,10 @@ from finlab.arrays import Array
 from finlab.axes import AXES
 from finlab.layout import Damage, Layout, parse_layout
 from finlab.physics.plant import plant_of
-from tests.allocation.quick import quick_allocator
-from tests.exhaustive import sampled
-from tests.mixed_robots import KINDS, random_flow, random_robot, with_dead_bands, with_rates
-from tests.own_plant import OwnPlant
+from tests.allocation.quick_allocator import quick_allocator
+from tests.oracle_plant import OraclePlant
+from tests.random_robots import KINDS, random_flow, random_robot, with_dead_bands, with_rates
+from tests.sampled_cases import sampled
 
 SEED = 58
 """Of the robots; another one than that of the tests of the default method."""
@@ -50,7 +50,7 @@ class Robot:
     """A robot of a kind, and what judges its answers."""
 
     layout: Layout
-    plant: OwnPlant
+    plant: OraclePlant
     flow: Array | None
 
 
@@ -61,7 +61,7 @@ def robot_of(kind: str) -> Robot:
     rng = np.random.default_rng([SEED, KINDS.index(kind)])
     mapping = with_dead_bands(with_rates(random_robot(kind, number, SEED)), rng)
     flow = random_flow(kind, number, SEED)
-    return Robot(parse_layout(mapping), OwnPlant(mapping, flow), flow)
+    return Robot(parse_layout(mapping), OraclePlant(mapping, flow), flow)
 
 
 def fits(method: str, kind: str) -> bool:

@@ -13,7 +13,7 @@ from finlab.cli import main
 from finlab.errors import AllocationError, FinlabError, LayoutError
 from finlab.layout import Damage, Layout, Limits, load_layout
 from finlab.physics import Plant
-from tests.any_robot import AnyRobot
+from tests.allocator_cache import AllocatorCache
 from tests.terminal import refused
 
 TARGET = [1.0, 0.3, 1.0, 0.0, 0.05, 0.1]
@@ -26,7 +26,7 @@ def penta() -> Layout:
     return load_layout(shipped_layouts()["penta"])
 
 
-def test_a_weak_fin_keeps_to_what_is_left(search: AnyRobot, penta: Layout) -> None:
+def test_a_weak_fin_keeps_to_what_is_left(search: AllocatorCache, penta: Layout) -> None:
     health = Damage(weak={"bow": 0.4})
     result = search.allocate(penta, TARGET, damage=health)
     assert result.err_norm < 1e-5
@@ -39,7 +39,7 @@ def test_a_weak_fin_keeps_to_what_is_left(search: AnyRobot, penta: Layout) -> No
 
 @pytest.mark.parametrize("kind", SCALES_THRUST)
 def test_a_torn_fin_gives_its_share_at_every_command(
-    search: AnyRobot, penta: Layout, kind: str
+    search: AllocatorCache, penta: Layout, kind: str
 ) -> None:
     fins = tuple(replace(fin, model=FinModelSpec(kind)) for fin in penta.fins)
     layout = replace(penta, actuators=fins)
@@ -62,7 +62,7 @@ def test_the_thrust_of_a_table_cannot_be_scaled() -> None:
         Damage(torn={"bow": 1.5})
 
 
-def test_a_stuck_fin_points_where_it_stays(search: AnyRobot, penta: Layout) -> None:
+def test_a_stuck_fin_points_where_it_stays(search: AllocatorCache, penta: Layout) -> None:
     for angle in (0.7, -2.0, 0.7 + 2 * math.pi):
         result = search.allocate(penta, TARGET, damage=Damage(stuck={"bow": angle}))
         assert result.err_norm < 1e-5
@@ -78,7 +78,7 @@ def test_the_force_of_a_running_fin_is_made_up_for(method: str, penta: Layout) -
     np.testing.assert_allclose(result.wrench, Plant(penta).wrench(result.command), atol=1e-12)
 
 
-def test_damage_and_failures_go_together(search: AnyRobot, penta: Layout) -> None:
+def test_damage_and_failures_go_together(search: AllocatorCache, penta: Layout) -> None:
     name = penta.names[1]
     result = search.allocate(penta, TARGET, lost=[name], damage=Damage(stuck={"bow": 0.2}))
     assert np.isnan(result.command[1]).all() and result.command[
@@ -97,7 +97,7 @@ def test_whole_fins_are_left_alone(penta: Layout) -> None:
     assert same.count(False) == 1
 
 
-def test_nonsense_is_refused(search: AnyRobot, penta: Layout) -> None:
+def test_nonsense_is_refused(search: AllocatorCache, penta: Layout) -> None:
     for bad in (
         {"weak": {"bow": 0.0}},
         {"weak": {"bow": 1.5}},

@@ -12,9 +12,9 @@ from finlab.allocation import Allocator, Policy
 from finlab.errors import LayoutError
 from finlab.layout import Damage, Layout
 from finlab.physics import plant_of
-from tests.any_robot import AnyRobot
-from tests.exhaustive import sampled
+from tests.allocator_cache import AllocatorCache
 from tests.hostile_robots import hostile_robot
+from tests.sampled_cases import sampled
 
 N_CASES = 400
 """How many random robots there are; each day a share of them is asked."""
@@ -32,7 +32,7 @@ def quick_method(name: str) -> Allocator:
         options = {"n_candidates": 4, "n_steps": 2}
     if kind == "sqp":
         options |= {"n_starts": 1, "n_steps": 4}
-    return AnyRobot(kind, **options)
+    return AllocatorCache(kind, **options)
 
 
 def choose(rng: np.random.Generator, values: Any) -> Any:

@@ -12,10 +12,10 @@ from finlab.allocation.rates import Rates
 from finlab.layout import Fin, FinModelSpec, Layout, Limits
 from finlab.physics import plant_of
 from finlab.research.random_layouts import random_layout
-from tests.any_robot import AnyRobot
+from tests.allocator_cache import AllocatorCache
 
 
-def problem_of(search: AnyRobot, layout: Layout) -> CommandProblem:
+def problem_of(search: AllocatorCache, layout: Layout) -> CommandProblem:
     """The problem that Levenberg-Marquardt solves for a robot."""
     return CommandProblem.of(plant_of(layout), search.normalization.std)
 
@@ -60,7 +60,7 @@ HOSTILE_LAYOUTS = {
 
 
 @pytest.mark.parametrize("limits", ["nominal", "varied"])
-def test_never_makes_it_worse_and_mostly_much_better(limits: str, search: AnyRobot) -> None:
+def test_never_makes_it_worse_and_mostly_much_better(limits: str, search: AllocatorCache) -> None:
     before = []
     after = []
     for seed in range(5000, 5010):
@@ -80,7 +80,7 @@ def test_never_makes_it_worse_and_mostly_much_better(limits: str, search: AnyRob
     assert np.median(first) > 0.5 and (last < 0.05 * first).mean() > 0.7
 
 
-def test_finds_the_way_back_from_nearby(search: AnyRobot) -> None:
+def test_finds_the_way_back_from_nearby(search: AllocatorCache) -> None:
     problem = problem_of(search, random_layout(np.random.default_rng(5003), n_fins=5))
     middle = problem.lower + (0.3 + 0.4 * np.random.default_rng(0).uniform(size=(30, 5, 3))) * (
         problem.upper - problem.lower
@@ -101,7 +101,7 @@ STRONG_FINS = {
 
 @pytest.mark.parametrize(("model", "limits"), STRONG_FINS.values(), ids=list(STRONG_FINS))
 def test_strong_fins_on_long_levers_give_numbers(
-    model: FinModelSpec, limits: Limits, search: AnyRobot
+    model: FinModelSpec, limits: Limits, search: AllocatorCache
 ) -> None:
     """Their derivatives are large and of too low a rank: without a relative ridge a step is no
     number.
@@ -119,7 +119,7 @@ def test_strong_fins_on_long_levers_give_numbers(
     assert np.isfinite(refined.command).all() and np.isfinite(refined.error).all()
 
 
-def test_a_start_a_whole_turn_off_is_the_same_start(search: AnyRobot) -> None:
+def test_a_start_a_whole_turn_off_is_the_same_start(search: AllocatorCache) -> None:
     limits = Limits(zero_direction=(0.0, 2.0 * math.pi))
     problem = problem_of(search, Layout("one", (Fin("a", (0.0, 0.0, 0.0), 0.0, limits),)))
     start = np.array([[[0.4, 1.5, -1.0]]])
@@ -128,7 +128,7 @@ def test_a_start_a_whole_turn_off_is_the_same_start(search: AnyRobot) -> None:
     assert refined.error[0] < 1e-9
 
 
-def test_commands_without_room_stay_bit_for_bit(search: AnyRobot) -> None:
+def test_commands_without_room_stay_bit_for_bit(search: AllocatorCache) -> None:
     problem = problem_of(search, HOSTILE_LAYOUTS["no width"])
     refined = refine(
         problem, np.random.default_rng(0).normal(size=(10, 6)), random_commands(problem, 10, 1), 10
@@ -138,7 +138,7 @@ def test_commands_without_room_stay_bit_for_bit(search: AnyRobot) -> None:
     assert np.ptp(refined.command[:, 1, 0]) > 0.01  # what has room moves
 
 
-def test_rows_do_not_see_each_other(search: AnyRobot) -> None:
+def test_rows_do_not_see_each_other(search: AllocatorCache) -> None:
     problem = problem_of(search, random_layout(np.random.default_rng(5004), n_fins=4))
     target = problem.wrench(random_commands(problem, 6, 1))
     start = random_commands(problem, 6, 2)
@@ -148,7 +148,7 @@ def test_rows_do_not_see_each_other(search: AnyRobot) -> None:
         np.testing.assert_allclose(together.error[row], alone.error[0], rtol=1e-3, atol=1e-6)
 
 
-def test_a_direction_may_cross_the_seam(search: AnyRobot) -> None:
+def test_a_direction_may_cross_the_seam(search: AllocatorCache) -> None:
     # The answer lies just across +-pi from the start, and nearly a full turn away the other way
     # round.
     problem = problem_of(search, Layout("one", (Fin("a", (0.0, 0.0, 0.0), 0.0),)))

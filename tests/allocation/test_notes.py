@@ -19,8 +19,8 @@ from finlab.assets import shipped_checkpoints
 from finlab.errors import DataError
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout
 from finlab.physics import make_law, write_table
-from tests.allocation.quick import OF_FINS, quick_allocator
-from tests.any_robot import FIN_ROBOTS
+from tests.allocation.quick_allocator import OF_FINS, quick_allocator
+from tests.allocator_cache import FIN_ROBOTS
 
 pytestmark = pytest.mark.skipif(
     not {"default", "paper"} <= set(shipped_checkpoints()),

@@ -20,7 +20,7 @@ from finlab.allocation.method import Method
 from finlab.errors import AllocationError
 from finlab.layout import Damage, Fin, FinModelSpec, Layout, load_layout
 from finlab.physics.objective import yardstick
-from tests.allocation.quick import QUICK_SETTINGS
+from tests.allocation.quick_allocator import QUICK_SETTINGS
 
 WRENCH = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
 """A wrench within reach of robot A: surge, heave and yaw [N, N m]."""

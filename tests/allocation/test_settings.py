@@ -9,7 +9,7 @@ from finlab.allocation import METHODS, Allocator
 from finlab.assets import shipped_checkpoints
 from finlab.errors import AllocationError
 from finlab.layout import load_layout
-from tests.any_robot import AnyRobot
+from tests.allocator_cache import AllocatorCache
 
 WRENCH = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
 """A wrench within reach of robot A: surge, heave and yaw [N, N m]."""
@@ -68,7 +68,7 @@ def test_networks_are_shared() -> None:
 @pytest.mark.parametrize("method", METHODS)
 def test_unknown_settings_are_refused(method: str) -> None:
     with pytest.raises(AllocationError, match="knows the settings .*, got 'shoe_size'"):
-        AnyRobot(method).with_settings(shoe_size=43)
+        AllocatorCache(method).with_settings(shoe_size=43)
 
 
 @pytest.mark.parametrize(
@@ -92,6 +92,6 @@ def test_unknown_settings_are_refused(method: str) -> None:
 )
 def test_impossible_settings_are_refused(method: str, wrong: dict[str, Any], message: str) -> None:
     with pytest.raises(AllocationError, match=message):
-        AnyRobot(method, **wrong)
+        AllocatorCache(method, **wrong)
     with pytest.raises(AllocationError, match=message):
-        AnyRobot(method).with_settings(**wrong)
+        AllocatorCache(method).with_settings(**wrong)

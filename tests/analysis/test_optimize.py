@@ -19,7 +19,7 @@ from finlab.arrays import Array
 from finlab.axes import AXES as WRENCH
 from finlab.errors import FinlabError, LayoutError
 from finlab.layout import Layout
-from tests.exhaustive import sampled
+from tests.sampled_cases import sampled
 
 Layouts = Callable[[str], Layout]
 """The type of the fixture `shipped`: a shipped robot by its name."""

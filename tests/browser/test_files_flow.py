@@ -13,7 +13,7 @@ from finlab.cli import main
 from finlab.files import yaml_text
 from finlab.layout import FinModelSpec, layout_to_dict, load_layout
 from finlab.physics import make_law
-from tests.fit.cell import columns_of, commands, measured, soft, write
+from tests.fit.load_cell import columns_of, commands, measured, soft, write
 
 DROPPED_FILES_SCRIPT = """files => {
   const carried = new DataTransfer();

@@ -20,7 +20,7 @@ from finlab import cli
 from finlab.cli import EXAMPLES, _command_line, _verb, examples, main
 from finlab.cli.shared_options import with_json_file
 from finlab.files.guarded import read_file
-from tests.fit.cell import columns_of, commands, measured, soft, write
+from tests.fit.load_cell import columns_of, commands, measured, soft, write
 from tests.terminal import refused
 
 FINLAB = [sys.executable, "-m", "finlab"]

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from finlab.cli import main
-from tests.fit.cell import columns_of, commands, measured, soft, write
+from tests.fit.load_cell import columns_of, commands, measured, soft, write
 from tests.terminal import refused
 
 WITHOUT_TORCH = """

@@ -8,7 +8,17 @@ import numpy as np
 import pytest
 
 from finlab.arrays import Array
-from tests.core.parts import POD, ROBOTS, LineResponse, Robot, Set, Tangent, at, functions, robot_of
+from tests.core.internal_functions import (
+    POD,
+    ROBOTS,
+    LineResponse,
+    Robot,
+    Set,
+    Tangent,
+    at,
+    functions,
+    robot_of,
+)
 
 N_ANGLES = 361
 """How many angles of a sector are scanned."""

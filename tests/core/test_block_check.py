@@ -6,7 +6,7 @@ import pytest
 from finlab.arrays import Array
 from finlab.core.fields import actuators_of, constant, head_of, tables_begin
 from finlab.core.library import library
-from tests.core.parts import FIN, POD, Robot, robot_of
+from tests.core.internal_functions import FIN, POD, Robot, robot_of
 
 FOIL = constant("FL_FOIL")
 """The kind of a rudder's command."""

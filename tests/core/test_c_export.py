@@ -19,9 +19,9 @@ from finlab.core.fields import actuators_of
 from finlab.deploy.c_sources import c_sources, write_c
 from finlab.deploy.thin_block import tables_of, thinned
 from finlab.layout import load_layout
-from tests.any_robot import AnyRobot
-from tests.exhaustive import sampled
-from tests.mixed_robots import KINDS, load, random_robot, with_rates
+from tests.allocator_cache import AllocatorCache
+from tests.random_robots import KINDS, load, random_robot, with_rates
+from tests.sampled_cases import sampled
 from tests.terminal import refused
 
 HERE = Path(__file__).parent
@@ -175,7 +175,7 @@ def test_on_a_cortex_m7_in_its_memory(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["A", "fish", "torpedo", "bluerov2", "octo"])
 def test_tables_of_a_law_are_small_and_say_the_same(name: str) -> None:
-    method = AnyRobot().method(load_layout(name))
+    method = AllocatorCache().method(load_layout(name))
     robot = (
         method.at(np.array(SPEED)).compiled.robot if name == "torpedo" else method.compiled.robot
     )

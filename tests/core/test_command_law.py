@@ -11,7 +11,17 @@ from scipy.interpolate import CubicHermiteSpline
 from finlab.actuators.hermite_grid import grid_numbers
 from finlab.arrays import Array
 from finlab.core.fields import actuators_of, numbers_of, struct, tables_begin
-from tests.core.parts import EITHER_WAY, FIN, POD, ROBOTS, Box, Robot, at, functions, robot_of
+from tests.core.internal_functions import (
+    EITHER_WAY,
+    FIN,
+    POD,
+    ROBOTS,
+    Box,
+    Robot,
+    at,
+    functions,
+    robot_of,
+)
 
 STEP = 1e-6
 """Of differences."""

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from finlab.arrays import Array
-from tests.core.parts import EITHER_WAY, MOST, Robot, at, functions, robot_of
+from tests.core.internal_functions import EITHER_WAY, MOST, Robot, at, functions, robot_of
 
 # Their commands have no dead bands, and none of their foils stalls.
 SMOOTH = ("azimuths", "fins", "fins any shaft", "fins uneven", "wide arcs", "holes")

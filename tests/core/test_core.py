@@ -14,7 +14,7 @@ from finlab.core.fields import constant, head_of, struct
 from finlab.core.library import library
 from finlab.errors import CommandError, DataError
 from finlab.layout import Layout
-from tests.mixed_robots import KINDS, bluerov2_heavy, load, random_plant, random_robot, within
+from tests.random_robots import KINDS, bluerov2_heavy, load, random_plant, random_robot, within
 
 
 def core_of_layout(layout: Layout) -> Core:

@@ -10,7 +10,7 @@ import pytest
 from finlab.allocation import Policy
 from finlab.arrays import Array
 from finlab.core.calls import policy_record
-from tests.core.parts import (
+from tests.core.internal_functions import (
     ROBOTS,
     Robot,
     Set,

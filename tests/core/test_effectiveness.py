@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from finlab.arrays import Array
-from tests.core.parts import ROBOTS, Robot, Span, at, functions, robot_of
+from tests.core.internal_functions import ROBOTS, Robot, Span, at, functions, robot_of
 
 
 def span_of(robot: Robot, work: ctypes.Array[ctypes.c_char], lost: Array, free: Array) -> Span:

@@ -8,7 +8,7 @@ import pytest
 
 from finlab.allocation.rates import Rates
 from finlab.arrays import Array
-from tests.core.parts import FIN, POD, ROBOTS, Robot, Set, robot_of
+from tests.core.internal_functions import FIN, POD, ROBOTS, Robot, Set, robot_of
 
 PERIOD_S = 0.1
 """Length of a tick [s]."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from finlab.arrays import Array
-from tests.core.parts import FIN, MOST, ROBOTS, Robot, at, functions, robot_of
+from tests.core.internal_functions import FIN, MOST, ROBOTS, Robot, at, functions, robot_of
 
 
 def told(robot: Robot, command: Array, lost: Array) -> tuple[float, Array]:

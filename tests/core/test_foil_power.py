@@ -8,8 +8,8 @@ from scipy.optimize import minimize
 
 from finlab.arrays import Array
 from finlab.layout.load import parse_layout
-from tests.core.parts import Robot, in_the_core
-from tests.mixed_robots import random_flow, random_robot
+from tests.core.internal_functions import Robot, in_the_core
+from tests.random_robots import random_flow, random_robot
 
 STARTS = 20
 """Random commands at which SLSQP begins."""

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from finlab.arrays import Array
-from tests.core.parts import at, functions
+from tests.core.internal_functions import at, functions
 
 
 def factor_of(matrix: Array) -> tuple[int, Array]:

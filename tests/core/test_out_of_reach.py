@@ -11,9 +11,9 @@ from finlab.allocation import Policy
 from finlab.arrays import Array
 from finlab.core.calls import policy_record
 from finlab.layout.load import parse_layout
-from tests.core.parts import Robot, in_the_core
+from tests.core.internal_functions import Robot, in_the_core
 from tests.core.test_actuator_response import forces_of
-from tests.mixed_robots import random_robot
+from tests.random_robots import random_robot
 
 NUMBERS = range(4)
 """Of each kind of robot."""

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from finlab.arrays import Array
-from tests.core.parts import (
+from tests.core.internal_functions import (
     REAL,
     Response,
     Robot,

@@ -25,8 +25,8 @@ from finlab.deploy.deployed_robot import (
 from finlab.errors import FinlabError
 from finlab.layout import Layout, save_layout
 from finlab.physics import plant_of
-from tests.any_robot import FIN_ROBOTS, AnyRobot
-from tests.exhaustive import sampled
+from tests.allocator_cache import FIN_ROBOTS, AllocatorCache
+from tests.sampled_cases import sampled
 
 TARGET = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
 """A wrench within reach of robot A: surge, heave and yaw [N, N m]."""
@@ -175,7 +175,7 @@ def test_answer_says_what_is_missing(robot: DeployedRobot) -> None:
         robot.allocate([0] * 6, lost=["nobody"])
 
 
-def test_lost_fins_of_the_bundle_stay_lost(shipped_allocator: AnyRobot) -> None:
+def test_lost_fins_of_the_bundle_stay_lost(shipped_allocator: AllocatorCache) -> None:
     layout = finlab.load_layout("A")
     robot = parse_robot(make_bundle(shipped_allocator.on(layout), ("back_left",)).files)
     lost = layout.index("back_left")
@@ -191,7 +191,7 @@ def test_every_shipped_layout_answers_as_the_library_to_the_last_bit(
 ) -> None:
     """By its own physics, tables included; single, batched and from tick to tick."""
     layout = measured if name == "measured" else finlab.load_layout(name)
-    desk = AnyRobot()
+    desk = AllocatorCache()
     make_bundle(desk.on(layout)).write_zip(tmp_path / "x.zip")
     robot = load_robot(tmp_path / "x.zip")
     assert not bad(robot)

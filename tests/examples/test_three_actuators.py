@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import finlab
-from tests.least_power import lower_bound
-from tests.mixed_robots import T200, T200_FORCE, layout_of, load
-from tests.own_plant import OwnPlant
+from tests.oracle_optima import lower_bound
+from tests.oracle_plant import OraclePlant
+from tests.random_robots import T200, T200_FORCE, layout_of, load
 
 PATH = Path(__file__).resolve().parents[2] / "examples" / "12_three_actuators.py"
 """The example under test."""
@@ -44,7 +44,7 @@ ROBOT = layout_of(
 
 @pytest.mark.parametrize("seed", range(10))
 def test_least_watts_of_three_actuators(seed: int) -> None:
-    plant = OwnPlant(ROBOT)
+    plant = OraclePlant(ROBOT)
     rng = np.random.default_rng(seed)
     wrench = plant.wrench(plant.draw(rng, float(rng.uniform(0.2, 1.0))))
     force, watts, bound = runpy.run_path(str(PATH))["solve"](wrench[[0, 1, 5]])

@@ -13,7 +13,7 @@ from finlab.errors import LayoutError
 from finlab.exchange import Exchange, convert, read_any
 from finlab.exchange.motor_factors import FRAMES, factors_of
 from finlab.layout import Layout, Thruster, own_effectiveness, save_layout
-from tests.mixed_robots import load, random_robot
+from tests.random_robots import load, random_robot
 
 DIAGONAL = np.sqrt(0.5)
 """Part of a unit vector along each of two axes, between which it lies."""

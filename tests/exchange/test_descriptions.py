@@ -12,8 +12,8 @@ import finlab
 from finlab.errors import LayoutError
 from finlab.exchange import Exchange, convert, read_any
 from finlab.layout import Azimuth, Body, Layout, Thruster, own_effectiveness
-from tests.any_robot import FIN_ROBOTS
-from tests.mixed_robots import load, random_robot
+from tests.allocator_cache import FIN_ROBOTS
+from tests.random_robots import load, random_robot
 
 HERE = Path(__file__).parent
 """Folder of the descriptions."""

@@ -34,7 +34,7 @@ from finlab.swim.identification.swim import read_swim
 from finlab.swim.simulation import load_log
 from finlab.swim.simulation.log import Tick, log_of_ticks
 from finlab.swim.simulation.task import make_trajectory
-from tests.fit.cell import columns_of, commands, measured, soft, write
+from tests.fit.load_cell import columns_of, commands, measured, soft, write
 from tests.swim.identification.swims import write_csv as write_swim
 from webapp.session.files import packed as design
 from webapp.session.files import read_layout, unpacked

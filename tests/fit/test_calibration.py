@@ -13,8 +13,8 @@ from finlab.fit.fin_fit import fit_fin, write_fin
 from finlab.layout import FinModelSpec
 from finlab.physics import FinLaw, TableLaw, make_law, plant_of
 from finlab.research.random_layouts import random_fin_model, random_layout
-from tests.exhaustive import sampled
-from tests.fit.cell import commands, measured, samples
+from tests.fit.load_cell import commands, measured, samples
+from tests.sampled_cases import sampled
 
 LAWS = ("drag", "lighthill", "soft", "table")
 """The last one is a soft fin's grid with noise of 3 %."""

@@ -17,7 +17,7 @@ from finlab.errors import DataError
 from finlab.fit.fin_fit import FinFit, fit_fin, summary, write_fin
 from finlab.layout import Fin, FinModelSpec, Layout
 from finlab.physics import TableLaw
-from tests.fit.cell import commands, measured, samples, soft
+from tests.fit.load_cell import commands, measured, samples, soft
 
 LAW = soft(k=4.0, p=1.4, x0=0.9, q=4.0, e=0.15, phi_e=1.0, d=0.12)
 """The law of the fin that is measured, uneven in its directions."""

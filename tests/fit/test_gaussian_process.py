@@ -6,7 +6,7 @@ import pytest
 from scipy.optimize import approx_fprime
 
 from finlab.fit.gaussian_process import GaussianProcess, ThrustKernel
-from tests.fit.cell import commands
+from tests.fit.load_cell import commands
 
 KERNEL = ThrustKernel(isotropic=0.7, directional=0.2, amplitude=0.5, frequency=0.8, turn=1.3)
 """The kernel, with another length in each direction."""

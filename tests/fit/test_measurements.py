@@ -9,7 +9,7 @@ import pytest
 from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.fit.measurements import Measurements, read_measurements
-from tests.fit.cell import columns_of, commands, measured, soft, write
+from tests.fit.load_cell import columns_of, commands, measured, soft, write
 
 Columns = dict[str, Array]
 """Columns of a file by their names."""

@@ -16,7 +16,7 @@ from finlab.errors import DataError
 from finlab.fit.thruster_bench import BenchData, read_bench
 from finlab.fit.thruster_fit import ThrusterFit, fit_thruster, layout_lines
 from finlab.physics.table_error import thrust_table_error
-from tests.fit.cell import write
+from tests.fit.load_cell import write
 
 T200 = Path(__file__).parent / "data" / "t200_16v.csv"
 """Force in kgf, voltage and current in place of power, rpm beside PWM."""

@@ -17,9 +17,9 @@ from finlab.forces.reach import axis_ranges, max_wrench_along_exactly
 from finlab.layout import Azimuth, Layout, Thruster, load_layout
 from finlab.physics import Plant
 from tests.forces.conftest import THRUST
-from tests.least_power import farthest
-from tests.mixed_robots import load, random_flow, random_plant, random_robot
-from tests.own_plant import OwnPlant
+from tests.oracle_optima import farthest
+from tests.oracle_plant import OraclePlant
+from tests.random_robots import load, random_flow, random_plant, random_robot
 
 Array = NDArray[np.float64]
 Layouts = Callable[[str], Layout]
@@ -147,7 +147,7 @@ def test_where_the_water_pushes_harder_than_all_can_hold() -> None:
         robot = random_robot("rudders", number, 21)
         flow = rng.normal(size=6) * [1.5, 1.5, 1.5, 0.3, 0.3, 0.3]
         sets = force_sets(load(robot), flow=flow)
-        plant = OwnPlant(robot, flow)
+        plant = OraclePlant(robot, flow)
         directions = rng.normal(size=(4, 6))
         directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
         found = max_wrench_along_exactly(sets, directions)[0][0]

@@ -16,9 +16,9 @@ from finlab.forces.reach import (
 )
 from finlab.layout import Layout
 from finlab.physics import Plant
-from tests.exhaustive import crossed
 from tests.forces.conftest import THRUST, largest_by_polygons
 from tests.forces.test_force_sets import HALF_ANGLES, sectors
+from tests.sampled_cases import crossed
 
 Layouts = Callable[[str], Layout]
 """The type of the fixture `shipped`: a shipped robot by its name."""

@@ -16,7 +16,7 @@ from finlab.layout import FinModelSpec, Layout, Uncertainty, load_layout
 from finlab.physics import make_law, plant_of, write_table
 from finlab.physics.expected_miss import expected_miss
 from finlab.physics.table_error import grid_uncertainty, thrust_table_error
-from tests.mixed_robots import load, random_flow, random_robot
+from tests.random_robots import load, random_flow, random_robot
 
 N_DRAWS = 20_000
 """How many errors of the forces are sampled."""

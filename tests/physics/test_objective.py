@@ -7,7 +7,7 @@ import pytest
 
 from finlab.physics import Plant
 from finlab.physics.objective import EffortMeter, Name, command_effort, cost_meter, fin_effort
-from tests.random_fins import KINDS, random_robot_of_fins
+from tests.random_fin_robots import KINDS, random_robot_of_fins
 
 
 @pytest.mark.parametrize("objective", ["power", "effort"])

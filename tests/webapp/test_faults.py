@@ -18,7 +18,7 @@ import viser
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
-from tests.exhaustive import sampled
+from tests.sampled_cases import sampled
 from tests.webapp.stand_in import SilentClient, load_stand_in
 from webapp.session import Display, Session
 from webapp.session.looking import DRAWERS

@@ -9,7 +9,7 @@ import pytest
 import viser
 
 from finlab.layout import load_layout
-from tests.exhaustive import sampled
+from tests.sampled_cases import sampled
 from tests.webapp.stand_in import SilentClient, until
 from tests.webapp.test_app import app, on_loop, server, view
 from webapp.app import App

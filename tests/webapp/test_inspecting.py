@@ -16,7 +16,7 @@ from finlab.errors import FinlabError, LayoutError
 from finlab.files import yaml_text
 from finlab.layout import FinModelSpec, Layout, layout_to_dict, load_layout
 from finlab.physics import make_law, plant_of
-from tests.any_robot import FIN_ROBOTS
+from tests.allocator_cache import FIN_ROBOTS
 from webapp.markup.verdict import verdict_sentence
 from webapp.panels.actuator_list import actuator_list
 from webapp.panels.files_tab import command_line

@@ -14,8 +14,8 @@ from finlab.errors import AllocationError
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout
 from finlab.physics import make_law, plant_of
 from finlab.physics.objective import Name
-from tests.any_robot import AnyRobot
-from tests.exhaustive import crossed
+from tests.allocator_cache import AllocatorCache
+from tests.sampled_cases import crossed
 
 METHODS = ("analytic", "qp", "sqp", "ipopt")
 """Model-based methods that take robots of fins."""
@@ -132,12 +132,12 @@ def robot_of_models(models: list[FinModelSpec]) -> Layout:
     return Layout("robot", tuple(Fin(f"fin_{i}", *parts) for i, parts in enumerate(fins)))
 
 
-def few_starts(method: str, objective: Name) -> AnyRobot:
+def few_starts(method: str, objective: Name) -> AllocatorCache:
     """A method with settings that let it answer in seconds; skipped where CasADi is missing."""
     if method == "ipopt":
         pytest.importorskip("casadi", reason="method ipopt is an optional extra")
     aim = {"objective": objective} if method == "sqp" else {}
-    return AnyRobot(method, **aim, **FEW_STARTS.get(method, {}))
+    return AllocatorCache(method, **aim, **FEW_STARTS.get(method, {}))
 
 
 @pytest.mark.parametrize(
@@ -185,9 +185,9 @@ def test_what_is_no_objective_is_refused() -> None:
     with pytest.raises(
         AllocationError, match="objective: expected one of power, effort, got 'thrift'"
     ):
-        AnyRobot("sqp", objective="thrift")
+        AllocatorCache("sqp", objective="thrift")
     with pytest.raises(AllocationError, match="knows the settings .*objective"):
-        AnyRobot("sqp", price=1.0)
+        AllocatorCache("sqp", price=1.0)
 
 
 def test_settings_are_told_like_any_other() -> None:

@@ -16,7 +16,7 @@ from finlab.physics import Plant, plant_of
 from finlab.physics.objective import yardstick
 from finlab.research.networks.trained import WrenchNormalization
 from finlab.research.random_layouts import random_layout
-from tests.any_robot import AnyRobot, normalized_error
+from tests.allocator_cache import AllocatorCache, normalized_error
 
 NORMALIZATION = WrenchNormalization(np.zeros(6), np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.35]))
 """Scale of errors in the six axes [N, N m]."""
@@ -28,12 +28,12 @@ THRUST = 4.737410112522892
 """Thrust of the default fin over f^2 sin^2(A) [N s^2]."""
 
 
-def make(method: str, **aim: Any) -> AnyRobot:
+def make(method: str, **aim: Any) -> AllocatorCache:
     """A method, the slow ones with few starts."""
     if method == "ipopt":
         pytest.importorskip("casadi", reason="method ipopt is an optional extra")
-        return AnyRobot(method, n_starts=4, **aim)
-    return AnyRobot(method, **aim)
+        return AllocatorCache(method, n_starts=4, **aim)
+    return AllocatorCache(method, **aim)
 
 
 def one_fin(**changes: object) -> Layout:

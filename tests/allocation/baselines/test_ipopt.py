@@ -15,9 +15,9 @@ from finlab.errors import AllocationError
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout
 from finlab.physics import Plant, plant_of
 from finlab.research.random_layouts import random_layout
-from tests.any_robot import AnyRobot
-from tests.exhaustive import crossed, sampled
-from tests.mixed_robots import load, random_flow, random_plant, random_robot, within
+from tests.allocator_cache import AllocatorCache
+from tests.random_robots import load, random_flow, random_plant, random_robot, within
+from tests.sampled_cases import crossed, sampled
 
 casadi = pytest.importorskip("casadi", reason="method ipopt is an optional extra")
 UNEVEN = FinModelSpec("soft", (("d", 0.12), ("e", 0.15), ("p", 1.5), ("phi_e", 0.4)))
@@ -31,7 +31,7 @@ def reachable_wrenches(layout: Layout, count: int = 3) -> np.ndarray:
 
 
 def answered(
-    allocator: AnyRobot, layout: Layout, targets: np.ndarray
+    allocator: AllocatorCache, layout: Layout, targets: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Power and error of the answers."""
     answers = [allocator.allocate(layout, target) for target in targets]
@@ -42,8 +42,8 @@ def answered(
 def test_it_agrees_with_the_search_on_shipped_robots(name: str) -> None:
     layout = load_layout(name)
     targets = reachable_wrenches(layout)
-    least, _ = answered(AnyRobot(), layout, targets)
-    power, error = answered(AnyRobot("ipopt"), layout, targets)
+    least, _ = answered(AllocatorCache(), layout, targets)
+    power, error = answered(AllocatorCache("ipopt"), layout, targets)
     assert error.max() < 1e-3
     np.testing.assert_allclose(power, least, rtol=2e-3)
 
@@ -63,8 +63,8 @@ def test_it_agrees_with_the_search_on_any_fin_and_arc(
     fins = [replace(fin, model=model, limits=Limits(zero_direction=arc)) for fin in drawn.fins]
     layout = replace(drawn, actuators=(*fins[:2], replace(fins[2], limits=Limits()), *fins[3:]))
     targets = reachable_wrenches(layout)
-    least, missed = answered(AnyRobot(), layout, targets)
-    power, error = answered(AnyRobot("ipopt"), layout, targets)
+    least, missed = answered(AllocatorCache(), layout, targets)
+    power, error = answered(AllocatorCache("ipopt"), layout, targets)
     exact = missed < 1e-4
     assert exact.any() and error[exact].max() < 5e-3
     np.testing.assert_allclose(power[exact], least[exact], rtol=0.01)
@@ -106,8 +106,8 @@ def test_it_keeps_watts_least_and_nothing_else() -> None:
 def test_out_of_reach_it_comes_as_near_as_the_search() -> None:
     layout = load_layout("ucat")
     far = 20.0 * reachable_wrenches(layout)
-    _, nearest = answered(AnyRobot(), layout, far)
-    _, error = answered(AnyRobot("ipopt"), layout, far)
+    _, nearest = answered(AllocatorCache(), layout, far)
+    _, error = answered(AllocatorCache("ipopt"), layout, far)
     np.testing.assert_allclose(error, nearest, rtol=1e-3, atol=1e-3)
 
 
@@ -241,6 +241,6 @@ def test_random_starts_of_a_plane_are_anywhere_in_its_arc(
 def test_power_is_measured_by_that_of_all_actuators_at_full_load(kind: str) -> None:
     layout = load(random_robot(kind, 1, 7))
     flow = random_flow(kind, 1, 7)
-    program = AnyRobot("ipopt").method(layout).at(flow)._program
-    most = AnyRobot().method(layout).at(flow).compiled.robot.largest_power
+    program = AllocatorCache("ipopt").method(layout).at(flow)._program
+    most = AllocatorCache().method(layout).at(flow).compiled.robot.largest_power
     assert sum(part.full_power for part in program._actuators) == pytest.approx(most, rel=0.02)

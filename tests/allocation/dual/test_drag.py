@@ -13,7 +13,7 @@ from finlab.allocation.dual.compiled import Compiled
 from finlab.layout import Actuator, Thruster, load_layout
 from finlab.layout.layout import Layout
 from finlab.physics.plant import Plant
-from tests.mixed_robots import load, random_flow, random_plant, random_robot, within
+from tests.random_robots import load, random_flow, random_plant, random_robot, within
 
 
 def test_answers_of_robots_with_rudders_are_exact_and_above_a_bound_that_is_met() -> None:

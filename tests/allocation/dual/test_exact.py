@@ -15,7 +15,7 @@ from finlab.layout import Fin, FinModelSpec, Layout, load_layout
 from finlab.physics import Plant, make_law, write_table
 from finlab.research.random_layouts import random_layout
 from tests.allocation.test_levenberg_marquardt import HOSTILE_LAYOUTS as SIMPLE_LAYOUTS
-from tests.any_robot import AnyRobot, normalized_error
+from tests.allocator_cache import AllocatorCache, normalized_error
 
 GOOD = 1e-5
 """Normalized error below which an answer counts as exact, here."""
@@ -43,19 +43,19 @@ def errors(method: Allocator, layout: Layout, targets: np.ndarray) -> np.ndarray
 
 
 @pytest.mark.parametrize("name", list(shipped_layouts()))
-def test_exact_on_shipped_layouts(name: str, search: AnyRobot) -> None:
+def test_exact_on_shipped_layouts(name: str, search: AllocatorCache) -> None:
     layout = load_layout(shipped_layouts()[name])
     assert errors(search, layout, reachable(layout, 25)).max() < GOOD
 
 
 @pytest.mark.parametrize("limits", ["nominal", "varied"])
-def test_exact_on_random_layouts(limits: str, search: AnyRobot) -> None:
+def test_exact_on_random_layouts(limits: str, search: AllocatorCache) -> None:
     for seed in range(5000, 5015):
         layout = random_layout(np.random.default_rng(seed), limits=limits)  # type: ignore[arg-type]
         assert errors(search, layout, reachable(layout, 20, seed)).max() < GOOD, seed
 
 
-def test_exact_outside_the_training_box_and_with_more_fins(search: AnyRobot) -> None:
+def test_exact_outside_the_training_box_and_with_more_fins(search: AllocatorCache) -> None:
     for seed in range(5000, 5005):
         rng = np.random.default_rng(seed)
         wide = random_layout(rng, box=(0.45, 0.45, 0.2), outside=(0.3, 0.3, 0.1))
@@ -65,7 +65,7 @@ def test_exact_outside_the_training_box_and_with_more_fins(search: AnyRobot) -> 
 
 
 @pytest.mark.parametrize("name", ["A", "B", "C", "D"])
-def test_exact_after_the_loss_of_any_fin(name: str, search: AnyRobot) -> None:
+def test_exact_after_the_loss_of_any_fin(name: str, search: AllocatorCache) -> None:
     layout = load_layout(shipped_layouts()[name])
     for fin in layout.names:
         for target in reachable(layout.without([fin]), 2):
@@ -87,19 +87,19 @@ HOSTILE_LAYOUTS = {
 @pytest.mark.parametrize(
     "name", ["one fin", "two at one place", "all parallel", "may rest", "sixteen"]
 )
-def test_hostile_layouts_still_get_what_they_can_do(name: str, search: AnyRobot) -> None:
+def test_hostile_layouts_still_get_what_they_can_do(name: str, search: AllocatorCache) -> None:
     layout = HOSTILE_LAYOUTS[name]
     error = errors(search, layout, reachable(layout, 10))
     assert error.max() < GOOD
 
 
-def test_what_cannot_be_done_is_done_as_far_as_possible(search: AnyRobot) -> None:
+def test_what_cannot_be_done_is_done_as_far_as_possible(search: AllocatorCache) -> None:
     result = search.allocate(HOSTILE_LAYOUTS["one fin"], [0.0, 50.0, 0.0, 0.0, 0.0, 0.0])
     np.testing.assert_allclose(result.command[0], [0.6, 2.1, 0.0], atol=1e-2)
     assert result.unallocated[1] > 40.0
 
 
-def test_many_targets_are_answered_as_well_as_one(search: AnyRobot) -> None:
+def test_many_targets_are_answered_as_well_as_one(search: AllocatorCache) -> None:
     layout = load_layout(shipped_layouts()["A"])
     targets = reachable(layout, CHUNK + 3)
     batch = search.allocate_batch(layout, targets)
@@ -111,7 +111,7 @@ def test_many_targets_are_answered_as_well_as_one(search: AnyRobot) -> None:
 
 
 def test_a_force_table_that_was_measured_again_is_read_again(
-    search: AnyRobot, tmp_path: Path
+    search: AllocatorCache, tmp_path: Path
 ) -> None:
     grid = np.linspace(0.0, 0.6, 9), np.linspace(0.0, 2.1, 10), np.linspace(-np.pi, np.pi, 13)
     table = FinModelSpec("table", (("path", str(tmp_path / "fin.csv")),))
@@ -123,7 +123,7 @@ def test_a_force_table_that_was_measured_again_is_read_again(
         assert search.allocate(layout, [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]).err_norm < GOOD
 
 
-def test_turning_the_robot_does_not_make_it_worse(search: AnyRobot) -> None:
+def test_turning_the_robot_does_not_make_it_worse(search: AllocatorCache) -> None:
     layout = load_layout(shipped_layouts()["C"])
     yaw = 0.8
     c = math.cos(yaw)

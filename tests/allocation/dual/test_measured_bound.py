@@ -17,9 +17,9 @@ from finlab.assets import shipped_layouts
 from finlab.axes import TURN
 from finlab.layout import load_layout
 from finlab.physics import Plant, TableLaw, make_law
-from tests.exhaustive import sampled
-from tests.mixed_robots import load, random_robot
-from tests.random_fins import write_fin_table
+from tests.random_fin_robots import write_fin_table
+from tests.random_robots import load, random_robot
+from tests.sampled_cases import sampled
 
 
 def random_table(rng: np.random.Generator, limits: Array, noise: float) -> TableLaw:

@@ -27,7 +27,7 @@ from finlab.layout import Layout, load_layout
 from finlab.layout.load import parse_layout
 from finlab.physics import Plant
 from finlab.research.random_layouts import random_jet_robot
-from tests.mixed_robots import bluerov2_heavy
+from tests.random_robots import bluerov2_heavy
 
 MOST_STEPS = 540.0
 """Steps of the iterations of all questions: what they took when this was written, and a tenth more."""

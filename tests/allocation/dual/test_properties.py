@@ -12,7 +12,7 @@ from finlab.allocation import Allocation
 from finlab.layout import Layout
 from finlab.physics import Plant
 from finlab.research.random_layouts import random_layout
-from tests.any_robot import AnyRobot, normalized_error
+from tests.allocator_cache import AllocatorCache, normalized_error
 from webapp.tasks.modes import force_sizes, mode_signature, same_signature
 
 GOOD = 1e-5
@@ -62,7 +62,7 @@ def wrapped(angle: float) -> float:
 
 @few(20)
 @given(seed=SEEDS)
-def test_the_order_of_the_fins_does_not_matter(search: AnyRobot, seed: int) -> None:
+def test_the_order_of_the_fins_does_not_matter(search: AllocatorCache, seed: int) -> None:
     layout, target = drawn(seed)
     order = np.random.default_rng(seed).permutation(layout.n_fins)
     shuffled = replace(layout, actuators=tuple(layout.fins[i] for i in order))
@@ -76,7 +76,7 @@ def test_the_order_of_the_fins_does_not_matter(search: AnyRobot, seed: int) -> N
 @few(20)
 @given(seed=SEEDS, limits=LIMITS, yaw=st.floats(-math.pi, math.pi))
 def test_a_turned_robot_gets_the_turned_answer(
-    search: AnyRobot, seed: int, limits: str, yaw: float
+    search: AllocatorCache, seed: int, limits: str, yaw: float
 ) -> None:
     layout, target = drawn(seed, limits)
     c = math.cos(yaw)
@@ -100,7 +100,7 @@ def test_a_turned_robot_gets_the_turned_answer(
 @few(20)
 @given(seed=SEEDS, limits=LIMITS)
 def test_a_mirrored_robot_gets_the_mirrored_answer(
-    search: AnyRobot, seed: int, limits: str
+    search: AllocatorCache, seed: int, limits: str
 ) -> None:
     layout, target = drawn(seed, limits)
     # The thrust axis e_h is mirrored, so zero directions and with them the energy stay what they
@@ -121,7 +121,7 @@ def test_a_mirrored_robot_gets_the_mirrored_answer(
 
 @few(15)
 @given(seed=SEEDS, limits=LIMITS, place=st.integers(0, 4))
-def test_a_lost_one_is_removed(search: AnyRobot, seed: int, limits: str, place: int) -> None:
+def test_a_lost_one_is_removed(search: AllocatorCache, seed: int, limits: str, place: int) -> None:
     layout, target = drawn(seed, limits)
     name = layout.names[place % layout.n_fins]
     # What is nearest depends on the wrench scale, which is that of the whole robot.
@@ -139,7 +139,7 @@ def test_a_lost_one_is_removed(search: AnyRobot, seed: int, limits: str, place: 
 @few(15)
 @given(seed=SEEDS)
 def test_a_small_change_of_the_layout_changes_the_answer_little(
-    search: AnyRobot, seed: int
+    search: AllocatorCache, seed: int
 ) -> None:
     layout, target = drawn(seed)
     rng = np.random.default_rng(seed + 1)

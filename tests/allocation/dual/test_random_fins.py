@@ -14,9 +14,9 @@ from finlab.layout import Fin, FinModelSpec, Layout, load_layout
 from finlab.physics import Plant
 from finlab.physics.objective import Name, cost_meter
 from finlab.research.evaluation.splits import make_split
-from tests.any_robot import AnyRobot
-from tests.exhaustive import crossed, sampled
-from tests.random_fins import KINDS, random_robot_of_fins
+from tests.allocator_cache import AllocatorCache
+from tests.random_fin_robots import KINDS, random_robot_of_fins
+from tests.sampled_cases import crossed, sampled
 
 Array = NDArray[np.float64]
 FORMULAS = KINDS[:3]
@@ -50,7 +50,7 @@ def with_arcs(name: str, arcs: dict[int, tuple[float, float]]) -> Layout:
     ),
 )
 def test_exact_on_any_fin(kinds: tuple[str, ...], limits: str, tmp_path: Path) -> None:
-    method = AnyRobot()
+    method = AllocatorCache()
     for seed in range(4):
         layout = random_robot_of_fins(
             np.random.default_rng(seed), kinds, tmp_path, limits=limits, n_fins=(2, 7)
@@ -64,7 +64,7 @@ def test_exact_on_any_fin(kinds: tuple[str, ...], limits: str, tmp_path: Path) -
 
 
 def test_no_more_than_brute_force_finds() -> None:
-    method = AnyRobot()
+    method = AllocatorCache()
     ratio = []
     for seed in range(2):
         layout = random_robot_of_fins(np.random.default_rng(seed), FORMULAS, n_fins=(2, 4))
@@ -101,7 +101,7 @@ def test_arcs_wider_than_half_a_turn_are_as_cheap(axis: int) -> None:
 @pytest.mark.parametrize("name", ["A", "B", "penta", "hexa", "octo"])
 def test_pure_axes_of_symmetric_robots(name: str) -> None:
     layout = load_layout(shipped_layouts()[name])
-    method = AnyRobot()
+    method = AllocatorCache()
     for target in AXIS_WRENCHES[[0, 2, 5, 6]]:
         answer = method.allocate(layout, target)
         assert answer.err_norm < 1e-5
@@ -111,7 +111,7 @@ def test_coincident_fins_share() -> None:
     """Two at one place: each gives half."""
     pair = Layout("twins", tuple(Fin(name, (0.1, 0.05, 0.0), 0.3) for name in "ab"))
     plant = Plant(pair)
-    method = AnyRobot()
+    method = AllocatorCache()
     for force in (0.5, 2.0, 6.0, 12.0):
         command = np.array([[0.6, 2.1, 0.4]] * 2)
         target = plant.wrench(command) * force / 13.32
@@ -135,7 +135,7 @@ def test_tiny_fins_are_as_exact_beside_their_own_strength(area: float) -> None:
     layout = load_layout(shipped_layouts()["A"])
     model = FinModelSpec("drag", (("area", area),))
     tiny = replace(layout, actuators=tuple(replace(fin, model=model) for fin in layout.fins))
-    method = AnyRobot()
+    method = AllocatorCache()
     for target in reachable_wrenches(tiny, 6):
         answer = method.allocate(tiny, target)
         assert answer.err_norm < 1e-4 * 1.0

@@ -15,26 +15,26 @@ from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
 from finlab.layout.load import parse_layout
-from tests import mixed_robots
-from tests.exhaustive import sampled
-from tests.least_power import conic_optimum, farthest, least_known, least_miss, lower_bound
-from tests.own_plant import OwnPlant
+from tests import random_robots
+from tests.oracle_optima import conic_optimum, farthest, least_known, least_miss, lower_bound
+from tests.oracle_plant import OraclePlant
+from tests.sampled_cases import sampled
 
 ERROR_LIMIT = 1e-3
 """Largest error of a wrench that counts as served, in units of the wrench scale."""
 
 
-def relative_error(plant: OwnPlant, commands: Array, wrench: Array) -> float:
+def relative_error(plant: OraclePlant, commands: Array, wrench: Array) -> float:
     """The error of commands, in units of the judge's wrench scale."""
     return float(np.linalg.norm((plant.wrench(commands) - wrench) / plant.scales))
 
 
 def test_a_heavy_takes_the_watts_of_clarabel() -> None:
-    plant = OwnPlant(mixed_robots.bluerov2_heavy())
+    plant = OraclePlant(random_robots.bluerov2_heavy())
     rng = np.random.default_rng(4)
-    allocator = finlab.Allocator(mixed_robots.load(plant.layout))
+    allocator = finlab.Allocator(random_robots.load(plant.layout))
     for _ in range(10):
-        wrench = mixed_robots.within(plant, rng)
+        wrench = random_robots.within(plant, rng)
         commands = plant.commands_of(allocator.allocate(wrench))
         assert relative_error(plant, commands, wrench) <= 1e-6
         assert plant.excess(commands) == 0.0
@@ -42,11 +42,11 @@ def test_a_heavy_takes_the_watts_of_clarabel() -> None:
 
 
 def test_a_heavy_beyond_reach_keeps_the_direction_or_comes_nearest() -> None:
-    plant = OwnPlant(mixed_robots.bluerov2_heavy())
+    plant = OraclePlant(random_robots.bluerov2_heavy())
     rng = np.random.default_rng(5)
-    allocator = finlab.Allocator(mixed_robots.load(plant.layout))
+    allocator = finlab.Allocator(random_robots.load(plant.layout))
     for times in (1.2, 2.0, 3.0):
-        wrench = mixed_robots.beyond(plant, rng, times)
+        wrench = random_robots.beyond(plant, rng, times)
         along = plant.commands_of(allocator.allocate(wrench, policy="direction"))
         most = farthest(plant, wrench)
         assert relative_error(plant, along, most * wrench) <= 2e-3
@@ -55,14 +55,14 @@ def test_a_heavy_beyond_reach_keeps_the_direction_or_comes_nearest() -> None:
 
 
 @pytest.mark.parametrize("number", sampled(range(3)))
-@pytest.mark.parametrize("kind", mixed_robots.KINDS)
+@pytest.mark.parametrize("kind", random_robots.KINDS)
 def test_exact_within_limits_at_the_least_watts(kind: str, number: int) -> None:
-    plant = mixed_robots.random_plant(kind, number, 7)
+    plant = random_robots.random_plant(kind, number, 7)
     rng = np.random.default_rng(number)
-    allocator = finlab.Allocator(mixed_robots.load(plant.layout))
+    allocator = finlab.Allocator(random_robots.load(plant.layout))
     most = plant.power(np.array([each.limits[1] for each in plant.actuators]))
     for _ in range(2):
-        wrench = mixed_robots.within(plant, rng)
+        wrench = random_robots.within(plant, rng)
         result = allocator.allocate(wrench, flow=plant.flow)
         commands = plant.commands_of(result)
         assert relative_error(plant, commands, wrench) <= ERROR_LIMIT
@@ -77,22 +77,22 @@ def test_exact_within_limits_at_the_least_watts(kind: str, number: int) -> None:
 
 @pytest.mark.parametrize("kind", ["thrusters", "azimuths", "fins", "mixed"])
 def test_a_random_robot_beyond_reach_keeps_the_direction(kind: str) -> None:
-    plant = mixed_robots.random_plant(kind, 3, 7)
+    plant = random_robots.random_plant(kind, 3, 7)
     rng = np.random.default_rng(0)
-    allocator = finlab.Allocator(mixed_robots.load(plant.layout))
+    allocator = finlab.Allocator(random_robots.load(plant.layout))
     for times in (1.2, 3.0):
-        wrench = mixed_robots.beyond(plant, rng, times)
+        wrench = random_robots.beyond(plant, rng, times)
         commands = plant.commands_of(allocator.allocate(wrench, policy="direction"))
         assert relative_error(plant, commands, wrench / times) <= 2e-3
 
 
 def test_fins_of_mixed_laws_have_no_dear_answers() -> None:
     for number in range(4):
-        plant = OwnPlant(mixed_robots.fins_with_a_tail(number, 3))
+        plant = OraclePlant(random_robots.fins_with_a_tail(number, 3))
         rng = np.random.default_rng(number)
-        wrench = mixed_robots.within(plant, rng)
+        wrench = random_robots.within(plant, rng)
         commands = plant.commands_of(
-            finlab.Allocator(mixed_robots.load(plant.layout)).allocate(wrench)
+            finlab.Allocator(random_robots.load(plant.layout)).allocate(wrench)
         )
         assert relative_error(plant, commands, wrench) <= ERROR_LIMIT
         assert plant.power(commands) <= 1.01 * lower_bound(plant, wrench)
@@ -103,11 +103,11 @@ def test_fins_of_mixed_laws_have_no_dear_answers() -> None:
 def test_ticks_of_a_wandering_wrench(kind: str, period: float) -> None:
     """No limit and no rate is broken, and an answer that misses is the nearest, or the farthest in
     its direction, among those that may follow."""
-    plant = OwnPlant(mixed_robots.with_rates(mixed_robots.random_robot(kind, 1, 7)))
+    plant = OraclePlant(random_robots.with_rates(random_robots.random_robot(kind, 1, 7)))
     rng = np.random.default_rng(1)
-    allocator = finlab.Allocator(mixed_robots.load(plant.layout), period_s=period)
-    first = mixed_robots.within(plant, rng)
-    last = mixed_robots.within(plant, rng)
+    allocator = finlab.Allocator(random_robots.load(plant.layout), period_s=period)
+    first = random_robots.within(plant, rng)
+    last = random_robots.within(plant, rng)
     before: Array | None = None
     for share in np.linspace(0.0, 1.0, 6):
         wrench = (1.0 - share) * first + share * last
@@ -157,7 +157,7 @@ def _robot(number: int) -> tuple[Allocator, Array, Array, Array]:
             | {"force_n": ends[-1], "torque_per_newton_m": turn}
             | {"model": THRUST_LAW}
         )
-    allocator = Allocator(parse_layout(mixed_robots.layout_of(f"r{number}", parts)))
+    allocator = Allocator(parse_layout(random_robots.layout_of(f"r{number}", parts)))
     return allocator, np.array(columns).T, *np.array(ends).T
 
 
@@ -243,7 +243,7 @@ def test_a_command_inside_a_dead_band_is_neutral() -> None:
                     "position_m": rng.uniform(-1, 1, 3).tolist(),
                 }
             )
-        allocator = Allocator(parse_layout(mixed_robots.layout_of(f"b{number}", parts)))
+        allocator = Allocator(parse_layout(random_robots.layout_of(f"b{number}", parts)))
         targets = rng.normal(size=(20, 6)) * allocator.scale * 10.0 ** rng.uniform(-2, 1, (20, 1))
         for policy, target in itertools.product(("closest", "direction", "priority"), targets):
             force = allocator.allocate(target, policy=policy).command[:, 0]

@@ -16,7 +16,7 @@ from finlab.layout import Layout, Servo, load_layout
 from finlab.physics import Plant
 from finlab.research.evaluation.method_specs import load_method_spec
 from finlab.swim.vehicle.fin_motion import LagStep
-from tests.any_robot import AnyRobot
+from tests.allocator_cache import AllocatorCache
 
 TICKS = np.arange(150) * 0.1
 """15 s at 10 Hz."""
@@ -46,7 +46,9 @@ class Drive(NamedTuple):
         return np.abs(change)
 
 
-def answers_along(method: AnyRobot, layout: Layout, path: np.ndarray, *, bound: bool) -> Drive:
+def answers_along(
+    method: AllocatorCache, layout: Layout, path: np.ndarray, *, bound: bool
+) -> Drive:
     """Answers to the wrenches of a path; with `bound`, each within the rates from the one
     before."""
     previous = None
@@ -77,19 +79,19 @@ def penta() -> Layout:
 
 
 @pytest.fixture(scope="module")
-def method() -> AnyRobot:
+def method() -> AllocatorCache:
     """The default method."""
-    return AnyRobot()
+    return AllocatorCache()
 
 
 @pytest.fixture(scope="module")
-def free(method: AnyRobot, penta: Layout) -> Drive:
+def free(method: AllocatorCache, penta: Layout) -> Drive:
     """Answers along a path with no regard for rates."""
     return answers_along(method, penta, smooth_path(0), bound=False)
 
 
 @pytest.fixture(scope="module")
-def steady(method: AnyRobot, penta: Layout) -> Drive:
+def steady(method: AllocatorCache, penta: Layout) -> Drive:
     """Answers along the same path, each within the rates from the one before."""
     return answers_along(method, penta, smooth_path(0), bound=True)
 
@@ -105,7 +107,7 @@ def test_the_path_is_still_tracked_at_about_the_same_cost(free: Drive, steady: D
     assert steady.cost.mean() < 1.002 * free.cost.mean()
 
 
-def test_rates_are_those_of_each_fin(search: AnyRobot, penta: Layout) -> None:
+def test_rates_are_those_of_each_fin(search: AllocatorCache, penta: Layout) -> None:
     first = replace(
         penta.fins[0], servo=replace(penta.fins[0].servo, frequency_rate=0.5, direction_rate=1.0)
     )
@@ -116,7 +118,7 @@ def test_rates_are_those_of_each_fin(search: AnyRobot, penta: Layout) -> None:
 
 
 def test_ticks_may_be_longer(penta: Layout) -> None:
-    slow = AnyRobot(period_s=0.4)
+    slow = AllocatorCache(period_s=0.4)
     before = slow.allocate(penta, TARGET).command
     after = slow.allocate(penta, -np.array(TARGET), previous=before).command
     change = np.abs(after - before)
@@ -130,7 +132,7 @@ def test_commands_stay_inside_the_limits_across_the_seam(steady: Drive, penta: L
     assert jumps.any()  # fins do pass the seam
 
 
-def test_a_fin_follows_a_turning_force_over_the_seam(search: AnyRobot) -> None:
+def test_a_fin_follows_a_turning_force_over_the_seam(search: AllocatorCache) -> None:
     layout = load_layout("pair")
     previous = None
     for angle in np.linspace(0.0, 4.0 * math.pi, 80):
@@ -141,14 +143,14 @@ def test_a_fin_follows_a_turning_force_over_the_seam(search: AnyRobot) -> None:
         previous = result.command
 
 
-def test_arcs_are_kept(search: AnyRobot) -> None:
+def test_arcs_are_kept(search: AllocatorCache) -> None:
     layout = load_layout("restricted")
     ride = answers_along(search, layout, smooth_path(1)[:60], bound=True)
     assert ((ride.command >= layout.lower) & (ride.command <= layout.upper)).all()
 
 
 def test_a_previous_command_that_is_the_answer_stays(
-    method: AnyRobot, penta: Layout, free: Drive
+    method: AllocatorCache, penta: Layout, free: Drive
 ) -> None:
     plant = Plant(penta)
     for tick in (0, 50, 120):
@@ -164,7 +166,7 @@ def test_the_first_tick_knows_no_past(free: Drive, steady: Drive) -> None:
     np.testing.assert_array_equal(steady.command[0], free.command[0])
 
 
-def test_a_failed_fin_comes_back(search: AnyRobot, penta: Layout) -> None:
+def test_a_failed_fin_comes_back(search: AllocatorCache, penta: Layout) -> None:
     lost = search.allocate(penta, TARGET, lost=["port_back"])
     still = search.allocate(penta, TARGET, lost=["port_back"], previous=lost.command)
     assert np.isnan(still.command[2]).all() and np.isfinite(still.command[[0, 1, 3, 4]]).all()
@@ -175,7 +177,7 @@ def test_a_failed_fin_comes_back(search: AnyRobot, penta: Layout) -> None:
 
 
 def test_a_target_that_needs_a_turn_is_reached_tick_by_tick(
-    method: AnyRobot, penta: Layout
+    method: AllocatorCache, penta: Layout
 ) -> None:
     """From rise to dive all fins turn by half a circle: seven ticks, in which less and less is
     missing."""

@@ -14,12 +14,12 @@ from finlab.allocation.dual.robot import CommandLimits, DualRobot
 from finlab.axes import AXES
 from finlab.layout import load_layout
 from finlab.research.evaluation.experiments.thrusters import _draws, misses_more, missing_by_group
-from tests.core.parts import dual_function
-from tests.least_power import conic_optimum, farthest, least_known, least_miss, lower_bound
-from tests.mixed_robots import KINDS, bluerov2_heavy, random_plant, within
-from tests.own_plant import OwnPlant
+from tests.core.internal_functions import dual_function
+from tests.oracle_optima import conic_optimum, farthest, least_known, least_miss, lower_bound
+from tests.oracle_plant import OraclePlant
+from tests.random_robots import KINDS, bluerov2_heavy, random_plant, within
 
-HEAVY = OwnPlant(bluerov2_heavy())
+HEAVY = OraclePlant(bluerov2_heavy())
 """The judge's model of a BlueROV2 Heavy."""
 
 

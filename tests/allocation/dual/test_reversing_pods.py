@@ -16,7 +16,7 @@ from finlab.arrays import Array
 from finlab.layout import Azimuth, Layout, Thruster, load_layout
 from finlab.layout.save import save_layout
 from finlab.physics.plant import Plant
-from tests.exhaustive import sampled
+from tests.sampled_cases import sampled
 
 ARC_HALF_ANGLE = math.radians(45.0)
 """Half of the arc that a pod can turn within [rad]."""

@@ -13,8 +13,8 @@ from finlab.allocation.dual.robot import POINTS, _usual_price, gauge_numbers
 from finlab.arrays import Array
 from finlab.core.fields import actuators_of
 from finlab.layout import Azimuth, Layout, load_layout
-from tests.any_robot import AnyRobot
-from tests.mixed_robots import T200, T200_FORCE, bluerov2_heavy, layout_of, load
+from tests.allocator_cache import AllocatorCache
+from tests.random_robots import T200, T200_FORCE, bluerov2_heavy, layout_of, load
 
 FINE_ANGLES = np.linspace(0.0, 2.0 * math.pi, 20_001)
 """Angles of a scan [rad], so fine that its best one is as good as exact."""
@@ -52,7 +52,7 @@ def test_the_support_function_of_a_gauge_and_its_derivative() -> None:
 
 
 def test_the_largest_power_is_that_of_all_thrusters_at_their_dearer_end() -> None:
-    robot = AnyRobot().method(load(bluerov2_heavy())).compiled.robot
+    robot = AllocatorCache().method(load(bluerov2_heavy())).compiled.robot
     dearer = max(
         T200["forward"] * T200_FORCE[1] ** 1.5, T200["reverse"] * abs(T200_FORCE[0]) ** 1.5
     )
@@ -61,7 +61,7 @@ def test_the_largest_power_is_that_of_all_thrusters_at_their_dearer_end() -> Non
 
 def test_the_usual_price_of_a_thruster_is_that_of_its_dearer_end() -> None:
     """P = c F^1.5 has the price dP/dF = 1.5 c sqrt(F)."""
-    response = AnyRobot().method(load(bluerov2_heavy())).compiled.robot.responses[0]
+    response = AllocatorCache().method(load(bluerov2_heavy())).compiled.robot.responses[0]
     ahead = 1.5 * T200["forward"] * math.sqrt(T200_FORCE[1])
     astern = 1.5 * T200["reverse"] * math.sqrt(-T200_FORCE[0])
     assert _usual_price(response) == pytest.approx(max(ahead, astern), rel=0.02)
@@ -82,13 +82,13 @@ def test_a_pod_is_searched_in_reverse_only_where_that_brings_anything(
 ) -> None:
     model = PowerLaw(0.3, reverse)
     pod = Azimuth("pod", (0.3, 0, 0), (0, 0, 1), (1, 0, 0), ends, model, (-half, half))
-    own = actuators_of(AnyRobot().method(Layout("one", (pod,))).compiled.robot.block)[0]
+    own = actuators_of(AllocatorCache().method(Layout("one", (pod,))).compiled.robot.block)[0]
     assert own["force_min"] == pytest.approx(ends[0])
     assert own["force_min_needed"] == (own["force_min"] if is_needed else 0.0)
 
 
 def test_a_method_in_a_flow_is_kept_for_the_next_question() -> None:
-    method = AnyRobot().method(load_layout("torpedo"))
+    method = AllocatorCache().method(load_layout("torpedo"))
     slow = np.array([1.0, 0, 0, 0, 0, 0])
     fast = np.array([2.0, 0, 0, 0, 0, 0])
     kept = method.at(slow)

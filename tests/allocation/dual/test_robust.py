@@ -13,7 +13,7 @@ from finlab.arrays import Array
 from finlab.errors import AllocationError
 from finlab.layout import Layout, Uncertainty, load_layout
 from finlab.physics import plant_of
-from tests.mixed_robots import load, random_flow, random_robot
+from tests.random_robots import load, random_flow, random_robot
 
 HEAVY = load_layout("bluerov2_heavy")
 """Eight thrusters, to whose forces the tests give standard deviations."""

@@ -17,7 +17,7 @@ from finlab.layout import Layout, load_layout
 from finlab.layout.load import parse_layout
 from finlab.physics import plant_of
 from tests.hostile_robots import hostile_robot
-from tests.mixed_robots import (
+from tests.random_robots import (
     KINDS,
     bluerov2_heavy,
     layout_of,

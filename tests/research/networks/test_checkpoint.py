@@ -23,7 +23,7 @@ from finlab.errors import CheckpointError
 from finlab.layout import load_layout
 from finlab.research.networks import checkpoint
 from finlab.research.networks.trained import to_command, to_normalized
-from tests.any_robot import AnyRobot
+from tests.allocator_cache import AllocatorCache
 
 
 def file_sha256(path: Path) -> str:
@@ -71,7 +71,7 @@ def refusal(folder: Path) -> str:
     with it."""
     with pytest.raises(CheckpointError) as caught:
         checkpoint.read_checkpoint(folder)
-        AnyRobot("paper", checkpoint=folder).on(load_layout("A"))
+        AllocatorCache("paper", checkpoint=folder).on(load_layout("A"))
     message = str(caught.value)
     assert "\n" not in message and folder.name in message
     return message
@@ -264,7 +264,7 @@ def test_a_surrogate_alone_loads_but_cannot_allocate(folder: Path) -> None:
     )
     assert checkpoint.read_checkpoint(folder).network_sizes is None
     with pytest.raises(CheckpointError, match="holds no network, .* of the shipped `paper`"):
-        AnyRobot("paper", checkpoint=folder).on(load_layout("A"))
+        AllocatorCache("paper", checkpoint=folder).on(load_layout("A"))
 
 
 def test_a_network_over_forces_comes_back_without_a_surrogate(
@@ -274,7 +274,7 @@ def test_a_network_over_forces_comes_back_without_a_surrogate(
     assert first.surrogate_sizes is None and first.network_sizes is not None
     assert checkpoint.write_checkpoint(tmp_path / "again", first).sha256 == first.sha256
     with pytest.raises(CheckpointError, match="fed 'forces', expected one that is fed 'raw'"):
-        AnyRobot("paper", checkpoint=untrained_mdn).on(load_layout("A"))
+        AllocatorCache("paper", checkpoint=untrained_mdn).on(load_layout("A"))
 
 
 def test_a_checkpoint_of_an_earlier_finlab_is_refused(folder: Path) -> None:

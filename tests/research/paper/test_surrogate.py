@@ -10,7 +10,7 @@ from finlab.research.networks.checkpoint import read_checkpoint, resolve_checkpo
 from finlab.research.networks.trained import TrainedWeights, WrenchNormalization
 from finlab.research.paper.surrogate import BLOCK, LayoutSurrogate, SurrogateConfig
 from finlab.research.random_layouts import random_layout
-from tests.research.paper.asked_in_torch import wrench_in_torch
+from tests.research.paper.surrogate_in_torch import wrench_in_torch
 
 
 @pytest.fixture

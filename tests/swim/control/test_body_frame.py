@@ -12,7 +12,7 @@ from finlab.swim import control
 from finlab.swim.control.body_frame import Pid
 from finlab.swim.control.contract import NO_WRENCH
 from finlab.swim.simulation import NO_NOISE, ClosedLoop, RunLog, Trajectory, straight
-from tests.any_robot import AnyRobot
+from tests.allocator_cache import AllocatorCache
 
 AT_REST = control.Measurement(
     0.0, np.array([0.0, 0.0, -1.0]), 0.0, np.zeros(3), 1.0, np.zeros(3), 0.0, 0.0
@@ -21,7 +21,7 @@ AT_REST = control.Measurement(
 
 
 def swim_log(
-    name: str, method: AnyRobot, task: Trajectory, controller: str, lost: int = 0
+    name: str, method: AllocatorCache, task: Trajectory, controller: str, lost: int = 0
 ) -> RunLog:
     """A swim along a path, with `lost` fins lost that leave it steerable."""
     robot = load_layout(name)
@@ -38,7 +38,7 @@ def swim_log(
 
 
 @pytest.mark.parametrize(("name", "lost"), [("A", 0), ("A", 2), ("B", 0), ("C", 1), ("D", 0)])
-def test_a_waypoint_is_reached_and_kept(name: str, lost: int, analytic: AnyRobot) -> None:
+def test_a_waypoint_is_reached_and_kept(name: str, lost: int, analytic: AllocatorCache) -> None:
     there = np.array([0.9, -0.7, -1.4])
     log = swim_log(
         name,
@@ -52,7 +52,7 @@ def test_a_waypoint_is_reached_and_kept(name: str, lost: int, analytic: AnyRobot
 
 
 @pytest.mark.parametrize(("name", "speed"), [("A", 0.1), ("B", 0.15), ("C", 0.15), ("D", 0.2)])
-def test_speed_and_depth_are_kept(name: str, speed: float, analytic: AnyRobot) -> None:
+def test_speed_and_depth_are_kept(name: str, speed: float, analytic: AllocatorCache) -> None:
     log = swim_log(name, analytic, straight(30.0, speed), "velocity")
     late = log.time > 20.0
     assert log.motion[late, 0].mean() == pytest.approx(speed, rel=0.03)

@@ -14,7 +14,8 @@ from finlab.swim.vehicle.fossen import complete_body
 from finlab.swim.vehicle.vehicle import Vehicle
 
 NOISE = np.array([0.01] * 3 + [0.005] * 6 + [0.005] * 3)
-"""Standard deviations (12,) of what is measured [m/s, rad/s, m/s2, ...]."""
+"""Standard deviations (12,) of position [m], angles [rad], velocity [m/s] and angular velocity
+[rad/s]."""
 
 
 def swim(

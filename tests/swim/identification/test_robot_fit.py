@@ -15,8 +15,8 @@ from finlab.swim.identification.fitted_robot import summary, table, write_robot
 from finlab.swim.identification.robot_fit import RobotFit, fit_robot
 from finlab.swim.identification.swim import Swim, only_new, read_swim, replay
 from finlab.swim.simulation.excite import excitation
-from tests.any_robot import AnyRobot
-from tests.exhaustive import sampled
+from tests.allocator_cache import AllocatorCache
+from tests.sampled_cases import sampled
 from tests.swim.identification.swims import swim, write_csv
 
 CENTER = np.array([0.015, -0.01, 0.005])
@@ -95,7 +95,7 @@ def test_the_fitted_layout_allocates_for_the_true_robot(
     assert fitted.description.startswith("fitted to 60 s of swimming")
     true = plant_of(truth)
     targets = 0.6 * true.wrench(true.sample(np.random.default_rng(3), (30,)))
-    allocator = AnyRobot()
+    allocator = AllocatorCache()
     missed = [
         np.linalg.norm(
             true.wrench(allocator.allocate_batch(robot, targets).command) - targets, axis=1

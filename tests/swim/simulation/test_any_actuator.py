@@ -10,7 +10,7 @@ from finlab.layout import Layout
 from finlab.research.evaluation.experiments.hard_days import OTHER_HEAVY
 from finlab.swim.control import FaultMonitor
 from finlab.swim.simulation import NO_NOISE, ClosedLoop, Fault, RunLog, make_trajectory, straight
-from tests.exhaustive import crossed, sampled
+from tests.sampled_cases import crossed, sampled
 
 
 @pytest.fixture(scope="module")

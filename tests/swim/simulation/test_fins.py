@@ -8,7 +8,7 @@ from finlab.layout import Layout, load_layout
 from finlab.physics import Plant
 from finlab.swim.simulation.devices import ActuatorForce
 from finlab.swim.vehicle.fin_motion import FinMotion
-from tests.ripple import RippleForce
+from tests.ripple_force import RippleForce
 
 STEP_S = 0.01
 """A step of the simulation [s]."""

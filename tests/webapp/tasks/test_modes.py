@@ -9,7 +9,7 @@ from finlab.allocation.solution import Candidates
 from finlab.assets import shipped_layouts
 from finlab.layout import load_layout
 from finlab.physics import Plant
-from tests.any_robot import AnyRobot, normalized_error
+from tests.allocator_cache import AllocatorCache, normalized_error
 from webapp.tasks.modes import (
     ModeSignature,
     cluster,
@@ -82,7 +82,7 @@ def test_angles_are_compared_the_shorter_way_round() -> None:
 
 
 def test_modes_of_an_answer_deliver_the_wrench_in_different_ways() -> None:
-    search = AnyRobot("mdn")
+    search = AllocatorCache("mdn")
     layout = load_layout(shipped_layouts()["penta"])
     target = np.array([1.0, 0.5, 2.0, 0.0, 0.1, 0.1])
     before = search.allocate(layout, 0.9 * target).command

@@ -22,7 +22,7 @@ from finlab.research.networks.checkpoint import read_normalization, resolve_chec
 from finlab.research.networks.trained import WrenchNormalization
 
 
-class AnyRobot:
+class AllocatorCache:
     """Makes an allocator for each robot, and keeps it."""
 
     def __init__(
@@ -50,7 +50,7 @@ class AnyRobot:
         """Settings of the method."""
         return self.choice.settings
 
-    def with_settings(self, **changes: Any) -> "AnyRobot":
+    def with_settings(self, **changes: Any) -> "AllocatorCache":
         """The same method with some settings changed."""
         other = copy(self)
         settings = checked_settings(self.choice.kind, {**vars(self.settings), **changes})

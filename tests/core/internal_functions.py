@@ -22,7 +22,7 @@ from finlab.core.library import PATH, library
 from finlab.layout import Azimuth, Layout
 from finlab.layout.load import parse_layout
 from finlab.physics.plant import Plant
-from tests.mixed_robots import KINDS, random_flow, random_robot, with_dead_bands, with_rates
+from tests.random_robots import KINDS, random_flow, random_robot, with_dead_bands, with_rates
 
 CORE_FOLDER = Path(core.__path__[0])
 """Where the headers stand."""

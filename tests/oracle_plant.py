@@ -33,7 +33,7 @@ FIN_DEFAULTS: Mapping[str, Mapping[str, float]] = {
 """Kind of fin model -> constants that a layout file may leave out."""
 
 
-class OwnActuator:
+class OracleActuator:
     """One actuator of a layout file: its set of forces, its watts, and its effectiveness.
 
     A force is a size along a direction of the actuator's own plane (angle [rad]); a thruster or a
@@ -276,7 +276,7 @@ class OwnActuator:
             change[turn] = (change[turn] + math.pi) % (2.0 * math.pi) - math.pi
         return float((np.abs(change) / (self.rates * period_s)).max() - 1.0)
 
-    def after(self, previous: Array, period_s: float) -> "OwnActuator":
+    def after(self, previous: Array, period_s: float) -> "OracleActuator":
         """The actuator with only the commands that may follow a previous one (3,) after a time
         [s]."""
         low, high = self.limits
@@ -291,7 +291,7 @@ class OwnActuator:
             if not whole:
                 near[turn] = previous[turn] - step[turn]
                 far[turn] = previous[turn] + step[turn]
-        return OwnActuator(self.spec, self.flow, (near, far))
+        return OracleActuator(self.spec, self.flow, (near, far))
 
     def draw(self, rng: np.random.Generator, share: float = 1.0, count: int = 1) -> Array:
         """Commands (count, 3), uniform in the limits, the size of the force up to a share of its
@@ -310,14 +310,14 @@ class OwnActuator:
         return low + rng.random((count, 3)) * (top - low)
 
 
-class OwnPlant:
+class OraclePlant:
     """All actuators of a layout file, in a flow: the velocity (6,) through the water, none by
     default."""
 
     def __init__(self, layout: Mapping[str, Any], flow: ArrayLike | None = None) -> None:
         self.layout = layout
         self.flow = flow
-        self.actuators = tuple(OwnActuator(spec, flow) for spec in layout["actuators"])
+        self.actuators = tuple(OracleActuator(spec, flow) for spec in layout["actuators"])
 
     @cached_property
     def effectiveness(self) -> Array:
@@ -350,10 +350,10 @@ class OwnPlant:
         rows = zip(self.actuators, previous, commands, strict=True)
         return max(each.rate_excess(before, now, period_s) for each, before, now in rows)
 
-    def after(self, previous: Array, period_s: float) -> "OwnPlant":
+    def after(self, previous: Array, period_s: float) -> "OraclePlant":
         """The plant with only the commands that may follow previous ones (n, 3) after a time
         [s]."""
-        other = OwnPlant(self.layout, self.flow)
+        other = OraclePlant(self.layout, self.flow)
         rows = zip(self.actuators, previous, strict=True)
         other.actuators = tuple(each.after(row, period_s) for each, row in rows)
         other.scales = self.scales
@@ -401,7 +401,7 @@ COMMAND_KEYS = {
 """Kind of actuator -> names of its command's numbers, in their order."""
 
 
-def edge_forces(actuator: OwnActuator, count: int) -> Array:
+def edge_forces(actuator: OracleActuator, count: int) -> Array:
     """The outermost forces (K, 1 or 2) [N] in the own plane of an actuator: the corners of its
     hull."""
     low, high = actuator.limits

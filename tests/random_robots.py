@@ -2,7 +2,7 @@
 beyond.
 
 Written apart from the library's makers (`finlab/research/random_layouts.py`): these robots are
-mappings of layout files, which the library reads by its loader and `tests/own_plant.py` by itself,
+mappings of layout files, which the library reads by its loader and `tests/oracle_plant.py` by itself,
 so that a fault in a maker, the loader or a law cannot stand in both. They have what no training
 needs: rudders, dead bands, rates, fins that cannot rest.
 """
@@ -16,8 +16,8 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.layout.load import parse_layout
-from tests.least_power import farthest
-from tests.own_plant import LIMIT_KEYS, NOMINAL, OwnPlant, edge_forces
+from tests.oracle_optima import farthest
+from tests.oracle_plant import LIMIT_KEYS, NOMINAL, OraclePlant, edge_forces
 
 DOMAIN = 0x3A11
 """Leads the seed of every robot."""
@@ -87,19 +87,21 @@ def random_flow(kind: str, number: int, seed: int) -> Array | None:
     return along + 0.03 * rng.normal(size=6)
 
 
-def random_plant(kind: str, number: int, seed: int) -> OwnPlant:
+def random_plant(kind: str, number: int, seed: int) -> OraclePlant:
     """The own plant of `random_robot` in its `random_flow`."""
-    return OwnPlant(random_robot(kind, number, seed), random_flow(kind, number, seed))
+    return OraclePlant(random_robot(kind, number, seed), random_flow(kind, number, seed))
 
 
-def within(plant: OwnPlant, rng: np.random.Generator, low: float = 0.2, high: float = 1.0) -> Array:
+def within(
+    plant: OraclePlant, rng: np.random.Generator, low: float = 0.2, high: float = 1.0
+) -> Array:
     """A wrench (6,) within reach: that of a random command whose sizes are up to 0.2 to 1 of their
     range."""
     wrench: Array = plant.wrench(plant.draw(rng, float(rng.uniform(low, high))))
     return wrench
 
 
-def beyond(plant: OwnPlant, rng: np.random.Generator, times: float) -> Array:
+def beyond(plant: OraclePlant, rng: np.random.Generator, times: float) -> Array:
     """A wrench (6,) so many times as far as what is pushed at most along its direction."""
     wrench = plant.wrench(plant.draw(rng))
     return times * farthest(plant, wrench) * wrench
@@ -128,7 +130,7 @@ def layout_of(name: str, actuators: list[dict[str, Any]]) -> dict[str, Any]:
 
 def _condition(layout: Mapping[str, Any]) -> float:
     """Condition number of a robot's scaled effectiveness."""
-    plant = OwnPlant(layout)
+    plant = OraclePlant(layout)
     return float(np.linalg.cond(plant.effectiveness / plant.scales[:, None]))
 
 
@@ -322,7 +324,9 @@ def _restless_fin(rng: np.random.Generator, name: str, scale: float) -> dict[str
     limits["amplitude_rad"][0] = 0.3
     for frequency in np.linspace(0.1, 1.5, 141):
         limits["frequency_hz"][0] = float(frequency)
-        size = np.linalg.norm(edge_forces(OwnPlant({"actuators": [spec]}).actuators[0], 3), axis=1)
+        size = np.linalg.norm(
+            edge_forces(OraclePlant({"actuators": [spec]}).actuators[0], 3), axis=1
+        )
         if size.min() >= share * size.max():
             break
     limits["frequency_hz"][0] = max(float(frequency) - 0.01, 0.1)
