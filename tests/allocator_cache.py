@@ -1,4 +1,8 @@
-"""A method for whatever robot a test asks about."""
+"""`AllocatorCache`: a method with its settings, and its allocator of each robot that a test asks about.
+
+Tests of several robots load the networks of a method once, and not once a robot. Used by all rooms
+that allocate.
+"""
 
 from copy import copy
 from dataclasses import replace
@@ -28,13 +32,12 @@ class AllocatorCache:
     def __init__(
         self, method: str | type[Method] = "dual", checkpoint: Checkpoint = None, **settings: Any
     ) -> None:
-        self.choice = (
-            choose_method(
-                method, checkpoint if method_class(method).needs_networks else None, **settings
-            )
-            if isinstance(method, str)
-            else MethodChoice(method, checked_settings(method, settings))
-        )
+        if not isinstance(method, str):
+            self.choice = MethodChoice(method, checked_settings(method, settings))
+        elif method_class(method).needs_networks:
+            self.choice = choose_method(method, checkpoint, **settings)
+        else:
+            self.choice = choose_method(method, None, **settings)
         self.name = self.choice.kind.name
         self._made: dict[Layout, Allocator] = {}
 
@@ -90,4 +93,4 @@ def _is_of_planar_fins(layout: Layout) -> bool:
 FIN_ROBOTS = {
     name: path for name, path in shipped_layouts().items() if _is_of_planar_fins(load_layout(path))
 }
-"""Names and layout files."""
+"""Name of a shipped robot of such fins -> its layout file."""

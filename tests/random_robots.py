@@ -9,6 +9,7 @@ needs: rudders, dead bands, rates, fins that cannot rest.
 
 import math
 from collections.abc import Callable, Mapping
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -114,7 +115,8 @@ def bluerov2_heavy() -> dict[str, Any]:
     places = [(0.14, -0.092), (0.14, 0.092), (-0.15, -0.092), (-0.15, 0.092)]
     axes = [(-s, -s), (-s, s), (s, -s), (s, s)]
     rows = [((x, y, -0.011), (*axis, 0.0)) for (x, y), axis in zip(places, axes, strict=True)]
-    rows += [((x, y, 0.053), (0.0, 0.0, -1.0)) for x in (0.118, -0.118) for y in (-0.215, 0.215)]
+    for x, y in product((0.118, -0.118), (-0.215, 0.215)):
+        rows.append(((x, y, 0.053), (0.0, 0.0, -1.0)))
     thrusters = [
         {"name": f"t{i}", "type": "thruster", "position_m": list(position), "axis": list(axis)}
         | {"force_n": T200_FORCE, "model": T200}

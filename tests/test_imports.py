@@ -6,6 +6,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from functools import cache
+from itertools import chain
 from pathlib import Path
 from pkgutil import resolve_name
 
@@ -151,7 +152,7 @@ def _allowed(module: str, here: str, there: str) -> bool:
 def test_every_room_is_known() -> None:
     package = ROOT / "finlab"
     wings = [package / wing for wing in ("swim", "research")]
-    paths = [path for folder in (package, *wings) for path in folder.iterdir()]
+    paths = list(chain.from_iterable(folder.iterdir() for folder in (package, *wings)))
     rooms = {
         path.relative_to(package).with_suffix("").as_posix()
         for path in paths
@@ -197,9 +198,10 @@ def _names_of_wings(module: str, path: Path) -> Iterator[tuple[str, str]]:
 def test_wings_are_named_by_strings_in_registries_alone() -> None:
     named: dict[str, set[str]] = {}
     for module, path in _modules(ROOT).items():
-        if module.startswith("finlab") and (
-            wings := {wing for _, wing in _names_of_wings(module, path)}
-        ):
+        if not module.startswith("finlab"):
+            continue
+        wings = {wing for _, wing in _names_of_wings(module, path)}
+        if wings:
             named[module] = wings
     assert named == {module: wings for module, wings in REGISTRIES.items() if wings}
 
@@ -222,9 +224,7 @@ def test_what_registries_name_is_there() -> None:
 
 def _modules(root: Path) -> dict[str, Path]:
     """Every module of finlab and webapp by its full name."""
-    paths = [
-        path for package in ("finlab", "webapp") for path in sorted((root / package).rglob("*.py"))
-    ]
+    paths = [*sorted((root / "finlab").rglob("*.py")), *sorted((root / "webapp").rglob("*.py"))]
     return {_module_of(path, root): path for path in paths}
 
 
@@ -358,7 +358,7 @@ def test_allocating_loads_few_files_and_no_wing() -> None:
     )
     names = done.stdout.splitlines()[-1].split()
     ours = [name for name in names if name.partition(".")[0] in ("finlab", "webapp")]
-    rooms = {room for name in ours if (room := _room(name)) is not None}
+    rooms = {_room(name) for name in ours} - {None}
     assert not [room for room in rooms if _wing(room) not in ("core", "cli")]
     assert not {"torch", "scipy", "matplotlib", "safetensors", "tqdm"} & set(names)
     kinds = {name.rpartition(".")[2] for name in ours if name.startswith("finlab.actuators.")}

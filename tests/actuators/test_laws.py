@@ -197,7 +197,8 @@ def coefficients_with_stall(
 ) -> Array:
     """Coefficients (2,) of lift and drag by Beard and McLain (2012), section 4.2, with a sharpness
     of 50."""
-    below, above = math.exp(-50.0 * (a - stall)), math.exp(50.0 * (a + stall))
+    below = math.exp(-50.0 * (a - stall))
+    above = math.exp(50.0 * (a + stall))
     sigma = (1.0 + below + above) / ((1.0 + below) * (1.0 + above))
     lift = slope * a
     plate = (

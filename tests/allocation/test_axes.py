@@ -53,8 +53,11 @@ def test_an_axis_is_freed_by_name_for_one_question(policy: str) -> None:
 
 
 def test_a_free_axis_takes_what_the_cheapest_answer_gives() -> None:
-    plant = OraclePlant(parts := layout_of("r", _three_thrusters()))
-    answer = Allocator(parse_layout(parts)).allocate([12.0, 0.0, 0.0, 0.0, 0.0, 9.0], free=("Tz",))
+    mapping = layout_of("robot", _three_thrusters())
+    plant = OraclePlant(mapping)
+    answer = Allocator(parse_layout(mapping)).allocate(
+        [12.0, 0.0, 0.0, 0.0, 0.0, 9.0], free=("Tz",)
+    )
     watts = [
         lower_bound(plant, np.array([12.0, 0, 0, 0, 0, yaw])) for yaw in np.linspace(-6, 6, 121)
     ]

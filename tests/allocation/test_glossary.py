@@ -97,7 +97,10 @@ def definitions(room: str) -> dict[str, frozenset[str]]:
 @cache
 def all_defined() -> frozenset[str]:
     """What the files of all rooms define."""
-    return frozenset().union(*(names for room in ROOMS for names in definitions(room).values()))
+    names = set[str]()
+    for room in ROOMS:
+        names.update(*definitions(room).values())
+    return frozenset(names)
 
 
 def test_the_tables_are_read() -> None:

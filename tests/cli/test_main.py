@@ -74,9 +74,9 @@ def still(app: SubcommandApp, seen: list[str]) -> None:
             command.target = without_work(command.target, seen)
 
 
-ALL_EXAMPLES = [
-    line for verb in verbs(_command_line(["eval", "--help"])) for line in examples(verb.split())
-]
+ALL_EXAMPLES = list[str]()
+for _words in verbs(_command_line(["eval", "--help"])):
+    ALL_EXAMPLES += examples(_words.split())
 """Lines of the examples that the help pages show."""
 
 
@@ -96,7 +96,7 @@ def test_the_options_of_every_example_are_understood(
 
 
 @pytest.mark.parametrize(
-    "line", [line for verb in ("allocate", "layout show", "export") for line in EXAMPLES[verb]]
+    "line", [*EXAMPLES["allocate"], *EXAMPLES["layout show"], *EXAMPLES["export"]]
 )
 def test_quick_examples_run(line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)

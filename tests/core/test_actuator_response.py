@@ -121,10 +121,8 @@ def differences(
     slope = np.zeros((2, 2))
     for q in range(rows):
         change = step * np.eye(2)[q]
-        ahead, back = (
-            robot.response(i, limits, price + change),
-            robot.response(i, limits, price - change),
-        )
+        ahead = robot.response(i, limits, price + change)
+        back = robot.response(i, limits, price - change)
         gradient[q] = (ahead.conjugate - back.conjugate) / (2.0 * step)
         slope[q] = (np.array(ahead.force) - np.array(back.force)) / (2.0 * step)
     return gradient, slope
@@ -192,7 +190,8 @@ def crossing(robot: Robot, i: int, limits: Set, top: float) -> tuple[float, floa
     ]
     apart = [np.linalg.norm(b - a) for a, b in zip(force, force[1:], strict=False)]
     k = int(np.argmax(apart))
-    low, high = angle[k], angle[k + 1]
+    low = angle[k]
+    high = angle[k + 1]
     if apart[k] < 0.3 * robot.actuators[i]["row_force_max"][0]:
         return None
     for _ in range(50):
@@ -254,12 +253,11 @@ def turned_worth(
 ) -> list[float]:
     """What forces of both ways are worth at angles around the one before, less the cost of turning
     there."""
-    low, high = (
-        limits.sector_center - limits.sector_half_angle,
-        limits.sector_center + limits.sector_half_angle,
-    )
+    low = limits.sector_center - limits.sector_half_angle
+    high = limits.sector_center + limits.sector_half_angle
     if limits.sector_half_angle >= np.pi:
-        low, high = limits.turn_origin - np.pi, limits.turn_origin + np.pi
+        low = limits.turn_origin - np.pi
+        high = limits.turn_origin + np.pi
     found = list[float]()
     ways = [(limits.force_min, limits.force_max, -1.0 if limits.is_flipped else 1.0, 1.0)]
     if limits.force_max_reverse > 0.0:
@@ -298,14 +296,14 @@ def test_a_foil_on_its_tangent_answers_with_the_best_step() -> None:
     robot = robot_of("rudders")
     for _ in range(40):
         tangent = Tangent()
-        tangent.force[:], tangent.force_slope[:] = rng.normal(size=2), rng.normal(size=2)
-        tangent.cost, tangent.cost_slope, tangent.curvature = (
-            rng.random(),
-            rng.normal(),
-            rng.uniform(0.5, 4.0),
-        )
+        tangent.force[:] = rng.normal(size=2)
+        tangent.force_slope[:] = rng.normal(size=2)
+        tangent.cost = rng.random()
+        tangent.cost_slope = rng.normal()
+        tangent.curvature = rng.uniform(0.5, 4.0)
         limits = robot.whole_set(0)
-        limits.force_min, limits.force_max = -rng.uniform(0.1, 1.0), rng.uniform(0.1, 1.0)
+        limits.force_min = -rng.uniform(0.1, 1.0)
+        limits.force_max = rng.uniform(0.1, 1.0)
         limits.tangent = ctypes.addressof(tangent)
         price = rng.normal(size=2)
         step = np.linspace(limits.force_min, limits.force_max, 20_001)
@@ -329,14 +327,13 @@ def test_a_table_s_force_power_and_price_belong_together(name: str) -> None:
         own = robot.actuators[i]
         for place in {own["force_table"], own["force_table_reverse"] or own["force_table"]}:
             table = robot.table(place).copy()
-            top, largest = table[0], table[3 + 3 * int(table[1])]
+            top = table[0]
+            largest = table[3 + 3 * int(table[1])]
             for price in top * rng.random(20) ** 3:
                 told = force_of_price(table, price)
                 step = 1e-6 * price  # cells are narrower the lower the price
-                ahead, back = (
-                    force_of_price(table, price + step),
-                    force_of_price(table, price - step),
-                )
+                ahead = force_of_price(table, price + step)
+                back = force_of_price(table, price - step)
                 force = (ahead.conjugate - back.conjugate) / (2.0 * step)
                 slope = (ahead.force - back.force) / (2.0 * step)
                 assert told.force == pytest.approx(force, abs=1e-5 * largest)
@@ -351,7 +348,8 @@ def test_a_table_s_force_power_and_price_belong_together(name: str) -> None:
                 if table[3] < told.force < largest * (1.0 - 1e-6):
                     again = force_of_price(table, float(paid[0]))
                     assert again.force == pytest.approx(told.force, abs=1e-6 * largest)
-            beyond, at_top = force_of_price(table, 1.5 * top), force_of_price(table, top)
+            beyond = force_of_price(table, 1.5 * top)
+            at_top = force_of_price(table, top)
             assert beyond.force == largest
             assert beyond.conjugate - at_top.conjugate == pytest.approx(
                 0.5 * top * largest, rel=1e-9

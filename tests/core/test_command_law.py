@@ -70,10 +70,8 @@ def test_slopes_of_forces_are_those_of_differences(name: str) -> None:
             _, slope = robot.force(i, command)
             for c in range(3):
                 change = STEP * np.eye(3)[c]
-                ahead, back = (
-                    robot.force(i, command + change)[0],
-                    robot.force(i, command - change)[0],
-                )
+                ahead = robot.force(i, command + change)[0]
+                back = robot.force(i, command - change)[0]
                 np.testing.assert_allclose(
                     slope[c] / most, (ahead - back) / (2 * STEP * most), atol=1e-4
                 )
@@ -99,7 +97,8 @@ def test_slopes_of_uneven_fins_that_are_commanded_by_force() -> None:
             np.testing.assert_allclose(force, command[1] * radius * direction, rtol=1e-12)
             for c, change in enumerate((step, 1e-6 * own["row_force_max"][0])):
                 near = change * np.eye(3)[c]
-                ahead, back = robot.force(i, command + near)[0], robot.force(i, command - near)[0]
+                ahead = robot.force(i, command + near)[0]
+                back = robot.force(i, command - near)[0]
                 atol = 1e-5 * own["row_force_max"][0]
                 np.testing.assert_allclose(
                     slope[c] * change, (ahead - back) / 2.0, atol=atol * change
@@ -233,7 +232,8 @@ def test_a_range_of_forces_holds_what_commands_of_a_box_give_and_no_more(name: s
             own = robot.actuators[i]
             if own["unevenness"] != 0.0 or own["gauge_table"] != 0.0:
                 continue  # the largest force is not the same in all directions
-            low, high = np.array(box.command_min[i]), np.array(box.command_max[i])
+            low = np.array(box.command_min[i])
+            high = np.array(box.command_max[i])
             share = np.stack(np.meshgrid(*3 * [np.linspace(0.0, 1.0, 6)]), axis=-1).reshape(-1, 3)
             size, angle = sizes_and_angles(robot, i, low + share * (high - low))
             told = functions().fl_force_range(at(robot.block), i, ctypes.byref(box))

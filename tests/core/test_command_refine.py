@@ -38,7 +38,8 @@ def test_near_commands_that_give_a_wrench_a_few_steps_come_to_some(name: str) ->
     for number in range(3):
         robot = robot_of(name, number)
         rng = np.random.default_rng([8, number])
-        lower, upper = robot.actuators["command_min"], robot.actuators["command_max"]
+        lower = robot.actuators["command_min"]
+        upper = robot.actuators["command_max"]
         width = upper - lower
         for _ in range(8):
             known = lower + (0.2 + 0.6 * rng.random((robot.n, 3))) * width
@@ -70,7 +71,8 @@ def test_commands_at_their_limits_are_held_where_steps_would_leave(name: str) ->
     for number in range(3):
         robot = robot_of(name, number)
         rng = np.random.default_rng([9, number])
-        lower, upper = robot.actuators["command_min"], robot.actuators["command_max"]
+        lower = robot.actuators["command_min"]
+        upper = robot.actuators["command_max"]
         width = upper - lower
         for _ in range(6):
             share = 0.25 + 0.5 * rng.random((robot.n, 3))

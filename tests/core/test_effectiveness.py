@@ -11,7 +11,8 @@ from tests.core.internal_functions import ROBOTS, Robot, Span, at, functions, ro
 
 def span_of(robot: Robot, work: ctypes.Array[ctypes.c_char], lost: Array, free: Array) -> Span:
     """What is spanned with some actuators (n,) lost and some axes (6,) free."""
-    gone, open_axes = lost.astype(np.uint8), free.astype(np.uint8)
+    gone = lost.astype(np.uint8)
+    open_axes = free.astype(np.uint8)
     places = ctypes.c_void_p(gone.ctypes.data), ctypes.c_void_p(open_axes.ctypes.data)
     assert functions().fl_span_of_question(at(robot.block), work, *places)
     return Span.from_buffer(work)
@@ -91,7 +92,8 @@ def test_the_span_is_that_of_the_columns_of_what_works(name: str) -> None:
 def test_a_state_that_was_asked_for_before_is_the_same_again(name: str) -> None:
     robot = robot_of(name)
     work = robot.work()
-    whole, none = np.zeros(robot.n, bool), np.zeros(6, bool)
+    whole = np.zeros(robot.n, bool)
+    none = np.zeros(6, bool)
     first = bytes(span_of(robot, work, whole, none))
     lost = np.arange(robot.n) == 1
     assert bytes(span_of(robot, work, lost, none)) != first

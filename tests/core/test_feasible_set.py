@@ -18,7 +18,8 @@ LEAST_POWER = 1e-3
 
 def commands_before(robot: Robot, rng: np.random.Generator) -> Array:
     """Commands (n, 3) of a tick before, some of them at a limit."""
-    lower, upper = robot.actuators["command_min"], robot.actuators["command_max"]
+    lower = robot.actuators["command_min"]
+    upper = robot.actuators["command_max"]
     share = rng.random(lower.shape)
     share = np.where(rng.random(share.shape) < 0.15, np.round(share), share)
     return np.ascontiguousarray(np.minimum(lower + share * (upper - lower), upper))

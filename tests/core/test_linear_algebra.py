@@ -41,7 +41,8 @@ def test_a_matrix_with_a_direction_that_falls_is_singular(negative: int) -> None
 
 def test_squares_are_added_to_the_lower_triangle() -> None:
     rng = np.random.default_rng(1)
-    matrix, row = np.zeros((6, 6)), rng.normal(size=6)
+    matrix = np.zeros((6, 6))
+    row = rng.normal(size=6)
     functions().fl_add_square(at(matrix), at(row), ctypes.c_double(2.5))
     np.testing.assert_allclose(matrix, np.tril(2.5 * np.outer(row, row)), rtol=1e-12)
     trace = functions().fl_trace

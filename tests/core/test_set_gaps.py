@@ -180,14 +180,14 @@ def test_a_pod_is_cut_where_its_answer_jumps() -> None:
         limits = robot.set_of(
             i, 0.0, own["force_max"], own["sector_center"], own["sector_half_angle"]
         )
-        limits.turn_cost, limits.has_jumped = 1.0, 1
+        limits.turn_cost = 1.0
+        limits.has_jumped = 1
         limits.turn_origin = limits.sector_center + 0.3 * min(limits.sector_half_angle, 1.0)
-        low, high = (
-            limits.sector_center - limits.sector_half_angle,
-            limits.sector_center + limits.sector_half_angle,
-        )
+        low = limits.sector_center - limits.sector_half_angle
+        high = limits.sector_center + limits.sector_half_angle
         if limits.sector_half_angle >= math.pi:
-            low, high = limits.turn_origin - math.pi, limits.turn_origin + math.pi
+            low = limits.turn_origin - math.pi
+            high = limits.turn_origin + math.pi
         limits.jump_angle = rng.uniform(low, high)
         cut = np.array([own["force_max"], 0.0])
         below, above = (narrowed(robot, i, limits, cut, side) for side in (-1, 1))

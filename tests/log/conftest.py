@@ -21,7 +21,9 @@ FLU_TO_FRD = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
 """Signs by which wrenches go from x forward, y left, z up to y right, z down."""
 DIAGONAL = np.sqrt(0.5)
 """Part of a unit vector along each of two axes, between which it lies."""
-LEVER, ROLL, PITCH = 0.24 * DIAGONAL, 0.22, 0.12
+LEVER = 0.24 * DIAGONAL
+ROLL = 0.22
+PITCH = 0.12
 """Arms of yaw, roll and pitch [m]."""
 # PX4 divides columns of the pseudo-inverse: each of thrust by the mean of its entries, roll and
 # pitch by sqrt(2) times the larger entry, yaw by its own.

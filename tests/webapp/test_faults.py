@@ -91,7 +91,8 @@ class Tab:
         """To all that can be seen: each task with each drawer, with a fin selected and without."""
         session = self.view.session
         acts: list[Callable[[], object]] = [lambda: session.select(session.state.layout.names[0])]
-        acts += [partial(session.show_drawer, name) for names in DRAWERS.values() for name in names]
+        for names in DRAWERS.values():
+            acts += [partial(session.show_drawer, name) for name in names]
         acts += [partial(session.show_task, task) for task in ("Export", "Design")]
         return [*acts, partial(session.select, None), partial(session.show_task, "Allocate")]
 

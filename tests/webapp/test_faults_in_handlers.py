@@ -41,10 +41,10 @@ def intents() -> Iterator[tuple[type, str]]:
 
 def handles(server: viser.ViserServer) -> list[Any]:
     """Every widget of the page that does anything."""
-    found = [
-        h for c in server.gui._container_handle_from_uuid.values() for h in c._children.values()
-    ]
-    return [handle for handle in found if getattr(handle._impl, "update_cb", ())]
+    handles = list[Any]()
+    for container in server.gui._container_handle_from_uuid.values():
+        handles += container._children.values()
+    return [handle for handle in handles if getattr(handle._impl, "update_cb", ())]
 
 
 def others(handle: Any) -> list[Any]:

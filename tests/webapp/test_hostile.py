@@ -11,6 +11,7 @@ import zlib
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from itertools import chain
 from types import SimpleNamespace
 from typing import Any
 
@@ -73,9 +74,8 @@ def test_garbage_from_the_page_changes_nothing_but_raises_no_fault(
 ) -> None:
     view.session.select("front_left")
     before = view.session.state.layout
-    handles = [
-        h for c in server.gui._container_handle_from_uuid.values() for h in c._children.values()
-    ]
+    containers = server.gui._container_handle_from_uuid.values()
+    handles = list(chain.from_iterable(container._children.values() for container in containers))
     heard = 0
     for handle in handles:
         if isinstance(handle, viser.GuiUploadButtonHandle):
@@ -197,7 +197,7 @@ ESCAPED = re.compile(r"&(lt|amp);")
 def contents(server: viser.ViserServer) -> list[str]:
     """All markup on the page."""
     containers = server.gui._container_handle_from_uuid.values()
-    handles = [handle for container in containers for handle in container._children.values()]
+    handles = chain.from_iterable(container._children.values() for container in containers)
     return [handle.content for handle in handles if isinstance(handle, viser.GuiHtmlHandle)]
 
 
@@ -221,12 +221,10 @@ def test_no_page_shows_markup_of_ours_as_text(server: viser.ViserServer, view: V
         on_loop(server, lambda task=task: view.do(lambda: view.session.show_task(task)))
         on_loop(server, lambda: view.do(lambda: view.session.select("front_left")))
         until(lambda: not view.busy and not view.jobs.analyst.busy)
-        found = [ESCAPED.finditer(text) for text in contents(server)]
-        wrong = {
-            text.string[max(0, text.start() - 60) : text.end() + 30]
-            for part in found
-            for text in part
-        }
+        wrong = set[str]()
+        for text in contents(server):
+            for match in ESCAPED.finditer(text):
+                wrong.add(text[max(0, match.start() - 60) : match.end() + 30])
         assert wrong == set(), task
 
 

@@ -3,6 +3,7 @@
 import gzip
 import http.client
 from http.client import HTTPConnection
+from itertools import chain
 from typing import Any
 from urllib.request import Request, urlopen
 
@@ -78,7 +79,8 @@ class Sending:
     def kept(self) -> int:
         """Bytes that are held."""
         states = self.gui._current_file_upload_states.values()
-        return sum(len(part) for state in states for part in state["parts"].values())
+        parts = chain.from_iterable(state["parts"].values() for state in states)
+        return sum(map(len, parts))
 
 
 def test_a_file_that_sends_more_than_it_announced_is_dropped_there(

@@ -175,7 +175,8 @@ def plane_of(low: float, high: float, least: float, is_uneven: bool) -> Plane:
     top = 1.5 * np.sqrt(20.0)
     force = np.clip((price_grid(top) / 1.5) ** 2, 20.0 * least, 20.0)
     table = RadialTable.of_forces(top, force, (20.0 * least) ** 1.5)
-    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    middle = 0.5 * (low + high)
+    half = 0.5 * (high - low)
     around = np.linspace(0.0, 2.0 * np.pi, 90, endpoint=False)
     gauge = 1.0 + 0.1 * np.cos(around - 0.5) if is_uneven else None
     return Plane(np.eye(2, 6), table, sector_center=middle, sector_half_angle=half, gauge=gauge)
@@ -185,7 +186,8 @@ def plane_of(low: float, high: float, least: float, is_uneven: bool) -> Plane:
 def test_the_conditions_of_a_plane_hold_for_its_forces_alone(
     case: tuple[float, float, float, bool],
 ) -> None:
-    plane, least = plane_of(*case), case[2]
+    plane = plane_of(*case)
+    least = case[2]
     share = casadi.MX.sym("share", 2)
     part = _PlaneProgram(casadi, plane, share)
     told = casadi.Function(

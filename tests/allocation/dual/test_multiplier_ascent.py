@@ -17,7 +17,8 @@ N_COMMANDS = 400
 
 def commands_around(plant: Plant, command: Array, rng: np.random.Generator) -> Array:
     """Commands (DRAWN, n, 3) near a command and anywhere within the limits."""
-    low, high = plant.layout.lower, plant.layout.upper
+    low = plant.layout.lower
+    high = plant.layout.upper
     spread = np.geomspace(1e-3, 1.0, N_COMMANDS)[:, None, None] * rng.uniform(
         -1.0, 1.0, (N_COMMANDS, *command.shape)
     )

@@ -246,7 +246,7 @@ def test_a_picture_shows_the_rows() -> None:
     )
     raw, refined = (each.get_offsets() for each in candidates_picture(rows).axes[0].collections)
     points = rows[0]["points"]
-    np.testing.assert_allclose(raw, [each for point in points for each in point["raw"]])
+    np.testing.assert_allclose(raw, np.concatenate([point["raw"] for point in points]))
     assert len(raw) == 16 and len(refined) == 8
     assert refined[:, 0].mean() < raw[:, 0].mean()
 

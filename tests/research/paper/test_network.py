@@ -3,6 +3,7 @@ itself."""
 
 import math
 from dataclasses import replace
+from itertools import permutations
 
 import numpy as np
 import pytest
@@ -67,7 +68,7 @@ def test_graph_attention_is_that_of_pytorch_geometric(n: int) -> None:
             theirs.bias.copy_(weights[f"graph.0.{ours}.bias"])
         reference.att.copy_(weights["graph.0.attention"][None])
         reference.bias.copy_(weights["graph.0.bias"])
-    edges = torch.tensor([(i, j) for i in range(n) for j in range(n) if i != j]).T
+    edges = torch.tensor(list(permutations(range(n), 2))).T
     x = torch.randn(3, n, CONFIG.width)
     found = graph_attention(weights, "graph.0", x)
     for row in range(3):

@@ -71,7 +71,8 @@ def test_what_is_empty_or_held_is_not_new(rows: Rows, pair: Layout, tmp_path: Pa
     v = rows[0].index("v")
     for k, row in enumerate(rows[1:]):
         if k % 2:
-            row[u], row[v] = "", rows[k][v]
+            row[u] = ""
+            row[v] = rows[k][v]
     swim = read(rows, pair, tmp_path)
     known = np.isfinite(swim.measured)
     assert known[::2, 6].all() and not known[1::2, 6].any()

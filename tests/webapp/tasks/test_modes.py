@@ -1,6 +1,7 @@
 """Distinct ways to deliver a wrench: what counts as the same, and what is told of each."""
 
 import math
+from itertools import combinations, starmap
 
 import numpy as np
 import pytest
@@ -97,8 +98,8 @@ def test_modes_of_an_answer_deliver_the_wrench_in_different_ways() -> None:
     )
     wrench = Plant(layout).wrench(np.array([mode.command for mode in modes]))
     assert normalized_error(search.normalization, wrench, target).max() < 1e-3
-    ways = [mode.signature for mode in modes]
-    assert not any(same_signature(a, b) for i, a in enumerate(ways) for b in ways[:i])
+    signatures = [mode.signature for mode in modes]
+    assert not any(starmap(same_signature, combinations(signatures, 2)))
     bow = layout.index("bow")
     assert all(np.isnan(mode.command[bow]).all() for mode in modes)
 

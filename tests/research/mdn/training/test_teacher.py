@@ -1,6 +1,8 @@
 """What the teacher tells: exact ways, told apart, the cheapest first, with weights by their
 cost."""
 
+from itertools import chain
+
 import numpy as np
 import pytest
 
@@ -85,7 +87,8 @@ def test_robots_are_of_all_kinds(robots: list[Layout]) -> None:
     assert {robot.n_fins for robot in robots} == set(range(2, 13))
     one_kind = [len({(fin.model, fin.limits) for fin in robot.fins}) == 1 for robot in robots]
     assert any(one_kind) and not all(one_kind)
-    assert {fin.model.type for robot in robots for fin in robot.fins} == set(WIDE)
+    fins = chain.from_iterable(robot.fins for robot in robots)
+    assert {fin.model.type for fin in fins} == set(WIDE)
     # Some robots have a fin whose mirror image, or whose twin above it, is a fin as well.
     symmetric = 0
     for robot in robots:

@@ -37,7 +37,8 @@ def test_a_file_of_answers_depends_on_its_seed_and_number(shard: Path, tmp_path:
     assert first.keys() == again.keys()
     for n, arrays in first.items():
         assert all(np.array_equal(values, again[n][name]) for name, values in arrays.items())
-    asked = [np.abs(group["asked"]).sum() for part in (first, other) for group in part.values()]
+    groups = [*first.values(), *other.values()]
+    asked = [np.abs(group["asked"]).sum() for group in groups]
     assert len(set(asked)) == len(asked)
 
 
