@@ -8,6 +8,7 @@ actuators' sets, `least_miss` a quadratic one, `conic_optimum` Clarabel on thrus
 import itertools
 import math
 from functools import cache
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -431,7 +432,7 @@ def conic_optimum(plant: OraclePlant, wrench: Array) -> tuple[float, Array]:
     from scipy import sparse
 
     n = len(plant.actuators)
-    parts = [(i, sign) for i in range(n) for sign in (1.0, -1.0)]
+    parts = list(product(range(n), (1.0, -1.0)))
     ends = np.array([each.limits for each in plant.actuators])[:, :, 0]
     if (ends[:, 0] > 0.0).any() or (ends[:, 1] < 0.0).any():
         raise ValueError("expected thrusters whose limits hold 0")

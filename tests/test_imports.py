@@ -75,12 +75,10 @@ REGISTRIES = {
 """Modules outside of the wings that name what stands in these, in a string that is resolved when it
 is asked for."""
 
-LEVEL = {
-    room: (wing, level)
-    for wing, levels in {"core": CORE, **WINGS, "cli": (("cli",),)}.items()
-    for level, rooms in enumerate(levels)
-    for room in rooms
-}
+LEVEL = dict[str, tuple[str, int]]()
+for _name, _levels in {"core": CORE, **WINGS, "cli": (("cli",),)}.items():
+    for _level, _rooms in enumerate(_levels):
+        LEVEL |= dict.fromkeys(_rooms, (_name, _level))
 """Room -> its wing, and its level there."""
 
 
@@ -255,14 +253,12 @@ def _shortest_circles(graph: "nx.DiGraph[str]") -> list[list[str]]:
     last."""
     circles = []
     for group in nx.strongly_connected_components(graph):
-        found = [
-            [start, *nx.shortest_path(graph, then, start)]
-            for start in group
-            for then in graph.successors(start)
-            if then in group
-        ]
-        if found:
-            circles.append(min(found, key=lambda circle: (len(circle), circle)))
+        circles_of_group = []
+        for start in group:
+            for then in group.intersection(graph.successors(start)):
+                circles_of_group.append([start, *nx.shortest_path(graph, then, start)])
+        if circles_of_group:
+            circles.append(min(circles_of_group, key=lambda circle: (len(circle), circle)))
     return sorted(circles)
 
 
@@ -306,13 +302,13 @@ def test_circles_of_imports_are_found(tmp_path: Path) -> None:
 )
 def test_rooms_do_without(package: str, banned: tuple[str, ...]) -> None:
     door = "finlab/cli/app_verb.py"  # the one place that starts the web app
-    wrong = [
-        f"{path.relative_to(ROOT)}:{line} imports {module}"
-        for path in _sources(package)
-        if path.relative_to(ROOT).as_posix() != door
-        for module, line in _imports(path)
-        if any(module == name or module.startswith(name + ".") for name in banned)
-    ]
+    wrong = []
+    for path in _sources(package):
+        if path.relative_to(ROOT).as_posix() == door:
+            continue
+        for module, line in _imports(path):
+            if any(module == name or module.startswith(name + ".") for name in banned):
+                wrong.append(f"{path.relative_to(ROOT)}:{line} imports {module}")
     assert not wrong, "\n".join(wrong)
 
 

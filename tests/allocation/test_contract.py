@@ -307,7 +307,7 @@ def check_default(answer: Allocation, question: Question, robot: Robot, damage_k
     previous = question.arguments.get("previous")
     if previous is None:
         return
-    period_s = 0.1  # the default of `dual`
+    period_s = 0.1  # `USUAL_PERIOD_S`, which no question here changes
     for part, old, new in zip(answer.layout.actuators, previous, answer.command, strict=True):
         if np.isnan(new).any():
             continue

@@ -122,13 +122,10 @@ def test_a_word_in_a_comment_is_no_definition() -> None:
 @pytest.mark.parametrize("word", FORBIDDEN)
 def test_a_word_with_one_meaning_names_nothing_else(word: str) -> None:
     pattern, rooms = FORBIDDEN[word]
-    wrong = [
-        f"{path}: {name}"
-        for room in rooms
-        for path, names in definitions(room).items()
-        for name in sorted(names)
-        if re.fullmatch(pattern, name)
-    ]
+    wrong = []
+    for room in rooms:
+        for path, names in definitions(room).items():
+            wrong += [f"{path}: {name}" for name in sorted(names) if re.fullmatch(pattern, name)]
     assert not wrong, f"{word} means something else, see docs/theory/glossary.md: {wrong}"
 
 

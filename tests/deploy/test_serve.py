@@ -304,6 +304,8 @@ def test_what_waited_longer_than_the_watchdog_allows_is_dropped(
     monkeypatch.setattr(Server, "answers", paused)
 
     class Late(Script):
+        """Requests that have waited for some time, each after a silence."""
+
         def newest(self, timeout: float | None) -> Line | None:
             if not self.requests:
                 raise EOFError
@@ -453,15 +455,19 @@ def test_after_a_pause_of_the_process_the_first_line_is_rest(folder: Path) -> No
         for i in range(15):
             feed.write(json.dumps(GOOD_REQUEST | {"id": [paused, i]}).encode() + b"\n")
             feed.flush()
-            while not paused and (reply := json.loads(out.readline()))["id"] != [False, i]:
+            while not paused:
+                reply = json.loads(out.readline())
+                if reply["id"] == [False, i]:
+                    break
                 assert reply["status"] == "neutral"
             time.sleep(0.07 * paused)
         service.send_signal(signal.SIGCONT if paused else signal.SIGSTOP)
     assert json.loads(out.readline())["status"] == "neutral"
     feed.write(json.dumps(GOOD_REQUEST | {"id": "new"}).encode() + b"\n")
     feed.flush()
-    while (reply := json.loads(out.readline()))["status"] == "neutral":
-        pass
+    reply = json.loads(out.readline())
+    while reply["status"] == "neutral":
+        reply = json.loads(out.readline())
     assert reply["id"] == "new"
     feed.close()
     service.wait(60)
@@ -525,5 +531,6 @@ def test_times_are_finite_and_above_zero(option: str, capsys: pytest.CaptureFixt
 
     assert main(["serve", "bundle", option]) == 2
     name, text = option.split("=")
-    assert f"argument {name}: expected a number from" in (told := capsys.readouterr().err)
-    assert told.endswith(f"got {text!r}\n")
+    error = capsys.readouterr().err
+    assert f"argument {name}: expected a number from" in error
+    assert error.endswith(f"got {text!r}\n")

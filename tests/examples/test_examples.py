@@ -6,6 +6,7 @@ import runpy
 import shutil
 import time
 from collections.abc import Iterator
+from itertools import chain
 from operator import attrgetter
 from pathlib import Path
 from typing import Any
@@ -52,7 +53,7 @@ def test_notebook_runs(path: Path, kernel: NotebookClient, tmp_path: Path) -> No
     for number, cell in enumerate(notebook.cells):
         kernel.execute_cell(cell, number)
     assert time.monotonic() - started < PATIENCE_S
-    outputs = [output for cell in notebook.cells for output in cell.get("outputs", ())]
+    outputs = list(chain.from_iterable(cell.get("outputs", ()) for cell in notebook.cells))
     assert any(output.get("name") == "stdout" and output.text.strip() for output in outputs)
     assert not [output for output in outputs if output.get("name") == "stderr"]
     (*_, last) = [output for output in outputs if "data" in output]

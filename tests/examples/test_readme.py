@@ -57,11 +57,9 @@ def test_links_and_files_of_all_pages_exist() -> None:
 
 
 def test_make_targets_of_all_pages_exist() -> None:
-    targets = {
-        name
-        for page in PAGES
-        for name in re.findall(r"(?:^|`)make ([a-z-]+)", page.read_text(), re.MULTILINE)
-    }
+    targets = set[str]()
+    for page in PAGES:
+        targets.update(re.findall(r"(?:^|`)make ([a-z-]+)", page.read_text(), re.MULTILINE))
     makefile = (ROOT / "Makefile").read_text()
     gone = {"mutate", "bench", "bench-runtime"}  # which the changelog says
     assert {
@@ -74,11 +72,9 @@ def test_make_targets_of_all_pages_exist() -> None:
 def test_figures_of_pages_are_columns_of_experiments() -> None:
     from finlab.research.evaluation.experiment import load_experiment
 
-    marks = [
-        mark
-        for page in PAGES
-        for mark in re.findall(r"<!-- figures: (\w+) ?([^>]*) -->", page.read_text())
-    ]
+    marks = list[tuple[str, str]]()
+    for page in PAGES:
+        marks += re.findall(r"<!-- figures: (\w+) ?([^>]*) -->", page.read_text())
     assert marks
     for name, keys in marks:
         keys = {key for key in keys.split() if "=" not in key}

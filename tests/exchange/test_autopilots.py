@@ -1,6 +1,7 @@
 """Layouts from and to the parameters of PX4, the factors of ArduSub, and allocation matrices."""
 
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -199,7 +200,7 @@ def test_a_published_matrix_of_the_bluerov2(tmp_path: Path) -> None:
     layout = read_any(str(tmp_path / "tam.csv"), Exchange())
     np.testing.assert_allclose(wrenches(layout), matrix, atol=1e-15)
     np.testing.assert_allclose(np.linalg.norm(layout.position[:4], axis=1), 0.1888)
-    places = [[x, y, 0.0] for x in (0.12, -0.12) for y in (-0.21805, 0.21805)]
+    places = list(product((0.12, -0.12), (-0.21805, 0.21805), (0.0,)))
     np.testing.assert_allclose(layout.position[4:], places, atol=1e-15)
     assert (layout.lower[0, 0], layout.upper[0, 0]) == (-39.91, 51.44)
     convert(str(tmp_path / "tam.csv"), tmp_path / "rov.cpp", None, Exchange())

@@ -51,10 +51,8 @@ NUMBER = re.compile(rb"-?\d+(\.\d+)?")
 
 def changed(rng: np.random.Generator, content: bytes) -> bytes:
     """Content with some bytes or numbers changed, cut, doubled, or something odd put in."""
-    content, numbers = (
-        bytearray(content),
-        [found.span() for found in NUMBER.finditer(content[:20_000])],
-    )
+    numbers = [match.span() for match in NUMBER.finditer(content[:20_000])]
+    content = bytearray(content)
     for _ in range(rng.integers(1, 4)):
         place = int(rng.integers(0, len(content) + 1))
         kind = rng.integers(6)

@@ -40,10 +40,10 @@ def write_table(samples: Samples, path: Path) -> None:
         writer = csv.writer(file)
         writer.writerow([*names, "Fx", "Fy", "Fz", "Tx", "Ty", "Tz"])
         for command, wrench in zip(samples.command, samples.wrench, strict=True):
-            parts = zip(layout.actuators, command, strict=True)
-            writer.writerow(
-                [*(v for part, row in parts for v in row[: len(part.KIND.numbers)]), *wrench]
-            )
+            cells = list[float]()
+            for actuator, row in zip(layout.actuators, command, strict=True):
+                cells += row[: len(actuator.KIND.numbers)].tolist()
+            writer.writerow([*cells, *wrench])
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,7 @@
 """Layouts as values: names, losses, changes; and as padded arrays."""
 
 import math
+from itertools import chain
 
 import numpy as np
 import pytest
@@ -76,7 +77,7 @@ def test_random_layouts_keep_to_box_counts_and_limits():
     rng = np.random.default_rng(0)
     layouts = [random_layout(rng, limits="varied") for _ in range(1200)]
     assert {layout.n for layout in layouts} == {2, 3, 4, 5}
-    fins = [fin for layout in layouts for fin in layout.fins]
+    fins = chain.from_iterable(layout.fins for layout in layouts)
     assert all((np.abs(fin.position) <= TRAINING_BOX).all() for fin in fins)
     upper, lower = (
         np.concatenate([getattr(layout, end) for layout in layouts]) for end in ("upper", "lower")

@@ -22,9 +22,11 @@ FLU_TO_FRD = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
 DIAGONAL = np.sqrt(0.5)
 """Part of a unit vector along each of two axes, between which it lies."""
 LEVER = 0.24 * DIAGONAL
+"""Arm of yaw [m]."""
 ROLL = 0.22
+"""Arm of roll [m]."""
 PITCH = 0.12
-"""Arms of yaw, roll and pitch [m]."""
+"""Arm of pitch [m]."""
 # PX4 divides columns of the pseudo-inverse: each of thrust by the mean of its entries, roll and
 # pitch by sqrt(2) times the larger entry, yaw by its own.
 PX4_UNIT = 4 * FULL * np.array([DIAGONAL, DIAGONAL, 1.0, PITCH * DIAGONAL, PITCH * DIAGONAL, LEVER])

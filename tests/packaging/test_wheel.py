@@ -74,7 +74,8 @@ def with_requirements(names: set[str]) -> set[str]:
     waiting = set(names)
     seen = set[str]()
     while waiting:
-        seen.add(name := waiting.pop())
+        name = waiting.pop()
+        seen.add(name)
         lines = map(Requirement, metadata.distribution(name).requires or ())
         needed = {
             normal_name(line.name)
@@ -90,12 +91,13 @@ def declared(*extras: str) -> set[str]:
     lines = [Requirement(line) for line in PROJECT["dependencies"]]
     for extra in extras:
         lines += map(Requirement, PROJECT["optional-dependencies"][extra])
-    inside = {extra for line in lines if line.name == NAME for extra in line.extras} - set(extras)
-    return (
-        declared(*extras, *inside)
-        if inside
-        else {normal_name(line.name) for line in lines} - {NAME}
-    )
+    extras_of_extras = set[str]()
+    for line in lines:
+        if line.name == NAME:
+            extras_of_extras |= line.extras
+    if extras_of_extras - set(extras):
+        return declared(*extras, *(extras_of_extras - set(extras)))
+    return {normal_name(line.name) for line in lines} - {NAME}
 
 
 def bare_run(bare: Path, cwd: Path, *argv: str) -> subprocess.CompletedProcess[str]:

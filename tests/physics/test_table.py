@@ -4,6 +4,7 @@ file."""
 import math
 import os
 import zipfile
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -114,6 +115,10 @@ def test_a_layout_may_use_a_table(tmp_path):
 
 HEADER = "A,f,phi,Fx,Fy,Fz"
 """Columns of a file without power."""
+GOOD_COMMANDS = list(product((0.1, 0.2), (1, 2), (0, 1)))
+"""Amplitude [rad], frequency [Hz] and direction [rad] of a grid of 2 x 2 x 2 commands."""
+GOOD_ROWS = [f"{a},{f},{d},0,1,2" for a, f, d in GOOD_COMMANDS]
+"""Rows of a table on this grid."""
 
 
 def scaled(*, amplitude=1.0, frequency=1.0, direction=1.0, force=1.0, power=None):
@@ -128,15 +133,9 @@ def scaled(*, amplitude=1.0, frequency=1.0, direction=1.0, force=1.0, power=None
             2 * force,
             *([] if power is None else [f * f * power]),
         ]
-        for a in (0.1, 0.2)
-        for f in (1, 2)
-        for d in (0, 1)
+        for a, f, d in GOOD_COMMANDS
     ]
     return [HEADER + ("" if power is None else ",P"), *(",".join(map(str, row)) for row in rows)]
-
-
-GOOD_ROWS = [f"{a},{f},{d},0,1,2" for a in (0.1, 0.2) for f in (1, 2) for d in (0, 1)]
-"""Rows of a grid of 2 x 2 x 2 commands."""
 
 
 @pytest.mark.parametrize(
@@ -205,13 +204,12 @@ def circle_with_power(path, force_at_end, extra):
     """A table around the circle, whose end has another force, and extra power, beside its
     beginning."""
     angles = np.linspace(-math.pi, math.pi, 9)
-    last = np.arange(9) == 8
-    rows = [
-        f"{a},{f},{d},0,{a * f * math.cos(d) + force_at_end * end},{a * f * math.sin(d)},{5 + extra * end}"
-        for a in (0.5, 1)
-        for f in (1, 2)
-        for d, end in zip(angles, last, strict=True)
-    ]
+    rows = []
+    for a, f, d in product((0.5, 1), (1, 2), angles):
+        is_end = d == angles[-1]
+        across = a * f * math.cos(d) + force_at_end * is_end
+        along = a * f * math.sin(d)
+        rows.append(f"{a},{f},{d},0,{across},{along},{5 + extra * is_end}")
     path.write_text("\n".join([HEADER + ",P", *rows]))
     return path
 
@@ -232,9 +230,7 @@ def test_a_circle_is_closed_by_its_forces_whatever_the_power(tmp_path):
 def test_power_never_falls_below_zero_between_points_near_zero(tmp_path):
     """A cubic through 0, 0, 1 dips; its slope is then told as that of zero."""
     power = [0.0, 0.0, 0.0, 1.0, 1.0]
-    rows = [
-        f"{a},{f},{d},0,1,2,{p}" for a in (0.1, 0.2) for f, p in enumerate(power) for d in (0, 1)
-    ]
+    rows = [f"{a},{f},{d},0,1,2,{power[f]}" for a, f, d in product((0.1, 0.2), range(5), (0, 1))]
     (tmp_path / "t.csv").write_text("\n".join([HEADER + ",P", *rows]))
     law = read_table(tmp_path / "t.csv")
     at = np.zeros((401, 3))
@@ -252,9 +248,7 @@ def test_one_turn_apart_noise_may_be_a_twentieth_of_the_largest_force(share, goo
     angles = np.linspace(-math.pi, math.pi, 9)
     rows = [
         f"{a},{f},{d},0,{a * f * math.cos(d) * (1.0 + share * (d > 3.0))},{a * f * math.sin(d)}"
-        for a in (0.5, 1)
-        for f in (1, 2)
-        for d in angles
+        for a, f, d in product((0.5, 1), (1, 2), angles)
     ]
     (tmp_path / "t.csv").write_text("\n".join([HEADER, *rows]))
     if good:

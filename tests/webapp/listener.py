@@ -85,4 +85,8 @@ def _arrays(value: Any) -> list[int]:
         if "__binary_index" in value:
             return [value["__binary_index"]]
         value = list(value.values())
-    return [index for part in value for index in _arrays(part)] if isinstance(value, list) else []
+    indices = list[int]()
+    if isinstance(value, list):
+        for part in value:
+            indices += _arrays(part)
+    return indices

@@ -177,12 +177,8 @@ def tab(workers: Pools) -> Iterator[Tab]:
     ("place", "fault"),
     sampled(
         [
-            pytest.param(place, kind(FAULT_TEXT))
-            for kind, places in (
-                (RuntimeError, COMPUTED + DRAWN),
-                (FinlabError, (COMPUTED[0], DRAWN[2])),
-            )
-            for place in places
+            *(pytest.param(place, RuntimeError(FAULT_TEXT)) for place in COMPUTED + DRAWN),
+            *(pytest.param(place, FinlabError(FAULT_TEXT)) for place in (COMPUTED[0], DRAWN[2])),
         ],
         every=6,
     ),

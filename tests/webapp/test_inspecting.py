@@ -246,13 +246,11 @@ def test_one_error_everywhere() -> None:
     plant = plant_of(layout)
     assert answer.candidates is not None and answer.wrench_expected is not None
     modes = [named.mode for named in solver.modes(reply).visible]
-    told = [
-        (c, e)
-        for found in (answer.candidates, answer.samples)
-        if found
-        for c, e in zip(found.command, found.err_norm, strict=True)
-    ]
-    for command, error in [*told, *((mode.command, mode.err_norm) for mode in modes)]:
+    errors = [(mode.command, mode.err_norm) for mode in modes]
+    for candidates in (answer.candidates, answer.samples):
+        if candidates:
+            errors += zip(candidates.command, candidates.err_norm, strict=True)
+    for command, error in errors:
         missing = (np.array(state.target) - plant.wrench(command)) / answer.scale
         assert error == pytest.approx(float(np.linalg.norm(missing)), abs=1e-9)
     assert modes[0].err_norm == pytest.approx(answer.err_norm, rel=1e-9)

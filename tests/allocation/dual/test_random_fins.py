@@ -180,9 +180,10 @@ def least_cost(
     starts[..., :2] = np.where(resting[..., None], 0.0, starts[..., :2])
     if also is not None:
         starts = np.concatenate([(also - low)[None] / width, starts])
-    bounds = [
-        (None, None) if axis == 2 and full[i] else (0.0, 1.0) for i in range(n) for axis in range(3)
-    ]
+    bounds = list[tuple[float | None, float | None]]()
+    for turns_all_round in full:
+        direction_bounds = (None, None) if turns_all_round else (0.0, 1.0)
+        bounds += [(0.0, 1.0), (0.0, 1.0), direction_bounds]
     # Equations beyond the rank of what the fins can do only confuse the solver.
     axes = np.linalg.svd(plant.effectiveness[:, 1:].reshape(2 * n, 6) / sigma, full_matrices=False)
     rank = int((axes[1] > 1e-9 * axes[1][0]).sum())

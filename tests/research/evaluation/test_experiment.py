@@ -74,6 +74,8 @@ def test_rows_table_and_json_are_the_same(
 
 def test_a_terminal_is_told_before_the_work(monkeypatch: pytest.MonkeyPatch) -> None:
     class Terminal(io.StringIO):
+        """A terminal that keeps what is written to it."""
+
         def isatty(self) -> bool:
             return True
 
