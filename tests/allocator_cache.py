@@ -1,4 +1,5 @@
-"""`AllocatorCache`: a method with its settings, and its allocator of each robot that a test asks about.
+"""`AllocatorCache`: a method with its settings, and its allocator of each robot that a test asks
+about.
 
 Tests of several robots load the networks of a method once, and not once a robot. Used by all rooms
 that allocate.

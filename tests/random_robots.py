@@ -2,9 +2,9 @@
 beyond.
 
 Written apart from the library's makers (`finlab/research/random_layouts.py`): these robots are
-mappings of layout files, which the library reads by its loader and `tests/oracle_plant.py` by itself,
-so that a fault in a maker, the loader or a law cannot stand in both. They have what no training
-needs: rudders, dead bands, rates, fins that cannot rest.
+mappings of layout files, which the library reads by its loader and `tests/oracle_plant.py` by
+itself, so that a fault in a maker, the loader or a law cannot stand in both. They have what no
+training needs: rudders, dead bands, rates, fins that cannot rest.
 """
 
 import math

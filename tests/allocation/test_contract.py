@@ -1,5 +1,5 @@
-"""The contract of all methods: what each promises of every answer, for every kind of robot and damage,
-policy, tick and free axis.
+"""The contract of all methods: what each promises of every answer, for every kind of robot and
+damage, policy, tick and free axis.
 
 A new method is tested here as soon as it stands in `METHODS`, a new kind of robot as soon as it
 stands in `KINDS` of `tests/random_robots.py`. The judge is `tests/oracle_plant.py`, a second set of
@@ -38,8 +38,8 @@ DAMAGE_KINDS = ("whole", "lost", "weak", "torn", "stuck", "running")
 POLICIES = ("closest", "direction", "priority")
 """The kinds of policy."""
 REACHES = (0.0, 1.0, 30.0)
-"""Sizes of the wrenches, as multiples of that of a command within limits: 0 is rest, 1 is within reach,
-30 is beyond."""
+"""Sizes of the wrenches, as multiples of that of a command within limits: 0 is rest, 1 is within
+reach, 30 is beyond."""
 EXTREMES = (1e-6, 1e4)
 """The same of wrenches that are asked for by the default policy alone."""
 ARRAYS = (

@@ -1,4 +1,5 @@
-"""What `fl_check` of the core refuses: each number of a block that makes no sense, with its code."""
+"""What `fl_check` of the core refuses: each number of a block that makes no sense, with its
+code."""
 
 import numpy as np
 import pytest

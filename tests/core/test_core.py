@@ -1,5 +1,5 @@
-"""`finlab.core.calls.Core`, the core as Python calls it: structs as long as in C, refusals as errors,
-and the same answers one by one, in a batch and from several threads."""
+"""`finlab.core.calls.Core`, the core as Python calls it: structs as long as in C, refusals as
+errors, and the same answers one by one, in a batch and from several threads."""
 
 import re
 from concurrent.futures import ThreadPoolExecutor

@@ -1,4 +1,5 @@
-"""Power and forces of commands, on which the search of robots whose foils drag steps from one to the next."""
+"""Power and forces of commands, on which the search of robots whose foils drag steps from one to
+the next."""
 
 import ctypes
 

@@ -1,4 +1,5 @@
-"""The lattice of foils' angles at which searches for commands begin, against the plant and numpy."""
+"""The lattice of foils' angles at which searches for commands begin, against the plant and
+numpy."""
 
 import ctypes
 from dataclasses import dataclass

@@ -1,5 +1,5 @@
-"""Raised multipliers prove nearly as much as drawn commands allow: beside a linear program over their
-mixtures."""
+"""Raised multipliers prove nearly as much as drawn commands allow: beside a linear program over
+their mixtures."""
 
 import numpy as np
 import pytest

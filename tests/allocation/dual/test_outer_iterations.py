@@ -30,7 +30,8 @@ from finlab.research.random_layouts import random_jet_robot
 from tests.random_robots import bluerov2_heavy
 
 MOST_STEPS = 540.0
-"""Steps of the iterations of all questions: what they took when this was written, and a tenth more."""
+"""Steps of the iterations of all questions: what they took when this was written, and a tenth
+more."""
 
 
 def test_other_starts_rotate_planes_and_change_sizes() -> None:

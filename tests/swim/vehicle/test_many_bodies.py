@@ -22,7 +22,7 @@ assert BODY.mass_kg is not None
 BODY = replace(
     BODY, center_of_buoyancy_m=CENTER_OF_BUOYANCY, buoyancy_n=BODY.mass_kg * GRAVITY + NET_BUOYANCY
 )
-"""U-CAT's body, with a center of buoyancy that is not above its origin, and a little too light."""
+"""U-CAT's body, lighter than water, with its center of buoyancy a little off the vertical."""
 
 
 def quaternion(angles: np.ndarray) -> np.ndarray:
