@@ -157,11 +157,11 @@ def test_numbers_of_a_command_that_its_kind_does_not_use_are_zero() -> None:
         i = first_of(robot, kind)
         for k in range(3):
             block = robot.block.copy()
-            own = actuators_of(block)
+            actuators = actuators_of(block)
             if k < used:  # an empty range
-                own["command_min"][i, k] = own["command_max"][i, k] + 1.0
+                actuators["command_min"][i, k] = actuators["command_max"][i, k] + 1.0
             else:
-                own["command_max"][i, k] = 1.0
+                actuators["command_max"][i, k] = 1.0
             assert code_of(block) == "FL_BAD_NUMBER", (name, k)
 
 

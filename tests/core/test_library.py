@@ -74,10 +74,18 @@ def test_two_robots_link_into_a_program_in_cpp(tmp_path: Path) -> None:
         folder = tmp_path / name
         write_c(c_sources(load_layout(name)), folder)
         for source in sorted(folder.glob("*.c")):
-            made = folder / f"{source.stem}.o"
-            words = ["gcc", *STRICT_FLAGS, "-DFL_NO_MAIN", "-c", str(source), "-o", str(made)]
+            object_file = folder / f"{source.stem}.o"
+            words = [
+                "gcc",
+                *STRICT_FLAGS,
+                "-DFL_NO_MAIN",
+                "-c",
+                str(source),
+                "-o",
+                str(object_file),
+            ]
             subprocess.run(words, check=True, cwd=folder)
-            objects.append(made)
+            objects.append(object_file)
     names = set(itertools.chain.from_iterable(map(_global_names, objects)))
     assert {"fl_a_answer_one", "fl_catamaran_answer_one"} < names
     assert not {name for name in names if not name.startswith("fl_")}

@@ -23,10 +23,10 @@ def test_equations_are_solved(seed: int) -> None:
     matrix = root @ root.T + 0.1 * np.eye(6)
     right = rng.normal(size=6)
     code, factor = factor_of(matrix)
-    found = np.zeros(6)
-    functions().fl_solve(at(factor), at(right), at(found))
+    solution = np.zeros(6)
+    functions().fl_solve(at(factor), at(right), at(solution))
     assert code == 1
-    np.testing.assert_allclose(found, np.linalg.solve(matrix, right), rtol=1e-9)
+    np.testing.assert_allclose(solution, np.linalg.solve(matrix, right), rtol=1e-9)
 
 
 @pytest.mark.parametrize("negative", range(6))
