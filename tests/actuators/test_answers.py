@@ -99,14 +99,14 @@ def check(
     command = robot.core.commands(force)
     assert (command >= low).all() and (command <= high).all()
     given = law.force(command)
-    worth = np.einsum("nma,maw,wn->nm", given, wrench, multipliers) - law.power(command)
+    net_value = np.einsum("nma,maw,wn->nm", given, wrench, multipliers) - law.power(command)
     tried = low + np.random.default_rng(1).uniform(size=(400, m, 3)) * (high - low)
     others = np.einsum("tma,maw,wn->tnm", law.force(tried), wrench, multipliers)
     others -= law.power(tried)[:, None]
-    scale = np.abs(worth).max(axis=0) + 1e-9
-    assert (worth >= others.max(axis=0) - 5e-4 * scale).all()
+    scale = np.abs(net_value).max(axis=0) + 1e-9
+    assert (net_value >= others.max(axis=0) - 5e-4 * scale).all()
     most = [answer(robot, price)[1] for price in multipliers.T]
-    np.testing.assert_allclose(most, worth.sum(axis=1), atol=5e-4 * scale.sum())
+    np.testing.assert_allclose(most, net_value.sum(axis=1), atol=5e-4 * scale.sum())
 
 
 def test_thrusters_answer_with_what_is_worth_most() -> None:
@@ -148,9 +148,9 @@ def test_rudders_answer_with_a_lift_that_their_deflections_give(
     robot = prepared(group, wrench, low, high)
     met = law.flow_at(inflow, inflow.shape)
     across = np.stack([0.0 * met.course, -np.sin(met.course), np.cos(met.course)], axis=-1)
-    for share in (0.0, 0.3, 1.0):
+    for fraction in (0.0, 0.3, 1.0):
         force = np.zeros((1, 2, 2))
-        force[0, :, 0] = robot.ends[:, 0] + share * (robot.ends[:, 1] - robot.ends[:, 0])
+        force[0, :, 0] = robot.ends[:, 0] + fraction * (robot.ends[:, 1] - robot.ends[:, 0])
         command = robot.core.commands(force)[0]
         assert (command >= low).all() and (command <= high).all()
         given = law.force(command, inflow)
@@ -174,12 +174,12 @@ def test_a_rudder_answers_a_price_with_the_lift_whose_drag_it_pays() -> None:
     rows = np.linalg.pinv(
         robot.effectiveness[0]
     )  # multipliers at which lift has a price, and drag none
-    found = [answer(robot, rows @ [own, 0.0])[1] for own in price]
+    dual_values = [answer(robot, rows @ [own, 0.0])[1] for own in price]
     delta = np.linspace(-0.5, 0.5, 4001)[:, None, None] * [1.0, 0.0, 0.0]
     course = law.flow_at(inflow, inflow.shape).course[0]
     lift = law.force(delta, inflow)[:, 0] @ [0.0, -np.sin(course), np.cos(course)]
-    worth = price * lift[:, None] - law.power(delta, inflow)
-    np.testing.assert_allclose(found, worth.max(axis=0), rtol=0.02, atol=0.02)
+    net_value = price * lift[:, None] - law.power(delta, inflow)
+    np.testing.assert_allclose(dual_values, net_value.max(axis=0), rtol=0.02, atol=0.02)
 
 
 def test_a_price_of_drag_counts_in_the_answer_of_a_rudder() -> None:
@@ -225,9 +225,9 @@ def test_every_actuator_of_a_mixed_robot_is_in_one_group() -> None:
     robot = Layout(
         "robot", (RUDDERS[0], *THRUSTERS[:2], *AZIMUTHS, Fin("fin", (0.1, 0, 0), 0.3), RUDDERS[1])
     )
-    found = groups_of(robot.actuators, own_effectiveness(robot))
-    assert sorted(np.concatenate([places for places, _ in found])) == list(range(robot.n))
-    assert [len(group.responses) == len(group.forms) == len(places) for places, group in found]
+    groups = groups_of(robot.actuators, own_effectiveness(robot))
+    assert sorted(np.concatenate([places for places, _ in groups])) == list(range(robot.n))
+    assert [len(group.responses) == len(group.forms) == len(places) for places, group in groups]
     plant = Plant(robot)
     command = Compiled(robot, plant, np.ones(6)).robot.core.commands(np.zeros((2, robot.n, 2)))
     np.testing.assert_array_equal(plant.feasible(command), command)

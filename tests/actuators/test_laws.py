@@ -29,26 +29,36 @@ REMUS_RUDDER = {"area": 6.65e-3, "deflection": (-0.24, 0.24)}
 
 def thruster(name: str = "t", model: Any = LAW, **changes: Any) -> Thruster:
     """A thruster with some of its fields changed."""
-    told = {"position": (0.1, 0.2, 0.3), "axis": (0.0, 0.6, 0.8), "force": (-39.0, 51.0), **changes}
-    return Thruster(name=name, model=model, **told)
+    fields = {
+        "position": (0.1, 0.2, 0.3),
+        "axis": (0.0, 0.6, 0.8),
+        "force": (-39.0, 51.0),
+        **changes,
+    }
+    return Thruster(name=name, model=model, **fields)
 
 
 def azimuth(name: str = "a", model: Any = LAW, **changes: Any) -> Azimuth:
     """A pod with some of its fields changed."""
-    told = {"turn_axis": (0.0, 0.0, 1.0), "zero": (1.0, 0.0, 0.0), "force": (0.0, 40.0), **changes}
-    return Azimuth(name=name, position=(-0.5, 0.1, 0.0), model=model, **told)
+    fields = {
+        "turn_axis": (0.0, 0.0, 1.0),
+        "zero": (1.0, 0.0, 0.0),
+        "force": (0.0, 40.0),
+        **changes,
+    }
+    return Azimuth(name=name, position=(-0.5, 0.1, 0.0), model=model, **fields)
 
 
 def rudder(name: str = "r", **changes: Any) -> Rudder:
     """A rudder of the REMUS with some of its fields changed."""
-    told = {
+    fields = {
         "shaft": (0.0, 0.0, 1.0),
         "zero": (1.0, 0.0, 0.0),
         "aspect_ratio": 2.21,
         **REMUS_RUDDER,
         **changes,
     }
-    return Rudder(name=name, position=(-0.638, 0.0, 0.0), **told)
+    return Rudder(name=name, position=(-0.638, 0.0, 0.0), **fields)
 
 
 def random_commands(low: Array, high: Array) -> Array:
@@ -73,21 +83,21 @@ def random_commands(low: Array, high: Array) -> Array:
     ],
 )
 def test_derivatives_are_those_of_finite_differences(law: type[Any], parts: list[Any]) -> None:
-    own: ActuatorLaw = law(parts)
+    actuator_law: ActuatorLaw = law(parts)
     command = random_commands(
         np.array([p.lower for p in parts]), np.array([p.upper for p in parts])
     )
     inflow = np.random.default_rng(4).normal(0.0, 2.0, command.shape)
-    force, jacobian = own.force_and_jacobian(command, inflow)
-    np.testing.assert_array_equal(force, own.force(command, inflow))
-    gradient = own.power_gradient(command, inflow)
+    force, jacobian = actuator_law.force_and_jacobian(command, inflow)
+    np.testing.assert_array_equal(force, actuator_law.force(command, inflow))
+    gradient = actuator_law.power_gradient(command, inflow)
     step = 1e-6
     for k in range(3):
         move = step * np.eye(3)[k]
-        by_force = (own.force(command + move, inflow) - own.force(command - move, inflow)) / (
-            2.0 * step
-        )
-        ahead, back = (own.power(command + s * move, inflow) for s in (1.0, -1.0))
+        by_force = (
+            actuator_law.force(command + move, inflow) - actuator_law.force(command - move, inflow)
+        ) / (2.0 * step)
+        ahead, back = (actuator_law.power(command + s * move, inflow) for s in (1.0, -1.0))
         scale = 1.0 + np.abs(force).max()
         np.testing.assert_allclose(jacobian[..., k, :], by_force, atol=2e-6 * scale)
         np.testing.assert_allclose(
@@ -213,13 +223,13 @@ def test_a_foil_stalls_as_its_source_says() -> None:
     rudders = [rudder(stall=0.3, drag=0.02), rudder(lift_slope=2.0, stall=0.6, aspect_ratio=4.0)]
     law = RudderLaw(rudders)
     for angle in np.linspace(-1.5, 1.5, 301):
-        told = law.coefficients(np.array([angle, angle]))
+        coefficients = law.coefficients(np.array([angle, angle]))
         for i, part in enumerate(rudders):
             expected = coefficients_with_stall(
                 part.slope, part.drag, part.induced, part.stall, float(angle)
             )
             np.testing.assert_allclose(
-                [told.lift[i], told.drag[i]], expected, rtol=1e-9, atol=1e-12
+                [coefficients.lift[i], coefficients.drag[i]], expected, rtol=1e-9, atol=1e-12
             )
 
 

@@ -47,14 +47,14 @@ def test_every_field_counts_but_the_time() -> None:
         {"seed": 1},
     ):
         assert replace(result, **changed) != result, changed
-    told = result.candidates
+    candidates_of_result = result.candidates
     for candidates, samples in (
-        (replace(told, power=told.power + 1e-12), None),
+        (replace(candidates_of_result, power=candidates_of_result.power + 1e-12), None),
         (None, None),
-        (told, told),
+        (candidates_of_result, candidates_of_result),
     ):
         assert result.with_candidates(candidates, samples) != result
-    assert result.with_candidates(told, result.samples) == result
+    assert result.with_candidates(candidates_of_result, result.samples) == result
     assert result != "an answer" and result is not None
     with pytest.raises(TypeError, match="unhashable"):
         hash(result)
@@ -122,8 +122,8 @@ def test_a_method_that_does_not_know_the_fins_blames_no_limit() -> None:
         result
     ) and "the method does not know these fins: front_right" in str(result)
     for method in ("dual", "sqp"):
-        known = Allocator(strange, method).allocate(WRENCH)
-        assert known.reachable and known.unknown_fins == ()
+        answer = Allocator(strange, method).allocate(WRENCH)
+        assert answer.reachable and answer.unknown_fins == ()
 
 
 @pytest.mark.parametrize("method", OF_FINS)

@@ -43,8 +43,8 @@ class Drawn(LeastErrorMethod):
         seeds = [
             np.random.default_rng([seed, *np.abs(t).view(np.uint64).tolist()]) for t in targets
         ]
-        share = np.array([rng.uniform(size=(self.layout.n, 3)) for rng in seeds])
-        command = np.array([0.05, 0.1, -3.0]) + share * [0.5, 1.9, 6.0]
+        fraction = np.array([rng.uniform(size=(self.layout.n, 3)) for rng in seeds])
+        command = np.array([0.05, 0.1, -3.0]) + fraction * [0.5, 1.9, 6.0]
         few = Candidates(command, targets * 0, np.zeros(1), np.zeros(1), np.zeros(1), ("drawn",))
         return Solution(command, wrench=0.5 * targets, candidates=lambda: few)
 

@@ -128,8 +128,8 @@ def test_priority_of_a_robot_that_commands_three_axes() -> None:
 def test_axes_in_files() -> None:
     layout = replace(load_layout("bluerov2"), axes=("Tz", "Fx"))
     assert layout.axes == ("Fx", "Tz")
-    again: Layout = parse_layout(json.loads(json.dumps(layout_to_dict(layout))))
-    assert again == layout and again != load_layout("bluerov2")
+    layout_read_back: Layout = parse_layout(json.loads(json.dumps(layout_to_dict(layout))))
+    assert layout_read_back == layout and layout_read_back != load_layout("bluerov2")
     with pytest.raises(LayoutError, match="named once"):
         replace(layout, axes=("Fx", "Fx"))
     with pytest.raises(LayoutError, match="axes"):

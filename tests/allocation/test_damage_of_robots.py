@@ -33,8 +33,10 @@ def test_a_weak_fin_keeps_to_what_is_left(search: AllocatorCache, penta: Layout)
     whole = penta.fins[penta.index("bow")].limits
     amplitude, frequency, _ = result.command[penta.index("bow")]
     assert amplitude <= 0.4 * whole.amplitude[1] and frequency <= 0.4 * whole.frequency[1]
-    far = search.allocate(penta, [20.0, 0, 0, 0, 0, 0], damage=health)
-    assert np.linalg.norm(far.forces[penta.index("bow")]) < 0.05 * np.linalg.norm(far.forces)
+    result_out_of_reach = search.allocate(penta, [20.0, 0, 0, 0, 0, 0], damage=health)
+    assert np.linalg.norm(result_out_of_reach.forces[penta.index("bow")]) < 0.05 * np.linalg.norm(
+        result_out_of_reach.forces
+    )
 
 
 @pytest.mark.parametrize("kind", SCALES_THRUST)
@@ -46,11 +48,11 @@ def test_a_torn_fin_gives_its_share_at_every_command(
     bow = penta.index("bow")
     result = search.allocate(layout, TARGET, damage=Damage(torn={"bow": 0.4}))
     assert result.err_norm < 1e-5
-    told = result.forces
+    forces = result.forces
     law = Plant(layout).body_forces(result.command)
     assert np.linalg.norm(law[bow]) > 0.01, "the fin is in use"
-    np.testing.assert_allclose(told[bow], 0.4 * law[bow], rtol=1e-9)
-    np.testing.assert_allclose(np.delete(told, bow, 0), np.delete(law, bow, 0), rtol=1e-9)
+    np.testing.assert_allclose(forces[bow], 0.4 * law[bow], rtol=1e-9)
+    np.testing.assert_allclose(np.delete(forces, bow, 0), np.delete(law, bow, 0), rtol=1e-9)
 
 
 def test_the_thrust_of_a_table_cannot_be_scaled() -> None:
@@ -71,9 +73,11 @@ def test_a_stuck_fin_points_where_it_stays(search: AllocatorCache, penta: Layout
 
 @pytest.mark.parametrize("method", ["dual", "sqp"])
 def test_the_force_of_a_running_fin_is_made_up_for(method: str, penta: Layout) -> None:
-    kept = (0.4, 1.2, 1.0)
-    result = Allocator(penta, method).allocate(TARGET, damage=Damage(running={"bow": kept}))
-    np.testing.assert_allclose(result.command[penta.index("bow")], kept)
+    running_command = (0.4, 1.2, 1.0)
+    result = Allocator(penta, method).allocate(
+        TARGET, damage=Damage(running={"bow": running_command})
+    )
+    np.testing.assert_allclose(result.command[penta.index("bow")], running_command)
     assert result.err_norm < (1e-5 if method == "dual" else 0.02)
     np.testing.assert_allclose(result.wrench, Plant(penta).wrench(result.command), atol=1e-12)
 
@@ -171,8 +175,10 @@ def test_what_is_left_of_a_weak_fins_limits(
     """The upper limits shrink; a lower one only where it would lie above."""
     whole = penta.replace_actuator("bow", limits=Limits((0.1, 0.5), (1.0, 2.0), (0.0, 1.0)))
     layout = Damage(weak={"bow": share}).applied_to(whole)
-    left = layout.fins[layout.index("bow")].limits
-    assert left.amplitude == pytest.approx(amplitude) and left.frequency == pytest.approx(frequency)
-    assert left.zero_direction == (0.0, 1.0)
+    limits = layout.fins[layout.index("bow")].limits
+    assert limits.amplitude == pytest.approx(amplitude) and limits.frequency == pytest.approx(
+        frequency
+    )
+    assert limits.zero_direction == (0.0, 1.0)
     others = [i for i, name in enumerate(penta.names) if name != "bow"]
     assert [layout.fins[i] for i in others] == [whole.fins[i] for i in others]

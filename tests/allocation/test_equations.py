@@ -47,8 +47,8 @@ def citations() -> dict[str, set[int]]:
 
 
 def test_cited_equations_exist() -> None:
-    known = set(numbers_of_page())
-    wrong = [place for place, numbers in citations().items() if not numbers <= known]
+    numbers_on_page = set(numbers_of_page())
+    wrong = [place for place, numbers in citations().items() if not numbers <= numbers_on_page]
     assert wrong == []
 
 

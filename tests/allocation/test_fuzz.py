@@ -52,30 +52,30 @@ def random_policy(rng: np.random.Generator) -> Policy:
 def random_damage(rng: np.random.Generator, robot: Layout) -> dict[str, Any]:
     """Arguments `lost` and `damage` of a question, each of them in three of ten."""
     names = [str(name) for name in rng.permutation(robot.names)]
-    asked: dict[str, Any] = {}
+    arguments: dict[str, Any] = {}
     if len(names) > 1 and rng.random() < 0.3:
-        asked["lost"] = names[: int(rng.integers(1, len(names)))]
+        arguments["lost"] = names[: int(rng.integers(1, len(names)))]
     if rng.random() < 0.3:
         kind = choose(rng, ("weak", "stuck", "running", "torn"))
         value = {"weak": 1e-3, "stuck": 0.7, "running": (0.3, 1.0, 0.5), "torn": 1e-3}[kind]
-        asked["damage"] = Damage(**{kind: {names[-1]: value}})
-    return asked
+        arguments["damage"] = Damage(**{kind: {names[-1]: value}})
+    return arguments
 
 
 def question(rng: np.random.Generator, robot: Layout) -> dict[str, Any]:
     """What is asked of a robot, other than the wrench."""
     plant = plant_of(robot)
-    asked = random_damage(rng, robot)
-    way = rng.integers(6)
-    if way == 0:
-        asked["previous"] = plant.sample(rng, (1,))[0]
-    elif way == 1:
-        asked["previous"] = np.where(rng.random((robot.n_fins, 1)) < 0.5, np.nan, plant.upper)
-    elif way == 2:
-        asked["previous"] = rng.normal(size=(robot.n_fins, 3)) * 1e6
+    arguments = random_damage(rng, robot)
+    choice = rng.integers(6)
+    if choice == 0:
+        arguments["previous"] = plant.sample(rng, (1,))[0]
+    elif choice == 1:
+        arguments["previous"] = np.where(rng.random((robot.n_fins, 1)) < 0.5, np.nan, plant.upper)
+    elif choice == 2:
+        arguments["previous"] = rng.normal(size=(robot.n_fins, 3)) * 1e6
     if rng.random() < 0.1:
-        asked["reference"] = rng.normal(size=(4, 6))
-    return asked
+        arguments["reference"] = rng.normal(size=(4, 6))
+    return arguments
 
 
 def ask(seed: int) -> None:
@@ -88,7 +88,7 @@ def ask(seed: int) -> None:
     if name not in ("dual", "mdn") and not how.is_plain:
         how = Policy()
     plant = plant_of(robot)
-    asked = question(rng, robot)
+    arguments = question(rng, robot)
     reached = plant.wrench(plant.sample(rng, (1,)))[0]
     anywhere = rng.normal(size=6) * 10.0 ** rng.uniform(-12, 6)
     target = np.clip(
@@ -101,14 +101,14 @@ def ask(seed: int) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
-            result = allocator.allocate(robot, target, policy=how, **asked)
+            result = allocator.allocate(robot, target, policy=how, **arguments)
         except LayoutError as error:  # what damage leaves of a fin may be below all bounds
-            assert "must be at least" in str(error) and "damage" in asked
+            assert "must be at least" in str(error) and "damage" in arguments
             return
         if result.bound is not None and result.reachable:
             assert 0.0 <= result.bound <= result.power * (1 + 1e-6) + 1e-12
         batch = allocator.allocate_batch(
-            robot, [target, 0.3 * target], policy=how, lost=asked.get("lost", ())
+            robot, [target, 0.3 * target], policy=how, lost=arguments.get("lost", ())
         )
     for found, limited in (
         (result.command, result.layout),

@@ -81,7 +81,7 @@ def defined_in_python(source: str) -> set[str]:
 @cache
 def definitions(room: str) -> dict[str, frozenset[str]]:
     """The names that each file of a room defines, by its path; that of the file itself, too."""
-    found: dict[str, frozenset[str]] = {}
+    names_of_files: dict[str, frozenset[str]] = {}
     for path in sorted((ROOT / room).rglob("*")):
         if path.suffix == ".py":
             names = defined_in_python(path.read_text(encoding="utf-8"))
@@ -90,8 +90,8 @@ def definitions(room: str) -> dict[str, frozenset[str]]:
             names = set(re.findall(r"[A-Za-z_]\w*", code))
         else:
             continue
-        found[path.relative_to(ROOT).as_posix()] = frozenset({path.stem, *names})
-    return found
+        names_of_files[path.relative_to(ROOT).as_posix()] = frozenset({path.stem, *names})
+    return names_of_files
 
 
 @cache

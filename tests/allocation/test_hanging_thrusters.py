@@ -126,8 +126,8 @@ def test_the_others_make_up_for_what_hangs(seed: int) -> None:
     many = allocator.allocate_batch(targets, damage=damage)
     assert many.err_norm.max() < MET
     np.testing.assert_allclose(many.command[:, index], np.tile(kept, (4, 1)), rtol=0.0, atol=1e-12)
-    far = allocator.allocate(1e3 * targets[0], damage=damage, policy="direction")
-    np.testing.assert_allclose(far.command[index], kept, rtol=0.0, atol=1e-12)
+    result_out_of_reach = allocator.allocate(1e3 * targets[0], damage=damage, policy="direction")
+    np.testing.assert_allclose(result_out_of_reach.command[index], kept, rtol=0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize("method", ["dual", "px4", "analytic", "ardusub", "ipopt"])
@@ -152,11 +152,15 @@ def test_power_of_what_hangs_counts_as_it_is() -> None:
     layout = load_layout("bluerov2_heavy")
     name = layout.names[0]
     result = Allocator(layout).allocate([0.0] * 6, damage=Damage(stuck={name: 20.0}))
-    own = float(plant_of(layout).power(result.command)[0])
-    assert own == pytest.approx(0.997 * 20.0**1.5, rel=0.2) and result.power > own
+    power = float(plant_of(layout).power(result.command)[0])
+    assert power == pytest.approx(0.997 * 20.0**1.5, rel=0.2) and result.power > power
     in_band = layout.replace_actuator(name, dead_band=3.0)
-    still = Allocator(in_band).allocate([0.0] * 6, damage=Damage(stuck={name: 2.0}))
-    assert still.command[0, 0] == 2.0 and not still.forces.any() and still.err_norm < MET
+    result_of_stuck = Allocator(in_band).allocate([0.0] * 6, damage=Damage(stuck={name: 2.0}))
+    assert (
+        result_of_stuck.command[0, 0] == 2.0
+        and not result_of_stuck.forces.any()
+        and result_of_stuck.err_norm < MET
+    )
 
 
 def test_jets_of_one_that_hangs_count() -> None:

@@ -22,8 +22,8 @@ def problem_of(search: AllocatorCache, layout: Layout) -> CommandProblem:
 
 def random_commands(problem: CommandProblem, rows: int, seed: int) -> np.ndarray:
     """Commands (rows, n, 3) within the limits."""
-    share = np.random.default_rng(seed).uniform(size=(rows, *problem.lower.shape))
-    return np.asarray(problem.lower + share * (problem.upper - problem.lower))
+    fraction = np.random.default_rng(seed).uniform(size=(rows, *problem.lower.shape))
+    return np.asarray(problem.lower + fraction * (problem.upper - problem.lower))
 
 
 def wrench_error(problem: CommandProblem, target: np.ndarray, command: np.ndarray) -> np.ndarray:

@@ -111,9 +111,11 @@ def test_errors_are_shares_of_what_the_robot_can_push() -> None:
         < allocator.scale[3]
         <= 2.0 * strongest * lever.max() * 1.0001
     )
-    far = allocator.allocate([100.0, 0, 0, 0, 0, 0])
-    assert far.err_norm == pytest.approx((100.0 - far.wrench[0]) / allocator.scale[0], rel=1e-6)
-    assert far.expected_error == 0.0 and not far.expected_miss.any()
+    result_out_of_reach = allocator.allocate([100.0, 0, 0, 0, 0, 0])
+    assert result_out_of_reach.err_norm == pytest.approx(
+        (100.0 - result_out_of_reach.wrench[0]) / allocator.scale[0], rel=1e-6
+    )
+    assert result_out_of_reach.expected_error == 0.0 and not result_out_of_reach.expected_miss.any()
     lost = allocator.allocate(WRENCH, lost=["front_left"])
     np.testing.assert_array_equal(lost.scale, allocator.scale)
 

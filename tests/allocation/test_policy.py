@@ -75,8 +75,8 @@ def proven_error(layout: Layout, result: Allocation, target: np.ndarray) -> floa
 def cosine(result: Allocation) -> float:
     """Between what was asked and what is given, both normalized."""
     asked = result.target / result.scale
-    given = result.wrench / result.scale
-    return float(asked @ given / (np.linalg.norm(asked) * np.linalg.norm(given)))
+    wrench = result.wrench / result.scale
+    return float(asked @ wrench / (np.linalg.norm(asked) * np.linalg.norm(wrench)))
 
 
 @pytest.mark.parametrize(

@@ -49,10 +49,10 @@ def called(run: Callable[[], Any]) -> list[Step]:
 
 def assert_in_order(steps: list[Step], profile: list[Step]) -> None:
     """Each step is in what is left of a profile after the step before it."""
-    at = 0
+    next_step = 0
     for step in steps:
-        assert step in profile[at:], step
-        at = profile.index(step, at) + 1
+        assert step in profile[next_step:], step
+        next_step = profile.index(step, next_step) + 1
 
 
 def test_an_allocator_is_made_as_traced() -> None:

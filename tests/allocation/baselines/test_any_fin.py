@@ -150,14 +150,14 @@ def test_every_method_on_every_fin(
     plant = plant_of(layout)
     allocator = few_starts(method, objective)
     target = plant.wrench(plant.lower + np.array([0.7, 0.55, 0.4]) * plant.width)
-    for asked in (target, 100.0 * target):
-        answer = allocator.allocate(layout, asked)
+    for wrench in (target, 100.0 * target):
+        answer = allocator.allocate(layout, wrench)
         assert (answer.command >= plant.lower).all() and (answer.command <= plant.upper).all()
         assert np.isfinite([answer.err_norm, answer.power, answer.effort]).all()
-        if asked is target and method in METHODS_THAT_SERVE_EXACTLY:
+        if wrench is target and method in METHODS_THAT_SERVE_EXACTLY:
             assert answer.err_norm < 6e-3
         if (
-            asked is target
+            wrench is target
             and method == "analytic"
             and name not in ("never at rest", "force along the shaft")
         ):
@@ -192,5 +192,5 @@ def test_what_is_no_objective_is_refused() -> None:
 
 def test_settings_are_told_like_any_other() -> None:
     allocator = Allocator(load_layout("A"), "sqp", objective="effort", n_steps=7)
-    told = vars(allocator.settings)
-    assert told["objective"] == "effort" and told["n_steps"] == 7
+    settings = vars(allocator.settings)
+    assert settings["objective"] == "effort" and settings["n_steps"] == 7

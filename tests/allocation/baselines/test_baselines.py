@@ -224,11 +224,11 @@ def test_a_box_qp_meets_its_optimality_conditions() -> None:
     held = 0
     for _ in range(20):
         matrix = rng.normal(size=(6, 9))
-        wanted = 4.0 * rng.normal(size=6)
+        target = 4.0 * rng.normal(size=6)
         low = -rng.uniform(0.0, 1.0, 9)
         high = rng.uniform(0.1, 1.0, 9)
-        x = box_qp(matrix, wanted, 0.1, low, high)
-        pull = -(matrix.T @ (matrix @ x - wanted) + 0.1 * x)  # downhill
+        x = box_qp(matrix, target, 0.1, low, high)
+        pull = -(matrix.T @ (matrix @ x - target) + 0.1 * x)  # downhill
         at_low = np.isclose(x, low, atol=1e-12)
         at_high = np.isclose(x, high, atol=1e-12)
         held += int(at_low.sum() + at_high.sum())

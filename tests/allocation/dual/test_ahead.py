@@ -64,7 +64,7 @@ def ride(known: int, seed: int, ticks: int = 300) -> tuple[float, float, int]:
     wrench = waves(ticks, seed)
     command = np.array([[sum(arc) / 2.0, 0.0, 0.0] for arc in POD_ARCS])
     power = 0.0
-    turned = 0.0
+    total_turn = 0.0
     missed = 0
     for tick in range(ticks):
         reference = wrench[tick + 1 : tick + 1 + known] if known else None
@@ -73,10 +73,10 @@ def ride(known: int, seed: int, ticks: int = 300) -> tuple[float, float, int]:
         turn = np.abs(answer.command[:, 0] - command[:, 0])
         assert turn.max() <= 0.5 * PERIOD_S * (1.0 + 1e-6)
         power += answer.power / ticks
-        turned += turn.sum()
+        total_turn += turn.sum()
         missed += not answer.reachable
         command = answer.command
-    return power, turned, missed
+    return power, total_turn, missed
 
 
 @pytest.mark.parametrize("seed", [2, 11])

@@ -138,15 +138,20 @@ def test_turning_the_robot_does_not_make_it_worse(search: AllocatorCache) -> Non
         )
         for fin in layout.fins
     ]
-    turned = Layout("turned", tuple(fins))
+    rotated_layout = Layout("turned", tuple(fins))
     targets = reachable(layout, 10)
     rotated = np.concatenate([targets[:, :3] @ rotation.T, targets[:, 3:] @ rotation.T], axis=1)
     straight = search.allocate_batch(layout, targets).command
-    again = search.allocate_batch(turned, rotated).command
-    assert normalized_error(search.normalization, Plant(turned).wrench(again), rotated).max() < GOOD
+    command_of_rotated = search.allocate_batch(rotated_layout, rotated).command
+    assert (
+        normalized_error(
+            search.normalization, Plant(rotated_layout).wrench(command_of_rotated), rotated
+        ).max()
+        < GOOD
+    )
     # Forces in the fins' own frames know nothing of where forward is: the old answer serves the new
     # robot.
-    np.testing.assert_allclose(Plant(turned).wrench(straight), rotated, atol=1e-5)
+    np.testing.assert_allclose(Plant(rotated_layout).wrench(straight), rotated, atol=1e-5)
 
 
 def test_targets_of_single_precision_are_delivered_by_few_fins() -> None:
@@ -157,5 +162,5 @@ def test_targets_of_single_precision_are_delivered_by_few_fins() -> None:
         allocator = Allocator(layout)
         rounded = reachable(layout, 5, seed).astype(np.float32).astype(float)
         assert allocator.allocate_batch(rounded).err_norm.max() < 1e-6
-        far = allocator.allocate(1000.0 * rounded[0], policy="direction")
-        assert 0.001 - 1e-6 < far.share < 1.0
+        answer_out_of_reach = allocator.allocate(1000.0 * rounded[0], policy="direction")
+        assert 0.001 - 1e-6 < answer_out_of_reach.share < 1.0

@@ -29,14 +29,14 @@ def robot(rng: np.random.Generator, limit: float) -> Layout:
     parts: list[Actuator] = []
     for i in range(rng.integers(2, 5)):
         turn = rng.uniform(0.0, 2.0 * math.pi)
-        place = rng.uniform(-1.0, 1.0, 3) * [1.0, 0.3, 0.3]
+        position = rng.uniform(-1.0, 1.0, 3) * [1.0, 0.3, 0.3]
         shaft = 0.0, math.cos(turn), math.sin(turn)
-        parts.append(Rudder(f"f{i}", tuple(place), shaft, (1, 0, 0), 0.01, (-limit, limit), 2.0))
+        parts.append(Rudder(f"f{i}", tuple(position), shaft, (1, 0, 0), 0.01, (-limit, limit), 2.0))
     for i in range(rng.integers(2, 5)):
         axis = rng.normal(size=3) if rng.random() < 0.5 else np.array([1.0, 0.0, 0.0])
-        place = rng.uniform(-1.0, 1.0, 3) * [1.0, 0.3, 0.3]
+        position = rng.uniform(-1.0, 1.0, 3) * [1.0, 0.3, 0.3]
         unit = tuple(axis / np.linalg.norm(axis))
-        parts.append(Thruster(f"t{i}", tuple(place), unit, (-30.0, 40.0), PowerLaw(1.0)))
+        parts.append(Thruster(f"t{i}", tuple(position), unit, (-30.0, 40.0), PowerLaw(1.0)))
     return Layout("foils", tuple(parts))
 
 
@@ -89,5 +89,5 @@ def test_policies_of_a_sheet_answer_wrenches_beside_it() -> None:
             wrench = rng.normal(size=6) * [20.0, 5.0, 5.0, 2.0, 5.0, 5.0]
             answer = allocator.allocate(wrench, policy=policy, flow=FLOW)
             assert not answer.reachable and np.isfinite(answer.power)
-            given = Plant(layout).wrench(answer.command, flow=FLOW)
-            np.testing.assert_allclose(given, answer.wrench, atol=1e-9)
+            wrench_of_plant = Plant(layout).wrench(answer.command, flow=FLOW)
+            np.testing.assert_allclose(wrench_of_plant, answer.wrench, atol=1e-9)

@@ -90,9 +90,11 @@ def test_a_turned_robot_gets_the_turned_answer(
         )
         for fin in layout.fins
     ]
-    turned = replace(layout, actuators=tuple(fins))
+    turned_layout = replace(layout, actuators=tuple(fins))
     one = search.allocate(layout, target)
-    other = search.allocate(turned, np.concatenate([rotation @ target[:3], rotation @ target[3:]]))
+    other = search.allocate(
+        turned_layout, np.concatenate([rotation @ target[:3], rotation @ target[3:]])
+    )
     assert one.err_norm < GOOD and other.err_norm < GOOD
     assert is_same_power(one, other, 0.002)
 
@@ -160,6 +162,6 @@ def test_a_small_change_of_the_layout_changes_the_answer_little(
     # be least.
     is_least = [answer.power <= (1.0 + 1e-4) * answer.bound for answer in (one, other)]
     assert is_same_power(one, other, 0.002) or all(is_least)
-    ways = [mode_signature(a.command, force_sizes(a.layout, a.command)) for a in (one, other)]
-    if same_signature(*ways):
+    signatures = [mode_signature(a.command, force_sizes(a.layout, a.command)) for a in (one, other)]
+    if same_signature(*signatures):
         np.testing.assert_allclose(one.forces, other.forces, atol=0.05)

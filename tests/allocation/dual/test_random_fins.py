@@ -187,24 +187,26 @@ def least_cost(
     # Equations beyond the rank of what the fins can do only confuse the solver.
     axes = np.linalg.svd(plant.effectiveness[:, 1:].reshape(2 * n, 6) / sigma, full_matrices=False)
     rank = int((axes[1] > 1e-9 * axes[1][0]).sum())
-    seen = axes[2][:rank] if not plant.force(plant.sample(rng, (3,)))[..., 0].any() else np.eye(6)
+    served_axes = (
+        axes[2][:rank] if not plant.force(plant.sample(rng, (3,)))[..., 0].any() else np.eye(6)
+    )
     scale = max(float(meter(plant.upper[None])[0]), 1e-9)
     best = np.inf
     for start in starts:
-        found = minimize(
+        optimum = minimize(
             lambda s: float(meter(command(s)[None])[0]) / scale,
             start.ravel(),
             jac=lambda s: (meter.gradient(command(s)[None])[0] * width).ravel() / scale,
             bounds=bounds,
             constraints={
                 "type": "eq",
-                "fun": lambda s: seen @ missing(s),
-                "jac": lambda s: seen @ bent(s),
+                "fun": lambda s: served_axes @ missing(s),
+                "jac": lambda s: served_axes @ bent(s),
             },
             method="SLSQP",
             options={"maxiter": 150, "ftol": 1e-10},
         )
-        answer = plant.feasible(command(found.x))
+        answer = plant.feasible(command(optimum.x))
         error = float(np.linalg.norm((plant.wrench(answer) - target) / sigma))
         if error < 1e-5:
             best = min(best, float(meter(answer[None])[0]))

@@ -143,15 +143,15 @@ def _robot(number: int) -> tuple[Allocator, Array, Array, Array]:
     for k in range(rng.integers(2, 13)):
         axis = np.eye(3)[rng.integers(3)] if rng.random() < 0.4 else rng.normal(size=3)
         axis /= np.linalg.norm(axis)
-        place = rng.uniform(-0.5, 0.5, 3)
+        position = rng.uniform(-0.5, 0.5, 3)
         turn = float(rng.choice([0.0, 0.02]))
         ends.append([-float(rng.choice([0.0, 10.0, 40.0])), float(rng.uniform(1.0, 60.0))])
-        columns.append([*axis, *(np.cross(place, axis) + turn * axis)])
+        columns.append([*axis, *(np.cross(position, axis) + turn * axis)])
         parts.append(
             {
                 "name": f"m{k}",
                 "type": "thruster",
-                "position_m": place.tolist(),
+                "position_m": position.tolist(),
                 "axis": axis.tolist(),
             }
             | {"force_n": ends[-1], "torque_per_newton_m": turn}
@@ -197,9 +197,9 @@ def test_closest_and_the_first_group_miss_no_more_than_least_squares(number: int
         ):
             answer = allocator.allocate(target, policy=policy or "closest")
             scaled = (by / allocator.scale[:, None])[rows]
-            wanted = (target / allocator.scale)[rows]
-            best = lsq_linear(scaled, wanted, (low, high), method="bvls", tol=1e-14)
-            least = np.linalg.norm(scaled @ best.x - wanted)
+            target_of_rows = (target / allocator.scale)[rows]
+            best = lsq_linear(scaled, target_of_rows, (low, high), method="bvls", tol=1e-14)
+            least = np.linalg.norm(scaled @ best.x - target_of_rows)
             assert np.linalg.norm((answer.unallocated / allocator.scale)[rows]) <= least + 1e-5
 
 

@@ -157,8 +157,8 @@ def test_a_previous_command_that_is_the_answer_stays(
         before = free.command[tick]
         result = method.allocate(penta, smooth_path(0)[tick], previous=before)
         np.testing.assert_allclose(result.forces, plant.body_forces(before), atol=1e-3)
-        again = method.allocate(penta, smooth_path(0)[tick], previous=result.command)
-        np.testing.assert_allclose(again.forces, result.forces, atol=1e-3)
+        result_again = method.allocate(penta, smooth_path(0)[tick], previous=result.command)
+        np.testing.assert_allclose(result_again.forces, result.forces, atol=1e-3)
         assert result.power < 1.005 * free.cost[tick]
 
 
@@ -168,12 +168,15 @@ def test_the_first_tick_knows_no_past(free: Drive, steady: Drive) -> None:
 
 def test_a_failed_fin_comes_back(search: AllocatorCache, penta: Layout) -> None:
     lost = search.allocate(penta, TARGET, lost=["port_back"])
-    still = search.allocate(penta, TARGET, lost=["port_back"], previous=lost.command)
-    assert np.isnan(still.command[2]).all() and np.isfinite(still.command[[0, 1, 3, 4]]).all()
+    result_still_lost = search.allocate(penta, TARGET, lost=["port_back"], previous=lost.command)
+    assert (
+        np.isnan(result_still_lost.command[2]).all()
+        and np.isfinite(result_still_lost.command[[0, 1, 3, 4]]).all()
+    )
     back = search.allocate(penta, TARGET, previous=lost.command)
     assert np.isfinite(back.command).all() and back.err_norm < 1e-5
-    known = [0, 1, 3, 4]
-    assert (np.abs(back.command - lost.command)[known] <= STEP + 1e-9).all()
+    working = [0, 1, 3, 4]
+    assert (np.abs(back.command - lost.command)[working] <= STEP + 1e-9).all()
 
 
 def test_a_target_that_needs_a_turn_is_reached_tick_by_tick(

@@ -54,11 +54,14 @@ def scanned(wrench: Array, factors: tuple[float, float]) -> float:
     """Least power of the pair for surge, sway and yaw, over the sway of the left pod."""
     surge, sway, yaw = wrench[[0, 1, 5]]
     apart = -(sway + yaw) / 0.5  # yaw = -sway - (left's surge - right's surge) / 2
-    left = np.linspace(-FORCE_MAX, FORCE_MAX, 400_001)
-    total = np.zeros(len(left))
-    for ahead, aside in ((0.5 * (surge + apart), left), (0.5 * (surge - apart), sway - left)):
+    force_left = np.linspace(-FORCE_MAX, FORCE_MAX, 400_001)
+    total = np.zeros(len(force_left))
+    for ahead, aside in (
+        (0.5 * (surge + apart), force_left),
+        (0.5 * (surge - apart), sway - force_left),
+    ):
         size = np.hypot(ahead, aside)
-        least = np.full(len(left), np.inf)
+        least = np.full(len(force_left), np.inf)
         for sign, most, factor in ((1.0, FORCE_MAX, factors[0]), (-1.0, -FORCE_MIN, factors[1])):
             inside = (np.abs(np.arctan2(sign * aside, sign * ahead)) <= ARC_HALF_ANGLE + 1e-9) & (
                 size <= most
@@ -106,13 +109,13 @@ def random_pods(rng: np.random.Generator) -> Layout:
         reverse = rng.uniform(0.6, 2.5)
         law = PowerLaw(forward, forward * reverse, rng.choice([1.5, rng.uniform(1.2, 2.5)]))
         model = law if rng.random() < 0.6 else table(forward, forward * reverse, *ends)
-        place = (rng.uniform(-1, 1), rng.uniform(-1, 1), 0.0)
-        parts.append(Azimuth(f"p{i}", place, (0, 0, 1), (1, 0, 0), ends, model, arc))
+        position = (rng.uniform(-1, 1), rng.uniform(-1, 1), 0.0)
+        parts.append(Azimuth(f"p{i}", position, (0, 0, 1), (1, 0, 0), ends, model, arc))
     for i in range(rng.integers(0, 3)):
         angle = rng.uniform(-3, 3)
-        place = (rng.uniform(-1, 1), rng.uniform(-1, 1), 0.0)
+        position = (rng.uniform(-1, 1), rng.uniform(-1, 1), 0.0)
         axis = (math.cos(angle), math.sin(angle), 0.0)
-        parts.append(Thruster(f"t{i}", place, axis, (-40.0, 50.0), PowerLaw(0.3)))
+        parts.append(Thruster(f"t{i}", position, axis, (-40.0, 50.0), PowerLaw(0.3)))
     return Layout("pods", tuple(parts))
 
 
@@ -125,14 +128,14 @@ def test_random_pods_give_what_they_can_and_nobody_finds_less_power(seed: int) -
     commands = plant.sample(rng, (4,))
     targets = plant.wrench(commands)
     together = allocator.allocate_batch(targets)
-    for row, (target, own) in enumerate(zip(targets, commands, strict=True)):
+    for row, (target, command) in enumerate(zip(targets, commands, strict=True)):
         answer = allocator.allocate(target)
         assert answer.reachable and answer.err_norm <= 1e-6
         assert answer.bound is not None and answer.bound <= answer.power
         assert together.power[row] == pytest.approx(answer.power, rel=1e-6)
 
         others = searched(plant, target, answer.scale, answer.power, rng)
-        assert answer.power <= min(others, float(plant.power(own).sum())) * (1.0 + 1e-4)
+        assert answer.power <= min(others, float(plant.power(command).sum())) * (1.0 + 1e-4)
 
 
 def searched(

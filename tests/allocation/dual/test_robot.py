@@ -35,8 +35,8 @@ def test_the_support_function_of_a_gauge_and_its_derivative() -> None:
     for place, angle in enumerate(np.arange(POINTS) * 2.0 * math.pi / POINTS):
         # h(angle) = max over psi of rho(psi) cos(angle - psi); h' = -rho sin(angle - psi) at the
         # best psi.
-        worth = uneven(FINE_ANGLES) * np.cos(angle - FINE_ANGLES)
-        first = FINE_ANGLES[int(worth.argmax())]
+        support_of_angles = uneven(FINE_ANGLES) * np.cos(angle - FINE_ANGLES)
+        first = FINE_ANGLES[int(support_of_angles.argmax())]
         ends = (first - 1e-3, first + 1e-3)
         best = minimize_scalar(
             lambda psi, angle=angle: -float(uneven(psi) * math.cos(angle - psi)),
@@ -82,18 +82,18 @@ def test_a_pod_is_searched_in_reverse_only_where_that_brings_anything(
 ) -> None:
     model = PowerLaw(0.3, reverse)
     pod = Azimuth("pod", (0.3, 0, 0), (0, 0, 1), (1, 0, 0), ends, model, (-half, half))
-    own = actuators_of(AllocatorCache().method(Layout("one", (pod,))).compiled.robot.block)[0]
-    assert own["force_min"] == pytest.approx(ends[0])
-    assert own["force_min_needed"] == (own["force_min"] if is_needed else 0.0)
+    actuator = actuators_of(AllocatorCache().method(Layout("one", (pod,))).compiled.robot.block)[0]
+    assert actuator["force_min"] == pytest.approx(ends[0])
+    assert actuator["force_min_needed"] == (actuator["force_min"] if is_needed else 0.0)
 
 
 def test_a_method_in_a_flow_is_kept_for_the_next_question() -> None:
     method = AllocatorCache().method(load_layout("torpedo"))
     slow = np.array([1.0, 0, 0, 0, 0, 0])
     fast = np.array([2.0, 0, 0, 0, 0, 0])
-    kept = method.at(slow)
-    assert kept is not method and method.at(slow.copy()) is kept
-    assert method.at(fast) is not kept and method.at(None) is method
+    slow_method = method.at(slow)
+    assert slow_method is not method and method.at(slow.copy()) is slow_method
+    assert method.at(fast) is not slow_method and method.at(None) is method
 
 
 def test_axes_that_come_together_only_are_told_where_they_are_asked_for_apart() -> None:

@@ -44,9 +44,9 @@ def beyond_what_is_allowed(robot: Layout, before: Array, after: Array) -> float:
         rates = np.array(part.rates)
         outside = np.maximum(np.maximum(lower - new, new - upper), 0.0)
         change = np.abs(new - old)
-        around = np.abs((new - old + math.pi) % (2.0 * math.pi) - math.pi)
+        turn = np.abs((new - old + math.pi) % (2.0 * math.pi) - math.pi)
         angle = np.isclose(upper - lower, 2.0 * math.pi)
-        change = np.where(angle, np.minimum(change, around), change)
+        change = np.where(angle, np.minimum(change, turn), change)
         allowed = np.where(np.isfinite(rates), rates * PERIOD_S, np.inf)
         # Where the command before was unknown, any may follow.
         faster = np.where(np.isnan(old), 0.0, np.maximum(change - allowed, 0.0))
