@@ -142,7 +142,7 @@ def test_interrupt_exits_with_130(monkeypatch: pytest.MonkeyPatch) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr("finlab.analysis.score_card", interrupted)
-    assert main(["layout", "show", "A"]) == 130
+    assert main(["layout", "show", "A"]) == 130  # as shells say: 128 + SIGINT
 
 
 RUNTIME = [sys.executable, "-m", "finlab.deploy.command"]
@@ -187,7 +187,7 @@ def test_files_are_written_before_anything_is_printed(tmp_path: Path) -> None:
         command, stdout=write_end, stderr=subprocess.PIPE, text=True, timeout=60, env=unbuffered
     )
     os.close(write_end)
-    assert done.returncode == 141
+    assert done.returncode == 141  # as shells say: 128 + SIGPIPE
     assert (tmp_path / "fin.csv").exists()
 
 

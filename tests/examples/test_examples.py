@@ -73,7 +73,7 @@ def test_the_script_says_how_it_is_called(
 @pytest.mark.parametrize("path", EXAMPLES, ids=stem)
 def test_example_is_short_and_says_what_you_will_see(path: Path) -> None:
     text = path.read_text()
-    assert len(text.splitlines()) < 100
+    assert len(text.splitlines()) < 100, "an example is read in a sitting"
     assert text.startswith(('"""', "# %% [markdown]\n# # ")) and "You will see" in text.replace(
         "\n#", ""
     )

@@ -292,7 +292,7 @@ def test_arrays_do_not_unpack_beyond_their_cap(kinds: list[Kind], tmp_path: Path
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     with pytest.raises(FinlabError, match="time.npy in it is larger than"):
         kind.read(path)
-    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 150_000
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 150_000, "kB"
 
 
 def test_a_large_force_table_is_read_in_time(tmp_path: Path) -> None:

@@ -87,7 +87,7 @@ def test_time_is_bounded() -> None:
 def test_memory_is_bounded() -> None:
     with pytest.raises(FinlabError, match="too much memory, over 150 MB"):
         in_worker(fill)
-    assert 100 < in_worker(grown) < 150 + 110, "and what was free before"
+    assert 100 < in_worker(grown) < 150 + 110, "MB, and what was free before"
 
 
 def test_limits_grow_with_the_file() -> None:
