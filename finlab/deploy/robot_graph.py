@@ -25,7 +25,7 @@ from finlab.layout.graph_file import (
 )
 from finlab.layout.load import FORMAT as LAYOUT_FORMAT
 from finlab.layout.save import layout_to_dict, plain
-from finlab.physics.objective import yardstick
+from finlab.physics.objective import wrench_scale_of
 from finlab.whole_file import write_whole
 
 
@@ -62,7 +62,7 @@ def graph_of(layout: Layout) -> Graph:
     for scale in SCALES:
         scales += [scale, scale]
     names = features_of(Fin("fin", (0.0, 0.0, 0.0), 0.0))
-    wrench = dict(zip(AXES, yardstick(layout).tolist(), strict=True))
+    wrench = dict(zip(AXES, wrench_scale_of(layout).tolist(), strict=True))
     return Graph(
         directed=False,
         multigraph=False,

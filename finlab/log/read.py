@@ -24,7 +24,7 @@ from finlab.layout import Layout, load_layout
 from finlab.log import ardusub_log, px4_log, ros_bag
 from finlab.log.ardusub_log import FULL_US, REST_US
 from finlab.log.recorded import Event, Form, LogRecord, Series
-from finlab.physics.objective import yardstick
+from finlab.physics.objective import wrench_scale_of
 
 MAX_BYTES = 1_000_000_000
 """Largest log."""
@@ -191,7 +191,7 @@ def _unit(source_program: Form, robot: Layout, scale: ArrayLike | None) -> Array
     if source_program == "ros":
         return np.ones(6)
     kind = Px4 if source_program == "px4" else ArduSub
-    return np.abs(kind(robot, kind.settings_class(), yardstick(robot)).setpoint_unit)
+    return np.abs(kind(robot, kind.settings_class(), wrench_scale_of(robot)).setpoint_unit)
 
 
 def _log_of_record(source: str, record: LogRecord, robot: Layout, scale: ArrayLike | None) -> Log:

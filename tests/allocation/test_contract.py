@@ -44,7 +44,16 @@ EXTREMES = (1e-6, 1e4)
 """The same of wrenches that are asked for by the default policy alone."""
 ARRAYS = (
     *("target", "command", "scale", "wrench", "forces", "unallocated", "expected_miss"),
-    *("flow", "previous", "prices", "err_norm", "power", "expected_error", "bound", "solve_ms"),
+    *(
+        "flow",
+        "previous",
+        "multipliers",
+        "err_norm",
+        "power",
+        "expected_error",
+        "bound",
+        "solve_ms",
+    ),
 )
 """What is read-only in an answer, where it is an array."""
 

@@ -30,7 +30,7 @@ NO_CHOICE = {
     "PI",
     "TINY",
     "LARGEST",
-    "NONE",
+    "INFEASIBLE_COST",
     "FL_MOST",
     "FL_VERSION",
     "FL_MAGIC",

@@ -19,7 +19,7 @@ from finlab.allocation.allocator import MAX_STATES
 from finlab.allocation.method import Method
 from finlab.errors import AllocationError
 from finlab.layout import Damage, Fin, FinModelSpec, Layout, load_layout
-from finlab.physics.objective import yardstick
+from finlab.physics.objective import wrench_scale_of
 from tests.allocation.quick_allocator import QUICK_SETTINGS
 
 WRENCH = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
@@ -121,7 +121,7 @@ def test_errors_are_shares_of_what_the_robot_can_push() -> None:
 
 
 @pytest.mark.parametrize("size", [0.05, 0.2, 5.0])
-def test_the_yardstick_grows_with_the_robot(size: float) -> None:
+def test_the_wrench_scale_grows_with_the_robot(size: float) -> None:
     """Of fins whose force grows with the area, on levers that grow with the robot."""
     model = FinModelSpec("drag", (("area", 0.02 * size**2), ("lever", 0.1)))
     places = [(size, 0.0, 0.0), (-size, 0.0, 0.0), (0.0, size, 0.0)]
@@ -134,8 +134,8 @@ def test_the_yardstick_grows_with_the_robot(size: float) -> None:
     plain = replace(
         plain, actuators=tuple(replace(f, model=FinModelSpec("drag")) for f in plain.fins)
     )
-    expected = yardstick(plain) * np.repeat([size**2, size**3], 3)
-    np.testing.assert_allclose(yardstick(robot), expected, rtol=1e-9)
+    expected = wrench_scale_of(plain) * np.repeat([size**2, size**3], 3)
+    np.testing.assert_allclose(wrench_scale_of(robot), expected, rtol=1e-9)
 
 
 def test_many_targets_take_flat_memory() -> None:

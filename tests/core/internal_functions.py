@@ -162,6 +162,12 @@ class ForceRange(ctypes.Structure):
     _fields_ = [(name, REAL) for name in ("low", "high", "middle", "half")]
 
 
+class CommandForm(ctypes.Structure):
+    """What the numbers of a command are: `command_form`."""
+
+    _fields_ = _members("src/internal.h", "command_form")
+
+
 @cache
 def functions() -> ctypes.PyDLL:
     """The library once more, with what its internal functions return."""
@@ -174,6 +180,7 @@ def functions() -> ctypes.PyDLL:
         "fl_limited_response": LineResponse,
         "fl_gauge_support": GaugePoint,
         "fl_force_range": ForceRange,
+        "fl_form_of": ctypes.POINTER(CommandForm),
         **dict.fromkeys(
             (
                 *(

@@ -1,6 +1,7 @@
 """`finlab.core.calls.Core`, the core as Python calls it: structs as long as in C, refusals as
 errors, and the same answers one by one, in a batch and from several threads."""
 
+import ctypes
 import re
 from concurrent.futures import ThreadPoolExecutor
 
@@ -40,7 +41,7 @@ def test_both_languages_agree_on_what_a_block_is(heavy: Core) -> None:
     ("field", "value", "code"),
     [
         ("magic", 7.0, "FL_BAD_BLOCK"),
-        ("version", 9.0, "FL_BAD_VERSION"),
+        ("version", constant("FL_VERSION") + 1.0, "FL_BAD_VERSION"),
         ("axis_scale", 0.0, "FL_BAD_NUMBER"),
     ],
 )
@@ -92,6 +93,21 @@ def test_one_and_many_are_the_same(kind: str) -> None:
         np.testing.assert_array_equal(many.command[row], single.command[0])
         np.testing.assert_array_equal(many.wrench_served[row], single.wrench_served[0])
         assert many.is_attainable[row] == single.is_attainable[0]
+
+
+def test_one_and_many_say_which_searches_were_truncated() -> None:
+    core = core_of_layout(load(random_robot("fins", 1, 3)))
+    settings = np.zeros(1, struct("fl_settings"))  # no part of a set with a gap is looked at
+    use_settings = library().fl_use_settings
+    use_settings.argtypes = [ctypes.c_void_p, ctypes.c_void_p]
+    assert use_settings(core._work_address, settings.ctypes.data) == 0
+    plant = random_plant("fins", 1, 3)
+    targets = np.array([within(plant, np.random.default_rng([3, k])) for k in range(8)])
+    truncated = [core.answer_one(target, None).is_truncated for target in targets]
+    assert any(truncated) and not all(truncated)
+    for target, is_truncated in zip(targets, truncated, strict=True):
+        assert core.answer_many(target[None], None).is_truncated == is_truncated
+    assert core.answer_many(targets, None).is_truncated
 
 
 def test_threads_share_one_robot(heavy: Core) -> None:

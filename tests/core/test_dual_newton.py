@@ -123,9 +123,9 @@ def test_from_the_multipliers_of_an_answer_nothing_is_left_to_do(name: str) -> N
         robot = robot_of(name, number)
         for wrench in wrenches(robot, number, 1.0, 6):
             first = robot.answer(wrench)
-            again = robot.answer(wrench, prices=first["prices"].copy())
+            again = robot.answer(wrench, multipliers=first["multipliers"].copy())
             assert again["newton_steps"] <= 1
-            near = robot.answer(1.001 * wrench, prices=first["prices"].copy())
+            near = robot.answer(1.001 * wrench, multipliers=first["multipliers"].copy())
             assert near["newton_steps"] <= max(4, first["newton_steps"])
 
 

@@ -37,8 +37,8 @@ def random_law(kind: str, rng: np.random.Generator) -> FinLaw:
 
 
 def miss_and_expected(kind: str, seed: int, folder: Path) -> tuple[Array, Array]:
-    """True misses and expected ones (K, 6) over the yardstick, of targets on three robots with one
-    fit."""
+    """True misses and expected ones (K, 6) over the wrench scale, of targets on three robots with
+    one fit."""
     rng = np.random.default_rng([seed, LAWS.index(kind)])
     law = random_law(kind, rng)
     command = commands(300, seed)

@@ -15,7 +15,7 @@ from finlab.interaction.learned import Learned, read_network
 from finlab.layout import Layout, layout_to_dict, parse_layout
 from finlab.layout.jet_geometry import jet_geometry_of
 from finlab.physics import Plant
-from finlab.physics.objective import yardstick
+from finlab.physics.objective import wrench_scale_of
 from finlab.research.random_layouts import random_jet_robot
 from tests.interaction.hidden_plant import wrenches
 from tests.interaction.test_jets import differs
@@ -56,7 +56,7 @@ def test_unseen_robots_are_missed_by_less_than_half(network: Learned) -> None:
                 result = allocator.allocate(target)
                 errors.append(
                     np.linalg.norm(
-                        (wrenches(layout, result.command[None]) - target) / yardstick(layout)
+                        (wrenches(layout, result.command[None]) - target) / wrench_scale_of(layout)
                     )
                 )
                 if robot is known:

@@ -20,7 +20,7 @@ from finlab.interaction.jets import Jets
 from finlab.layout import Layout, save_layout
 from finlab.layout.effectiveness import body_force
 from finlab.physics import Plant
-from finlab.physics.objective import yardstick
+from finlab.physics.objective import wrench_scale_of
 from finlab.research.interaction.random_samples import random_samples
 
 TRUE_JETS = Jets(2.1, 2.4, 28.0, 0.8, 1.0, 0.2, 0.15, 0.45)
@@ -93,7 +93,7 @@ def test_twenty_samples_fit_the_constants(samples: list[Samples]) -> None:
         robot = replace(one.layout, interaction=known.jets)
         command = one.command[20:]
         plant = Plant(robot)
-        scale = yardstick(one.layout)
+        scale = wrench_scale_of(one.layout)
         truth = true_wrench(one.layout, command)
         error, laws = (
             (Plant(layout).wrench(command) - truth) / scale for layout in (robot, one.layout)

@@ -49,7 +49,7 @@ OWN_SIGMA = (
 """Splits whose robots are each measured by their own wrenches, which are smaller or larger than
 those of training: errors there are relative to what the robot can do."""
 N_SIGMA = 4096
-"""Uniform commands from which such a robot's yardstick is computed."""
+"""Uniform commands from which such a robot's wrench scale is computed."""
 LEAST_SIGMA = 0.05
 """Least deviation on an axis, as a share of the largest one among the forces, or among the
 torques."""
@@ -72,7 +72,7 @@ class SplitCase(NamedTuple):
     lost: tuple[str, ...]
     """Names of the fins that do not work."""
     sigma: Array | None = None
-    """The robot's own yardstick of errors (6,); None where it is that of the training wrenches."""
+    """The robot's own wrench scale (6,); None where it is that of the training wrenches."""
 
     @property
     def healthy(self) -> Layout:
@@ -110,7 +110,7 @@ def make_case(split: str, n_targets: int, seed: int, k: int) -> SplitCase:
 
 
 def own_sigma(plant: Plant, rng: np.random.Generator) -> Array:
-    """A robot's own yardstick of errors (6,): what its wrenches deviate by under uniform
+    """A robot's own wrench scale (6,): what its wrenches deviate by under uniform
     commands."""
     deviation = plant.wrench(plant.sample(rng, (N_SIGMA,))).std(axis=0).reshape(2, 3)
     least = LEAST_SIGMA * deviation.max(axis=1, keepdims=True)

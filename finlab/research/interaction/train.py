@@ -1,8 +1,8 @@
 """Training of the networks of a learned interaction, from forward data of many robots.
 
-What the laws of the actuators leave of each measured wrench, on the robot's yardstick, is the sum
-of the messages. Their features and vectors do not depend on the weights, so they are made once; a
-step of training is two small networks on the rows of some samples.
+What the laws of the actuators leave of each measured wrench, over the robot's wrench scale, is the
+sum of the messages. Their features and vectors do not depend on the weights, so they are made once;
+a step of training is two small networks on the rows of some samples.
 """
 
 from collections.abc import Sequence
@@ -29,7 +29,7 @@ from finlab.whole_file import write_whole
 WIDTH = 64
 """Of the hidden layers."""
 MESSAGE_MIN = 1e-4
-"""Size of a message's vectors, as a share of the yardstick, below which it is left out."""
+"""Size of a message's vectors, as a share of the wrench scale, below which it is left out."""
 HELD_OUT_SHARE = 0.1
 """Share of the robots by which the networks are told how far to trust them."""
 WEIGHTS_FILE = "interaction.safetensors"
@@ -48,7 +48,7 @@ class Rows(NamedTuple):
     features: Tensor
     """(R, m)."""
     vectors: Tensor
-    """What each vector of a message adds to the wrench on the yardstick (R, k, 6)."""
+    """What each vector of a message adds to the wrench over the wrench scale (R, k, 6)."""
     starts: Tensor
     """First row (N + 1,) of each sample."""
 
@@ -69,9 +69,9 @@ class InteractionSamples(NamedTuple):
     rows: dict[str, Rows]
     """Of `pair` and `hull`."""
     residual: Tensor
-    """What the laws leave of the wrenches (N, 6), on the yardsticks."""
+    """What the laws leave of the wrenches (N, 6), over the wrench scales."""
     size: Tensor
-    """Root mean squares (N, 6) of the wrenches of their robots, on the yardsticks."""
+    """Root mean squares (N, 6) of the wrenches of their robots, over the wrench scales."""
     robot: Tensor
     """The robot (N,) of each sample."""
 
@@ -141,7 +141,7 @@ def train(
     resume: bool = False,
 ) -> float:
     """Trains three networks, writes their file, and log and state, into a folder, and returns the
-    root mean square error on robots that were held out, on the yardstick."""
+    root mean square error on robots that were held out, over the wrench scale."""
     data = data_set(samples)
     robots = torch.from_numpy(np.random.default_rng(seed).permutation(len(samples)))
     held = torch.isin(data.robot, robots[: max(1, int(HELD_OUT_SHARE * len(samples)))])

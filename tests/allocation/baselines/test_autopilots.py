@@ -19,7 +19,7 @@ from finlab.errors import AllocationError, LayoutError
 from finlab.exchange.motor_factors import FRAMES, SIGNS
 from finlab.layout import Layout
 from finlab.physics import plant_of
-from finlab.physics.objective import yardstick
+from finlab.physics.objective import wrench_scale_of
 
 HEAVY = load_layout("bluerov2_heavy")
 """Eight thrusters, for which PX4's results were worked out by hand."""
@@ -37,7 +37,7 @@ GOLDEN = {
 
 def px4(layout: Layout, desaturation: str = "airmode 0") -> Px4:
     """PX4's method of a robot, with the way in which it gives up axes."""
-    return Px4(layout, Px4Settings(desaturation), yardstick(layout))
+    return Px4(layout, Px4Settings(desaturation), wrench_scale_of(layout))
 
 
 def forces(layout: Layout, method: str, target: Array, **settings: str) -> Array:
@@ -104,10 +104,10 @@ def test_a_frame_of_ardusub_is_known_in_any_order_and_any_way_round(name: str) -
 
 
 def test_bluerov2_heavy_has_the_factors_of_its_frame() -> None:
-    method = ArduSub(HEAVY, ArduSub.settings_class(), yardstick(HEAVY))
+    method = ArduSub(HEAVY, ArduSub.settings_class(), wrench_scale_of(HEAVY))
     np.testing.assert_array_equal(method.factors, FRAMES["VECTORED_6DOF"])
     lost = HEAVY.without(["rear_left", "lift_front_left"])
-    method = ArduSub(lost, ArduSub.settings_class(), yardstick(HEAVY))
+    method = ArduSub(lost, ArduSub.settings_class(), wrench_scale_of(HEAVY))
     np.testing.assert_array_equal(
         method.factors, np.delete(FRAMES["VECTORED_6DOF"], [3, 5], axis=0)
     )

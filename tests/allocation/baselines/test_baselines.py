@@ -13,7 +13,7 @@ from finlab.allocation.method import MethodQuestion
 from finlab.errors import LayoutError
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout
 from finlab.physics import Plant, plant_of
-from finlab.physics.objective import yardstick
+from finlab.physics.objective import wrench_scale_of
 from finlab.research.networks.trained import WrenchNormalization
 from finlab.research.random_layouts import random_layout
 from tests.allocator_cache import AllocatorCache, normalized_error
@@ -107,7 +107,7 @@ def test_a_failed_fin_is_a_removed_fin(method: str) -> None:
     choice = make(method).choice
     rest = layout.without(["fin_2"])
     alone = choice.kind(
-        rest, choice.settings, yardstick(layout)
+        rest, choice.settings, wrench_scale_of(layout)
     )  # errors are those of the whole robot
     removed = alone.solve(MethodQuestion(np.array([target]))).command[0]
     assert np.isnan(lost[1]).all()
@@ -209,7 +209,7 @@ def test_the_papers_sqp_goes_on_to_other_starts_until_one_delivers(
 def test_a_descent_never_goes_up_nor_out(seed: int, reach: float) -> None:
     rng = np.random.default_rng(seed)
     layout = random_layout(rng, limits="varied")
-    method = PaperSqp(layout, PaperSqpSettings(), yardstick(layout))
+    method = PaperSqp(layout, PaperSqpSettings(), wrench_scale_of(layout))
     plant = plant_of(layout)
     target = reach * reachable_wrenches(layout, 1, seed)[0]
     end, errors = method.descent(target, plant.sample(rng, (1,))[0])

@@ -52,8 +52,8 @@ def test_prices_are_raised_to_what_mixtures_of_commands_take(name: str, off: flo
     rng = np.random.default_rng(1)
     target = 0.5 * plant.wrench(plant.sample(rng, (1,))[0])
     answer = Allocator(layout).allocate(target)
-    assert answer.reachable and answer.prices is not None
-    begun = off * answer.prices
+    assert answer.reachable and answer.multipliers is not None
+    begun = off * answer.multipliers
     raised = raised_multipliers(plant, answer.scale, answer.wrench, begun, answer.command)
 
     commands = commands_around(plant, answer.command, rng)

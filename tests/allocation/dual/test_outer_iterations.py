@@ -144,7 +144,7 @@ def test_iterations_settle_in_few_steps_at_the_conditions_of_a_minimum() -> None
         for target in 0.6 * plant.wrench(plant.sample(rng, (3,))):
             laws = dual.forces(target[None], CLOSEST, None, NOMINAL)
             ended = dual.coupled.iterate(
-                target, laws.force[0], ROUNDS, CLOSEST, laws.lam[0], NOMINAL, most_steps=1e6
+                target, laws.force[0], ROUNDS, CLOSEST, laws.multipliers[0], NOMINAL, most_steps=1e6
             )
             steps += ended.steps
     assert steps <= MOST_STEPS
@@ -179,7 +179,7 @@ def test_starts_that_make_nothing_cheaper_are_reversed_in_one_round_alone() -> N
     n = 6
     coupled = _ConstantIterations()
     laws = SimpleNamespace(
-        force=np.ones((1, n, 2)), lam=np.zeros((1, 6)), command=np.zeros((1, n, 3))
+        force=np.ones((1, n, 2)), multipliers=np.zeros((1, 6)), command=np.zeros((1, n, 3))
     )
     method = SimpleNamespace(
         coupled=coupled,

@@ -118,7 +118,9 @@ def test_costly_reverse_is_within_reach() -> None:
     robot = DualRobot(lines, [Form("thruster")] * 3, limits, own, np.ones(6))
     wrench = np.array([-9.0, -9.0, -9.0, 0.0, 0.0, 0.0])
     answer = robot.core.answer_one(wrench, None)
-    lambda_reduced = np.append(robot.basis.T @ (robot.axis_scale * answer.lam[0]), np.zeros(3))
+    lambda_reduced = np.append(
+        robot.basis.T @ (robot.axis_scale * answer.multipliers[0]), np.zeros(3)
+    )
     assert answer.is_attainable[0]
     dual_value = dual_function(robot.block, wrench, lambda_reduced)[1]
     np.testing.assert_allclose(dual_value, 3 * 5.0 * 9.0**1.5, rtol=1e-9)

@@ -126,7 +126,7 @@ def test_turning_the_robot_changes_nothing(layout: Layout) -> None:
         for fin in layout.fins
     )
     turned = np.concatenate([rotation @ target[:3], rotation @ target[3:]])
-    even = np.array([1.0, 1.0, 1.0, 0.2, 0.2, 0.2])  # a yardstick that turns along
+    even = np.array([1.0, 1.0, 1.0, 0.2, 0.2, 0.2])  # a wrench scale that turns along
     before = seen(layout, target, even)
     after = seen(replace(layout, actuators=fins), turned, even)
     for a, b in zip(before, after, strict=True):

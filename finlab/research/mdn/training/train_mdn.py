@@ -94,7 +94,7 @@ def train_mdn(
         raise DataError(f"preset: expected one of {', '.join(RECIPES)}, got {preset!r}")
     recipe = RECIPES[preset]
     settings = replace(recipe.training, **{k: v for k, v in training.items() if v is not None})
-    # One yardstick of errors for all that is shipped; the network does not depend on it.
+    # One wrench scale for all that is shipped; the network does not depend on it.
     normalization = read_normalization(resolve_checkpoint("paper"))
     parts: dict[str, Any] = {
         "training": settings,

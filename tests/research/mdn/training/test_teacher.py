@@ -8,7 +8,7 @@ import pytest
 
 from finlab.layout import Layout
 from finlab.physics import Plant
-from finlab.physics.objective import yardstick
+from finlab.physics.objective import wrench_scale_of
 from finlab.research.mdn.answers import EffortRobot, effort_robot
 from finlab.research.mdn.descent import realize, wrench
 from finlab.research.mdn.training import teacher
@@ -104,7 +104,7 @@ def test_robots_are_of_all_kinds(robots: list[Layout]) -> None:
 def test_targets_are_within_reach_of_fins_that_turn_fully(robots: list[Layout]) -> None:
     rng = np.random.default_rng(2)
     for layout in robots[:12]:
-        robot = effort_robot(Plant(layout), yardstick(layout))
+        robot = effort_robot(Plant(layout), wrench_scale_of(layout))
         target = teacher.random_targets(rng, robot, 24)
         assert target.shape == (24, 6) and np.isfinite(target).all()
         if not robot.forces.fins.turns_fully:
