@@ -14,7 +14,7 @@ from torch_geometric.nn import GATv2Conv
 from finlab.layout import Fin, Layout, Limits
 from finlab.research.networks.checkpoint import read_checkpoint, resolve_checkpoint
 from finlab.research.networks.layers import graph_attention
-from finlab.research.networks.trained import State
+from finlab.research.networks.trained import ArraysByName
 from finlab.research.paper.network import RAW_SIZE, Mixture, NetworkConfig, raw_features
 from finlab.research.random_layouts import random_layout
 
@@ -41,7 +41,7 @@ def arrays_of(weights: dict[str, torch.Tensor]) -> dict[str, np.ndarray]:
     return {name: value.numpy() for name, value in weights.items()}
 
 
-def tensors(weights: State) -> dict[str, torch.Tensor]:
+def tensors(weights: ArraysByName) -> dict[str, torch.Tensor]:
     """Weights as tensors."""
     return {name: torch.tensor(value) for name, value in weights.items()}
 
