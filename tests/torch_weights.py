@@ -2,8 +2,9 @@
 
 import torch
 
-from finlab.research.networks.trained import State
+from finlab.research.networks.trained import ArraysByName
 
 
-def arrays_of(weights: dict[str, torch.Tensor]) -> State:
+def arrays_of(weights: dict[str, torch.Tensor]) -> ArraysByName:
+    """Weights as arrays."""
     return {name: value.detach().numpy() for name, value in weights.items()}

@@ -284,7 +284,7 @@ class Allocation(Answer[float]):
     """
 
     LAZY: ClassVar[tuple[str, ...]] = (*Answer.LAZY, "calm_power", "candidates", "samples")
-    ARRAYS: ClassVar[tuple[str, ...]] = (*Answer.ARRAYS, "previous", "prices")
+    ARRAYS: ClassVar[tuple[str, ...]] = (*Answer.ARRAYS, "previous", "multipliers")
 
     solve_ms: float = field(compare=False)
     """Time spent solving [ms], judging not included."""
@@ -292,9 +292,9 @@ class Allocation(Answer[float]):
     """Settings of the method, by name."""
     previous: Array | None = None
     """Command (n, 3) of the previous tick, if it was given."""
-    prices: Array | None = field(default=None, compare=False)
-    """What one more unit of each axis of the wrench costs (6,) [W/N, W/(N m)], where the method
-    says."""
+    multipliers: Array | None = field(default=None, compare=False)
+    """Multipliers (6,) [W/N, W/(N m)] of the wrench, what one more unit of each axis costs; None
+    where the method has none."""
 
     @property
     def commands(self) -> dict[str, Command | None]:

@@ -37,9 +37,9 @@ from finlab.allocation.solution import Candidates, Rows, Solution, joined
 from finlab.arrays import Array
 from finlab.axes import Axis, axes_in
 from finlab.errors import AllocationError
-from finlab.layout.damage import WHOLE, Damage
+from finlab.layout.damage import NO_DAMAGE, Damage
 from finlab.layout.layout import Layout
-from finlab.physics.objective import yardstick
+from finlab.physics.objective import wrench_scale_of
 from finlab.physics.plant import plant_of
 
 MAX_STATES = 32
@@ -139,8 +139,8 @@ class Allocator:
         """Prepares the undamaged robot; all constructors end here."""
         self._layout = layout
         self._choice = choice
-        self._scale = yardstick(layout)
-        self._whole = self._make_state(WHOLE)
+        self._scale = wrench_scale_of(layout)
+        self._whole = self._make_state(NO_DAMAGE)
         self._states: dict[object, RobotState] = {}
         """States that were asked for, by damage and free axes; the one asked for last is last."""
 
@@ -246,11 +246,11 @@ class Allocator:
         question = self._question(damage_of(damage, lost), policy, flow, seed, free)
         state = question.state
         method = state.method
-        prices: Array | None = None
+        multipliers: Array | None = None
         reference_of_method: Array | None = None
         if isinstance(previous, Allocation):
-            if method.begins_at_prices and previous.prices is not None:
-                prices = previous.prices
+            if method.begins_at_multipliers and previous.multipliers is not None:
+                multipliers = previous.multipliers
             previous = previous.command
         command_previous = None if previous is None else check_previous(previous, state.layout)
 
@@ -263,7 +263,7 @@ class Allocator:
                 reference_of_method = state.with_free_axes(wrenches_expected, 0.0)
         targets = state.with_free_axes(target, 0.0)[None]
         solution = question.solve(
-            targets, command_previous, prices=prices, reference=reference_of_method
+            targets, command_previous, multipliers=multipliers, reference=reference_of_method
         )
         solve_ms = (time.perf_counter() - start) * 1e3
 
@@ -275,7 +275,7 @@ class Allocator:
             settings=vars(self.settings).copy(),
             previous=command_previous,
             wrench_expected=None if solution.wrench is None else solution.wrench[0],
-            prices=None if solution.prices is None else solution.prices[0],
+            multipliers=None if solution.multipliers is None else solution.multipliers[0],
         )
 
     def refinement(self, result: Allocation) -> tuple[Candidates, ...]:
@@ -410,7 +410,7 @@ class Allocator:
     def _state(self, damage: Damage, free: Sequence[str] = ()) -> RobotState:
         """Returns the robot with a damage, asked for all axes but some: from the cache, or prepared
         now."""
-        if damage == WHOLE and not len(free):
+        if damage == NO_DAMAGE and not len(free):
             return self._whole
         mask = free_mask(self._layout, free)
         key = damage, None if mask is None else mask.tobytes()

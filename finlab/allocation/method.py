@@ -67,7 +67,7 @@ class MethodQuestion(NamedTuple):
     """Which actuators (n,) do not work, for methods that take losses; None where all do."""
     free: NDArray[np.bool_] | None = None
     """Which axes (6,) may take any wrench, for methods that take losses; None for none."""
-    prices: Array | None = None
+    multipliers: Array | None = None
     """Multipliers (6,) [W/N, W/(N m)] of an earlier answer, for a single target and methods that
     begin there; None for their own."""
     reference: Array | None = None
@@ -92,8 +92,8 @@ class Method(ABC):
     takes_losses: ClassVar[bool] = False
     """Whether `solve` reads `lost` actuators and `free` axes, rather than being made for a robot
     without them."""
-    begins_at_prices: ClassVar[bool] = False
-    """Whether `solve` reads the `prices` of an earlier answer, to begin there."""
+    begins_at_multipliers: ClassVar[bool] = False
+    """Whether `solve` reads the `multipliers` of an earlier answer, to begin there."""
     looks_ahead: ClassVar[bool] = False
     """Whether `solve` reads the `reference` of the next ticks."""
     needs_networks: ClassVar[bool] = False
@@ -133,9 +133,9 @@ class Method(ABC):
     def check_robot(cls, layout: Layout) -> None:
         """Raise a `LayoutError` at an actuator that the method does not take."""
         if cls.takes == "thrusters":
-            layout.only(f"method {cls.name}", "thruster")
+            layout.require_kind(f"method {cls.name}", "thruster")
         elif cls.takes != "any actuator":
-            layout.only(f"method {cls.name}", horizontal=cls.takes == "horizontal fins")
+            layout.require_kind(f"method {cls.name}", horizontal=cls.takes == "horizontal fins")
 
     @classmethod
     def fits(cls, layout: Layout) -> bool:

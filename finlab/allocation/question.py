@@ -26,7 +26,7 @@ from finlab.allocation.solution import Candidates, Solution, among_all
 from finlab.arrays import Array
 from finlab.axes import AXES, mask_of
 from finlab.errors import AllocationError, CommandError
-from finlab.layout.damage import WHOLE, Damage, lost_names
+from finlab.layout.damage import NO_DAMAGE, Damage, lost_names
 from finlab.layout.layout import Layout
 from finlab.physics.plant import Plant
 
@@ -139,7 +139,7 @@ class CheckedQuestion(NamedTuple):
         targets: Array,
         previous: Array | None = None,
         offset: int = 0,
-        prices: Array | None = None,
+        multipliers: Array | None = None,
         reference: Array | None = None,
     ) -> Solution:
         """Asks the method.
@@ -149,7 +149,7 @@ class CheckedQuestion(NamedTuple):
             previous: command (n, 3) of the tick before; None outside of ticks.
             offset: index of the first target among all of the question, which shifts the seed, so
                 that a target gets the same answer in any batch.
-            prices: multipliers (6,) [W/N, W/(N m)] of an earlier answer, for a single target.
+            multipliers: lambda (6,) [W/N, W/(N m)] of an earlier answer, for a single target.
             reference: wrenches (K, 6) of the next ticks [N, N m], 0 along free axes.
 
         Returns:
@@ -157,7 +157,7 @@ class CheckedQuestion(NamedTuple):
             drives; outside of ticks actuators that have nothing to do are at rest.
         """
         method = self.state.method
-        question = self._for_method(targets, previous, offset, prices, reference)
+        question = self._for_method(targets, previous, offset, multipliers, reference)
         solution = method.solve(question)
         if question.previous is None:
             return solution._replace(command=method.plant.rested(solution.command))
@@ -169,7 +169,7 @@ class CheckedQuestion(NamedTuple):
         targets: Array,
         previous: Array | None,
         offset: int,
-        prices: Array | None,
+        multipliers: Array | None,
         reference: Array | None,
     ) -> MethodQuestion:
         """The question as the method takes it: of all n actuators with the lost ones and the free
@@ -186,7 +186,7 @@ class CheckedQuestion(NamedTuple):
             seed=self.seed + offset,
             lost=state.lost if takes_losses else None,
             free=state.free if takes_losses else None,
-            prices=prices,
+            multipliers=multipliers,
             reference=reference,
         )
 
@@ -285,7 +285,7 @@ def damage_of(damage: Damage | None, lost: Sequence[str]) -> Damage:
         AllocationError: `damage` is no `Damage`, or `lost` is no list of names.
     """
     if damage is None:
-        known = WHOLE
+        known = NO_DAMAGE
     elif isinstance(damage, Damage):
         known = damage
     else:

@@ -136,9 +136,9 @@ class Solution(NamedTuple):
     """Gives the refined candidates, for a single target."""
     samples: Callable[[], Candidates] | None = None
     """Gives the raw candidates before refinement, for a single target."""
-    prices: Array | None = None
-    """What one more unit of each axis of the wrenches costs (N, 6) [W/N, W/(N m)], where the method
-    tells."""
+    multipliers: Array | None = None
+    """Multipliers (N, 6) [W/N, W/(N m)] of the wrenches, what one more unit of each axis costs;
+    None where the method has none."""
     notes: tuple[str, ...] = ()
     """Sentences about these answers."""
 

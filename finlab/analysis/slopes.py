@@ -221,13 +221,13 @@ class MissionPower:
             moved_effectiveness(moves.layout, *moves.geometry(nudged(moves, point.vector)))
         )
         for answer in point.data:
-            prices = answer.prices
+            multipliers = answer.multipliers
             if not answer.reachable:
-                prices = UNREACHED * answer.unallocated / answer.scale**2 / answer.err_norm
-            if prices is not None:
+                multipliers = UNREACHED * answer.unallocated / answer.scale**2 / answer.err_norm
+            if multipliers is not None:
                 force = np.einsum("nj,nij->ni", answer.forces, frames)
                 effect = np.einsum(
-                    "ni,Dnim,m->D", force, change, np.nan_to_num(prices), optimize=True
+                    "ni,Dnim,m->D", force, change, np.nan_to_num(multipliers), optimize=True
                 )
                 total += effect / len(point.data)
         return np.array([point.value]), total[None]

@@ -25,7 +25,7 @@ class CoreAnswer(NamedTuple):
     force: Array
     """Forces y (N, n, 2) [N], along each actuator's directions; the second of a foil is its
     drag."""
-    lam: Array
+    multipliers: Array
     """Multipliers (N, 6) of the wrench [W/N, W/(N m)] (Eq. 3)."""
     wrench_served: Array
     """Wrenches (N, 6) [N, N m] that the forces give: those asked for, or those that the policy
@@ -41,7 +41,7 @@ class CoreAnswer(NamedTuple):
     """Distance (N,) of what the commands give from `wrench_served`, over the wrench scale, by the
     grids of the laws."""
     is_truncated: bool
-    """Whether a search ended at its limit of steps before it was done."""
+    """Whether a search for one of them ended at its limit of steps before it was done."""
 
 
 class Conjugates(NamedTuple):
@@ -110,8 +110,15 @@ class PolicyFields(Protocol):
 
 
 @lru_cache(maxsize=64)
-def _policy_record(policy: PolicyFields) -> Record:
-    """The `fl_policy` (1,) of a policy; who hands its address to the core keeps the record."""
+def policy_record(policy: PolicyFields) -> Record:
+    """Returns a policy as the core reads it.
+
+    Args:
+        policy: kind, weights and groups of axes.
+
+    Returns:
+        One `fl_policy` (1,). Who hands its address to the core keeps the record alive.
+    """
     weights = np.array(policy.axis_weights)
     record = np.zeros(1, struct("fl_policy"))
     record["policy"] = constant(f"FL_{policy.kind.upper()}")
@@ -138,7 +145,7 @@ class QuestionRecord:
         # Views of the fields, since every tick would pay for looking them up by name.
         self._wrench = record["wrench"]
         self._policy_pointer = record["policy"]
-        self._lam_pointer = record["prices"]
+        self._multipliers_pointer = record["multipliers"]
         self._previous_pointer = record["previous"]
         self._lost_pointer = record["lost"]
         self._free_pointer = record["free"]
@@ -147,12 +154,12 @@ class QuestionRecord:
         self._angles_wanted_pointer = record["angles_wanted"]
 
         self._policy: Record | None = None
-        self._lam = np.zeros(6)
+        self._multipliers = np.zeros(6)
         self._previous = np.zeros((count, 3))
         self._lost = np.zeros(count, np.uint8)
         self._free = np.zeros(6, np.uint8)
         self._angles_wanted = np.zeros(count)
-        self._lam_address = self._lam.ctypes.data
+        self._multipliers_address = self._multipliers.ctypes.data
         self._previous_address = self._previous.ctypes.data
         self._lost_address = self._lost.ctypes.data
         self._free_address = self._free.ctypes.data
@@ -162,20 +169,23 @@ class QuestionRecord:
         """Writes what is asked for, (6,) [N, N m]."""
         self._wrench[0] = wrench
 
-    def write(self, policy: PolicyFields | None, lam: Array | None, conditions: Conditions) -> None:
+    def write(
+        self, policy: PolicyFields | None, multipliers: Array | None, conditions: Conditions
+    ) -> None:
         """Writes all but the wrench.
 
         Args:
             policy: what to give out of reach; None for nothing else than what is asked.
-            lam: multipliers (6,) [W/N, W/(N m)] at which Newton's method begins; None for its own.
+            multipliers: lambda (6,) [W/N, W/(N m)] at which Newton's method begins; None for its
+                own.
             conditions: what holds.
         """
-        self._policy = None if policy is None else _policy_record(policy)
+        self._policy = None if policy is None else policy_record(policy)
         self._policy_pointer[0] = 0 if self._policy is None else self._policy.ctypes.data
-        self._lam_pointer[0] = 0
-        if lam is not None:
-            self._lam[:] = lam
-            self._lam_pointer[0] = self._lam_address
+        self._multipliers_pointer[0] = 0
+        if multipliers is not None:
+            self._multipliers[:] = multipliers
+            self._multipliers_pointer[0] = self._multipliers_address
         self.write_conditions(conditions)
 
     def write_conditions(self, conditions: Conditions) -> None:
@@ -209,7 +219,7 @@ class AnswerRecord:
         self._record = record
         self.address = record.ctypes.data
         self._force = record["force"][:, :count]
-        self._lam = record["prices"]
+        self._multipliers = record["multipliers"]
         self._wrench_served = record["wrench_served"]
         self._gap_power_bound = record["gap_power_bound"]
         self._error = record["error"]
@@ -221,7 +231,7 @@ class AnswerRecord:
         """Returns a copy of what the core has written."""
         return CoreAnswer(
             force=self._force.copy(),
-            lam=self._lam.copy(),
+            multipliers=self._multipliers.copy(),
             wrench_served=self._wrench_served.copy(),
             gap_power_bound=self._gap_power_bound.copy(),
             is_attainable=self._is_attainable.astype(bool),
@@ -278,7 +288,7 @@ class Core:
         self,
         wrench: Array,
         policy: PolicyFields | None,
-        lam: Array | None = None,
+        multipliers: Array | None = None,
         conditions: Conditions = NOMINAL,
     ) -> CoreAnswer:
         """Answers one wrench.
@@ -286,7 +296,8 @@ class Core:
         Args:
             wrench: desired (6,) [N, N m].
             policy: what to give out of reach; None for nothing else than the wrench.
-            lam: multipliers (6,) [W/N, W/(N m)] at which Newton's method begins; None for its own.
+            multipliers: lambda (6,) [W/N, W/(N m)] at which Newton's method begins; None for its
+                own.
             conditions: what holds of the robot.
 
         Returns:
@@ -297,7 +308,7 @@ class Core:
         """
         with self._lock:
             self._question.write_wrench(wrench)
-            self._question.write(policy, lam, conditions)
+            self._question.write(policy, multipliers, conditions)
             code = self._core.fl_answer_one(
                 self._block_address,
                 self._work_address,
@@ -326,12 +337,13 @@ class Core:
         wrenches = np.ascontiguousarray(wrenches)
         count = len(wrenches)
         force = np.empty((count, self._count, 2))
-        lam = np.empty((count, 6))
+        multipliers = np.empty((count, 6))
         wrench_served = np.empty((count, 6))
         gap_power_bound = np.empty(count)
         command = np.empty((count, self._count, 3))
         is_attainable = np.empty(count, np.bool_)
         error = np.empty(count)
+        is_truncated = np.empty(count, np.bool_)
         with self._lock:
             self._question.write(policy, None, conditions)
             code = self._core.fl_answer_many(
@@ -341,18 +353,24 @@ class Core:
                 wrenches.ctypes.data,
                 count,
                 force.ctypes.data,
-                lam.ctypes.data,
+                multipliers.ctypes.data,
                 wrench_served.ctypes.data,
                 gap_power_bound.ctypes.data,
                 command.ctypes.data,
                 is_attainable.ctypes.data,
                 error.ctypes.data,
+                is_truncated.ctypes.data,
             )
-        is_truncated = code == constant("FL_TRUNCATED")
-        if not is_truncated:
-            raise_refusal(code)
+        raise_refusal(code)
         return CoreAnswer(
-            force, lam, wrench_served, gap_power_bound, is_attainable, command, error, is_truncated
+            force,
+            multipliers,
+            wrench_served,
+            gap_power_bound,
+            is_attainable,
+            command,
+            error,
+            bool(is_truncated.any()),
         )
 
     def commands(self, force: Array, previous: Array | None = None) -> Array:
@@ -382,35 +400,11 @@ class Core:
             )
         return command
 
-    def dual_value(self, wrench: Array, lambda_reduced: Array) -> tuple[Array, float]:
-        """Evaluates the dual function (Eq. 3) at reduced multipliers, in the state (losses, free
-        axes, limits) of the last question.
-
-        Args:
-            wrench: desired (6,) [N, N m].
-            lambda_reduced: multipliers (6,) [W] in the basis of what the actuators span.
-
-        Returns:
-            The responses (n, 2) [N] (Eq. 5), and the dual value [W].
-        """
-        wrench = np.ascontiguousarray(wrench)
-        lambda_reduced = np.ascontiguousarray(lambda_reduced)
-        force = np.empty((self._count, 2))
-        with self._lock:
-            value = self._core.fl_dual_value(
-                self._block_address,
-                self._work_address,
-                wrench.ctypes.data,
-                lambda_reduced.ctypes.data,
-                force.ctypes.data,
-            )
-        return force, value
-
-    def conjugates(self, lam: Array, conditions: Conditions = NOMINAL) -> Conjugates:
+    def conjugates(self, multipliers: Array, conditions: Conditions = NOMINAL) -> Conjugates:
         """Evaluates the conjugates of all costs (Eq. 4), by the core's tables.
 
         Args:
-            lam: multipliers (N, 6) of the wrench [W/N, W/(N m)].
+            multipliers: lambda (N, 6) of the wrench [W/N, W/(N m)].
             conditions: what holds of the robot, which limits the sets of forces.
 
         Returns:
@@ -419,16 +413,16 @@ class Core:
         Raises:
             CommandError: the core cannot work with these numbers.
         """
-        lam = np.ascontiguousarray(lam)
-        records = np.empty((len(lam), self._count), struct("fl_actuator_conjugate"))
+        multipliers = np.ascontiguousarray(multipliers)
+        records = np.empty((len(multipliers), self._count), struct("fl_actuator_conjugate"))
         with self._lock:
             self._question.write_conditions(conditions)
             error = self._core.fl_conjugates(
                 self._block_address,
                 self._work_address,
                 self._question.address,
-                lam.ctypes.data,
-                len(lam),
+                multipliers.ctypes.data,
+                len(multipliers),
                 records.ctypes.data,
             )
         raise_refusal(error)

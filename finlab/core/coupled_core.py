@@ -2,7 +2,7 @@
 that is made linear at the last forces.
 
 `finlab/allocation/dual/outer_iterations.py` asks a `CoupledCore`; the iterations themselves are in
-finlab/core/src/sequential_convex.c.
+finlab/core/src/outer_iterations.c.
 """
 
 import ctypes
@@ -104,7 +104,7 @@ class CoupledCore:
         self._answer = AnswerRecord(count)
         self._wrench_offset = wrench_offset
         self._raised: BaseException | None = None
-        """Raised by the callback, for `_settle` to raise again."""
+        """Raised by the callback, for `_run_iterations` to raise again."""
         callback: Any = library().fl_jets
         if wrench_offset.core_constants is None:
             callback = _OFFSET_CALLBACK(self._effect)
@@ -125,9 +125,9 @@ class CoupledCore:
         robot["frames"] = _address_of(frames)
         robot["axis_counts"] = wrench_offset.counts
         self._robot: Record = robot
-        self._limits: Record = np.zeros(1, struct("fl_settle_limits"))
+        self._limits: Record = np.zeros(1, struct("fl_outer_limits"))
         """When the iterations end."""
-        self._result: Record = np.zeros(1, struct("fl_settle_result"))
+        self._result: Record = np.zeros(1, struct("fl_outer_result"))
         """What they end with."""
         self._force = np.zeros((count, 2))
         """Forces [N] at which the iterations begin, and then those at which they end."""
@@ -138,7 +138,7 @@ class CoupledCore:
         force: Array | None,
         most_iterations: int,
         policy: PolicyFields | None = None,
-        lam: Array | None = None,
+        multipliers: Array | None = None,
         conditions: Conditions = NOMINAL,
         penalty_least: float = 0.0,
         most_steps: float = math.inf,
@@ -152,7 +152,7 @@ class CoupledCore:
             most_iterations: how many outer iterations; 0 for the nearest forces that give the
                 wrench.
             policy: what to give out of reach; None for nothing else than the wrench.
-            lam: multipliers (6,) [W/N, W/(N m)] at which the first iteration begins.
+            multipliers: lambda (6,) [W/N, W/(N m)] at which the first iteration begins.
             conditions: what holds of the robot.
             penalty_least: what an error as large as the wrench scale counts at least [W].
             most_steps: steps after which no iteration but the first is begun.
@@ -169,8 +169,8 @@ class CoupledCore:
             self._limits["most_steps"] = most_steps
             self._limits["most_iterations"] = most_iterations
             self._question.write_wrench(wrench)
-            self._question.write(policy, lam, conditions)
-            raise_refusal(self._settle())
+            self._question.write(policy, multipliers, conditions)
+            raise_refusal(self._run_iterations())
             return OuterResult(
                 answer=self._answer.read() if most_iterations > 0 else None,
                 force=self._force.copy(),
@@ -180,9 +180,9 @@ class CoupledCore:
                 steps=float(self._result["steps"][0]),
             )
 
-    def _settle(self) -> int:
+    def _run_iterations(self) -> int:
         """Runs the iterations for the question that is written; returns an error code."""
-        error: int = self._core.fl_settle(
+        error: int = self._core.fl_outer_iterations(
             self._robot.ctypes.data,
             self._block_linear.ctypes.data,
             ctypes.addressof(self._work),

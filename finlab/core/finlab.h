@@ -68,7 +68,7 @@ typedef double fl_wide; /* where differences of large numbers matter, in single 
 #define FL_FOILS (FL_FOIL_STEPS * FL_STEPS_AT_KINK * 2 * (FL_STARTS + FL_RAY_SHARES))
 #define FL_BOUND (2 * (FL_FORCES + FL_FOILS))
 
-#define FL_VERSION 8   /* of all structs and functions here */
+#define FL_VERSION 9   /* of all structs and functions here */
 #define FL_MAGIC 41721 /* first number of a block */
 
 /* The structs that cross the border of the library. */
@@ -101,7 +101,13 @@ typedef void (*fl_offset_at)(const fl_real *constants, const fl_real *force, int
 #undef FL_END
 
 /* Kinds of commands: fl_actuator.command_kind. */
-enum { FL_THRUSTER, FL_POD, FL_FIN, FL_FOIL };
+enum {
+  FL_THRUSTER, /* a force */
+  FL_POD,      /* an angle and a force */
+  FL_FIN,      /* amplitude, frequency and direction of a beat */
+  FL_FOIL,     /* an angle */
+  FL_KINDS     /* how many kinds there are */
+};
 
 /* What to give for a wrench beyond reach: fl_policy.policy. */
 enum {
@@ -112,13 +118,12 @@ enum {
 
 /* What functions return; fl_error_text has a sentence for each. */
 enum {
-  FL_TRUNCATED = -1, /* all is answered, but a search ended at its bound of parts or steps */
-  FL_OK,             /* all is well */
-  FL_BAD_BLOCK,      /* no robot of this library */
-  FL_BAD_VERSION,    /* a block of another FL_VERSION */
-  FL_BAD_NUMBER,     /* of a robot: not finite, or out of its range */
-  FL_BAD_ARGUMENT,   /* of a question or of settings: the same */
-  FL_ERRORS          /* how many codes there are from FL_OK on */
+  FL_OK,           /* all is well */
+  FL_BAD_BLOCK,    /* no robot of this library */
+  FL_BAD_VERSION,  /* a block of another FL_VERSION */
+  FL_BAD_NUMBER,   /* of a robot: not finite, or out of its range */
+  FL_BAD_ARGUMENT, /* of a question or of settings: the same */
+  FL_ERRORS        /* how many codes there are */
 };
 
 /* Everything that changes while a question is answered; see fl_work.h. */
@@ -183,18 +188,19 @@ int fl_answer_one(const fl_real *block, fl_work *work, const fl_question *questi
 
    @param wrench           (count, 6) desired [N, N m]
    @param force            (count, n, 2) [N]
-   @param prices           (count, 6) multipliers of the wrenches [W/N, W/(N m)]
+   @param multipliers      (count, 6) lambda of the wrenches [W/N, W/(N m)]
    @param wrench_served    (count, 6) wrenches that the forces give [N, N m]
    @param gap_power_bound  (count,) power that gaps are proved to need [W]
    @param command          (count, n, 3)
    @param is_attainable    (count,) whether a wrench is within reach
-   @param error            (count,) distance of the commands' wrench from the one served, on the
-                           yardstick
-   @return                 FL_OK, FL_TRUNCATED, or the error code of fl_answer_one */
+   @param error            (count,) distance of the commands' wrench from the one served, over the
+                           wrench scale
+   @param is_truncated     (count,) whether a search ended at its bound of parts or steps
+   @return                 as fl_answer_one, of the first wrench that has no answer */
 int fl_answer_many(const fl_real *block, fl_work *work, const fl_question *question,
-                   const fl_real *wrench, int count, fl_real *force, fl_real *prices,
+                   const fl_real *wrench, int count, fl_real *force, fl_real *multipliers,
                    fl_real *wrench_served, fl_real *gap_power_bound, fl_real *command,
-                   unsigned char *is_attainable, fl_real *error);
+                   fl_byte *is_attainable, fl_real *error, fl_byte *is_truncated);
 
 /* Finds commands for forces.
 
@@ -208,11 +214,11 @@ void fl_commands(const fl_real *block, fl_work *work, const fl_real *force, int 
    bound of the power.
 
    @param question    what limits the sets of forces; its wrench is not read
-   @param prices      (count, 6) multipliers [W/N, W/(N m)]
+   @param multipliers (count, 6) lambda [W/N, W/(N m)]
    @param conjugates  becomes those of each actuator (count, n)
    @return            FL_OK or FL_BAD_NUMBER */
 int fl_conjugates(const fl_real *block, fl_work *work, const fl_question *question,
-                  const fl_real *prices, int count, fl_actuator_conjugate *conjugates);
+                  const fl_real *multipliers, int count, fl_actuator_conjugate *conjugates);
 
 /* Says how far rays go in the wrenches that robots of planes give.
 
@@ -243,7 +249,7 @@ fl_real fl_dual_value(const fl_real *block, fl_work *work, const fl_real *wrench
    @param robot     what its actuators do to each other
    @param block     a copy of robot->block_uncoupled, which becomes the linear model
    @param work      work area, prepared for that block
-   @param question  as for fl_answer_one, with the multipliers of the wrench in prices
+   @param question  as for fl_answer_one, with multipliers to begin with
    @param limits    when the iterations end
    @param force     (n, 2) where they begin, unless the question has commands of the tick before
                     [N]; becomes what they come to
@@ -251,9 +257,9 @@ fl_real fl_dual_value(const fl_real *block, fl_work *work, const fl_real *wrench
                     these commands; untouched where most_iterations is 0
    @param result    becomes what the iterations end with
    @return          as fl_answer_one */
-int fl_settle(const fl_coupled_robot *robot, fl_real *block, fl_work *work,
-              const fl_question *question, const fl_settle_limits *limits, fl_real *force,
-              fl_answer *answer, fl_settle_result *result);
+int fl_outer_iterations(const fl_coupled_robot *robot, fl_real *block, fl_work *work,
+                        const fl_question *question, const fl_outer_limits *limits, fl_real *force,
+                        fl_answer *answer, fl_outer_result *result);
 
 /* The wrench offset of jets, an fl_offset_at.
 

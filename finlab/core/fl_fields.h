@@ -15,7 +15,7 @@ FL_FIELD(fl_real, length, , "1", "numbers in the block")
 FL_FIELD(fl_real, n, , "1", "actuators")
 FL_FIELD(fl_real, rank, , "1", "r, rank of the effectiveness")
 FL_FIELD(fl_real, axis_scale, [6], "N, N m", "wrench = axis_scale * scaled wrench")
-FL_FIELD(fl_real, wrench_scale, [6], "N, N m", "sigma, the yardstick of errors")
+FL_FIELD(fl_real, wrench_scale, [6], "N, N m", "sigma, by which errors are normalized")
 FL_FIELD(fl_real, is_commanded, [6], "1", "1 of an axis that the robot commands, else 0")
 FL_FIELD(fl_real, wrench_offset, [6], "N, N m", "o, wrench beside that of the forces")
 FL_FIELD(fl_real, basis, [6][6], "1", "6 x r: directions of scaled wrenches that are driven")
@@ -42,7 +42,7 @@ FL_FIELD(fl_real, row_force_max, [2], "N", "largest force of each row")
 FL_FIELD(fl_real, effectiveness_reduced, [2][6], "1/N",
          "columns of B: scaled wrench in the basis per newton of each row")
 FL_FIELD(fl_real, effectiveness_normalized, [3][6], "1/N",
-         "B / sigma: wrench on the yardstick per newton along each axis of the law")
+         "B / sigma: wrench over the wrench scale per newton along each axis of the law")
 FL_FIELD(fl_real, command_kind, , "1", "how forces become commands: FL_THRUSTER ...")
 FL_FIELD(fl_real, command_min, [3], "command", "least command; unused numbers 0")
 FL_FIELD(fl_real, command_max, [3], "command", "largest command; unused numbers 0")
@@ -50,7 +50,8 @@ FL_FIELD(fl_real, max_change, [3], "command", "largest changes in a tick")
 FL_FIELD(fl_real, is_free_angle, , "1", "1 where the angle of the command may turn freely")
 FL_FIELD(fl_real, law_grid, , "offset", "grid of the law")
 FL_FIELD(fl_real, command_table, , "offset", "a fin's beat, or a foil's curve of lift and angle")
-FL_FIELD(fl_real, command_sign, , "1", "of a thruster's command over its force")
+FL_FIELD(fl_real, command_sign, , "1",
+         "of the command over the force: -1 of a thruster that only pulls, else 1")
 FL_FIELD(fl_real, lean_angle, , "rad", "of a fin or foil: angle from command to force")
 FL_FIELD(fl_real, unevenness, , "1", "of a fin: 1 + unevenness cos(angle - unevenness_angle)")
 FL_FIELD(fl_real, unevenness_angle, , "rad", "see unevenness")
@@ -72,8 +73,8 @@ FL_BEGIN(fl_question)
 FL_FIELD(fl_real, wrench, [6], "N, N m",
          "desired; behind it all is zeros where there is nothing to say")
 FL_FIELD(fl_policy_at, policy, , "address", "what to give beyond reach; 0: nothing else")
-FL_FIELD(fl_reals, prices, , "address",
-         "multipliers (6,) of the wrench [W/N, W/(N m)] to begin with; 0 for none")
+FL_FIELD(fl_reals, multipliers, , "address",
+         "lambda (6,) of the wrench [W/N, W/(N m)] to begin with; 0 for none")
 FL_FIELD(fl_reals, previous, , "address",
          "commands (n, 3) of the tick before, NaN for an unknown one; 0 for none")
 FL_FIELD(fl_bytes, lost, , "address", "(n,) which actuators do not work; 0 for none")
@@ -88,19 +89,21 @@ FL_END(fl_question)
 
 FL_BEGIN(fl_answer)
 FL_FIELD(fl_real, force, [FL_MOST][2], "N", "of each actuator's rows")
-FL_FIELD(fl_real, prices, [6], "W/N, W/(N m)", "multipliers lambda of the wrench")
+FL_FIELD(fl_real, multipliers, [6], "W/N, W/(N m)", "lambda of the wrench, Eq. 3")
 FL_FIELD(fl_real, lambda_reduced, [6], "W",
          "the same in reduced coordinates, of what actuators span now")
 FL_FIELD(fl_real, wrench_served, [6], "N, N m",
          "wrench that the forces give, out of reach by the policy")
 FL_FIELD(fl_real, gap_power_bound, , "W", "power that gaps are proved to need")
 FL_FIELD(fl_real, error, , "1",
-         "distance of the commands' wrench from wrench_served, on the yardstick, by law grids")
+         "distance of the commands' wrench from wrench_served, over the wrench scale, by law grids")
 FL_FIELD(fl_real, command, [FL_MOST][3], "command", "of each actuator")
 FL_FIELD(int, newton_status, , "1", "how Newton's method ended: FL_MET ...")
 FL_FIELD(int, is_attainable, , "1", "1 where the target is within reach")
 FL_FIELD(int, newton_steps, , "1", "Newton's steps")
-FL_FIELD(int, is_truncated, , "1", "1 where a search ended at its bound of steps")
+FL_FIELD(int, is_truncated, , "1",
+         "1 where a search ended at its bound: all limits hold, but the power may not be least; "
+         "most_parts of fl_settings is that bound")
 FL_FIELD(int, has_foil_commands, , "1", "1 where the commands are those of a search, for foils")
 FL_END(fl_answer)
 
@@ -134,17 +137,19 @@ FL_FIELD(fl_reals, frames, , "address",
 FL_FIELD(fl_real, axis_counts, [6], "1", "1 of axes that count, else 0")
 FL_END(fl_coupled_robot)
 
-FL_BEGIN(fl_settle_limits)
-FL_FIELD(fl_real, penalty_least, , "W", "what an error as large as the yardstick counts at least")
+FL_BEGIN(fl_outer_limits)
+FL_FIELD(fl_real, penalty_least, , "W",
+         "what an error as large as the wrench scale counts at least")
 FL_FIELD(fl_real, most_steps, , "1",
          "steps after which no iteration but the first is begun, infinity for no limit")
 FL_FIELD(int, most_iterations, , "1",
          "outer iterations at most; 0 for commands of the nearest forces that give the wrench")
-FL_END(fl_settle_limits)
+FL_END(fl_outer_limits)
 
-FL_BEGIN(fl_settle_result)
+FL_BEGIN(fl_outer_result)
 FL_FIELD(fl_real, power, , "W", "of the forces that the iterations come to")
-FL_FIELD(fl_real, penalty, , "W", "what an error as large as the yardstick counted last")
-FL_FIELD(fl_real, error, , "1", "distance of the wrench from the one desired, on the yardstick")
+FL_FIELD(fl_real, penalty, , "W", "what an error as large as the wrench scale counted last")
+FL_FIELD(fl_real, error, , "1",
+         "distance of the wrench from the one desired, over the wrench scale")
 FL_FIELD(fl_real, steps, , "1", "steps of Newton's method and on commands")
-FL_END(fl_settle_result)
+FL_END(fl_outer_result)

@@ -71,7 +71,7 @@ typedef struct {
 /* A mixture of points, and an orthonormal basis of their differences from the first one. */
 typedef struct {
   fl_wide force[FL_POINTS][FL_MOST][2]; /* of each point [N] */
-  fl_wide point[FL_POINTS][6];          /* wrenches in weighted axes, on the yardstick */
+  fl_wide point[FL_POINTS][6];          /* wrenches in weighted axes, over the wrench scale */
   fl_wide weight[FL_POINTS];            /* of each point, their sum 1 */
   fl_wide miss[6];                      /* m, mixture less target */
   fl_wide ray_share[FL_POINTS];         /* of each point, how much of the ray (0 or 1) it takes */
@@ -138,7 +138,7 @@ struct fl_work {
   fl_mixture mixture;                            /* that comes nearest */
   fl_wide effectiveness_weighted[FL_MOST][2][6]; /* wrench per newton of each row, weighted axes */
   int polygon_offset[FL_MOST];                   /* of polygons that stand for sets; 0 for none */
-  fl_wide distance_enough; /* on the yardstick, up to which a point is the nearest one */
+  fl_wide distance_enough; /* over the wrench scale, up to which a point is the nearest one */
   const fl_wide *ray; /* (6,) of which a mixture may take a share, in weighted axes; 0 for none */
 
   /* Sets with gaps. */
@@ -150,9 +150,9 @@ struct fl_work {
   fl_real best_lambda[6];           /* reduced multipliers near these commands [W] */
 
   /* Commands. */
-  fl_real jacobian[FL_MOST][3][6]; /* J of Eq. 11, on the yardstick, over the widths of the box */
+  fl_real jacobian[FL_MOST][3][6]; /* J of Eq. 11 over the wrench scale and widths of the box */
   fl_tangent tangent[FL_MOST];     /* of each foil, at the commands of a step */
-  fl_real wrench_target[6];        /* that the commands are to give [N, N m] */
+  fl_real wrench_wanted[6];        /* that the commands are to give [N, N m] */
   int refine_steps; /* Levenberg-Marquardt steps on commands since whoever asks set it to 0 */
 
   /* Ticks. */

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from finlab.errors import FinlabError
 
-VERSION = 8
+VERSION = 9
 """What `fl_version()` of the C files returns; both rise together where a signature or a struct
 changes."""
 SIGNATURES = {
@@ -19,13 +19,12 @@ SIGNATURES = {
     "fl_check": "ipi",
     "fl_prepare": "ipp",
     "fl_answer_one": "ipppp",
-    "fl_answer_many": "ippppippppppp",
+    "fl_answer_many": "ippppipppppppp",
     "fl_commands": "vpppipp",
-    "fl_dual_value": "rppppp",
     "fl_conjugates": "ippppip",
     "fl_reach": "vpppppirppp",
     "fl_jets": "vppipppp",
-    "fl_settle": "ipppppppp",
+    "fl_outer_iterations": "ipppppppp",
 }
 """What each function returns and takes: i int, r real, p pointer, s text, v nothing."""
 _TYPES = {

@@ -23,7 +23,7 @@ from finlab.axes import AXES
 from finlab.deploy.thin_block import tables_of, thinned
 from finlab.errors import AllocationError
 from finlab.layout import Layout
-from finlab.physics.objective import yardstick
+from finlab.physics.objective import wrench_scale_of
 from finlab.whole_file import write_folder
 
 SAMPLES = 24
@@ -31,7 +31,7 @@ SAMPLES = 24
 MAX_CORE_ERROR = 3e-7
 """Largest normalized error of the core's commands for a question of the self-test: beyond it the
 library would refine them, and its answer were not the core's."""
-FILES_LEFT_OUT = ("jets.c", "sequential_convex.c", "attainable_set.c", "for_python.c")
+FILES_LEFT_OUT = ("jets.c", "outer_iterations.c", "attainable_set.c", "for_python.c")
 """Files of the core that an export does not need: `interaction`, attainable sets, and what Python
 alone calls."""
 QUESTIONS: tuple[tuple[PolicyName, float], ...] = (
@@ -70,7 +70,7 @@ def c_sources(
             "without"
         )
     water = check_flow(flow)
-    method = Dual(layout, DualSettings(), yardstick(layout), None).at(water)
+    method = Dual(layout, DualSettings(), wrench_scale_of(layout), None).at(water)
     block = method.compiled.robot.block
     thin = thinned(block)
     folder = Path(core.__path__[0])

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Sequence
 from html import escape
 from typing import TYPE_CHECKING, NamedTuple
 
-from finlab.assets import install
+from finlab.assets import install_command
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -100,5 +100,5 @@ def _image(picture: Callable[[], Figure]) -> str:
     try:
         content = b64encode(figure_bytes(picture, "png")).decode()
     except ImportError:
-        return _html(f"A picture needs matplotlib; run: {install('plot')}")
+        return _html(f"A picture needs matplotlib; run: {install_command('plot')}")
     return f"<img alt='picture' src='data:image/png;base64,{content}'>"

@@ -1,4 +1,4 @@
-"""A layout as a table of its actuators."""
+"""A layout as a table of its actuators, for terminals and notebooks: `print(layout)` shows it."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 from finlab.display import Block, Table
 
 Layout = Any
-"""`finlab.layout.Layout`, which prints itself by this module."""
+"""`finlab.layout.Layout`, which prints itself by this module, so that this one cannot import it."""
 
 
 class Column(NamedTuple):
@@ -33,7 +33,7 @@ COLUMNS = (
 
 
 def layout_blocks(layout: Layout) -> list[Block]:
-    """Returns a layout in words, and a table of its actuators."""
+    """Returns blocks of text that show a layout: its name and description, and a table."""
     head = [column.title for column in COLUMNS]
     rows = []
     for actuator in layout.actuators:

@@ -13,7 +13,7 @@ from finlab.axes import AXES, UNITS
 from finlab.layout import Layout
 from finlab.layout.save import layout_to_dict
 from finlab.log.replay import Replay
-from finlab.research.evaluation.document import three
+from finlab.research.evaluation.document import format_digits
 
 HELD_SHARE = 0.02
 """Share of what was missing along an axis that a replay which holds it may miss."""
@@ -127,17 +127,17 @@ class Judgement:
     @property
     def sentence(self) -> str:
         """The judgement in one sentence."""
+        seconds = format_digits(self.seconds)
         if self.axis is None:
-            return (
-                f"No axis was lost in {three(self.seconds)} s: no actuator at a limit cut a demand."
-            )
+            return f"No axis was lost in {seconds} s: no actuator at a limit cut a demand."
         i = AXES.index(self.axis)
         longest = max(self.spells, key=lambda spell: spell.end - spell.start)
         worst = max(self.spells, key=lambda spell: spell.missing[i])
         why = f", with {', '.join(worst.limits[:4])}" if worst.limits else ""
+        lost_s = format_digits(self.lost_s[i])
         return (
-            f"{MOTIONS[i].capitalize()} ({self.axis}) was lost for {three(self.lost_s[i])} s of "
-            f"{three(self.seconds)} s, in {self.n_spells} spell{'s' * (self.n_spells > 1)}, the "
+            f"{MOTIONS[i].capitalize()} ({self.axis}) was lost for {lost_s} s of "
+            f"{seconds} s, in {self.n_spells} spell{'s' * (self.n_spells > 1)}, the "
             f"longest from {longest.start:.1f} to {longest.end:.1f} s: {amount(self.missing, i)} "
             f"of {amount(self.asked, i)} were missing{why}; {self._remedy(i)}."
         )
@@ -176,4 +176,4 @@ class Judgement:
 
 def amount(impulse: Sequence[float] | Array, axis: int) -> str:
     """Returns the component of an impulse (6,) along an axis, with its unit."""
-    return f"{three(impulse[axis])} {UNITS[axis]} s"
+    return f"{format_digits(impulse[axis])} {UNITS[axis]} s"

@@ -19,13 +19,13 @@ from finlab.log.judgement import Judgement, Spell, Timeline
 from finlab.log.read import Log, rest_command
 from finlab.log.recorded import Event
 from finlab.log.replay import demands_of, replay, six
-from finlab.physics.objective import judged_power, yardstick
+from finlab.physics.objective import judged_power, wrench_scale_of
 from finlab.physics.plant import plant_of
 
 CHUNK_ROWS = 8192
 """Samples whose wrenches are computed at once: bounds the memory."""
 LOST_SHARE = 0.01
-"""Share of the yardstick from which on a missing wrench counts as an axis lost."""
+"""Share of the wrench scale from which on a missing wrench counts as an axis lost."""
 UNEXPLAINED_SHARE = 0.05
 """Share of the demand that may be missing with no actuator at a limit before a note says it."""
 DEAD_SHARE = 0.1
@@ -114,7 +114,7 @@ class Account:
     def __init__(self, log: Log) -> None:
         """Takes the log, and computes all fields."""
         self.log = log
-        self.scale = yardstick(log.robot)
+        self.scale = wrench_scale_of(log.robot)
         self.demand = np.nan_to_num(log.demand)
         """(N, 6) [N, N m]."""
         self.watts: float | None = None

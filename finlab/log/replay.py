@@ -12,7 +12,7 @@ from finlab.allocation.policy import CLOSEST, Policy
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.log.demand_answers import answers_to
-from finlab.physics.objective import REACHED, yardstick
+from finlab.physics.objective import REACHED, wrench_scale_of
 
 MAX_DEMANDS = 2000
 """Most demands of a replay; of more, similar ones are merged."""
@@ -42,7 +42,7 @@ class Replay:
     watts: float
     """Mean power [W] by the actuators' own models."""
     saturated_s: float
-    """Time over which a wrench was not delivered, by more than a thousandth of the yardstick
+    """Time over which a wrench was not delivered, by more than a thousandth of the wrench scale
     [s]."""
 
 
@@ -109,7 +109,7 @@ def replay(
         improved: whether the robot is the improved one; the other one is replayed with each
             actuator lost, too.
     """
-    scale = yardstick(robot)
+    scale = wrench_scale_of(robot)
     intact = demands_of(wrench, span, scale, MAX_DEMANDS)
     merged = demands_of(intact.wrench, intact.span, scale, MAX_DEMANDS_LOST)
     autopilots: tuple[MethodName, ...] = ("px4", "ardusub")

@@ -153,7 +153,7 @@ LEAST_LEVER = 1e-3
 torque."""
 
 
-def yardstick(layout: Layout) -> Array:
+def wrench_scale_of(layout: Layout) -> Array:
     """Returns the wrench scale sigma (6,) of a robot: three times F [N], three times T [N m].
 
     F is the root of the sum of squares of the actuators' largest forces, and T is F times the root

@@ -1,4 +1,4 @@
-/* A fuzzer of the core: blocks with mutated numbers, wild wrenches, policies, prices and previous commands. What is
+/* A fuzzer of the core: blocks with mutated numbers, wild wrenches, policies, multipliers and previous commands. What is
    not refused by an error code must come back finite, within the limits to the bit, in a bounded number of steps.
    Built with the C files of an export; arguments: cases, seed. */
 #include "robot.h"
@@ -48,7 +48,7 @@ static void ask(fl_question *q, fl_policy *policy, fl_real *price, fl_real *prev
   }
   for (int k = 0; k < ROBOT_COUNT + 6; k++) flags[k] = (unsigned char)!below(4);
   q->policy = below(4) ? policy : 0;
-  q->prices = below(4) ? 0 : price;
+  q->multipliers = below(4) ? 0 : price;
   q->previous = below(2) ? previous : 0;
   q->lost = below(3) ? 0 : flags;
   q->free = below(3) ? 0 : flags + ROBOT_COUNT;

@@ -1,4 +1,5 @@
-"""The lattice of foils' angles at which searches for commands begin, against the plant and numpy."""
+"""The lattice of foils' angles at which searches for commands begin, against the plant and
+numpy."""
 
 import ctypes
 from dataclasses import dataclass
@@ -11,7 +12,7 @@ import pytest
 
 from finlab.arrays import Array
 from finlab.layout.load import parse_layout
-from tests.core.parts import (
+from tests.core.internal_functions import (
     MOST,
     REAL,
     Box,
@@ -23,14 +24,14 @@ from tests.core.parts import (
     in_the_core,
     question_of,
 )
-from tests.mixed_robots import layout_of, random_flow, random_robot
+from tests.random_robots import layout_of, random_flow, random_robot
 
 FOILS = 6
-"""Foils on the lattice at most: FL_LATTICE_FOILS."""
+"""Foils on the lattice at most: LATTICE_FOILS."""
 NODES = 48
-"""Nodes of all foils at most: FL_LATTICE_NODES."""
+"""Nodes of all foils at most: LATTICE_NODES."""
 STARTS = 60
-"""Points of the lattice that are returned at most: FL_LATTICE_STARTS."""
+"""Points of the lattice that are returned at most: LATTICE_STARTS."""
 POINTS = 4096
 """Points of the lattice at most: LATTICE of foil_lattice.c."""
 NODES_OF_BRANCH = 6
@@ -42,7 +43,7 @@ ROBOTS = range(4)
 
 
 class Lattice(ctypes.Structure):
-    """The angles of all foils: `fl_lattice`."""
+    """The angles of all foils: `foil_lattice`."""
 
     _fields_ = [
         ("foils", ctypes.c_int),
@@ -59,7 +60,7 @@ class Lattice(ctypes.Structure):
 
 
 class Point(ctypes.Structure):
-    """One node of each foil: `fl_lattice_point`."""
+    """One node of each foil: `lattice_point`."""
 
     _fields_ = [("node", ctypes.c_ubyte * FOILS), ("cost", REAL)]
 
@@ -107,7 +108,7 @@ class Laid:
         return np.array(list(product(*nodes)))
 
     def target(self, wrench: Array) -> Array:
-        """A wrench (6,) on the yardstick, in the basis of driven directions (6,)."""
+        """A wrench (6,) over the wrench scale, in the basis of driven directions (6,)."""
         reduced = np.zeros(6)
         functions().fl_reduce_wrench(self.work, at(np.ascontiguousarray(wrench)), at(reduced))
         return reduced

@@ -10,15 +10,15 @@ import pytest
 from scipy.optimize import linprog, lsq_linear
 
 from finlab.arrays import Array
-from tests.core.parts import POINTS, REAL, Mixture, Robot, at, functions, robot_of
+from tests.core.internal_functions import POINTS, REAL, Mixture, Robot, at, functions, robot_of
 from tests.core.test_actuator_response import forces_of
 
 CLOSE = 1e-9
-"""Distance in weighted axes, on the yardstick, up to which a point is the nearest one."""
+"""Distance in weighted axes, over the wrench scale, up to which a point is the nearest one."""
 
 
 def columns_of(robot: Robot, weight: Array) -> Array:
-    """Wrenches (n, 2, 6) in weighted axes, on the yardstick, per newton along the rows of each
+    """Wrenches (n, 2, 6) in weighted axes, over the wrench scale, per newton along the rows of each
     actuator."""
     head = robot.head
     scaled_wrench = robot.actuators["effectiveness_reduced"] @ head["basis"].T
@@ -59,7 +59,7 @@ def mixed_forces(robot: Robot, mixture: Mixture) -> Array:
 
 
 def targets_of(robot: Robot, weight: Array, rng: np.random.Generator) -> Array:
-    """Targets (10, 6) in weighted axes, on the yardstick, most of them beyond reach."""
+    """Targets (10, 6) in weighted axes, over the wrench scale, most of them beyond reach."""
     size = 10.0 ** rng.uniform(-0.5, 1.0, (10, 1))
     return np.asarray(size * weight * rng.normal(size=(10, 6)))
 

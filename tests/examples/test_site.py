@@ -14,6 +14,7 @@ pytest.importorskip("mkdocs")
 
 @pytest.fixture
 def site(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Any:
+    """The module that runs the blocks of pages, with a cache of its own."""
     monkeypatch.syspath_prepend(str(ROOT / "tools" / "site"))
     import blocks
 
@@ -42,7 +43,7 @@ def test_every_name_of_the_package_has_a_page(site: Any) -> None:
     import reference
 
     pages = reference.python_pages()
-    assert {f"reference/python/finlab.{name}.md" for name in finlab._HOME} <= set(pages)
+    assert {f"reference/python/finlab.{name}.md" for name in finlab._MODULE_OF_NAME} <= set(pages)
     assert "reference/python/finlab.swim.simulation.ClosedLoop.md" in pages
 
 

@@ -13,12 +13,13 @@ from finlab.fit.fin_fit import fit_fin, write_fin
 from finlab.layout import FinModelSpec
 from finlab.physics import FinLaw, TableLaw, make_law, plant_of
 from finlab.research.random_layouts import random_fin_model, random_layout
-from tests.exhaustive import sampled
-from tests.fit.cell import commands, measured, samples
+from tests.fit.load_cell import commands, measured, samples
+from tests.sampled_cases import sampled
 
 LAWS = ("drag", "lighthill", "soft", "table")
 """The last one is a soft fin's grid with noise of 3 %."""
-TARGETS = 40
+N_TARGETS = 40
+"""How many wrenches each robot is asked for."""
 
 
 def random_law(kind: str, rng: np.random.Generator) -> FinLaw:
@@ -36,8 +37,8 @@ def random_law(kind: str, rng: np.random.Generator) -> FinLaw:
 
 
 def miss_and_expected(kind: str, seed: int, folder: Path) -> tuple[Array, Array]:
-    """True misses and expected ones (K, 6) over the yardstick, of targets on three robots with one
-    fit."""
+    """True misses and expected ones (K, 6) over the wrench scale, of targets on three robots with
+    one fit."""
     rng = np.random.default_rng([seed, LAWS.index(kind)])
     law = random_law(kind, rng)
     command = commands(300, seed)
@@ -51,7 +52,9 @@ def miss_and_expected(kind: str, seed: int, folder: Path) -> tuple[Array, Array]
         layout = replace(layout, actuators=tuple(replace(fin, model=model) for fin in layout.fins))
         plant = plant_of(layout)
         allocator = Allocator(layout)
-        targets = rng.uniform(0.2, 0.9, (TARGETS, 1)) * plant.wrench(plant.sample(rng, (TARGETS,)))
+        targets = rng.uniform(0.2, 0.9, (N_TARGETS, 1)) * plant.wrench(
+            plant.sample(rng, (N_TARGETS,))
+        )
         answers = allocator.allocate_batch(targets)
         off = law.force(answers.command) - plant.force(answers.command)
         misses.append(np.einsum("kni,niw->kw", off, plant.effectiveness) / allocator.scale)

@@ -15,7 +15,7 @@ from finlab.interaction.learned import Learned, read_network
 from finlab.layout import Layout, layout_to_dict, parse_layout
 from finlab.layout.jet_geometry import jet_geometry_of
 from finlab.physics import Plant
-from finlab.physics.objective import yardstick
+from finlab.physics.objective import wrench_scale_of
 from finlab.research.random_layouts import random_jet_robot
 from tests.interaction.hidden_plant import wrenches
 from tests.interaction.test_jets import differs
@@ -23,6 +23,7 @@ from tests.interaction.test_jets import differs
 
 @pytest.fixture(scope="module")
 def network(tmp_path_factory: pytest.TempPathFactory) -> Learned:
+    """A network of a short training."""
     from finlab.fit.interaction.samples import read_samples, write_samples
     from finlab.research.interaction.random_samples import random_samples
     from finlab.research.interaction.train import WEIGHTS_FILE, recipe, train
@@ -34,6 +35,7 @@ def network(tmp_path_factory: pytest.TempPathFactory) -> Learned:
 
 
 def unseen(count: int) -> list[tuple[Layout, Array]]:
+    """Robots that it has not seen, with their true forward data."""
     robots = []
     for k in range(count):
         rng = np.random.default_rng([51, k])
@@ -54,7 +56,7 @@ def test_unseen_robots_are_missed_by_less_than_half(network: Learned) -> None:
                 result = allocator.allocate(target)
                 errors.append(
                     np.linalg.norm(
-                        (wrenches(layout, result.command[None]) - target) / yardstick(layout)
+                        (wrenches(layout, result.command[None]) - target) / wrench_scale_of(layout)
                     )
                 )
                 if robot is known:

@@ -13,14 +13,16 @@ import pytest
 import finlab
 from finlab.log import Judgement, judge, read_log
 from finlab.log.replay import demands_of, replay
-from finlab.physics.objective import yardstick
+from finlab.physics.objective import wrench_scale_of
 from tests.log.conftest import SUB_UNIT, Dive, columns, px4_dive, sub_dive
 
 YAW = 5
+"""Index of yaw in a wrench."""
 
 
 @pytest.fixture(params=["px4", "sub"])
 def dive(request: pytest.FixtureRequest) -> Dive:
+    """The dive of a log, by the name of its fixture."""
     made: Dive = request.getfixturevalue(request.param)
     return made
 
@@ -174,7 +176,7 @@ def test_a_better_layout_is_proposed_and_replayed(px4: Dive) -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_demands_taken_together_keep_their_impulse(seed: int, px4: Dive) -> None:
     rng = np.random.default_rng(seed)
-    scale = yardstick(px4.robot)
+    scale = wrench_scale_of(px4.robot)
     wrench = px4.demand + 0.02 * scale * rng.normal(size=px4.demand.shape)
     wrench[rng.random(len(wrench)) < 0.2, 1] = np.nan
     span = rng.uniform(0.01, 0.03, len(wrench))

@@ -17,7 +17,7 @@ from finlab.allocation.dual.method import Dual, DualSettings
 from finlab.allocation.policy import Policy
 from finlab.forces.reach import axis_ranges
 from finlab.layout import Layout
-from finlab.physics.objective import yardstick
+from finlab.physics.objective import wrench_scale_of
 from finlab.swim.vehicle.fossen import complete_body
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -43,7 +43,7 @@ def demo_files(robots: tuple[str, ...] = ROBOTS) -> dict[str, bytes]:
 
 def _robot(layout: Layout) -> tuple[dict[str, Any], bytes]:
     """What the page shows of a robot, and its block."""
-    scale = yardstick(layout)
+    scale = wrench_scale_of(layout)
     robot = Dual(layout, DualSettings(), scale, None).compiled.robot
     most = np.abs(axis_ranges(layout, np.zeros(6))).max(axis=0) * layout.commanded
     most[most < 1e-6 * scale] = 0.0

@@ -87,10 +87,10 @@ def command_line(state: State) -> str:
         for name, share in shares.items():
             words += [f"--{kind}", f"{name}={share:g}"]
     for name, held in damage.stuck.items():
-        turns = layout.part(name).KIND.sticks_at_angle
+        turns = layout.actuator(name).KIND.sticks_at_angle
         words += ["--stuck", f"{name}={math.degrees(held) if turns else held:g}"]
     for name, command in damage.running.items():
-        actuator = layout.part(name)
+        actuator = layout.actuator(name)
         numbers = list(command)
         if actuator.KIND.sticks_at_angle:
             numbers[actuator.KIND.stuck_number] = math.degrees(numbers[actuator.KIND.stuck_number])

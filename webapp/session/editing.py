@@ -16,19 +16,18 @@ from finlab.layout.body import Hull
 from finlab.layout.damage import Damage
 from finlab.swim.hull import estimated
 from webapp.session import layout_edits
-from webapp.session.core import Core
+from webapp.session.base import BaseSession
 from webapp.session.key_words import key_words
 from webapp.session.layout_edits import partner, unlinked, with_twin
 from webapp.session.lessons import Guide
-from webapp.session.looking import Desk, Display, SearchRequest
+from webapp.session.looking import Display
 from webapp.session.state import method_for
-from webapp.session.swim_plan import SwimSettings
 
 UNITS = ("kg", "kgm2", "m", "n")
 """Ends of the names of a body's fields that say a unit, and are no part of what undo calls them."""
 
 
-class Session(Core):
+class Session(BaseSession):
     """What one browser has made so far."""
 
     def __init__(self, layout: Layout, display: Display | None = None) -> None:
@@ -37,21 +36,12 @@ class Session(Core):
 
     def start_over(self) -> None:
         """Everything as at first sight, outside of tour and lessons; the way here can be undone.
-        What is looked at, and how, stays: see `forget_view`."""
+        What is looked at, and how, stays."""
         self.guide.stop = None  # nothing comes back
         self._commit("Start over", self._first)
         self.saved = self._first.layout
         self.selection_order = ()
         self.mode = 0
-
-    def forget_view(self, display: Display) -> None:
-        """All that `start_over` keeps, as at first sight: what is shown and which task is open, the
-        request for a better layout and the settings of a swim. `display` are the switches of a new
-        page."""
-        self.display = display
-        self.desk = Desk()
-        self.draft = SearchRequest()
-        self.swim = SwimSettings()
 
     # Robots.
 
@@ -214,14 +204,14 @@ class Session(Core):
         """The selected actuator at another position [m]; others that are selected take the
         coordinates that have changed."""
         names = self._chosen()
-        old_position = self.state.layout.part(names[-1]).position
+        old_position = self.state.layout.actuator(names[-1]).position
         has_changed = [
             abs(new - old) > layout_edits.UNTOUCHED
             for new, old in zip(position, old_position, strict=True)
         ]
 
         def placed(layout: Layout, name: str) -> Layout:
-            coordinates = list(layout.part(name).position)
+            coordinates = list(layout.actuator(name).position)
             for axis in range(3):
                 if has_changed[axis]:
                     coordinates[axis] = position[axis]
@@ -237,7 +227,7 @@ class Session(Core):
             [
                 name
                 for name in self._chosen()
-                if getattr(layout.part(name), "mounting_angle", None) is not None
+                if getattr(layout.actuator(name), "mounting_angle", None) is not None
             ]
         )
         turned = partial(layout_edits.with_mounting_angle, angle=angle)
@@ -295,7 +285,7 @@ class Session(Core):
         """One step that changes all selected actuators alike; twins follow."""
 
         def changed(layout: Layout, name: str) -> Layout:
-            return layout.with_part(change(layout.part(name)))
+            return layout.with_actuator(change(layout.actuator(name)))
 
         self._for_each(verb, self._chosen(), changed)
 

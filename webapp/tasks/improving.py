@@ -127,5 +127,5 @@ def improve(search: Search, work: Work[Search]) -> Improvement:
         cancelled=work.cancelled.is_set,
     )
     for actuator in improvement.layout.actuators:
-        layout = layout.with_part(actuator)
+        layout = layout.with_actuator(actuator)
     return replace(improvement, layout=layout)

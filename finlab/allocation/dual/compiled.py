@@ -19,7 +19,7 @@ from finlab.allocation.settings import USUAL_PERIOD_S
 from finlab.arrays import ROUNDING, Array
 from finlab.core.calls import NOMINAL, Conditions, Conjugates
 from finlab.layout.layout import Layout
-from finlab.physics.objective import yardstick
+from finlab.physics.objective import wrench_scale_of
 from finlab.physics.plant import Plant, plant_of
 
 
@@ -83,7 +83,7 @@ class Compiled:
         Raises:
             DataError: a force table cannot be read.
         """
-        return cls(layout, plant_of(layout).counting(layout.commanded), yardstick(layout))
+        return cls(layout, plant_of(layout).counting(layout.commanded), wrench_scale_of(layout))
 
     def _compile(self) -> None:
         """Makes the robot of the core from the responses of all groups."""
@@ -229,24 +229,24 @@ def miss_cost_of(layout: Layout, wrench_scale: Array, robust: float) -> Array | 
 
 
 def power_bound(
-    compiled: Compiled, wrench: Array, lam: Array, conditions: Conditions = NOMINAL
+    compiled: Compiled, wrench: Array, multipliers: Array, conditions: Conditions = NOMINAL
 ) -> Array:
     """Returns a lower bound of the power by weak duality (Eq. 3), with conjugates by the laws.
 
     Args:
         compiled: the robot.
         wrench: (N, 6) [N, N m] that is given.
-        lam: multipliers (N, 6) [W/N, W/(N m)]; any prove a bound.
+        multipliers: lambda (N, 6) [W/N, W/(N m)]; any prove a bound.
         conditions: what holds of the robot.
 
     Returns:
         Power (N,) [W] that no answer undercuts which gives these wrenches under the conditions.
     """
-    by_tables = compiled.robot.core.conjugates(lam, conditions)
+    by_tables = compiled.robot.core.conjugates(multipliers, conditions)
     conjugate = by_tables.conjugate.copy()
     for index, (indices, group) in enumerate(compiled.groups):
         along_price = compiled.conjugates_by_laws(index, by_tables)
-        in_all_directions = group.conjugate_bound(lam)
+        in_all_directions = group.conjugate_bound(multipliers)
         for by_laws in (along_price, in_all_directions):
             if by_laws is not None:
                 is_said = ~np.isnan(by_laws)
@@ -255,6 +255,6 @@ def power_bound(
     if conditions.lost is not None:
         conjugate[:, conditions.lost] = 0.0
         wrench_offset = compiled.wrench_offset_of(~conditions.lost)
-    paid = lam * (wrench - wrench_offset)
+    paid = multipliers * (wrench - wrench_offset)
     rounding = ROUNDING * (np.abs(paid).sum(axis=1) + np.abs(conjugate).sum(axis=1))
     return np.asarray(paid.sum(axis=1) - conjugate.sum(axis=1) - rounding)

@@ -34,7 +34,10 @@ MAX_BASES = 32
 """States of losses and free axes of which the basis of what is driven is kept."""
 TABLE_ERROR = 10.0 * CLOSE
 """Share of a power by which the core's tables may be off."""
-_TRUNCATED = "the search for a better answer was ended by its limit of steps"
+_TRUNCATED = (
+    "the search for a better answer was ended by its limit of steps: the power may be above the "
+    "least, by no more than it is above bound"
+)
 """Note of an answer whose search ended early."""
 
 
@@ -70,7 +73,7 @@ class Dual(Method):
     # A smaller wrench in the same direction still turns a robot to where it should go; the nearest
     # one may only push it on.
     policy_under_way = "direction"
-    begins_at_prices = True
+    begins_at_multipliers = True
     takes_losses = True
     looks_ahead = True
     settings_class = DualSettings
@@ -130,7 +133,9 @@ class Dual(Method):
             from finlab.allocation.dual.ahead import conditions_ahead
 
             conditions = conditions_ahead(method, reference, conditions)
-        return method.solve_under(conditions, question.targets, question.policy, question.prices)
+        return method.solve_under(
+            conditions, question.targets, question.policy, question.multipliers
+        )
 
     @cached_property
     def turning_pods(self) -> NDArray[np.bool_]:
@@ -149,7 +154,11 @@ class Dual(Method):
         return target if self.turns_ahead else super().in_time(target, reference)
 
     def solve_under(
-        self, conditions: Conditions, targets: Array, policy: Policy, lam: Array | None = None
+        self,
+        conditions: Conditions,
+        targets: Array,
+        policy: Policy,
+        multipliers: Array | None = None,
     ) -> Solution:
         """Solves for targets in the flow of this method.
 
@@ -157,7 +166,7 @@ class Dual(Method):
             conditions: rates, losses and free axes.
             targets: desired wrenches (N, 6), at least one [N, N m].
             policy: what to give out of reach.
-            lam: multipliers (6,) [W/N, W/(N m)] at which Newton's method begins, for a single
+            multipliers: lambda (6,) [W/N, W/(N m)] at which Newton's method begins, for a single
                 target; None for its own.
 
         Returns:
@@ -166,8 +175,8 @@ class Dual(Method):
         if self.plant.interaction is not None:
             from finlab.allocation.dual.outer_iterations import solve_outer
 
-            return solve_outer(self, targets, policy, conditions, lam)
-        answer = self.forces(targets, policy, lam, conditions)
+            return solve_outer(self, targets, policy, conditions, multipliers)
+        answer = self.forces(targets, policy, multipliers, conditions)
         # A search of bytes takes a third of the time of numpy's `all`, and every tick pays for it.
         all_reachable = 0 not in answer.is_attainable.tobytes()
         unreachable = [] if all_reachable else np.flatnonzero(~answer.is_attainable).tolist()
@@ -181,14 +190,14 @@ class Dual(Method):
         if unreachable:
             notes |= self.undriven_notes(targets[unreachable], conditions)
         return self.solution(
-            command, wrench_served, answer.lam, answer.gap_power_bound, notes, conditions
+            command, wrench_served, answer.multipliers, answer.gap_power_bound, notes, conditions
         )
 
     def solution(
         self,
         command: Array,
         wrench_served: Array,
-        lam: Array,
+        multipliers: Array,
         gap_power_bound: Array,
         notes: set[str],
         conditions: Conditions,
@@ -198,7 +207,7 @@ class Dual(Method):
         Args:
             command: (N, n, 3); its rows of lost actuators become NaN.
             wrench_served: (N, 6) [N, N m] that the commands give.
-            lam: multipliers (N, 6) [W/N, W/(N m)], which prove the bound.
+            multipliers: lambda (N, 6) [W/N, W/(N m)], which prove the bound.
             gap_power_bound: power (N,) [W] that gaps are proved to need.
             notes: sentences, of which empty ones are left out.
             conditions: under which the commands were found.
@@ -209,13 +218,13 @@ class Dual(Method):
         if conditions.lost is not None:
             command[:, conditions.lost] = np.nan
         bound: Callable[[Array], Array] = partial(
-            self.bound, wrench_served, lam, gap_power_bound, conditions
+            self.bound, wrench_served, multipliers, gap_power_bound, conditions
         )
         return Solution(
             command,
             bound=None if self.has_no_bound else bound,
             calm_power=partial(self.calm_power, conditions) if conditions.calm > 0.0 else None,
-            prices=lam,
+            multipliers=multipliers,
             notes=tuple(sorted(notes - {""})),
         )
 
@@ -332,7 +341,7 @@ class Dual(Method):
     def bound(
         self,
         wrench_served: Array,
-        lam: Array,
+        multipliers: Array,
         gap_power_bound: Array,
         conditions: Conditions,
         command: Array,
@@ -341,7 +350,7 @@ class Dual(Method):
 
         Args:
             wrench_served: (N, 6) [N, N m] for which the core found forces.
-            lam: its multipliers (N, 6) [W/N, W/(N m)].
+            multipliers: its lambda (N, 6) [W/N, W/(N m)].
             gap_power_bound: power (N,) [W] that gaps of the actuators' sets are proved to need for
                 these wrenches, by the core's tables.
             conditions: under which they were found.
@@ -357,11 +366,11 @@ class Dual(Method):
         wrench = wrench_of_forces(force, self.plant.effectiveness)
         if conditions.free is not None:  # its multiplier is 0
             wrench = np.where(conditions.free, 0.0, wrench)
-        is_finite = np.isfinite(lam).all(axis=-1, keepdims=True)
-        lam = np.where(is_finite, lam, 0.0)
+        is_finite = np.isfinite(multipliers).all(axis=-1, keepdims=True)
+        multipliers = np.where(is_finite, multipliers, 0.0)
         power = self.plant.power(command)[:, works].sum(axis=-1)
 
-        bound = self._bound_by_laws(wrench, lam, conditions)
+        bound = self._bound_by_laws(wrench, multipliers, conditions)
         if not self._reads_tables:
             is_served = _norms((wrench - wrench_served) / self.scale) <= NEARLY
             with_gaps = np.maximum(bound, self._bound_of_gaps(gap_power_bound, power))
@@ -370,7 +379,7 @@ class Dual(Method):
             # The multipliers are those of the smooth shapes that stand for measured tables.
             low = np.flatnonzero(bound < (1.0 - TABLE_ERROR) * power)
             by_measurements = self._bound_of_measured_tables(
-                wrench[low], lam[low], command[low], conditions
+                wrench[low], multipliers[low], command[low], conditions
             )
             bound[low] = np.maximum(bound[low], by_measurements)
 
@@ -379,13 +388,13 @@ class Dual(Method):
         bound = np.where(bound > largest_by_tables, 0.0, np.clip(bound, 0.0, power))
         return np.asarray(bound * (1.0 - ROUNDING))
 
-    def _bound_by_laws(self, wrench: Array, lam: Array, conditions: Conditions) -> Array:
+    def _bound_by_laws(self, wrench: Array, multipliers: Array, conditions: Conditions) -> Array:
         """Lower bounds (N,) [W] by the laws' conjugates: at multipliers (N, 6), or at 0 where that
         proves more."""
         # The last row is the multiplier 0, which proves for any wrench what all take at rest.
-        multipliers = np.concatenate([lam, np.zeros((1, 6))])
+        multipliers_and_zero = np.concatenate([multipliers, np.zeros((1, 6))])
         wrenches = np.concatenate([wrench, np.zeros((1, 6))])
-        bounds = power_bound(self.compiled, wrenches, multipliers, conditions)
+        bounds = power_bound(self.compiled, wrenches, multipliers_and_zero, conditions)
         return np.asarray(np.maximum(bounds[:-1], bounds[-1]))
 
     def _bound_of_gaps(self, gap_power_bound: Array, power: Array) -> Array:
@@ -400,7 +409,7 @@ class Dual(Method):
         return NEARLY * self.compiled.robot.largest_power
 
     def _bound_of_measured_tables(
-        self, wrench: Array, lam: Array, command: Array, conditions: Conditions
+        self, wrench: Array, multipliers: Array, command: Array, conditions: Conditions
     ) -> Array:
         """Lower bounds (R,) [W] for wrenches (R, 6) of commands (R, n, 3), at multipliers (R, 6)
         that are raised by the measured tables themselves."""
@@ -410,7 +419,7 @@ class Dual(Method):
             return np.empty(0)
         raised = [
             raised_multipliers(self.plant, self.scale, *row)
-            for row in zip(wrench, lam, command, strict=True)
+            for row in zip(wrench, multipliers, command, strict=True)
         ]
         return power_bound(self.compiled, wrench, np.stack(raised), conditions)
 
@@ -423,7 +432,7 @@ class Dual(Method):
         self,
         targets: Array,
         policy: Policy | None,
-        lam: Array | None = None,
+        multipliers: Array | None = None,
         conditions: Conditions = NOMINAL,
     ) -> CoreAnswer:
         """Asks the core for forces of least power, by the laws alone (Eq. 1).
@@ -431,7 +440,7 @@ class Dual(Method):
         Args:
             targets: desired wrenches (N, 6) [N, N m].
             policy: what to give out of reach; None for nothing else than the targets.
-            lam: multipliers (6,) [W/N, W/(N m)] at which Newton's method begins, for a single
+            multipliers: lambda (6,) [W/N, W/(N m)] at which Newton's method begins, for a single
                 target; None for its own.
             conditions: what holds of the robot.
 
@@ -440,7 +449,7 @@ class Dual(Method):
         """
         core = self.compiled.robot.core
         if len(targets) == 1:
-            return core.answer_one(targets[0], policy, lam, conditions)
+            return core.answer_one(targets[0], policy, multipliers, conditions)
         return core.answer_many(targets, policy, conditions)
 
     def exact(self, answer: CoreAnswer, conditions: Conditions = NOMINAL) -> Array:

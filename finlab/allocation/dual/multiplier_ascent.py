@@ -37,7 +37,7 @@ RIDGE_REFUSED = 10.0
 
 
 def raised_multipliers(
-    plant: Plant, wrench_scale: Array, wrench: Array, lam: Array, command: Array
+    plant: Plant, wrench_scale: Array, wrench: Array, multipliers: Array, command: Array
 ) -> Array:
     """Raises the bound that multipliers prove, by the laws of a plant.
 
@@ -45,7 +45,7 @@ def raised_multipliers(
         plant: the laws of n actuators, in the flow of the answer.
         wrench_scale: (6,) [N, N m], by which wrenches are normalized.
         wrench: (6,) [N, N m] that a command gives.
-        lam: its multipliers (6,) [W/N, W/(N m)], where the ascent begins.
+        multipliers: its lambda (6,) [W/N, W/(N m)], where the ascent begins.
         command: (n, 3).
 
     Returns:
@@ -63,10 +63,10 @@ def raised_multipliers(
         power=plant.power(commands).T,
         target=wrench / wrench_scale,
     )
-    lam_scaled = lam * wrench_scale
+    multipliers_scaled = multipliers * wrench_scale
     ridge = FIRST_RIDGE
     for temperature in TEMPERATURES * sampled.power[:, 0].mean():
-        negative_dual, weights = sampled.smoothed(lam_scaled, temperature)
+        negative_dual, weights = sampled.smoothed(multipliers_scaled, temperature)
         mean = np.einsum("nk,nkw->nw", weights, sampled.wrench)
         weighted = (sampled.wrench * weights[..., None]).swapaxes(1, 2)
         covariance = (weighted @ sampled.wrench).sum(axis=0) - mean.T @ mean
@@ -74,12 +74,12 @@ def raised_multipliers(
         for _ in range(ROUNDS):
             damped = covariance + (ridge * np.trace(covariance) + NOTHING) * np.eye(6)
             step = temperature * np.linalg.solve(damped, gradient)
-            if sampled.smoothed(lam_scaled + step, temperature)[0] <= negative_dual:
-                lam_scaled = lam_scaled + step
+            if sampled.smoothed(multipliers_scaled + step, temperature)[0] <= negative_dual:
+                multipliers_scaled = multipliers_scaled + step
                 ridge = RIDGE_KEPT * ridge
                 break
             ridge *= RIDGE_REFUSED
-    return lam_scaled / wrench_scale
+    return multipliers_scaled / wrench_scale
 
 
 class _SampledDual(NamedTuple):
@@ -92,11 +92,11 @@ class _SampledDual(NamedTuple):
     target: Array
     """Normalized wrench (6,) that is given."""
 
-    def smoothed(self, lam_scaled: Array, temperature: float) -> tuple[float, Array]:
+    def smoothed(self, multipliers_scaled: Array, temperature: float) -> tuple[float, Array]:
         """Returns -g_tau [W] at scaled multipliers (6,) [W], and the weights p_ik (n, SAMPLES)."""
-        exponent = (self.wrench @ lam_scaled - self.power) / temperature
+        exponent = (self.wrench @ multipliers_scaled - self.power) / temperature
         largest = exponent.max(axis=1, keepdims=True)
         exponential = np.exp(exponent - largest)  # shifted by the largest: none overflows
         total = exponential.sum(axis=1, keepdims=True)
         conjugates = temperature * (largest + np.log(total)).sum()
-        return float(conjugates - self.target @ lam_scaled), exponential / total
+        return float(conjugates - self.target @ multipliers_scaled), exponential / total

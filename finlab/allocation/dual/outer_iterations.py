@@ -4,9 +4,9 @@ at the last forces.
 With y the forces and o(y) the wrench offset that they cause (Eq. 18), an iteration takes o(y) for
 its value and slope at the last forces. Its answer is exact and cheapest on that linear model;
 Levenberg-Marquardt steps make it exact on the whole one, and shorter steps are taken where it is
-no cheaper. Where the iterations settle, the gradient of the power lies in the range of the slope
+no cheaper. Where the iterations converge, the gradient of the power lies in the range of the slope
 of the whole model: the conditions of Karush, Kuhn and Tucker hold there (sequential convex
-programming). The iterations themselves are in finlab/core/src/sequential_convex.c. Here is where
+programming). The iterations themselves are in finlab/core/src/outer_iterations.c. Here is where
 they begin: the whole model is not convex, so several starts are tried.
 """
 
@@ -72,7 +72,11 @@ def coupled_core(plant: Plant, compiled: Compiled) -> CoupledCore:
 
 
 def solve_outer(
-    method: PreparedDual, targets: Array, policy: Policy, conditions: Conditions, lam: Array | None
+    method: PreparedDual,
+    targets: Array,
+    policy: Policy,
+    conditions: Conditions,
+    multipliers: Array | None,
 ) -> Solution:
     """Solves for targets, one after the other, by outer iterations.
 
@@ -81,17 +85,17 @@ def solve_outer(
         targets: desired wrenches (N, 6) [N, N m], at least one.
         policy: what to give out of reach.
         conditions: what holds of the robot.
-        lam: multipliers (6,) [W/N, W/(N m)] at which Newton's method begins; None for its own.
+        multipliers: lambda (6,) [W/N, W/(N m)] at which Newton's method begins; None for its own.
 
     Returns:
         Commands, with the lower bound of their power by the laws alone.
     """
     commands: list[Array] = []
     wrenches: list[Array] = []
-    multipliers: list[Array] = []
+    multipliers_found: list[Array] = []
     notes: set[str] = set()
     for target in targets:
-        answer = _best_of_starts(method, target, policy, conditions, lam).answer
+        answer = _best_of_starts(method, target, policy, conditions, multipliers).answer
         assert answer is not None  # all starts that are kept were followed by iterations
         command = method.exact(answer, conditions)
         wrench_served = answer.wrench_served
@@ -101,11 +105,11 @@ def solve_outer(
             notes |= method.undriven_notes(target[None], conditions)
         commands.append(command)
         wrenches.append(wrench_served)
-        multipliers.append(answer.lam)
+        multipliers_found.append(answer.multipliers)
     return method.solution(
         np.concatenate(commands),
         np.concatenate(wrenches),
-        np.concatenate(multipliers),
+        np.concatenate(multipliers_found),
         np.zeros(len(targets)),
         notes,
         conditions,
@@ -113,19 +117,29 @@ def solve_outer(
 
 
 def _best_of_starts(
-    method: PreparedDual, target: Array, policy: Policy, conditions: Conditions, lam: Array | None
+    method: PreparedDual,
+    target: Array,
+    policy: Policy,
+    conditions: Conditions,
+    multipliers: Array | None,
 ) -> OuterResult:
     """What outer iterations come to for one target (6,): in a tick from the command before, else
     from the forces by the laws alone and, where the whole model takes more power, from others."""
     coupled = method.coupled
     if conditions.command_previous is not None:
-        return coupled.iterate(target, None, ITERATIONS_IN_TICK, policy, lam, conditions)
-    by_laws = method.forces(target[None], policy, lam, conditions)
+        return coupled.iterate(target, None, ITERATIONS_IN_TICK, policy, multipliers, conditions)
+    by_laws = method.forces(target[None], policy, multipliers, conditions)
     force_by_laws = by_laws.force[0]
-    lam_by_laws = by_laws.lam[0]
+    multipliers_by_laws = by_laws.multipliers[0]
     steps_left = MAX_WORK / len(force_by_laws)
     best = coupled.iterate(
-        target, force_by_laws, ROUNDS, policy, lam_by_laws, conditions, most_steps=steps_left
+        target,
+        force_by_laws,
+        ROUNDS,
+        policy,
+        multipliers_by_laws,
+        conditions,
+        most_steps=steps_left,
     )
     steps_left -= best.steps
 
@@ -148,7 +162,7 @@ def _best_of_starts(
                 tried[k].force,
                 ROUNDS,
                 policy,
-                lam_by_laws,
+                multipliers_by_laws,
                 conditions,
                 most_steps=steps_left,
             )

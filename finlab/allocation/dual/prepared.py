@@ -54,7 +54,11 @@ class PreparedDual(Protocol):
         ...
 
     def forces(
-        self, targets: Array, policy: Policy | None, lam: Array | None, conditions: Conditions
+        self,
+        targets: Array,
+        policy: Policy | None,
+        multipliers: Array | None,
+        conditions: Conditions,
     ) -> CoreAnswer:
         """Answers wrenches (N, 6) by the laws alone; see `Dual.forces`."""
         ...
@@ -85,7 +89,7 @@ class PreparedDual(Protocol):
         self,
         command: Array,
         wrench_served: Array,
-        lam: Array,
+        multipliers: Array,
         gap_power_bound: Array,
         notes: set[str],
         conditions: Conditions,

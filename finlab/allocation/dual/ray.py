@@ -26,7 +26,7 @@ class RowAnswer(NamedTuple):
     """(n, 3)."""
     wrench_served: Array
     """Wrench (6,) [N, N m] that the command gives."""
-    lam: Array
+    multipliers: Array
     """Multipliers (6,) [W/N, W/(N m)]."""
     gap_power_bound: float
     """Power [W] that gaps are proved to need for that wrench, by the core's tables."""
@@ -59,7 +59,7 @@ def keep_on_rays(
         first = RowAnswer(
             command[row],
             answer.wrench_served[row],
-            answer.lam[row],
+            answer.multipliers[row],
             float(answer.gap_power_bound[row]),
         )
         on_ray = _on_ray(method, targets[row], first, conditions)
@@ -68,7 +68,7 @@ def keep_on_rays(
             continue
         command[row] = on_ray.command
         answer.wrench_served[row] = on_ray.wrench_served
-        answer.lam[row] = on_ray.lam
+        answer.multipliers[row] = on_ray.multipliers
         answer.gap_power_bound[row] = on_ray.gap_power_bound
     return notes
 
@@ -101,7 +101,9 @@ def _on_ray(
             high = middle
             continue
         low = middle
-        best = RowAnswer(command[0], tried[0], answer.lam[0], float(answer.gap_power_bound[0]))
+        best = RowAnswer(
+            command[0], tried[0], answer.multipliers[0], float(answer.gap_power_bound[0])
+        )
     if best is not None:
         return best
     cancelling = _cancelling_command(method, conditions)

@@ -58,7 +58,7 @@ static push_direction direction_of(const fl_set *set, const real *gauge, const r
     const gauge_point sigma = fl_gauge_support(gauge, x, y);
     g.x = sigma.value * x - sigma.slope * y;
     g.y = sigma.value * y + sigma.slope * x;
-    turning *= fl_larger(sigma.value + sigma.bend, 0);
+    turning *= larger(sigma.value + sigma.bend, 0);
     g.v *= sigma.value;
   }
   if (set->sector_half_angle < PI) {
@@ -157,11 +157,11 @@ typedef struct {
 
 static soft_ratio soft_ratio_of(real r) {
   soft_ratio ratio = {r, r, 0, 0};
-  const real exponent = fl_smaller(r / SOFT - 1, 0);
+  const real exponent = smaller(r / SOFT - 1, 0);
   const real decay = EXP(exponent);
   if (decay > CLOSE) ratio.dq = decay; /* 1 where q = r */
   if (exponent < 0) {
-    ratio.q = SOFT * fl_larger(decay, CLOSE);
+    ratio.q = SOFT * larger(decay, CLOSE);
     ratio.ddq = ratio.dq / SOFT;
   }
   return ratio;
@@ -184,7 +184,7 @@ static response foil_response(const real *block, const fl_actuator *a, const fl_
   const real P_0 = power_at_rest(block, a);
 
   power_chord chord;
-  const real range = fl_larger(set->force_max - set->force_min, TINY);
+  const real range = larger(set->force_max - set->force_min, TINY);
   chord.slope = (set->cost_at_max - set->cost_at_min) / range;
   const real v = (price[0] + excess * chord.slope) / q;
   const line_response lift = fl_limited_response(block, a, set, 1, v); /* y = T(v), with P_0 + P */
@@ -212,7 +212,7 @@ static response foil_response(const real *block, const fl_actuator *a, const fl_
 static response tangent_response(const fl_set *set, const real *price) {
   const fl_tangent *t = set->tangent;
   const real gain = dot(price, t->force_slope, 2) - t->cost_slope; /* s.y' - c' [W/rad] */
-  const real d = fl_clipped(gain / t->curvature, set->force_min, set->force_max);
+  const real d = clipped(gain / t->curvature, set->force_min, set->force_max);
   real dd = 0; /* derivative of d by the gain; 0 at the limits */
   if (d > set->force_min && d < set->force_max) dd = 1 / t->curvature;
   const real x = t->force_slope[0];
@@ -311,7 +311,7 @@ real fl_support_of_set(const real *block, int i, const fl_set *set, const real *
   /* Without a gauge its length is 1 but for rounding, which would be that of the set: a step of
      Newton's method for the inverse root takes it off. */
   wide length_squared = 1;
-  if (!(a->gauge_table > 0)) length_squared = product(force, force, 2);
+  if (!(a->gauge_table > 0)) length_squared = dot_wide(force, force, 2);
   const wide times = size / 2 * (3 - length_squared);
   force[0] *= times;
   force[1] *= times;
@@ -340,6 +340,6 @@ int fl_undecided(const real *block, int i, const fl_set *set, const real *price,
   const real p = (1 + delta / root) / 2; /* Eq. 26 */
   const real dx = ahead.force[0] - reverse.force[0];
   const real dy = ahead.force[1] - reverse.force[1];
-  *off = fl_smaller(p, 1 - p) * SQRT(dx * dx + dy * dy);
+  *off = smaller(p, 1 - p) * SQRT(dx * dx + dy * dy);
   return p >= R(0.5);
 }

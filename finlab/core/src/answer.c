@@ -8,7 +8,7 @@
 #define LARGEST R(1e12) /* wrench, price or command of a question */
 #define MOST_CALM 1000
 #define STEPS_BY_LAWS 12 /* on commands, to a wrench a little beyond the tables */
-/* Error on the yardstick, beyond reach, up to which the laws may yet meet the target. */
+/* Error over the wrench scale, beyond reach, up to which the laws may yet meet the target. */
 #define BEYOND_TABLES (10 * CLOSE)
 /* A drive that passes a dead band stays within it by this share of the band. */
 #define INSIDE_BAND (1 - 10 * NEARLY)
@@ -29,7 +29,7 @@ static void begin_answer(const real *block, const real *wrench, fl_answer *out) 
   out->newton_status = FL_MET;
   out->has_foil_commands = 0;
   memset(out->lambda_reduced, 0, sizeof out->lambda_reduced);
-  memset(out->prices, 0, sizeof out->prices);
+  memset(out->multipliers, 0, sizeof out->multipliers);
   memset(out->force, 0, (size_t)COUNT(block) * sizeof out->force[0]);
   memcpy(out->wrench_served, wrench, sizeof out->wrench_served);
 }
@@ -45,13 +45,13 @@ static void answer_without_forces(const real *wrench, fl_answer *out) {
 
 /* Brings forces that may lie in gaps of their sets out of these, where the target is within reach
    of the convex hulls; returns whether it is within reach of the sets. */
-static int leave_gaps(const real *block, fl_work *work, const real *target, int status, int within,
-                      fl_answer *out) {
+static int leave_gaps(const real *block, fl_work *work, const real *target_reduced, int status,
+                      int within, fl_answer *out) {
   const int is_in_gap = fl_worst_gap(block, work, out->force, out->lambda_reduced) >= 0;
   if (!within || !is_in_gap) return within && status == FL_MET;
   real bound;
   out->gap_power_bound = 0;
-  if (!fl_search_gaps(block, work, target, status, &bound)) return 0;
+  if (!fl_search_gaps(block, work, target_reduced, status, &bound)) return 0;
   copy_forces(block, work->best_force, out->force);
   if (!work->has_turn_cost)
     out->gap_power_bound = bound * (1 - FINE); /* with turning it is more than power */
@@ -64,28 +64,28 @@ static int leave_gaps(const real *block, fl_work *work, const real *target, int 
 static void find_forces(const real *block, fl_work *work, const real *wrench,
                         const fl_policy *policy, const real *lambda, fl_answer *out) {
   const fl_span *span = &work->span;
-  real target[6];
+  real target_reduced[6];
   begin_answer(block, wrench, out);
-  fl_reduce_wrench(work, wrench, target);
+  fl_reduce_wrench(work, wrench, target_reduced);
   if (span->rank == 0) {
     answer_without_forces(wrench, out);
     return;
   }
   const int has_kinks = work->has_forks || work->has_drag || work->has_turn_cost;
-  const int is_in_range = fl_is_in_range(work, wrench, target);
+  const int is_in_range = fl_is_in_range(work, wrench, target_reduced);
   int most_steps = FL_STEPS;
   if (has_kinks) most_steps = FL_STEPS_AT_KINK;
-  const int status = fl_dual_newton(block, work, target, lambda, most_steps);
+  const int status = fl_dual_newton(block, work, target_reduced, lambda, most_steps);
   const int may_be_met = status == FL_MET || (status == FL_STUCK && has_kinks);
   int within = may_be_met && is_in_range;
   out->newton_status = status;
   memcpy(out->lambda_reduced, work->state_found->lambda_reduced, sizeof out->lambda_reduced);
   copy_forces(block, work->state_found->force, out->force);
   if (work->has_drag) {
-    within = is_in_range && fl_answer_with_drag(block, work, target, status, out);
+    within = is_in_range && fl_answer_with_drag(block, work, target_reduced, status, out);
     if (within) copy_forces(block, work->best_force, out->force);
   } else if (fl_may_have_gaps(block, work, out->force)) {
-    within = leave_gaps(block, work, target, status, within, out);
+    within = leave_gaps(block, work, target_reduced, status, within, out);
   }
   out->is_attainable = within;
   if (!within && policy) {
@@ -93,15 +93,16 @@ static void find_forces(const real *block, fl_work *work, const real *wrench,
     fl_out_of_reach(block, work, wrench, policy, out);
   }
   for (int k = 0; k < 6; k++) {
-    out->prices[k] = dot(span->basis[k], out->lambda_reduced, span->rank) / span->axis_scale[k];
+    out->multipliers[k] = dot(span->basis[k], out->lambda_reduced, span->rank) /
+                          span->axis_scale[k];
   }
 }
 
 /* Reduced multipliers to begin with [W]: those of a question, which go to `lambda`, or those of the
    commands before in a tick; 0 where there are none, or none of use. */
 static const real *first_multipliers(const fl_work *work, const fl_question *q, real *lambda) {
-  if (q->prices) {
-    fl_reduce_lambda(work, q->prices, lambda);
+  if (q->multipliers) {
+    fl_reduce_lambda(work, q->multipliers, lambda);
     if (fl_are_within(lambda, 6, LARGEST)) return lambda;
     return 0;
   }
@@ -114,7 +115,7 @@ static const real *first_multipliers(const fl_work *work, const fl_question *q, 
 static int may_pass_bands(const real *block, const fl_work *work, real command[][3]) {
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
-    const int k = fl_force_number(a);
+    const int k = fl_form_of(a)->force_number;
     if (work->span.is_lost[i] || !fl_is_in_dead_band(a, command[i])) continue;
     const int is_limited_below = work->box.command_min[i][k] > a->command_min[k];
     const int is_limited_above = work->box.command_max[i][k] < a->command_max[k];
@@ -146,17 +147,17 @@ static void pass_bands(const real *block, fl_work *work, const fl_question *q, r
   fl_limits_without_tick(block, work);
   wrench_that_counts(&work->span, q, wrench);
   take_off_offset(&work->span, wrench, of_forces);
-  memcpy(work->wrench_target, wrench, sizeof work->wrench_target);
+  memcpy(work->wrench_wanted, wrench, sizeof work->wrench_wanted);
   find_forces(block, work, of_forces, q->policy, 0, &later);
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
-    const int k = fl_force_number(a);
+    const int k = fl_form_of(a)->force_number;
     const real most = a->dead_band * INSIDE_BAND;
     if (work->span.is_lost[i] || !fl_is_in_dead_band(a, command[i])) continue;
     if (size_of(later.force[i]) < most) continue;
     real wanted[3];
     fl_command_for_force(block, i, &box, later.force[i], q->previous + 3 * i, wanted);
-    wanted[k] = fl_clipped(wanted[k], -most, most);
+    wanted[k] = clipped(wanted[k], -most, most);
     memcpy(command[i], wanted, sizeof wanted);
   }
   work->box = box;
@@ -191,7 +192,7 @@ static void answer_question(const real *block, fl_work *work, const fl_question 
   real of_forces[6];
   wrench_that_counts(span, q, wrench_desired);
   take_off_offset(span, wrench_desired, of_forces);
-  memcpy(work->wrench_target, wrench_desired, sizeof work->wrench_target);
+  memcpy(work->wrench_wanted, wrench_desired, sizeof work->wrench_wanted);
   work->newton_steps = 0;
   work->is_truncated = 0;
   work->command_previous = q->previous;

@@ -79,15 +79,8 @@ static int is_grid(const real *block, real offset) {
   return period == 0 || first_knot + period > last_knot;
 }
 
-/* How many of the three numbers of a command a kind uses. */
-static int used_numbers(real command_kind) {
-  if (command_kind == FL_FIN) return 3;
-  if (command_kind == FL_POD) return 2;
-  return 1;
-}
-
 static int are_command_limits(const fl_actuator *a) {
-  const int used = used_numbers(a->command_kind);
+  const int used = fl_form_of(a)->numbers;
   for (int k = 0; k < 3; k++) {
     if (!(a->max_change[k] >= 0)) return 0;
     if (k < used && !(a->command_min[k] <= a->command_max[k])) return 0;
@@ -99,19 +92,20 @@ static int are_command_limits(const fl_actuator *a) {
 
 /* Whether all offsets of an actuator are those of tables that it needs. */
 static int has_tables(const real *block, const fl_actuator *a) {
+  const command_form *form = fl_form_of(a);
   if (!is_table(block, a->force_table, FORCE_TABLE)) return 0;
   if (!is_table_or_none(block, a->force_table_reverse, FORCE_TABLE)) return 0;
   if (!is_table_or_none(block, a->gauge_table, GAUGE)) return 0;
-  if (a->command_kind == FL_FIN && !is_table(block, a->command_table, BEAT)) return 0;
-  if (a->command_kind == FL_FOIL && !is_table(block, a->command_table, CURVE)) return 0;
-  if (a->command_kind >= FL_FIN) return is_grid(block, a->law_grid);
+  if (form->command_table == BEAT_TABLE && !is_table(block, a->command_table, BEAT)) return 0;
+  if (form->command_table == CURVE_TABLE && !is_table(block, a->command_table, CURVE)) return 0;
+  if (form->has_law_grid) return is_grid(block, a->law_grid);
   return a->law_grid == 0;
 }
 
 /* An error code of one actuator. */
 static int check_actuator(const real *block, const fl_actuator *a) {
   if (a->rows != 1 && a->rows != 2) return FL_BAD_BLOCK;
-  if (!is_whole_number(a->command_kind, FL_THRUSTER, FL_FOIL)) return FL_BAD_BLOCK;
+  if (!is_whole_number(a->command_kind, 0, FL_KINDS - 1)) return FL_BAD_BLOCK;
   if (!has_tables(block, a)) return FL_BAD_BLOCK;
   if (!are_command_limits(a)) return FL_BAD_NUMBER;
   const real price_max = block[(int)a->force_table];
@@ -122,7 +116,7 @@ static int check_actuator(const real *block, const fl_actuator *a) {
   if (!(a->force_min <= a->force_max && a->sector_half_angle >= 0)) return FL_BAD_NUMBER;
   if (!(a->dead_band >= 0 && a->flow_speed >= 0 && a->uncertainty_cost >= 0)) return FL_BAD_NUMBER;
   if (!(a->secant[0] >= 0 && a->secant[1] >= 0)) return FL_BAD_NUMBER;
-  const int drags = a->command_kind == FL_FOIL && a->rows == 2;
+  const int drags = fl_form_of(a)->has_drag && a->rows == 2;
   if (a->flow_speed > 0 && !drags) return FL_BAD_BLOCK;
   return FL_OK;
 }

@@ -1,22 +1,7 @@
-/* Commands within their limits: which number is an angle or a force, limits of angles that
-   turn freely, dead bands. */
+/* Commands within their limits: angles that turn freely, dead bands. */
 #include "internal.h"
 
 #define AT_EDGE R(0.9) /* of a dead band: forces above this share of it are put at its edge */
-
-/* Which number of a command is an angle; -1 where none is. */
-int fl_angle_number(const fl_actuator *a) {
-  if (a->command_kind == FL_FIN) return 2;
-  if (a->command_kind == FL_POD) return 0;
-  return -1;
-}
-
-/* Which number of a command is a force; -1 where none is. */
-int fl_force_number(const fl_actuator *a) {
-  if (a->command_kind == FL_THRUSTER) return 0;
-  if (a->command_kind == FL_POD) return 1;
-  return -1;
-}
 
 /* A number of a command in a box, an angle wrapped first. */
 real fl_clip_number(const fl_box *box, int i, int k, int angle, real value) {
@@ -24,14 +9,14 @@ real fl_clip_number(const fl_box *box, int i, int k, int angle, real value) {
   const real high = box->command_max[i][k];
   const real middle = (low + high) / 2;
   if (k == angle) value = middle + fl_wrap_angle(value - middle);
-  return fl_clipped(value, low, high);
+  return clipped(value, low, high);
 }
 
 /* Whether a command lies in the dead band of its actuator, where it gives no force; on its
    edge but for rounding it does not. */
 int fl_is_in_dead_band(const fl_actuator *a, const real *command) {
-  const int k = fl_force_number(a);
-  return k >= 0 && FABS(command[k]) < a->dead_band * (1 - NEARLY);
+  const int k = fl_form_of(a)->force_number;
+  return k != NO_NUMBER && FABS(command[k]) < a->dead_band * (1 - NEARLY);
 }
 
 /* The edge of a dead band on the side of a command. */
@@ -45,8 +30,8 @@ static real edge_of_band(const fl_actuator *a, real command) {
 void fl_leave_dead_bands(const real *block, real force[][2], real command[][3]) {
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
-    const int k = fl_force_number(a);
-    if (k < 0 || !fl_is_in_dead_band(a, command[i])) continue;
+    const int k = fl_form_of(a)->force_number;
+    if (k == NO_NUMBER || !fl_is_in_dead_band(a, command[i])) continue;
     if (size_of(force[i]) < AT_EDGE * a->dead_band) continue;
     command[i][k] = edge_of_band(a, command[i][k]);
   }
@@ -57,8 +42,8 @@ void fl_leave_dead_bands(const real *block, real force[][2], real command[][3]) 
 void fl_rest_in_dead_bands(const real *block, const fl_box *box, real command[][3]) {
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
-    const int k = fl_force_number(a);
-    if (k < 0 || !(FABS(command[i][k]) < a->dead_band)) continue;
+    const int k = fl_form_of(a)->force_number;
+    if (k == NO_NUMBER || !(FABS(command[i][k]) < a->dead_band)) continue;
     if (!fl_is_in_dead_band(a, command[i]))
       command[i][k] = edge_of_band(a, command[i][k]);
     else if (box->command_min[i][k] <= 0 && box->command_max[i][k] >= 0)
@@ -76,7 +61,7 @@ int fl_is_known_command(const real *command) {
 void fl_clip_commands(const real *block, const fl_box *box, real command[][3]) {
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
-    const int angle = fl_angle_number(a);
+    const int angle = fl_form_of(a)->angle_number;
     for (int k = 0; k < 3; k++) {
       real value = command[i][k];
       if (!(k == angle && box->is_free_angle[i])) value = fl_clip_number(box, i, k, angle, value);
@@ -84,7 +69,7 @@ void fl_clip_commands(const real *block, const fl_box *box, real command[][3]) {
         const real middle = (a->command_min[k] + a->command_max[k]) / 2;
         value = middle + fl_wrap_angle(value - middle);
       }
-      command[i][k] = fl_clipped(value, a->command_min[k], a->command_max[k]);
+      command[i][k] = clipped(value, a->command_min[k], a->command_max[k]);
     }
   }
 }

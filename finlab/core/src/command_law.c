@@ -89,7 +89,7 @@ static void weights_at(const grid_axis *axis, real x, int has_slope, knot_weight
     end = begin + axis->period;
     x -= axis->period * FLOOR((x - begin) / axis->period);
   }
-  const real held = fl_clipped(x, begin, end);
+  const real held = clipped(x, begin, end);
   const int cell = cell_of(knot, cells, end, held);
   const real from = knot[cell];
   real to = end;
@@ -185,6 +185,16 @@ static void grid_at(const real *grid, const real *command, real *value, real (*s
   }
 }
 
+/* Force of a thruster: its one number. */
+static void thruster_force(const real *block, const fl_actuator *a, const real *command,
+                           real *force, real (*slope)[3], int has_slope) {
+  (void)block;
+  (void)a;
+  (void)has_slope;
+  force[0] = command[0];
+  slope[0][0] = 1;
+}
+
 /* Force of a pod: its second number along its first, an angle; of a fin by its force with a
    gauge rho. */
 static void pod_force(const real *block, const fl_actuator *a, const real *command, real *force,
@@ -213,8 +223,9 @@ static void pod_force(const real *block, const fl_actuator *a, const real *comma
 }
 
 /* Lift of a foil and its drag beyond that at rest, by its angle. */
-static void foil_force(const fl_actuator *a, const real *grid, const real *command, real *force,
+static void foil_force(const real *block, const fl_actuator *a, const real *command, real *force,
                        real (*slope)[3], int has_slope) {
+  const real *grid = block + (int)a->law_grid;
   const real along[3] = {0, 0, command[0] - a->lean_angle};
   real by[3][3] = {{0}};
   real(*by_or_none)[3] = 0;
@@ -229,8 +240,8 @@ static void foil_force(const fl_actuator *a, const real *grid, const real *comma
 
 /* Force of a fin whose law gives a size, by amplitude and frequency, along the third
    command, an angle. */
-static void fin_force(const fl_actuator *a, const real *grid, const real *command, real *force,
-                      real (*slope)[3], int has_slope) {
+static void sized_fin_force(const fl_actuator *a, const real *grid, const real *command,
+                            real *force, real (*slope)[3], int has_slope) {
   real size;
   real by[3][3] = {{0}};
   real(*by_or_none)[3] = 0;
@@ -258,31 +269,18 @@ static void fin_force(const fl_actuator *a, const real *grid, const real *comman
   slope[2][2] += force[1];
 }
 
-/* Force along an actuator's own axes (3,) of a command (3,), and, where there is room for
-   them, its derivatives (3 commands, 3 axes). */
-void fl_force_of_command(const real *block, int i, const real *command, real *force,
-                         real (*slope)[3]) {
-  const fl_actuator *a = ACTUATOR(block, i);
+/* Force of a fin, by a law of one column, its size, or of three, along its own axes. */
+static void fin_force(const real *block, const fl_actuator *a, const real *command, real *force,
+                      real (*slope)[3], int has_slope) {
   const real *grid = block + (int)a->law_grid;
-  const int has_slope = slope != 0;
-  real unused[3][3];
-  if (!has_slope) slope = unused;
-  memset(force, 0, 3 * sizeof *force);
-  memset(slope, 0, 9 * sizeof **slope);
-  if (a->command_kind == FL_THRUSTER) {
-    force[0] = command[0];
-    slope[0][0] = 1;
-  } else if (a->command_kind == FL_POD) {
-    pod_force(block, a, command, force, slope, has_slope);
-  } else if (a->command_kind == FL_FOIL) {
-    foil_force(a, grid, command, force, slope, has_slope);
-  } else if (grid[5] == 1) {
-    fin_force(a, grid, command, force, slope, has_slope);
-  } else {
-    real(*slope_or_none)[3] = 0;
-    if (has_slope) slope_or_none = slope;
-    grid_at(grid, command, force, slope_or_none);
+  const int columns = (int)grid[5];
+  if (columns == 1) {
+    sized_fin_force(a, grid, command, force, slope, has_slope);
+    return;
   }
+  real(*slope_or_none)[3] = 0;
+  if (has_slope) slope_or_none = slope;
+  grid_at(grid, command, force, slope_or_none);
 }
 
 /* Where an ascending column of a curve (count, 2) has a value: linear between its points. */
@@ -300,7 +298,7 @@ static real on_curve(const real *curve, real value) {
   }
   const real width = row[2 * high] - row[2 * low];
   real t = 0;
-  if (width > 0) t = fl_clipped((value - row[2 * low]) / width, 0, 1);
+  if (width > 0) t = clipped((value - row[2 * low]) / width, 0, 1);
   return row[2 * low + 1] + t * (row[2 * high + 1] - row[2 * low + 1]);
 }
 
@@ -308,7 +306,7 @@ static real on_curve(const real *curve, real value) {
    (j / k)^2. */
 static void beat_at(const real *beat, real share, real *command) {
   const int cells = (int)beat[0];
-  const real position = SQRT(fl_clipped(share, 0, 1)) * (real)cells;
+  const real position = SQRT(clipped(share, 0, 1)) * (real)cells;
   int cell = (int)position;
   if (cell > cells - 1) cell = cells - 1;
   const real *row = beat + 1 + 2 * cell;
@@ -317,8 +315,33 @@ static void beat_at(const real *beat, real share, real *command) {
   }
 }
 
+/* Command of a thruster for a force along its row. */
+static void thruster_command(const real *block, int i, const fl_box *box, const real *force,
+                             const real *before, real *command) {
+  (void)before;
+  const real wanted = ACTUATOR(block, i)->command_sign * force[0];
+  command[0] = fl_clip_number(box, i, 0, NO_NUMBER, wanted);
+  command[1] = 0;
+  command[2] = 0;
+}
+
+/* Angle of a foil for a lift, the first of its rows. */
+static void foil_command(const real *block, int i, const fl_box *box, const real *force,
+                         const real *before, real *command) {
+  (void)before;
+  const fl_actuator *a = ACTUATOR(block, i);
+  const real lift = force[0];
+  real angle = on_curve(block + (int)a->command_table, FABS(lift) / a->pressure_area);
+  if (lift < 0) angle = -angle;
+  command[0] = fl_clip_number(box, i, 0, NO_NUMBER, angle + a->zero_lift_angle);
+  command[1] = 0;
+  command[2] = 0;
+}
+
+/* Beat of a fin for a force in its plane. */
 static void fin_command(const real *block, int i, const fl_box *box, const real *force,
-                        real *command) {
+                        const real *before, real *command) {
+  (void)before;
   const fl_actuator *a = ACTUATOR(block, i);
   const real *gauge = 0;
   if (a->gauge_table > 0) gauge = block + (int)a->gauge_table;
@@ -339,7 +362,7 @@ static void fin_command(const real *block, int i, const fl_box *box, const real 
     if (k == 1) break;
     real delivered[3];
     fl_force_of_command(block, i, command, delivered, 0);
-    wanted = fl_larger(wanted + size - size_of(delivered + 1), 0);
+    wanted = larger(wanted + size - size_of(delivered + 1), 0);
     if (gauge && size > 0) angle += fl_wrap_angle(direction - ATAN2(delivered[2], delivered[1]));
   }
 }
@@ -369,12 +392,13 @@ static pod_way pod_way_of(const real *block, int i, const fl_box *box, real angl
 /* Angle and force of a pod, one way or the other: what comes nearer to a force, or the
    cheaper one. */
 static void pod_command(const real *block, int i, const fl_box *box, const real *force,
-                        real angle_before, real *command) {
+                        const real *before, real *command) {
   const fl_actuator *a = ACTUATOR(block, i);
   const real direction = ATAN2(force[1], force[0]);
   real size = size_of(force);
   if (a->gauge_table > 0) size /= fl_gauge_radius(block + (int)a->gauge_table, direction);
-  real angle = angle_before;
+  real angle = 0;
+  if (before) angle = before[0];
   if (size > 0) angle = direction;
   const pod_way ahead = pod_way_of(block, i, box, angle, size, 0);
   const pod_way back = pod_way_of(block, i, box, angle, size, 1);
@@ -389,47 +413,21 @@ static void pod_command(const real *block, int i, const fl_box *box, const real 
   command[2] = 0;
 }
 
-/* A command within a box for a force, as near as the tables are; an angle that does not
-   count stays that of the command before, where there is one. */
-void fl_command_for_force(const real *block, int i, const fl_box *box, const real *force,
-                          const real *before, real *command) {
-  const fl_actuator *a = ACTUATOR(block, i);
-  if (a->command_kind == FL_FIN) {
-    fin_command(block, i, box, force, command);
-    return;
-  }
-  if (a->command_kind == FL_POD) {
-    real angle_before = 0;
-    if (before) angle_before = before[0];
-    pod_command(block, i, box, force, angle_before, command);
-    return;
-  }
-  real wanted = a->command_sign * force[0];
-  if (a->command_kind == FL_FOIL) {
-    real angle = on_curve(block + (int)a->command_table, FABS(force[0]) / a->pressure_area);
-    if (force[0] < 0) angle = -angle;
-    wanted = angle + a->zero_lift_angle;
-  }
-  command[0] = fl_clip_number(box, i, 0, -1, wanted);
-  command[1] = 0;
-  command[2] = 0;
-}
-
 /* Least and largest force of a fin, or lift of a foil, on a grid of the commands within a
    box; and the direction of the largest one. */
 #define PROBES 5
 static void sizes_in(const real *block, int i, const fl_box *box, real *least, real *largest,
                      real *direction) {
-  const fl_actuator *a = ACTUATOR(block, i);
+  const int is_lift = fl_form_of(ACTUATOR(block, i))->has_drag;
   const real *low = box->command_min[i];
   const real *high = box->command_max[i];
-  *least = R(1e30);
-  *largest = -R(1e30);
+  *least = LARGEST_NUMBER;
+  *largest = -LARGEST_NUMBER;
   *direction = 0;
   for (int j = 0; j < PROBES * PROBES; j++) {
     real command[3] = {0, 0, (low[2] + high[2]) / 2};
     real force[3];
-    if (a->command_kind == FL_FOIL) {
+    if (is_lift) {
       command[0] = low[0] + (real)j / (PROBES * PROBES - 1) * (high[0] - low[0]);
     } else {
       command[0] = low[0] + (real)(j % PROBES) / (PROBES - 1) * (high[0] - low[0]);
@@ -437,41 +435,51 @@ static void sizes_in(const real *block, int i, const fl_box *box, real *least, r
     }
     fl_force_of_command(block, i, command, force, 0);
     real size = force[0];
-    if (a->command_kind != FL_FOIL) size = size_of(force + 1);
+    if (!is_lift) size = size_of(force + 1);
     if (size > *largest) *direction = ATAN2(force[2], force[1]);
-    *least = fl_smaller(*least, size);
-    *largest = fl_larger(*largest, size);
+    *least = smaller(*least, size);
+    *largest = larger(*largest, size);
   }
 }
 
-/* What commands within a box give: least and largest force [N], of planes below 0 in
-   reverse, and the arc of their directions [rad]. */
-force_range fl_force_range(const real *block, int i, const fl_box *box) {
-  const fl_actuator *a = ACTUATOR(block, i);
-  const real *low = box->command_min[i];
-  const real *high = box->command_max[i];
+static force_range thruster_range(const real *block, int i, const fl_box *box) {
+  const real low = box->command_min[i][0];
+  const real high = box->command_max[i][0];
+  force_range range = {low, high, 0, 0};
+  if (!(ACTUATOR(block, i)->command_sign > 0)) {
+    range.low = -high;
+    range.high = -low;
+  }
+  return range;
+}
+
+static force_range foil_range(const real *block, int i, const fl_box *box) {
   force_range range = {0, 0, 0, 0};
-  if (a->command_kind == FL_THRUSTER) {
-    range.low = low[0];
-    range.high = high[0];
-    if (!(a->command_sign > 0)) {
-      range.low = -high[0];
-      range.high = -low[0];
-    }
-    return range;
-  }
-  if (a->command_kind == FL_FOIL) {
-    real unused;
-    sizes_in(block, i, box, &range.low, &range.high, &unused);
-    return range;
-  }
-  const int angle = fl_angle_number(a);
-  range.middle = (low[angle] + high[angle]) / 2;
-  range.half = (high[angle] - low[angle]) / 2;
+  real unused;
+  sizes_in(block, i, box, &range.low, &range.high, &unused);
+  return range;
+}
+
+/* Arc of the angles of a command within a box; `low` and `high` are 0. */
+static force_range arc_of(const real *block, int i, const fl_box *box) {
+  const int angle = fl_form_of(ACTUATOR(block, i))->angle_number;
+  const real low = box->command_min[i][angle];
+  const real high = box->command_max[i][angle];
+  force_range range = {0, 0, (low + high) / 2, (high - low) / 2};
   if (range.half >= PI - NOTHING) range.half = PI;
-  range.low = low[1];
-  range.high = high[1];
-  if (a->command_kind == FL_POD) return range;
+  return range;
+}
+
+static force_range pod_range(const real *block, int i, const fl_box *box) {
+  force_range range = arc_of(block, i, box);
+  range.low = box->command_min[i][1];
+  range.high = box->command_max[i][1];
+  return range;
+}
+
+static force_range fin_range(const real *block, int i, const fl_box *box) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  force_range range = arc_of(block, i, box);
   real direction;
   sizes_in(block, i, box, &range.low, &range.high, &direction);
   /* where the force points at the middle of the commands' arc */
@@ -482,6 +490,55 @@ force_range fl_force_range(const real *block, int i, const fl_box *box) {
     range.high /= rho;
   }
   return range;
+}
+
+/* The law of a kind of command, in three questions. */
+typedef struct {
+  /* Becomes the force (3,) of a command, and where `has_slope` its derivatives (3, 3); both are
+     zeros before. */
+  void (*force)(const real *block, const fl_actuator *a, const real *command, real *force,
+                real (*slope)[3], int has_slope);
+  /* Becomes the command within a box for a force along the rows, `before` the one of the tick
+     before or 0. */
+  void (*command)(const real *block, int i, const fl_box *box, const real *force,
+                  const real *before, real *command);
+  /* What commands within a box give. */
+  force_range (*range)(const real *block, int i, const fl_box *box);
+} command_law;
+
+static const command_law LAWS[FL_KINDS] = {
+    [FL_THRUSTER] = {thruster_force, thruster_command, thruster_range},
+    [FL_POD] = {pod_force, pod_command, pod_range},
+    [FL_FIN] = {fin_force, fin_command, fin_range},
+    [FL_FOIL] = {foil_force, foil_command, foil_range},
+};
+
+static const command_law *law_of(const fl_actuator *a) { return LAWS + (int)a->command_kind; }
+
+/* Force along an actuator's own axes (3,) of a command (3,), and, where there is room for
+   them, its derivatives (3 commands, 3 axes). */
+void fl_force_of_command(const real *block, int i, const real *command, real *force,
+                         real (*slope)[3]) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  const int has_slope = slope != 0;
+  real unused[3][3];
+  if (!has_slope) slope = unused;
+  memset(force, 0, 3 * sizeof *force);
+  memset(slope, 0, 9 * sizeof **slope);
+  law_of(a)->force(block, a, command, force, slope, has_slope);
+}
+
+/* A command within a box for a force, as near as the tables are; an angle that does not
+   count stays that of the command before, where there is one. */
+void fl_command_for_force(const real *block, int i, const fl_box *box, const real *force,
+                          const real *before, real *command) {
+  law_of(ACTUATOR(block, i))->command(block, i, box, force, before, command);
+}
+
+/* What commands within a box give: least and largest force [N], of planes below 0 in
+   reverse, and the arc of their directions [rad]. */
+force_range fl_force_range(const real *block, int i, const fl_box *box) {
+  return law_of(ACTUATOR(block, i))->range(block, i, box);
 }
 
 /* Commands within a box for the forces of all actuators; `previous` commands (n, 3) or 0. */

@@ -2,7 +2,7 @@
 
        step = J' (J J' + (mu + epsilon) tr(J J') I)^-1 r    with    epsilon = ROUNDING REGULAR
 
-   r is the residual of the wrench on the yardstick, J the Jacobian of that wrench by the
+   r is the residual of the wrench over the wrench scale, J the Jacobian of that wrench by the
    commands over the widths of their limits, so that `step` is a share of these widths. What a
    step would take out of the limits is held, and the step found anew without it. */
 #include "internal.h"
@@ -12,7 +12,7 @@
 #define MU_REFUSED 10   /* the same after a refused step */
 #define REGULAR R(0.01) /* least damping (epsilon of Eq. 11) over the rounding of numbers */
 
-/* The residual (6,) of commands, on the yardstick. Returns its square. */
+/* The residual (6,) of commands, over the wrench scale. Returns its square. */
 static real residual_of(const real *block, const fl_work *work, const real *wrench_wanted,
                         real command[][3], real *residual) {
   const real *scale = HEAD(block)->wrench_scale;
@@ -36,7 +36,7 @@ static real residual_of(const real *block, const fl_work *work, const real *wren
   return dot(residual, residual, 6);
 }
 
-/* The Jacobian J of the wrench on the yardstick by the commands over the widths of their
+/* The Jacobian J of the wrench over the wrench scale by the commands over the widths of their
    limits, into the work area. */
 static void find_jacobian(const real *block, fl_work *work, const fl_box *box, real command[][3]) {
   const unsigned char *counts = work->span.axis_counts;
@@ -64,7 +64,7 @@ static void find_jacobian(const real *block, fl_work *work, const fl_box *box, r
 /* Whether a step takes number c of a command out of its limits. */
 static int leaves_box(const real *block, const fl_box *box, int i, int c, const real *command,
                       real step) {
-  if (c == fl_angle_number(ACTUATOR(block, i)) && box->is_free_angle[i]) return 0;
+  if (c == fl_form_of(ACTUATOR(block, i))->angle_number && box->is_free_angle[i]) return 0;
   if (step < 0) return command[c] <= box->command_min[i][c] + NOTHING;
   if (step > 0) return command[c] >= box->command_max[i][c] - NOTHING;
   return 0;
@@ -124,7 +124,7 @@ static void step_within(const real *block, fl_work *work, const fl_box *box, rea
 static void take_step(const real *block, const fl_box *box, real command[][3], real step[][3],
                       real stepped[][3]) {
   for (int i = 0; i < COUNT(block); i++) {
-    const int angle = fl_angle_number(ACTUATOR(block, i));
+    const int angle = fl_form_of(ACTUATOR(block, i))->angle_number;
     for (int c = 0; c < 3; c++) {
       real change = 0;
       if (!leaves_box(block, box, i, c, command[i], step[i][c])) change = step[i][c];
@@ -134,8 +134,8 @@ static void take_step(const real *block, const fl_box *box, real command[][3], r
   }
 }
 
-/* Levenberg-Marquardt steps on commands within a box towards a wrench [N, N m]; the error on
-   the yardstick that is left. */
+/* Levenberg-Marquardt steps on commands within a box towards a wrench [N, N m]; the error
+   over the wrench scale that is left. */
 real fl_refine_commands(const real *block, fl_work *work, const fl_box *box, const real *wrench,
                         real command[][3], int steps) {
   const size_t size = (size_t)COUNT(block) * sizeof *command;

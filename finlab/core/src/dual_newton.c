@@ -38,11 +38,12 @@
 #define SHARE_MOST R(0.7)     /* the largest one */
 
 /* Scaled wrench in the basis. */
-void fl_reduce_wrench(const fl_work *work, const real *wrench, real *target) {
+void fl_reduce_wrench(const fl_work *work, const real *wrench, real *target_reduced) {
   const fl_span *span = &work->span;
   for (int j = 0; j < 6; j++) {
-    target[j] = 0;
-    for (int k = 0; k < 6; k++) target[j] += span->basis[k][j] * (wrench[k] / span->axis_scale[k]);
+    target_reduced[j] = 0;
+    for (int k = 0; k < 6; k++)
+      target_reduced[j] += span->basis[k][j] * (wrench[k] / span->axis_scale[k]);
   }
 }
 
@@ -58,17 +59,17 @@ void fl_reduce_lambda(const fl_work *work, const real *lambda, real *lambda_redu
 }
 
 /* Whether a wrench lies in the range of the effectiveness but for rounding. */
-int fl_is_in_range(const fl_work *work, const real *wrench, const real *target) {
+int fl_is_in_range(const fl_work *work, const real *wrench, const real *target_reduced) {
   const fl_span *span = &work->span;
   real outside_squared = 0;
   real size_squared = 0;
   for (int k = 0; k < 6; k++) {
     const real scaled = wrench[k] / span->axis_scale[k];
-    const real outside = scaled - dot(span->basis[k], target, 6);
+    const real outside = scaled - dot(span->basis[k], target_reduced, 6);
     outside_squared += outside * outside;
     size_squared += scaled * scaled;
   }
-  const real rounding = fl_larger(NEARLY, 10 * ROUNDING);
+  const real rounding = larger(NEARLY, 10 * ROUNDING);
   return SQRT(outside_squared) <= rounding * (R(1e-3) + SQRT(size_squared));
 }
 
@@ -89,7 +90,7 @@ void fl_wrench_of_forces(const real *block, const fl_work *work, real force[][2]
 static real largest_cost(const fl_set *set) {
   real reverse_cost = 0;
   if (set->force_max_reverse > 0) reverse_cost = set->cost_at_max_reverse;
-  return fl_larger(fl_larger(set->cost_at_min, set->cost_at_max), reverse_cost);
+  return larger(larger(set->cost_at_min, set->cost_at_max), reverse_cost);
 }
 
 /* Sets what follows from all sets: the largest cost, and which kinds of sets there are. */
@@ -105,7 +106,7 @@ void fl_prepare_sets(const real *block, fl_work *work) {
     work->power_cost_max += largest_cost(set);
     if (set->turn_cost > 0) {
       const real farthest =
-          fl_smaller(FABS(set->sector_center - set->turn_origin) + set->sector_half_angle, PI);
+          smaller(FABS(set->sector_center - set->turn_origin) + set->sector_half_angle, PI);
       work->power_cost_max += set->turn_cost / 2 * farthest * farthest;
       work->has_turn_cost = 1;
     }
@@ -129,8 +130,8 @@ static real length(const fl_actuator *a, const real *vector) {
 
 /* Evaluates the dual at multipliers, for a target in the basis: its value, its gradient and
    the responses. */
-void fl_dual_at(const real *block, const fl_work *work, const real *target, const real *lambda,
-                fl_state *state) {
+void fl_dual_at(const real *block, const fl_work *work, const real *target_reduced,
+                const real *lambda, fl_state *state) {
   real wrench[6] = {0}; /* sum B y */
   real conjugate = 0;   /* sum c*(s) */
   for (int i = 0; i < COUNT(block); i++) {
@@ -151,7 +152,7 @@ void fl_dual_at(const real *block, const fl_work *work, const real *target, cons
     state->secant[i] = 0;
     if (!work->has_drag) { /* |y| / |s| of S, Eq. 9; near rest that of quadratic costs */
       const real price_quadratic = a->row_force_max[0] / a->secant[0];
-      state->secant[i] = size_y / fl_larger(size_s, price_quadratic);
+      state->secant[i] = size_y / larger(size_s, price_quadratic);
     }
     conjugate += answer.conjugate;
     const real(*B)[6] = work->span.effectiveness_reduced[i];
@@ -159,16 +160,17 @@ void fl_dual_at(const real *block, const fl_work *work, const real *target, cons
   }
   for (int j = 0; j < 6; j++) {
     state->lambda_reduced[j] = lambda[j];
-    state->residual[j] = target[j] - wrench[j]; /* Eq. 6 */
+    state->residual[j] = target_reduced[j] - wrench[j]; /* Eq. 6 */
   }
-  state->dual_value = dot(lambda, target, 6) - conjugate; /* Eq. 3 */
+  state->dual_value = dot(lambda, target_reduced, 6) - conjugate; /* Eq. 3 */
   state->residual_size = SQRT(dot(state->residual, state->residual, 6));
 }
 
 /* Starts Newton's method at given multipliers. */
-void fl_dual_start(const real *block, fl_work *work, const real *target, const real *lambda) {
+void fl_dual_start(const real *block, fl_work *work, const real *target_reduced,
+                   const real *lambda) {
   work->state_found = work->state;
-  fl_dual_at(block, work, target, lambda, work->state);
+  fl_dual_at(block, work, target_reduced, lambda, work->state);
 }
 
 /* Largest force [N] of a line at prices of this sign, and its secant there [N^2/W]. */
@@ -186,12 +188,12 @@ static void secant_of_line(const real *block, const fl_actuator *a, real s, real
 /* Multipliers to begin with: those at which actuators whose costs are ~ T^1.5 give a target,
    each with its force over price at what it gives where costs are quadratic. Also the first
    mu. */
-void fl_first_lambda(const real *block, const fl_work *work, const real *target, real *lambda,
-                     real *mu) {
+void fl_first_lambda(const real *block, const fl_work *work, const real *target_reduced,
+                     real *lambda, real *mu) {
   /* Multipliers of quadratic costs without limits. C99 cannot pass the factor as const; it
      is only read. */
   real lambda_quadratic[6];
-  fl_solve((real(*)[6])work->hessian_factor, target, lambda_quadratic);
+  fl_solve((real(*)[6])work->hessian_factor, target_reduced, lambda_quadratic);
   real H[6][6] = {{0}};
   *mu = NEARLY;
   for (int i = 0; i < COUNT(block); i++) {
@@ -208,7 +210,7 @@ void fl_first_lambda(const real *block, const fl_work *work, const real *target,
     const real share = size_y / most;
     if (share > NEAR_LIMIT) *mu = SATURATED;
     /* Force over price of a cost ~ T^1.5 is the root of the share; at a limit the force stays. */
-    real weight = SQRT(fl_clipped(share, CLOSE, 1));
+    real weight = SQRT(clipped(share, CLOSE, 1));
     if (share > 1 && !work->has_drag) weight = 1 / share;
     for (int row = 0; row < (int)a->rows; row++) {
       fl_add_square(H, work->span.effectiveness_reduced[i][row], weight * secant[row]);
@@ -217,10 +219,10 @@ void fl_first_lambda(const real *block, const fl_work *work, const real *target,
   const real trace = fl_trace(H);
   for (int j = 0; j < 6; j++) H[j][j] += NOTHING * trace; /* regular behind the range, too */
   if (fl_factor(H)) {
-    fl_solve(H, target, lambda);
+    fl_solve(H, target_reduced, lambda);
     return;
   }
-  for (int j = 0; j < 6; j++) lambda[j] = target[j] / trace;
+  for (int j = 0; j < 6; j++) lambda[j] = target_reduced[j] / trace;
 }
 
 /* Adds B D B' to the lower triangle of H, of a plane: B = (bx, by), D = (xx, xy; xy, yy). */
@@ -250,7 +252,7 @@ static int newton_step(const real *block, const fl_work *work, const fl_state *a
   }
   real c = SATURATED;
   if (work->has_drag) c = 1; /* S is left out there */
-  const real trace = fl_larger(fl_trace(H), work->trace_min);
+  const real trace = larger(fl_trace(H), work->trace_min);
   const real weight = c * mu * trace; /* of M */
   for (int row = 0; row < 6; row++) {
     for (int col = 0; col <= row; col++) H[row][col] += weight * work->metric[row][col];
@@ -294,7 +296,7 @@ static step_result judged_step(const real *step, const fl_state *from, const fl_
   step_result result;
   result.slope_begin = dot(step, from->residual, 6);
   result.slope_end = dot(step, to->residual, 6);
-  result.slope_left = result.slope_end / fl_larger(result.slope_begin, TINY);
+  result.slope_left = result.slope_end / larger(result.slope_begin, TINY);
   result.rise = to->dual_value - from->dual_value;
   return result;
 }
@@ -308,9 +310,9 @@ static int is_kept(const step_result *result, const fl_state *from, const fl_sta
 }
 
 static real mu_after_kept(real mu, const step_result *result) {
-  real factor = fl_clipped(FABS(result->slope_left) / 2, MU_KEPT_LEAST, 1);
+  real factor = clipped(FABS(result->slope_left) / 2, MU_KEPT_LEAST, 1);
   if (result->slope_left > R(0.5)) factor = MU_KEPT_EARLY;
-  return fl_larger(mu * factor, ROUNDING);
+  return larger(mu * factor, ROUNDING);
 }
 
 /* Divides mu by the share of the step where the cubic along it, of both values and slopes,
@@ -321,13 +323,13 @@ static real mu_after_refused(real mu, real nu, const step_result *result) {
   const real discriminant = b * b - 4 * a * result->slope_begin;
   real share = R(0.5);
   if (discriminant > 0) share = 2 * result->slope_begin / (SQRT(discriminant) - b);
-  const real factor = fl_larger(nu, 1 / fl_clipped(share, SHARE_LEAST, SHARE_MOST));
-  return fl_larger(mu * factor, ROUNDING);
+  const real factor = larger(nu, 1 / clipped(share, SHARE_LEAST, SHARE_MOST));
+  return larger(mu * factor, ROUNDING);
 }
 
 /* Newton's method from multipliers on, or from its own first ones where there are none;
    work->state_found is what it comes to. Returns FL_MET, FL_BEYOND or FL_STUCK. */
-int fl_dual_newton(const real *block, fl_work *work, const real *target, const real *lambda,
+int fl_dual_newton(const real *block, fl_work *work, const real *target_reduced, const real *lambda,
                    int most_steps) {
   /* No forces cost more than C: a larger value proves that none add up to the target, Eq. 13. */
   const real beyond = work->power_cost_max * (1 + NOTHING) + NOTHING;
@@ -335,10 +337,10 @@ int fl_dual_newton(const real *block, fl_work *work, const real *target, const r
   real nu = 2; /* growth of mu after a refused step; doubles with each in a row (Nielsen) */
   real lambda_first[6];
   if (!lambda) {
-    fl_first_lambda(block, work, target, lambda_first, &mu);
+    fl_first_lambda(block, work, target_reduced, lambda_first, &mu);
     lambda = lambda_first;
   }
-  fl_dual_start(block, work, target, lambda);
+  fl_dual_start(block, work, target_reduced, lambda);
   fl_state *at = work->state;
   fl_state *trial = work->state + 1;
   real best_value = at->dual_value; /* when it last got better by more than rounding */
@@ -370,7 +372,7 @@ int fl_dual_newton(const real *block, fl_work *work, const real *target, const r
     }
     real lambda_next[6];
     for (int j = 0; j < 6; j++) lambda_next[j] = at->lambda_reduced[j] + step[j];
-    fl_dual_at(block, work, target, lambda_next, trial);
+    fl_dual_at(block, work, target_reduced, lambda_next, trial);
     if (work->has_turn_cost && jumps_between(block, work, at, trial, step, 0)) {
       jumps++;
       if (jumps >= JUMPS) {

@@ -10,10 +10,10 @@
 /* Length of a column, over that of the longest one, below which nothing is left of the columns: ten
    times their rounding in single precision, where a lost actuator would else leave a direction
    that is rounding. */
-#define LEFT_OVER fl_larger(NOTHING, 10 * ROUNDING)
+#define LEFT_OVER larger(NOTHING, 10 * ROUNDING)
 #define DEPENDENT (LEFT_OVER * LEFT_OVER) /* the squared length */
 
-/* A wrench on the yardstick per newton of a row, as the laws have it: thrusters may be
+/* A wrench over the wrench scale per newton of a row, as the laws have it: thrusters may be
    commanded against their force. */
 static const real *law_axis(const fl_actuator *a, int row) {
   if (is_plane(a)) return a->effectiveness_normalized[1 + row];
@@ -25,8 +25,7 @@ static void column_of(const real *block, const fl_span *span, int i, int row, re
   const fl_actuator *a = ACTUATOR(block, i);
   const real *sigma = HEAD(block)->wrench_scale;
   const real *axis = law_axis(a, row);
-  real sign = 1;
-  if (a->command_kind == FL_THRUSTER) sign = a->command_sign;
+  real sign = a->command_sign;
   if ((real)row >= a->rows) sign = 0;
   if (span->is_lost[i]) sign = 0;
   for (int k = 0; k < 6; k++) {
@@ -49,7 +48,7 @@ static void scale_of(const real *block, fl_span *span) {
       }
     }
   }
-  for (int k = 0; k < 6; k++) most = fl_larger(most, size[k]);
+  for (int k = 0; k < 6; k++) most = larger(most, size[k]);
   for (int k = 0; k < 6; k++) {
     span->axis_scale[k] = 1;
     if (size[k] > DEPENDENT * most) span->axis_scale[k] = SQRT(size[k]);
@@ -122,7 +121,7 @@ void fl_offset_wrench(const real *block, fl_span *span) {
     real sum = h->wrench_offset[k];
     for (int i = 0; i < COUNT(block); i++) {
       const fl_actuator *a = ACTUATOR(block, i);
-      const int has_no_drag = span->is_lost[i] && a->command_kind == FL_FOIL;
+      const int has_no_drag = span->is_lost[i] && fl_form_of(a)->has_drag;
       if (has_no_drag)
         sum -= a->pressure_area * a->zero_lift_drag * a->effectiveness_normalized[1][k] *
                h->wrench_scale[k];
@@ -147,7 +146,7 @@ static int prepare_newton(const real *block, fl_work *work) {
   const real trace = fl_trace(H);
   for (int j = 0; j < 6; j++) {
     for (int k = 0; k <= j; k++) {
-      work->metric[j][k] = H[j][k] * (real)span->rank / fl_larger(trace, TINY);
+      work->metric[j][k] = H[j][k] * (real)span->rank / larger(trace, TINY);
     }
     work->metric[j][j] += NEARLY;
   }

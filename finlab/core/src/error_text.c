@@ -12,8 +12,6 @@ static const char *const TEXT[FL_ERRORS] = {
 };
 
 const char *fl_error_text(int code) {
-  if (code == FL_TRUNCATED)
-    return "a search ended at its bound of parts; raise most_parts of fl_settings";
   if (code < 0 || code >= FL_ERRORS) return "no error code of this library";
   return TEXT[code];
 }

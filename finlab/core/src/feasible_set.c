@@ -26,7 +26,7 @@ static void whole_box(const real *block, fl_box *box, int i) {
 static void box_after(const real *block, fl_box *box, int i, const real *before, real ticks) {
   const fl_actuator *a = ACTUATOR(block, i);
   for (int k = 0; k < 3; k++) {
-    const int is_angle = k == fl_angle_number(a);
+    const int is_angle = k == fl_form_of(a)->angle_number;
     const real step = a->max_change[k] * ticks;
     if (is_angle && a->is_free_angle != 0) {
       if (!(step < PI)) continue; /* any angle is near enough */
@@ -39,9 +39,9 @@ static void box_after(const real *block, fl_box *box, int i, const real *before,
     real center = before[k];
     /* an angle of an arc may be told a whole turn off */
     if (is_angle) center = middle + fl_wrap_angle(center - middle);
-    center = fl_clipped(center, a->command_min[k], a->command_max[k]);
-    box->command_min[i][k] = fl_larger(center - step, a->command_min[k]);
-    box->command_max[i][k] = fl_smaller(center + step, a->command_max[k]);
+    center = clipped(center, a->command_min[k], a->command_max[k]);
+    box->command_min[i][k] = larger(center - step, a->command_min[k]);
+    box->command_max[i][k] = smaller(center + step, a->command_max[k]);
   }
 }
 
@@ -53,12 +53,12 @@ static real power_at(const real *block, int i, const real *command, real *price)
   fl_force_of_command(block, i, command, force, 0);
   real size = a->command_sign * force[0];
   if (is_plane(a)) size = size_of(force + 1);
-  if (a->command_kind == FL_POD && command[1] < 0) size = -size;
+  if (fl_is_in_reverse(a, command)) size = -size;
   if (a->gauge_table > 0) {
     const real direction = ATAN2(force[2], force[1]);
     size /= fl_gauge_radius(block + (int)a->gauge_table, direction);
   }
-  const real within = fl_clipped(size, a->force_min, a->force_max);
+  const real within = clipped(size, a->force_min, a->force_max);
   const real power = fl_power_and_price(block, i, within, price);
   if (size < 0) *price = -*price;
   return power;
@@ -79,7 +79,7 @@ static real mean_power(const real *block, const fl_work *work, const real *previ
     if (fl_is_known_command(before)) power += power_at(block, i, before, price + i);
   }
   if (count == 0) count = 1;
-  return fl_larger(power, LEAST_POWER * full) / (real)count;
+  return larger(power, LEAST_POWER * full) / (real)count;
 }
 
 /* Adds to the normal equations H lambda = right that a newton along a direction b (6,) in the basis
@@ -102,9 +102,10 @@ static void begin_as_before(const real *block, fl_work *work, const real *previo
     const fl_actuator *a = ACTUATOR(block, i);
     const real(*B)[6] = span->effectiveness_reduced[i];
     const real *before = previous + 3 * i;
-    if (span->is_lost[i] || !fl_is_known_command(before) || fl_force_number(a) < 0) continue;
+    const int has_force = fl_form_of(a)->force_number != NO_NUMBER;
+    if (span->is_lost[i] || !fl_is_known_command(before) || !has_force) continue;
     real alpha = 0; /* a thruster has no second row */
-    if (a->command_kind == FL_POD) alpha = before[0];
+    if (fl_aims_force(a)) alpha = before[fl_form_of(a)->angle_number];
     const real c = COS(alpha);
     const real s = SIN(alpha);
     real ahead[6];
@@ -144,7 +145,7 @@ static force_range range_of_tick(const real *block, const fl_work *work, int i, 
     return whole;
   }
   force_range range = fl_force_range(block, i, box);
-  if (a->command_kind == FL_FIN && all_sizes) {
+  if (fl_form_of(a)->has_law_grid && all_sizes) { /* of a grid only samples are known */
     range.low = a->force_min;
     range.high = a->force_max;
   }
@@ -158,8 +159,8 @@ static void tick_set(const real *block, fl_work *work, int i, real angle, real k
   fl_set *set = work->set + i;
   const int is_costly = kappa > 0;
   const force_range range = range_of_tick(block, work, i, is_costly);
-  const real low = fl_clipped(range.low, a->force_min, a->force_max);
-  const real high = fl_clipped(range.high, a->force_min, a->force_max);
+  const real low = clipped(range.low, a->force_min, a->force_max);
+  const real high = clipped(range.high, a->force_min, a->force_max);
   fl_limit_set(block, i, set, low, high, range.middle, range.half);
   if (!is_costly) return;
   real at = angle;
@@ -196,9 +197,11 @@ void fl_limits_without_tick(const real *block, fl_work *work) {
    gives little. With such a cost it would stay for ever, and leave its work to others at a fifth
    more power. */
 static real turning_cost_of(const fl_actuator *a, real calm, real power, real ticks) {
-  const int has_rate = a->max_change[0] > 0 && a->max_change[0] < QUICK;
-  if (a->command_kind != FL_POD || !has_rate) return 0;
-  return calm * power / (a->max_change[0] * ticks);
+  if (!fl_aims_force(a)) return 0;
+  const real rate = a->max_change[fl_form_of(a)->angle_number];
+  const int has_rate = rate > 0 && rate < QUICK;
+  if (!has_rate) return 0;
+  return calm * power / (rate * ticks);
 }
 
 /* The same in a tick after the previous commands (n, 3) of a question, of which rows may be NaN.
@@ -251,10 +254,10 @@ int fl_prepare(const real *block, fl_work *work) {
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
     work->slope_max[i] = 0;
-    if (a->command_kind == FL_POD) work->slope_max[i] = fl_largest_slope(block, i);
+    if (fl_aims_force(a)) work->slope_max[i] = fl_largest_slope(block, i);
     const real power_high = fl_power_of_force(block, i, a->force_max);
     const real power_low = fl_power_of_force(block, i, a->force_min);
-    work->power_max[i] = fl_larger(power_high, power_low);
+    work->power_max[i] = larger(power_high, power_low);
   }
   for (int k = 0; k < 6; k++) work->span.axis_counts[k] = HEAD(block)->is_commanded[k] != 0;
   if (!fl_prepare_span(block, work, 1)) return FL_BAD_NUMBER;

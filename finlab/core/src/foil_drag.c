@@ -18,7 +18,6 @@
 #define SURE_STEPS 12             /* the same from forces that the dual is sure of */
 #define STALL_SAMPLES 12          /* angles of a stalled foil that are looked at for its worth */
 #define CHEAPER (R(0.1) * NEARLY) /* share of the cost below which a gain ends the steps */
-#define NONE R(1e30)              /* cost where no commands give a wrench */
 #define STEP_SHORTER R(0.25)      /* a step that is no cheaper is shortened to this share */
 /* commands that cost more than this times the best are left alone */
 #define WITHIN_BEST R(1.5)
@@ -39,16 +38,18 @@ static void take_sides(const real *block, fl_work *work, fl_box *box, real comma
     if (has_gap(a, set)) {
       fl_narrow_set(block, i, set, force[i], fl_nearer_side(block, i, set, force[i]));
     }
-    if (a->command_kind != FL_THRUSTER || !(a->dead_band > 0)) continue;
+    const int k = fl_form_of(a)->force_number;
+    const int has_dead_band = k != NO_NUMBER && a->dead_band > 0;
+    if (!has_dead_band || fl_aims_force(a)) continue;
     real low = set->force_min;
     real high = set->force_max;
     if (!(a->command_sign > 0)) {
       low = -set->force_max;
       high = -set->force_min;
     }
-    box->command_min[i][0] = fl_larger(box->command_min[i][0], low);
-    box->command_max[i][0] = fl_smaller(box->command_max[i][0], high);
-    command[i][0] = fl_clip_number(box, i, 0, -1, command[i][0]);
+    box->command_min[i][k] = larger(box->command_min[i][k], low);
+    box->command_max[i][k] = smaller(box->command_max[i][k], high);
+    command[i][k] = fl_clip_number(box, i, k, NO_NUMBER, command[i][k]);
   }
 }
 
@@ -59,10 +60,10 @@ static void take_step(const real *block, const fl_work *work, const fl_box *box,
     if (work->span.is_lost[i]) continue;
     const real *answer = work->state_found->force[i];
     const real change[2] = {share * (answer[0] - force[i][0]), share * (answer[1] - force[i][1])};
-    if (fl_is_foil(ACTUATOR(block, i))) { /* the angle whose tangent comes nearest to the change */
+    if (is_foil(ACTUATOR(block, i))) { /* the angle whose tangent comes nearest to the change */
       const real *slope = work->tangent[i].force_slope;
-      const real turn = dot(change, slope, 2) / fl_larger(dot(slope, slope, 2), TINY);
-      command[i][0] = fl_clip_number(box, i, 0, -1, command[i][0] + turn);
+      const real turn = dot(change, slope, 2) / larger(dot(slope, slope, 2), TINY);
+      command[i][0] = fl_clip_number(box, i, 0, NO_NUMBER, command[i][0] + turn);
       continue;
     }
     const real wanted[2] = {force[i][0] + change[0], force[i][1] + change[1]};
@@ -82,34 +83,34 @@ static int are_few(const real *block, const fl_work *work, const fl_box *box) {
   return free < work->span.rank;
 }
 
-/* Steps towards work->wrench_target, of which so many in a row have to halve the error: most starts
+/* Steps towards work->wrench_wanted, of which so many in a row have to halve the error: most starts
    end soon. */
 static void approach(const real *block, fl_work *work, const fl_box *box, real command[][3],
                      int steps) {
-  real error = NONE;
+  real error = LARGEST_NUMBER;
   for (int k = 0; k < APPROACH_STEPS; k += steps) {
     const real before = error;
-    error = fl_refine_commands(block, work, box, work->wrench_target, command, steps);
+    error = fl_refine_commands(block, work, box, work->wrench_wanted, command, steps);
     if (error <= EXACT || error > before / 2) return;
   }
 }
 
-/* Whether so many Levenberg-Marquardt steps make commands within a box give work->wrench_target,
-   to an error on the yardstick and to rounding. Where that is what tables leave, steps on their
-   error end soon. */
+/* Whether so many Levenberg-Marquardt steps make commands within a box give work->wrench_wanted,
+   to an error over the wrench scale and to rounding. Where that is what tables leave, steps on
+   their error end soon. */
 static int come_to_give(const real *block, fl_work *work, const fl_box *box, real command[][3],
                         int steps, real most_error) {
   real size = 0;
-  for (int k = 0; k < 6; k++) size += FABS(work->wrench_target[k]) / HEAD(block)->wrench_scale[k];
+  for (int k = 0; k < 6; k++) size += FABS(work->wrench_wanted[k]) / HEAD(block)->wrench_scale[k];
   if (most_error > EXACT) {
     approach(block, work, box, command, APPROACH_ROUND);
     steps = 0;
   }
-  const real error = fl_refine_commands(block, work, box, work->wrench_target, command, steps);
+  const real error = fl_refine_commands(block, work, box, work->wrench_wanted, command, steps);
   return error <= most_error + ROUNDING * size;
 }
 
-/* Largest error on the yardstick of commands that are said to give a wrench: what tables
+/* Largest error over the wrench scale of commands that are said to give a wrench: what tables
    leave where these are few. */
 static real error_allowed(const real *block, const fl_work *work, const fl_box *box) {
   if (are_few(block, work, box)) return FINE;
@@ -120,7 +121,7 @@ static real error_allowed(const real *block, const fl_work *work, const fl_box *
 static void draw_tangents(const real *block, fl_work *work, const fl_box *box, const real *lambda,
                           real command[][3]) {
   for (int i = 0; i < COUNT(block); i++) {
-    if (!fl_is_foil(ACTUATOR(block, i)) || work->span.is_lost[i]) continue;
+    if (!is_foil(ACTUATOR(block, i)) || work->span.is_lost[i]) continue;
     real s[2];
     actuator_price(work, i, lambda, s);
     fl_draw_tangent(block, i, box, command[i][0], s, work->tangent + i, work->set + i);
@@ -128,23 +129,24 @@ static void draw_tangents(const real *block, fl_work *work, const fl_box *box, c
 }
 
 /* Makes commands cheaper, from their forces and cost [W] on, by steps of sequential quadratic
-   programming that keep giving work->wrench_target; `lambda` becomes that of the last step.
+   programming that keep giving work->wrench_wanted; `lambda` becomes that of the last step.
    Their cost. */
-static real cheapen(const real *block, fl_work *work, const fl_box *box, const real *target,
+static real cheapen(const real *block, fl_work *work, const fl_box *box, const real *target_reduced,
                     real most_error, real cost, real *lambda, real command[][3], real force[][2]) {
   real share = 1;
   int has_moved = 1;
   for (int k = 0; k < FL_FOIL_STEPS; k++) {
     if (has_moved) draw_tangents(block, work, box, lambda, command);
     fl_prepare_sets(block, work);
-    if (has_moved && fl_dual_newton(block, work, target, lambda, FL_STEPS_AT_KINK) == FL_MET) {
+    if (has_moved &&
+        fl_dual_newton(block, work, target_reduced, lambda, FL_STEPS_AT_KINK) == FL_MET) {
       memcpy(lambda, work->state_found->lambda_reduced, sizeof work->state_found->lambda_reduced);
     }
     real stepped[FL_MOST][3];
     real force_stepped[FL_MOST][2];
     memcpy(stepped, command, sizeof stepped);
     take_step(block, work, box, force, share, stepped);
-    real gain = -NONE;
+    real gain = -INFEASIBLE_COST;
     if (come_to_give(block, work, box, stepped, EXACT_STEPS, most_error)) {
       gain = cost - fl_power_of_commands(block, work, stepped, force_stepped);
     }
@@ -161,33 +163,34 @@ static real cheapen(const real *block, fl_work *work, const fl_box *box, const r
   return cost;
 }
 
-/* Makes commands give work->wrench_target, in the basis `target`, to an error on the yardstick, and
-   then cheaper; `lambda` becomes that of the last step. Their forces along the rows, and
-   their cost [W]; NONE where they do not come to give it. */
-static real settle(const real *block, fl_work *work, const real *target, real most_error,
-                   real *lambda, real command[][3], real force[][2]) {
+/* Makes commands give work->wrench_wanted, in the basis `target_reduced`, to an error over the
+   wrench scale, and then cheaper; `lambda` becomes that of the last step. Their forces along the
+   rows, and their cost [W]; INFEASIBLE_COST where they do not come to give it. */
+static real meet_and_cheapen(const real *block, fl_work *work, const real *target_reduced,
+                             real most_error, real *lambda, real command[][3], real force[][2]) {
   fl_box box = work->box;
   fl_set before[FL_MOST];
   memcpy(before, work->set, sizeof before);
   fl_power_of_commands(block, work, command, force);
   take_sides(block, work, &box, command, force);
-  real cost = NONE;
+  real cost = INFEASIBLE_COST;
   if (come_to_give(block, work, &box, command, EXACT_STEPS, most_error)) {
     cost = fl_power_of_commands(block, work, command, force);
-    cost = cheapen(block, work, &box, target, most_error, cost, lambda, command, force);
+    cost = cheapen(block, work, &box, target_reduced, most_error, cost, lambda, command, force);
   }
   fl_restore_sets(block, work, before);
   return cost;
 }
 
 /* Remembers what commands and multipliers lead to, where it costs less than the best so far. */
-static void improve_from(const real *block, fl_work *work, const real *target, const real *lambda,
-                         real command[][3], real *best_cost) {
+static void improve_from(const real *block, fl_work *work, const real *target_reduced,
+                         const real *lambda, real command[][3], real *best_cost) {
   const real most_error = error_allowed(block, work, &work->box);
   real force[FL_MOST][2];
   real lambda_near[6];
   memcpy(lambda_near, lambda, sizeof lambda_near);
-  const real cost = settle(block, work, target, most_error, lambda_near, command, force);
+  const real cost =
+      meet_and_cheapen(block, work, target_reduced, most_error, lambda_near, command, force);
   if (!(cost < *best_cost)) return;
   *best_cost = cost;
   memcpy(work->best_command, command, sizeof work->best_command);
@@ -196,11 +199,12 @@ static void improve_from(const real *block, fl_work *work, const real *target, c
 }
 
 /* The same of the forces and multipliers that Newton's method came to. */
-void fl_improve_commands(const real *block, fl_work *work, const real *target, real *best_cost) {
+void fl_improve_commands(const real *block, fl_work *work, const real *target_reduced,
+                         real *best_cost) {
   real command[FL_MOST][3];
   fl_commands_for_forces(block, &work->box, work->state_found->force, work->command_previous,
                          command);
-  improve_from(block, work, target, work->state_found->lambda_reduced, command, best_cost);
+  improve_from(block, work, target_reduced, work->state_found->lambda_reduced, command, best_cost);
 }
 
 /* Whether a foil may stall at one end (0, 1) of its angles, which is then the command. */
@@ -208,7 +212,7 @@ static int may_stall(const real *block, const fl_work *work, int i, int end, rea
   const fl_actuator *a = ACTUATOR(block, i);
   *command = work->box.command_min[i][0];
   if (end) *command = work->box.command_max[i][0];
-  if (!fl_is_foil(a) || work->span.is_lost[i]) return 0;
+  if (!is_foil(a) || work->span.is_lost[i]) return 0;
   const real stall_angle = fl_lift_end(block, a)[1];
   return FABS(*command - a->zero_lift_angle) > stall_angle;
 }
@@ -229,7 +233,7 @@ static real worth_of_stall(const real *block, const fl_work *work, int i, int en
     fl_tangent tangent;
     fl_foil_at(block, i, begin + (limit - begin) * (real)k / STALL_SAMPLES, &tangent);
     const real conjugate = dot(s, tangent.force, 2) - tangent.cost;
-    more = fl_larger(more, conjugate - known.conjugate);
+    more = larger(more, conjugate - known.conjugate);
   }
   return more;
 }
@@ -253,21 +257,20 @@ static real proved_value(const real *block, const fl_work *work, real *most_cost
   return value;
 }
 
-/* Commands at a point, after steps towards work->wrench_target: first some that leave the foils on
+/* Commands at a point, after steps towards work->wrench_wanted: first some that leave the foils on
    their branches. */
-static void begin_at(const real *block, fl_work *work, const fl_lattice *lattice,
-                     const real *target, const fl_lattice_point *point, real command[][3]) {
+static void begin_at(const real *block, fl_work *work, const foil_lattice *lattice,
+                     const real *target_reduced, const lattice_point *point, real command[][3]) {
   fl_box branches = work->box;
-  fl_commands_of_point(block, work, lattice, target, point, &branches, command);
+  fl_commands_of_point(block, work, lattice, target_reduced, point, &branches, command);
   approach(block, work, &branches, command, APPROACH_ROUND);
   approach(block, work, &work->box, command, APPROACH_ROUND);
 }
 
 /* The cheapest point that costs more than the last one followed: commands that cost the same
    are the same; 0 for none. */
-static const fl_lattice_point *next_point(const fl_lattice_point *points, int count,
-                                          real last_cost) {
-  const fl_lattice_point *next = 0;
+static const lattice_point *next_point(const lattice_point *points, int count, real last_cost) {
+  const lattice_point *next = 0;
   for (int k = 0; k < count; k++) {
     const int is_new = points[k].cost > last_cost * (1 + NEARLY);
     if (is_new && (!next || points[k].cost < next->cost)) next = points + k;
@@ -278,53 +281,54 @@ static const fl_lattice_point *next_point(const fl_lattice_point *points, int co
 /* Improves on the best commands by what steps from a lattice come to: first exact commands
    from many points, then the cheapest of these are made cheaper, but for those that cost
    half as much again as the best so far. */
-static void improve_from_lattice(const real *block, fl_work *work, const real *target,
+static void improve_from_lattice(const real *block, fl_work *work, const real *target_reduced,
                                  const real *lambda, real enough, real *best_cost) {
   const real most_error = error_allowed(block, work, &work->box);
-  fl_lattice lattice;
-  fl_lattice_point points[FL_LATTICE_STARTS];
+  foil_lattice lattice;
+  lattice_point points[LATTICE_STARTS];
   real command[FL_MOST][3];
   fl_lay_lattice(block, work, &lattice);
-  const int count = fl_cheapest_points(block, work, &lattice, target, points);
+  const int count = fl_cheapest_points(block, work, &lattice, target_reduced, points);
   for (int k = 0; k < count; k++) {
     real unused[FL_MOST][2];
-    begin_at(block, work, &lattice, target, points + k, command);
-    points[k].cost = NONE;
+    begin_at(block, work, &lattice, target_reduced, points + k, command);
+    points[k].cost = INFEASIBLE_COST;
     if (come_to_give(block, work, &work->box, command, 0, most_error)) {
       points[k].cost = fl_power_of_commands(block, work, command, unused);
     }
   }
   real last_cost = 0;
   for (int tried = 0; tried < FL_LATTICE_FOLLOWED && *best_cost > enough; tried++) {
-    const fl_lattice_point *next = next_point(points, count, last_cost);
-    if (!next || !(next->cost < fl_smaller(*best_cost * WITHIN_BEST, NONE))) return;
+    const lattice_point *next = next_point(points, count, last_cost);
+    if (!next || !(next->cost < smaller(*best_cost * WITHIN_BEST, INFEASIBLE_COST))) return;
     last_cost = next->cost;
-    begin_at(block, work, &lattice, target, next, command);
-    improve_from(block, work, target, lambda, command, best_cost);
+    begin_at(block, work, &lattice, target_reduced, next, command);
+    improve_from(block, work, target_reduced, lambda, command, best_cost);
   }
 }
 
 /* Improves on the best commands from those with one foil at a limit where it stalls. */
-static void improve_from_stalls(const real *block, fl_work *work, const real *target,
+static void improve_from_stalls(const real *block, fl_work *work, const real *target_reduced,
                                 const real *lambda, real start[][3], real *best_cost) {
   real command[FL_MOST][3];
   for (int i = 0; i < COUNT(block); i++) {
     for (int end = 0; end < 2; end++) {
       real angle;
       if (!may_stall(block, work, i, end, &angle)) continue;
-      if (*best_cost < NONE)
+      if (*best_cost < INFEASIBLE_COST)
         memcpy(command, work->best_command, sizeof command);
       else
         memcpy(command, start, sizeof command);
       command[i][0] = angle;
-      improve_from(block, work, target, lambda, command, best_cost);
+      improve_from(block, work, target_reduced, lambda, command, best_cost);
     }
   }
 }
 
 /* The same as fl_improve_commands of several starts, as steps from a cheap one may end
    early: each has its own valley. */
-void fl_improve_from_starts(const real *block, fl_work *work, const real *target, real *best_cost) {
+void fl_improve_from_starts(const real *block, fl_work *work, const real *target_reduced,
+                            real *best_cost) {
   real most_cost;
   const real proved = proved_value(block, work, &most_cost);
   const real enough = proved * (1 + CLOSE);
@@ -333,16 +337,16 @@ void fl_improve_from_starts(const real *block, fl_work *work, const real *target
   memcpy(lambda, work->state_found->lambda_reduced, sizeof lambda);
   fl_commands_for_forces(block, &work->box, work->state_found->force, work->command_previous,
                          start);
-  fl_improve_commands(block, work, target, best_cost);
+  fl_improve_commands(block, work, target_reduced, best_cost);
   if (*best_cost <= enough) return;
-  improve_from_stalls(block, work, target, lambda, start, best_cost);
+  improve_from_stalls(block, work, target_reduced, lambda, start, best_cost);
   if (*best_cost <= enough) return;
   real unused;
-  fl_first_lambda(block, work, target, lambda, &unused);
-  fl_dual_start(block, work, target, lambda);
-  fl_improve_commands(block, work, target, best_cost);
+  fl_first_lambda(block, work, target_reduced, lambda, &unused);
+  fl_dual_start(block, work, target_reduced, lambda);
+  fl_improve_commands(block, work, target_reduced, best_cost);
   if (*best_cost > enough && proved <= most_cost) {
-    improve_from_lattice(block, work, target, lambda, enough, best_cost);
+    improve_from_lattice(block, work, target_reduced, lambda, enough, best_cost);
   }
 }
 
@@ -353,7 +357,7 @@ int fl_are_forces_sure(const real *block, fl_work *work) {
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
     if (a->uncertainty_cost > 0) return 0;
-    if (!fl_is_foil(a)) continue;
+    if (!is_foil(a)) continue;
     const real largest_lift = a->pressure_area * (1 - NOTHING) * fl_lift_end(block, a)[0];
     if (FABS(state->force[i][0]) >= largest_lift) return 0;
   }
@@ -383,7 +387,7 @@ void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, 
   /* how far below the most a share is tried, over it, until one is found */
   real below_most = NEARLY;
   real start[FL_MOST][3];
-  if (may_any_stall(block, work)) most = fl_smaller(most_by_dual * (1 + STALLED_MORE), 1);
+  if (may_any_stall(block, work)) most = smaller(most_by_dual * (1 + STALLED_MORE), 1);
   fl_commands_for_forces(block, &work->box, out->force, work->command_previous, start);
   for (int k = 0; k < FL_RAY_SHARES; k++) {
     if (!(below_most < 1 && most - found > NEARLY / 4 * most_by_dual)) return;
@@ -391,12 +395,12 @@ void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, 
     real ray_share = most_by_dual * (1 - below_most);
     if (has_found) ray_share = (found + most) / 2;
     real wrench_served[6]; /* by forces */
-    real target[6];
+    real target_reduced[6];
     for (int j = 0; j < 6; j++) {
-      work->wrench_target[j] = ray_share * (wrench[j] + work->span.wrench_offset[j]);
-      wrench_served[j] = work->wrench_target[j] - work->span.wrench_offset[j];
+      work->wrench_wanted[j] = ray_share * (wrench[j] + work->span.wrench_offset[j]);
+      wrench_served[j] = work->wrench_wanted[j] - work->span.wrench_offset[j];
     }
-    fl_reduce_wrench(work, wrench_served, target);
+    fl_reduce_wrench(work, wrench_served, target_reduced);
     real command[FL_MOST][3];
     real lambda[6];
     int is_met = 0;
@@ -409,7 +413,8 @@ void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, 
         memcpy(command, start, sizeof command);
       memcpy(lambda, out->lambda_reduced, sizeof lambda);
       real force[FL_MOST][2];
-      is_met = settle(block, work, target, EXACT, lambda, command, force) < NONE;
+      is_met = meet_and_cheapen(block, work, target_reduced, EXACT, lambda, command, force) <
+               INFEASIBLE_COST;
     }
     if (!is_met) {
       most = ray_share;

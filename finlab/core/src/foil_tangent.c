@@ -45,11 +45,11 @@ void fl_draw_tangent(const real *block, int i, const fl_box *box, real angle, co
   const real change = other.cost_slope - tangent->cost_slope - dot(s, other.force_slope, 2) +
                       dot(s, tangent->force_slope, 2);
   tangent->curvature =
-      fl_larger(FABS(change) / apart, CLOSE * a->flow_speed * a->pressure_area + TINY);
+      larger(FABS(change) / apart, CLOSE * a->flow_speed * a->pressure_area + TINY);
   const real most_cost = tangent->cost + FABS(tangent->cost_slope) * most_turn +
                          tangent->curvature * most_turn * most_turn;
-  set->force_min = fl_larger(low - angle, -most_turn);
-  set->force_max = fl_smaller(high - angle, most_turn);
+  set->force_min = larger(low - angle, -most_turn);
+  set->force_max = smaller(high - angle, most_turn);
   set->tangent = tangent;
   set->cost_at_min = most_cost;
   set->cost_at_max = most_cost;
@@ -77,14 +77,14 @@ real fl_power_of_commands(const real *block, const fl_work *work, real command[]
     }
     if (a->gauge_table > 0)
       size /= fl_gauge_radius(block + (int)a->gauge_table, ATAN2(along[2], along[1]));
-    if (fl_is_foil(a)) {
+    if (is_foil(a)) {
       fl_tangent tangent;
       fl_foil_at(block, i, command[i][0], &tangent);
       force[i][1] = tangent.force[1];
       cost += tangent.cost;
       continue;
     }
-    if (a->command_kind == FL_POD && command[i][1] < 0) size = -size;
+    if (fl_is_in_reverse(a, command[i])) size = -size;
     cost += fl_power_of_force(block, i, size);
   }
   return cost;

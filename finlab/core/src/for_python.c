@@ -1,5 +1,5 @@
 /* What Python alone asks: fields and constants, many answers, commands of other methods, and what
-   prices prove. */
+   multipliers prove. */
 #include "internal.h"
 
 typedef struct {
@@ -22,10 +22,10 @@ static const constant CONSTANTS[] = {
     CONSTANT(FL_POD),
     CONSTANT(FL_FIN),
     CONSTANT(FL_FOIL),
+    CONSTANT(FL_KINDS),
     CONSTANT(FL_CLOSEST),
     CONSTANT(FL_DIRECTION),
     CONSTANT(FL_PRIORITY),
-    CONSTANT(FL_TRUNCATED),
     CONSTANT(FL_OK),
     CONSTANT(FL_BAD_BLOCK),
     CONSTANT(FL_BAD_VERSION),
@@ -68,11 +68,10 @@ const char *fl_fields(void) {
 #undef FL_END
 
 int fl_answer_many(const real *block, fl_work *work, const fl_question *question,
-                   const real *wrench, int count, real *force, real *prices, real *wrench_served,
-                   real *gap_power_bound, real *command, unsigned char *is_attainable,
-                   real *error) {
+                   const real *wrench, int count, real *force, real *multipliers,
+                   real *wrench_served, real *gap_power_bound, real *command,
+                   fl_byte *is_attainable, real *error, fl_byte *is_truncated) {
   const size_t n = (size_t)COUNT(block);
-  int is_truncated = 0;
   fl_question q = *question;
   fl_answer out;
   for (int k = 0; k < count; k++) {
@@ -80,29 +79,28 @@ int fl_answer_many(const real *block, fl_work *work, const fl_question *question
     const int code = fl_answer_one(block, work, &q, &out);
     if (code) return code;
     memcpy(force, out.force, 2 * n * sizeof *force);
-    memcpy(prices, out.prices, sizeof out.prices);
+    memcpy(multipliers, out.multipliers, sizeof out.multipliers);
     memcpy(wrench_served, out.wrench_served, sizeof out.wrench_served);
     memcpy(command, out.command, 3 * n * sizeof *command);
     wrench += 6;
     force += 2 * n;
-    prices += 6;
+    multipliers += 6;
     wrench_served += 6;
     command += 3 * n;
     gap_power_bound[k] = out.gap_power_bound;
-    is_attainable[k] = (unsigned char)out.is_attainable;
+    is_attainable[k] = (fl_byte)out.is_attainable;
     error[k] = out.error;
-    is_truncated |= out.is_truncated;
+    is_truncated[k] = (fl_byte)out.is_truncated;
   }
-  if (is_truncated) return FL_TRUNCATED;
   return FL_OK;
 }
 
 real fl_dual_value(const real *block, fl_work *work, const real *wrench, const real *lambda_reduced,
                    real *force) {
   fl_state *state = work->state;
-  real target[6];
-  fl_reduce_wrench(work, wrench, target);
-  fl_dual_at(block, work, target, lambda_reduced, state);
+  real target_reduced[6];
+  fl_reduce_wrench(work, wrench, target_reduced);
+  fl_dual_at(block, work, target_reduced, lambda_reduced, state);
   memcpy(force, state->force, (size_t)COUNT(block) * sizeof state->force[0]);
   return state->dual_value;
 }
@@ -131,14 +129,14 @@ static fl_actuator_conjugate conjugate_at(const real *block, int i, const fl_set
   return result;
 }
 
-int fl_conjugates(const real *block, fl_work *work, const fl_question *question, const real *prices,
-                  int count, fl_actuator_conjugate *conjugates) {
+int fl_conjugates(const real *block, fl_work *work, const fl_question *question,
+                  const real *multipliers, int count, fl_actuator_conjugate *conjugates) {
   fl_question q = *question;
   q.calm = 0; /* turning is no power */
   if (!fl_prepare_question(block, work, &q)) return FL_BAD_NUMBER;
   for (int k = 0; k < count; k++) {
     real lambda[6];
-    fl_reduce_lambda(work, prices + 6 * k, lambda);
+    fl_reduce_lambda(work, multipliers + 6 * k, lambda);
     for (int i = 0; i < COUNT(block); i++) {
       real s[2];
       actuator_price(work, i, lambda, s);

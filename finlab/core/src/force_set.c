@@ -51,7 +51,7 @@ static void set_ends(int plane, fl_set *set) {
   if (set->force_min > 0) {
     real turning = TURNING;
     if (set->sector_half_angle <= NARROW) turning = CLOSE;
-    least = fl_larger(least, turning * set->cost_at_min / set->force_min);
+    least = larger(least, turning * set->cost_at_min / set->force_min);
   }
   set->price_floor_squared = least * least + TINY;
 
@@ -136,7 +136,7 @@ void fl_fix_force(const real *block, int i, fl_set *set, const real *force) {
   const int plane = is_plane(ACTUATOR(block, i));
   real size = force[0];
   if (plane) size = size_of(force);
-  real signed_size = fl_clipped(size, set->force_min, set->force_max);
+  real signed_size = clipped(size, set->force_min, set->force_max);
   if (set->is_flipped) signed_size = -signed_size;
   const real cost = fl_power_of_force(block, i, signed_size);
   set->cost_at_min = cost;
@@ -172,7 +172,7 @@ line_response fl_limited_response(const real *block, const fl_actuator *a, const
   const real v = sign * price;
   const int is_arc = !line && set->sector_half_angle < PI;
   real v_asked = v;
-  if (is_arc) v_asked = fl_larger(v, 0);
+  if (is_arc) v_asked = larger(v, 0);
 
   line_response y = at_price(block, a, is_reverse, v_asked);
   y.force *= sign;
@@ -205,7 +205,7 @@ static real steepest_in(const real *table) {
   const int cells = (int)table[1];
   const real *knot = table + 3;
   real most = 0;
-  if (knot[0] > 0) return R(1e30); /* a force at no price is a jump */
+  if (knot[0] > 0) return LARGEST_NUMBER; /* a force at no price is a jump */
   for (int k = 0; k < cells; k++) {
     real first = (real)k / (real)cells;
     real last = (real)(k + 1) / (real)cells;
@@ -213,8 +213,8 @@ static real steepest_in(const real *table) {
     last *= last;
     const real width = (last * last - first * first) * price_max;
     const real middle = 3 * (knot[3] - knot[0]) / width - knot[1] - knot[4];
-    const real most_at_knots = fl_larger(knot[1], knot[4]);
-    most = fl_larger(fl_larger(most, middle), most_at_knots);
+    const real most_at_knots = larger(knot[1], knot[4]);
+    most = larger(larger(most, middle), most_at_knots);
     knot += 3;
   }
   return most;
@@ -225,6 +225,6 @@ real fl_largest_slope(const real *block, int i) {
   const fl_actuator *a = ACTUATOR(block, i);
   const real ahead = steepest_in(table_of(block, a, 0));
   const real reverse = steepest_in(table_of(block, a, 1));
-  const real most = fl_larger(ahead, reverse);
+  const real most = larger(ahead, reverse);
   return most * a->force_scale * a->force_scale / a->power_scale;
 }

@@ -37,7 +37,7 @@ line_response fl_force_of_price(const real *table, real price) {
   const real price_max = table[0];
   const int cells = (int)table[1];
   const real *knot = knots(table);
-  price = fl_larger(price, 0); /* NaN is 0, too */
+  price = larger(price, 0); /* NaN is 0, too */
   if (!(price < price_max)) {
     const real *last = knot + 3 * cells;
     const real force_max = last[0];
@@ -86,12 +86,12 @@ static int cell_of_force(const real *knot, int cells, real size) {
 /* Where in a cell, from 0 to 1, a cubic gives a size of force: by Newton's method. */
 static real solve_cubic(const cubic *force, real rise, real size, int is_first) {
   real t = 0;
-  if (rise > 0) t = fl_larger((size - force->value) / rise, 0);
+  if (rise > 0) t = larger((size - force->value) / rise, 0);
   if (is_first) t = SQRT(t); /* as of costs ~ T^1.5 */
   for (int k = 0; k < CUBIC_STEPS; k++) {
     const real slope = slope_of(force, t);
     const real before = t;
-    if (slope > 0) t = fl_clipped(t - (value_of(force, t) - size) / slope, 0, 1);
+    if (slope > 0) t = clipped(t - (value_of(force, t) - size) / slope, 0, 1);
     if (FABS(t - before) <= ROUNDING) break;
   }
   return t;

@@ -2,7 +2,6 @@
    gives on each side of a cut. */
 #include "internal.h"
 
-#define NONE R(1e30) /* cost where no part meets the target */
 /* an answer below this share of the least force is no answer of an arc */
 #define HOLLOW_FORCE R(0.9)
 
@@ -21,9 +20,10 @@ static int any_hollow(const real *block, const fl_work *work) {
 }
 
 /* Remembers an answer without a gap, where it is the cheapest so far. */
-static void keep_answer(const real *block, fl_work *work, const real *target, real *best_cost) {
+static void keep_answer(const real *block, fl_work *work, const real *target_reduced,
+                        real *best_cost) {
   if (work->has_drag) {
-    fl_improve_commands(block, work, target, best_cost);
+    fl_improve_commands(block, work, target_reduced, best_cost);
     return;
   }
   if (!(work->state_found->dual_value < *best_cost)) return;
@@ -33,11 +33,11 @@ static void keep_answer(const real *block, fl_work *work, const real *target, re
 
 /* Remembers an answer without a gap; whether one with a gap (of actuator `gap`, or -1) could
    still be cheaper. */
-static int is_open(const real *block, fl_work *work, const real *target, int status, int gap,
-                   real *best_cost) {
+static int is_open(const real *block, fl_work *work, const real *target_reduced, int status,
+                   int gap, real *best_cost) {
   const real dual_value = work->state_found->dual_value;
   if (status == FL_MET && gap < 0 && !any_hollow(block, work)) {
-    keep_answer(block, work, target, best_cost);
+    keep_answer(block, work, target_reduced, best_cost);
     return 0;
   }
   const int is_bound = status == FL_MET || (status == FL_STUCK && gap >= 0);
@@ -53,13 +53,13 @@ static int is_restless(const real *block, int i, const fl_set *set, const real *
 
 /* Leaves all gaps on their nearer sides, round after round, until there are none; forces
    that cannot rest keep their direction. */
-static void dive(const real *block, fl_work *work, const real *target, int status,
+static void dive(const real *block, fl_work *work, const real *target_reduced, int status,
                  real *best_cost) {
   for (int round = 0; round < FL_DIVE_ROUNDS; round++) {
     fl_state *state = work->state_found;
     const real largest = fl_largest_force(block, state->force);
     const int gap = fl_worst_gap(block, work, state->force, state->lambda_reduced);
-    if (!is_open(block, work, target, status, gap, best_cost)) return;
+    if (!is_open(block, work, target_reduced, status, gap, best_cost)) return;
     for (int i = 0; i < COUNT(block); i++) {
       fl_set *set = work->set + i;
       const real *force = state->force[i];
@@ -75,12 +75,13 @@ static void dive(const real *block, fl_work *work, const real *target, int statu
     fl_prepare_sets(block, work);
     real lambda[6];
     memcpy(lambda, state->lambda_reduced, sizeof lambda);
-    status = fl_dual_newton(block, work, target, lambda, FL_STEPS_AT_KINK);
+    status = fl_dual_newton(block, work, target_reduced, lambda, FL_STEPS_AT_KINK);
   }
 }
 
 /* Solves both sides of a cut from the multipliers so far and stays at the cheaper one. */
-static int cheaper_side(const real *block, fl_work *work, const real *target, fl_node *node) {
+static int cheaper_side(const real *block, fl_work *work, const real *target_reduced,
+                        fl_node *node) {
   const int nearer = fl_nearer_side(block, node->actuator, &node->set_before, node->force);
   const int side[2] = {nearer, -nearer};
   real lambda_begin[6];
@@ -90,9 +91,9 @@ static int cheaper_side(const real *block, fl_work *work, const real *target, fl
   memcpy(lambda_begin, work->state_found->lambda_reduced, sizeof lambda_begin);
   for (int k = 0; k < 2; k++) {
     fl_take_side(block, work, node, side[k]);
-    status[k] = fl_dual_newton(block, work, target, lambda_begin, FL_STEPS_AT_KINK);
+    status[k] = fl_dual_newton(block, work, target_reduced, lambda_begin, FL_STEPS_AT_KINK);
     cost[k] = work->state_found->dual_value;
-    if (status[k] == FL_BEYOND) cost[k] = NONE;
+    if (status[k] == FL_BEYOND) cost[k] = INFEASIBLE_COST;
     memcpy(lambda[k], work->state_found->lambda_reduced, sizeof lambda[k]);
   }
   const int cheaper = cost[1] < cost[0];
@@ -102,7 +103,7 @@ static int cheaper_side(const real *block, fl_work *work, const real *target, fl
   memcpy(node->lambda_reduced, lambda[other], sizeof node->lambda_reduced);
   if (cheaper == 1) return status[1];
   fl_take_side(block, work, node, side[0]);
-  return fl_dual_newton(block, work, target, lambda[0], FL_STEPS_AT_KINK);
+  return fl_dual_newton(block, work, target_reduced, lambda[0], FL_STEPS_AT_KINK);
 }
 
 /* How many parts a search may look at. */
@@ -114,11 +115,11 @@ static int most_parts_of(const fl_work *work) {
 }
 
 /* Dives with the sets as they are, and leaves these as they were. */
-static void dive_and_return(const real *block, fl_work *work, const real *target, int status,
-                            real *best_cost) {
+static void dive_and_return(const real *block, fl_work *work, const real *target_reduced,
+                            int status, real *best_cost) {
   fl_set before[FL_MOST];
   memcpy(before, work->set, sizeof before);
-  dive(block, work, target, status, best_cost);
+  dive(block, work, target_reduced, status, best_cost);
   memcpy(work->set, before, sizeof before);
 }
 
@@ -130,39 +131,40 @@ static fl_node *last_cheaper_cut(const real *block, fl_work *work, int *depth, r
     fl_node *node = fl_last_open_cut(block, work, depth);
     if (!node) return 0;
     if (node->score[0] < best_cost * (1 - CLOSE)) return node;
-    *bound = fl_smaller(*bound, node->score[0]);
+    *bound = smaller(*bound, node->score[0]);
   }
 }
 
 /* Least power for a target at whose multipliers some force is in a gap: forces in
    work->best, and the power [W] that no forces in the sets undercut; 0 where no part meets
    the target. */
-int fl_search_gaps(const real *block, fl_work *work, const real *target, int status, real *bound) {
+int fl_search_gaps(const real *block, fl_work *work, const real *target_reduced, int status,
+                   real *bound) {
   const int most_parts = most_parts_of(work);
   const int status_begin = status;
-  real best_cost = NONE;
-  real least_bound = NONE;
+  real best_cost = INFEASIBLE_COST;
+  real least_bound = INFEASIBLE_COST;
   real lambda_begin[6];
   int depth = 0;
   int parts = 0;
   memcpy(work->set_before, work->set, sizeof work->set_before);
   memcpy(lambda_begin, work->state_found->lambda_reduced, sizeof lambda_begin);
   if (work->has_drag) {
-    fl_improve_from_starts(block, work, target, &best_cost);
-    fl_dual_start(block, work, target, lambda_begin);
+    fl_improve_from_starts(block, work, target_reduced, &best_cost);
+    fl_dual_start(block, work, target_reduced, lambda_begin);
   }
-  dive(block, work, target, status, &best_cost);
+  dive(block, work, target_reduced, status, &best_cost);
   fl_restore_sets(block, work, work->set_before);
-  fl_dual_start(block, work, target, lambda_begin);
+  fl_dual_start(block, work, target_reduced, lambda_begin);
   status = status_begin;
   for (;;) {
     fl_state *state = work->state_found;
     const real dual_value = state->dual_value;
     const int gap = fl_worst_gap(block, work, state->force, state->lambda_reduced);
-    int open = is_open(block, work, target, status, gap, &best_cost);
+    int open = is_open(block, work, target_reduced, status, gap, &best_cost);
     if (open && gap < 0) { /* hollow: at their least forces */
-      dive_and_return(block, work, target, status, &best_cost);
-      least_bound = fl_smaller(least_bound, dual_value);
+      dive_and_return(block, work, target_reduced, status, &best_cost);
+      least_bound = smaller(least_bound, dual_value);
       status = FL_BEYOND;
       open = 0;
     }
@@ -172,34 +174,34 @@ int fl_search_gaps(const real *block, fl_work *work, const real *target, int sta
       node = fl_cut_set(block, work, &depth, gap, state->force[gap]);
     }
     if (node) {
-      status = cheaper_side(block, work, target, node);
+      status = cheaper_side(block, work, target_reduced, node);
       parts += 2;
       continue;
     }
     work->is_truncated |= can_cut;
-    if (status != FL_BEYOND) least_bound = fl_smaller(least_bound, dual_value);
+    if (status != FL_BEYOND) least_bound = smaller(least_bound, dual_value);
     node = last_cheaper_cut(block, work, &depth, best_cost, &least_bound);
     if (!node) break;
     fl_take_side(block, work, node, -node->first_side);
-    status = fl_dual_newton(block, work, target, node->lambda_reduced, FL_STEPS_AT_KINK);
+    status = fl_dual_newton(block, work, target_reduced, node->lambda_reduced, FL_STEPS_AT_KINK);
   }
   fl_restore_sets(block, work, work->set_before);
   *bound = least_bound;
-  return best_cost < NONE;
+  return best_cost < INFEASIBLE_COST;
 }
 
-/* Commands that give work->wrench_target, from what Newton's method came to; 0 where none are
+/* Commands that give work->wrench_wanted, from what Newton's method came to; 0 where none are
    found. */
-int fl_answer_with_drag(const real *block, fl_work *work, const real *target, int status,
+int fl_answer_with_drag(const real *block, fl_work *work, const real *target_reduced, int status,
                         fl_answer *out) {
   const real dual_value = work->state_found->dual_value;
   memcpy(out->lambda_reduced, work->state_found->lambda_reduced, sizeof out->lambda_reduced);
   const int is_sure = status == FL_MET && fl_are_forces_sure(block, work);
   if (!is_sure) {
     real bound;
-    if (!fl_search_gaps(block, work, target, status, &bound)) return 0;
+    if (!fl_search_gaps(block, work, target_reduced, status, &bound)) return 0;
     if (status != FL_MET) { /* multipliers at the commands may prove more */
-      fl_dual_start(block, work, target, work->best_lambda);
+      fl_dual_start(block, work, target_reduced, work->best_lambda);
       if (work->state->dual_value > dual_value)
         memcpy(out->lambda_reduced, work->best_lambda, sizeof out->lambda_reduced);
     }

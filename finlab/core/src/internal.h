@@ -1,4 +1,8 @@
-/* What the files of the core share. */
+/* What the files of the core share.
+
+   Functions that one file defines and others call have the prefix fl_, as the linker sees them, and
+   so has all that finlab.h and fl_work.h declare. What stands here alone has none: static inline
+   functions, types, constants. */
 #ifndef FL_INTERNAL_H
 #define FL_INTERNAL_H
 #include "finlab.h"
@@ -22,7 +26,7 @@ typedef fl_wide wide;
 #define ENOUGH R(1e-4)
 #define IDLE 6
 #define ROUNDING R(1e-6)
-#define EXACT R(2e-6) /* error of commands, on the yardstick, that needs no further step */
+#define EXACT R(2e-6) /* error of commands, over the wrench scale, that needs no further step */
 #define TINY R(1e-30)
 #else
 #define R(x) x
@@ -42,9 +46,11 @@ typedef fl_wide wide;
 #define TINY 1e-300
 #endif
 #define PI R(3.14159265358979323846)
-#define LARGEST_NUMBER R(1e30) /* of a block or an answer */
+#define LARGEST_NUMBER R(1e30)  /* of a block or an answer */
+#define INFEASIBLE_COST R(1e30) /* [W] where no forces or commands meet a target */
 #define NOTHING R(1e-9)
-#define CLOSE_BY NOTHING /* distance, on the yardstick, up to which a point is the nearest one */
+/* distance, over the wrench scale, up to which a point is the nearest one */
+#define CLOSE_BY NOTHING
 #define NEARLY R(1e-6)
 #define FINE R(1e-5)
 #define CLOSE R(1e-4)
@@ -55,19 +61,17 @@ typedef fl_wide wide;
 #define ACTUATOR(block, i) ((const fl_actuator *)((block) + sizeof(fl_head) / sizeof(real)) + (i))
 #define COUNT(block) ((int)HEAD(block)->n)
 
-static inline real fl_larger(real a, real b) {
+static inline real larger(real a, real b) {
   if (a > b) return a;
   return b;
 }
 
-static inline real fl_smaller(real a, real b) {
+static inline real smaller(real a, real b) {
   if (a < b) return a;
   return b;
 }
 
-static inline real fl_clipped(real x, real low, real high) {
-  return fl_smaller(fl_larger(x, low), high);
-}
+static inline real clipped(real x, real low, real high) { return smaller(larger(x, low), high); }
 
 /* linear_algebra.c: linear algebra of 6 x 6 matrices */
 static inline real dot(const real *a, const real *b, int n) {
@@ -81,11 +85,16 @@ static inline real size_of(const real *force) {
 
 /* Whether an actuator pushes in a plane. */
 static inline int is_plane(const fl_actuator *a) { return a->rows == 2 && a->flow_speed == 0; }
+
+/* Whether an actuator is a foil in a flow, whose drag counts. */
+static inline int is_foil(const fl_actuator *a) { return a->flow_speed > 0; }
+
 /* Prices s = B' lambda of an actuator's force along its rows, Eq. 4. */
 static inline void actuator_price(const fl_work *work, int i, const real *lambda, real *s) {
   s[0] = dot(work->span.effectiveness_reduced[i][0], lambda, 6);
   s[1] = dot(work->span.effectiveness_reduced[i][1], lambda, 6);
 }
+
 real fl_wrap_angle(real angle);
 void fl_add_square(real H[6][6], const real *b, real weight);
 real fl_trace(real H[6][6]);
@@ -142,14 +151,27 @@ void fl_offset_wrench(const real *block, fl_span *span);
 int fl_span_of_question(const real *block, fl_work *work, const unsigned char *lost,
                         const unsigned char *free);
 
+/* command_form.c: what the numbers of each kind of command are */
+enum { NO_NUMBER = -1 };
+enum { NO_TABLE, BEAT_TABLE, CURVE_TABLE }; /* kinds of command tables, see fl_work.h */
+typedef struct {
+  int numbers;       /* how many of the three a command uses, from the first one on */
+  int angle_number;  /* which one is an angle that wraps, or NO_NUMBER */
+  int force_number;  /* which one is a force, which may have a dead band, or NO_NUMBER */
+  int command_table; /* what fl_actuator.command_table is: BEAT_TABLE ... */
+  int has_law_grid;  /* whether the law is a grid */
+  int has_drag;      /* whether the second axis of the law is drag */
+} command_form;
+const command_form *fl_form_of(const fl_actuator *a);
+int fl_aims_force(const fl_actuator *a);
+int fl_is_in_reverse(const fl_actuator *a, const real *command);
+
 /* command_box.c: commands within their limits */
 int fl_is_known_command(const real *command);
 void fl_clip_commands(const real *block, const fl_box *box, real command[][3]);
-int fl_angle_number(const fl_actuator *a);
 real fl_clip_number(const fl_box *box, int i, int k, int angle, real value);
 void fl_leave_dead_bands(const real *block, real force[][2], real command[][3]);
 void fl_rest_in_dead_bands(const real *block, const fl_box *box, real command[][3]);
-int fl_force_number(const fl_actuator *a);
 int fl_is_in_dead_band(const fl_actuator *a, const real *command);
 
 /* command_law.c: forces of commands and commands for forces */
@@ -176,16 +198,17 @@ int fl_prepare_question(const real *block, fl_work *work, const fl_question *q);
 /* dual_newton.c: Newton's method on the dual, Eq. 8 */
 void fl_prepare_sets(const real *block, fl_work *work);
 void fl_restore_sets(const real *block, fl_work *work, const fl_set *set);
-void fl_dual_start(const real *block, fl_work *work, const real *target, const real *lambda);
-void fl_dual_at(const real *block, const fl_work *work, const real *target, const real *lambda,
-                fl_state *state);
-void fl_first_lambda(const real *block, const fl_work *work, const real *target, real *lambda,
-                     real *mu);
-int fl_dual_newton(const real *block, fl_work *work, const real *target, const real *lambda,
+void fl_dual_start(const real *block, fl_work *work, const real *target_reduced,
+                   const real *lambda);
+void fl_dual_at(const real *block, const fl_work *work, const real *target_reduced,
+                const real *lambda, fl_state *state);
+void fl_first_lambda(const real *block, const fl_work *work, const real *target_reduced,
+                     real *lambda, real *mu);
+int fl_dual_newton(const real *block, fl_work *work, const real *target_reduced, const real *lambda,
                    int most_steps);
-void fl_reduce_wrench(const fl_work *work, const real *wrench, real *target);
+void fl_reduce_wrench(const fl_work *work, const real *wrench, real *target_reduced);
 void fl_reduce_lambda(const fl_work *work, const real *lambda, real *lambda_reduced);
-int fl_is_in_range(const fl_work *work, const real *wrench, const real *target);
+int fl_is_in_range(const fl_work *work, const real *wrench, const real *target_reduced);
 void fl_wrench_of_forces(const real *block, const fl_work *work, real force[][2], real *wrench);
 
 /* set_gaps.c: sets with gaps */
@@ -204,13 +227,12 @@ void fl_take_side(const real *block, fl_work *work, const fl_node *node, int sid
 fl_node *fl_last_open_cut(const real *block, fl_work *work, int *depth);
 
 /* gap_search.c: least power where sets have gaps */
-int fl_search_gaps(const real *block, fl_work *work, const real *target, int status, real *bound);
-int fl_answer_with_drag(const real *block, fl_work *work, const real *target, int status,
+int fl_search_gaps(const real *block, fl_work *work, const real *target_reduced, int status,
+                   real *bound);
+int fl_answer_with_drag(const real *block, fl_work *work, const real *target_reduced, int status,
                         fl_answer *out);
 
 /* foil_tangent.c: a foil near to a command */
-/* Whether an actuator is a foil in a flow, whose drag counts. */
-static inline int fl_is_foil(const fl_actuator *a) { return a->flow_speed > 0; }
 const real *fl_lift_end(const real *block, const fl_actuator *a);
 void fl_foil_at(const real *block, int i, real angle, fl_tangent *tangent);
 void fl_draw_tangent(const real *block, int i, const fl_box *box, real angle, const real *s,
@@ -219,58 +241,59 @@ real fl_power_of_commands(const real *block, const fl_work *work, real command[]
                           real force[][2]);
 
 /* foil_lattice.c: where searches for commands of foils may begin */
-enum { FL_BRANCHES = 4 };   /* of a foil's lift */
-#define FL_LATTICE_FOILS 6  /* foils on the lattice at most; others begin at rest */
-#define FL_LATTICE_NODES 48 /* nodes of all foils at most, angles of which a point has one a foil */
-#define FL_LATTICE_STARTS 60 /* points at which steps on the commands begin */
+enum { BRANCHES = 4 };    /* of a foil's lift */
+#define LATTICE_FOILS 6   /* foils on the lattice at most; others begin at rest */
+#define LATTICE_NODES 48  /* nodes of all foils at most, angles of which a point has one a foil */
+#define LATTICE_STARTS 60 /* points at which steps on the commands begin */
 typedef struct {
-  int foils;                                    /* how many there are */
-  int foil[FL_LATTICE_FOILS];                   /* which actuators these are */
-  int branches[FL_LATTICE_FOILS];               /* of each foil */
-  int first[FL_LATTICE_FOILS];                  /* its first node */
-  int each;                                     /* nodes on a branch */
-  real edge[FL_LATTICE_FOILS][FL_BRANCHES + 1]; /* ends of the branches [rad] */
-  real angle[FL_LATTICE_NODES];                 /* of each node [rad] */
-  real cost[FL_LATTICE_NODES];                  /* of each node [W] */
-  real wrench[FL_LATTICE_NODES][6];             /* of each node, in the basis */
-  real row[FL_MOST][2][6]; /* of other actuators: force by a wrench in the basis */
-} fl_lattice;
+  int foils;                              /* how many there are */
+  int foil[LATTICE_FOILS];                /* which actuators these are */
+  int branches[LATTICE_FOILS];            /* of each foil */
+  int first[LATTICE_FOILS];               /* its first node */
+  int each;                               /* nodes on a branch */
+  real edge[LATTICE_FOILS][BRANCHES + 1]; /* ends of the branches [rad] */
+  real angle[LATTICE_NODES];              /* of each node [rad] */
+  real cost[LATTICE_NODES];               /* of each node [W] */
+  real wrench[LATTICE_NODES][6];          /* of each node, in the basis */
+  real row[FL_MOST][2][6];                /* of other actuators: force by a wrench in the basis */
+} foil_lattice;
 typedef struct {
-  unsigned char node[FL_LATTICE_FOILS]; /* of each foil */
-  real cost;                            /* [W], with the price of a miss */
-} fl_lattice_point;
-void fl_lay_lattice(const real *block, const fl_work *work, fl_lattice *lattice);
-int fl_cheapest_points(const real *block, const fl_work *work, const fl_lattice *lattice,
-                       const real *target, fl_lattice_point *points);
-void fl_commands_of_point(const real *block, const fl_work *work, const fl_lattice *lattice,
-                          const real *target, const fl_lattice_point *point, fl_box *box,
+  unsigned char node[LATTICE_FOILS]; /* of each foil */
+  real cost;                         /* [W], with the price of a miss */
+} lattice_point;
+void fl_lay_lattice(const real *block, const fl_work *work, foil_lattice *lattice);
+int fl_cheapest_points(const real *block, const fl_work *work, const foil_lattice *lattice,
+                       const real *target_reduced, lattice_point *points);
+void fl_commands_of_point(const real *block, const fl_work *work, const foil_lattice *lattice,
+                          const real *target_reduced, const lattice_point *point, fl_box *box,
                           real command[][3]);
 
 /* foil_drag.c: commands of robots whose foils drag */
-void fl_improve_commands(const real *block, fl_work *work, const real *target, real *best);
-void fl_improve_from_starts(const real *block, fl_work *work, const real *target, real *best);
+void fl_improve_commands(const real *block, fl_work *work, const real *target_reduced, real *best);
+void fl_improve_from_starts(const real *block, fl_work *work, const real *target_reduced,
+                            real *best);
 int fl_are_forces_sure(const real *block, fl_work *work);
 void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, real found,
                           real most, fl_answer *out);
 
 /* nearest_point.c: points near to a wrench beyond reach */
-static inline wide product(const wide *a, const wide *b, int n) {
+static inline wide dot_wide(const wide *a, const wide *b, int n) {
   wide sum = 0;
   for (int k = 0; k < n; k++) sum += a[k] * b[k];
   return sum;
 }
 
-static inline wide length_of(const wide *a) { return sqrt(product(a, a, 6)); }
+static inline wide norm_wide(const wide *a) { return sqrt(dot_wide(a, a, 6)); }
 
-/* Adds a vector (6,) so many times. */
-static inline void add(wide *to, wide times, const wide *other) {
+/* Adds a vector (6,) times a number. */
+static inline void add_scaled(wide *to, wide times, const wide *other) {
   for (int k = 0; k < 6; k++) to[k] += times * other[k];
 }
 wide fl_out_of_range(const real *block, const fl_work *work, const real *inner, int axis);
 void fl_weigh_axes(const real *block, fl_work *work, const wide *weight);
 void fl_point_of_forces(const real *block, const fl_work *work, wide force[][2], wide *point);
-wide fl_nearest_point(const real *block, const fl_work *work, const wide *target, wide close,
-                      wide apart, fl_mixture *m);
+wide fl_nearest_point(const real *block, const fl_work *work, const wide *target_weighted,
+                      wide close, wide apart, fl_mixture *m);
 wide fl_farthest_along_ray(const real *block, const fl_work *work, const wide *from,
                            const wide *ray, wide least, wide most, wide close, fl_mixture *m,
                            wide *plane);

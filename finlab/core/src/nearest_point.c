@@ -22,7 +22,7 @@ static wide larger_wide(wide a, wide b) {
   return b;
 }
 
-/* An axis of a scaled wrench in the basis, on the yardstick. */
+/* An axis of a scaled wrench in the basis, over the wrench scale. */
 wide fl_out_of_range(const real *block, const fl_work *work, const real *reduced, int axis) {
   const fl_span *span = &work->span;
   wide sum = 0;
@@ -30,7 +30,7 @@ wide fl_out_of_range(const real *block, const fl_work *work, const real *reduced
   return sum * (wide)span->axis_scale[axis] / (wide)HEAD(block)->wrench_scale[axis];
 }
 
-/* Sets the wrench on the yardstick, in weighted axes, that each force gives per newton. */
+/* Sets the wrench over the wrench scale, in weighted axes, that each force gives per newton. */
 void fl_weigh_axes(const real *block, fl_work *work, const wide *weight) {
   for (int i = 0; i < COUNT(block); i++) {
     work->polygon_offset[i] = 0;
@@ -46,7 +46,7 @@ void fl_weigh_axes(const real *block, fl_work *work, const wide *weight) {
 /* The corner of a polygon, a count and pairs, that is farthest along prices s. */
 static void farthest_corner(const real *polygon, const real *s, wide *force) {
   const int count = (int)polygon[0];
-  real farthest = -R(1e30);
+  real farthest = -LARGEST_NUMBER;
   for (int k = 0; k < count; k++) {
     const real *corner = polygon + 1 + 2 * k;
     const real distance = dot(s, corner, 2);
@@ -62,7 +62,7 @@ void fl_point_of_forces(const real *block, const fl_work *work, wide force[][2],
   memset(point, 0, sizeof work->effectiveness_weighted[0][0]);
   for (int i = 0; i < COUNT(block); i++) {
     for (int q = 0; q < (int)ACTUATOR(block, i)->rows; q++) {
-      add(point, force[i][q], work->effectiveness_weighted[i][q]);
+      add_scaled(point, force[i][q], work->effectiveness_weighted[i][q]);
     }
   }
 }
@@ -75,7 +75,7 @@ static void append_farthest(const real *block, const fl_work *work, const wide *
   wide(*force)[2] = m->force[last];
   for (int i = 0; i < COUNT(block); i++) {
     const wide(*column)[6] = work->effectiveness_weighted[i];
-    const real s[2] = {(real)product(column[0], normal, 6), (real)product(column[1], normal, 6)};
+    const real s[2] = {(real)dot_wide(column[0], normal, 6), (real)dot_wide(column[1], normal, 6)};
     if (work->polygon_offset[i] > 0)
       farthest_corner(block + work->polygon_offset[i], s, force[i]);
     else
@@ -83,9 +83,9 @@ static void append_farthest(const real *block, const fl_work *work, const wide *
   }
   fl_point_of_forces(block, work, force, m->point[last]);
   m->ray_share[last] = 0;
-  if (work->ray && product(work->ray, normal, 6) < 0) {
+  if (work->ray && dot_wide(work->ray, normal, 6) < 0) {
     m->ray_share[last] = 1;
-    add(m->point[last], -1, work->ray);
+    add_scaled(m->point[last], -1, work->ray);
   }
 }
 
@@ -111,11 +111,11 @@ static int least_share(const fl_mixture *m) {
 /* Takes from vector j of the basis what lies along those before it; what is left of its length. */
 static wide orthogonalize(fl_mixture *m, int j) {
   for (int i = 1; i < j; i++) {
-    const wide along = product(m->q[i], m->q[j], 6);
+    const wide along = dot_wide(m->q[i], m->q[j], 6);
     m->r[i][j] += along;
-    add(m->q[j], -along, m->q[i]);
+    add_scaled(m->q[j], -along, m->q[i]);
   }
-  return length_of(m->q[j]);
+  return norm_wide(m->q[j]);
 }
 
 /* Extends the basis of a mixture by the difference of point j from the first one: by
@@ -124,9 +124,9 @@ static wide orthogonalize(fl_mixture *m, int j) {
 static void extend_basis(fl_mixture *m, int j) {
   wide *q = m->q[j];
   memcpy(q, m->point[j], sizeof m->q[j]);
-  add(q, -1, m->point[0]);
+  add_scaled(q, -1, m->point[0]);
   for (int i = 1; i < j; i++) m->r[i][j] = 0;
-  const wide size = length_of(q);
+  const wide size = norm_wide(q);
   wide left = orthogonalize(m, j);
   if (!(left > NEARLY_DEPENDENT * size)) left = orthogonalize(m, j);
   wide inverse = 0;
@@ -137,7 +137,7 @@ static void extend_basis(fl_mixture *m, int j) {
 
 /* Shares, which add up to 1, of the points that come nearest to a target, within their
    affine hull; a point that depends on those before it gets 0. */
-static void affine_shares(fl_mixture *m, const wide *target, wide *share) {
+static void affine_shares(fl_mixture *m, const wide *target_weighted, wide *share) {
   int begin = m->basis_count;
   if (begin < 1) begin = 1;
   for (int j = begin; j < m->count; j++) extend_basis(m, j);
@@ -145,15 +145,15 @@ static void affine_shares(fl_mixture *m, const wide *target, wide *share) {
 
   wide right[FL_POINTS];
   wide left[6];
-  memcpy(left, target, sizeof left);
-  add(left, -1, m->point[0]);
+  memcpy(left, target_weighted, sizeof left);
+  add_scaled(left, -1, m->point[0]);
   for (int j = 1; j < m->count; j++) {
-    right[j] = product(m->q[j], left, 6);
-    add(left, -right[j], m->q[j]);
+    right[j] = dot_wide(m->q[j], left, 6);
+    add_scaled(left, -right[j], m->q[j]);
   }
   share[0] = 1;
   for (int j = m->count - 1; j > 0; j--) {
-    const wide behind = product(m->r[j] + j + 1, share + j + 1, m->count - j - 1);
+    const wide behind = dot_wide(m->r[j] + j + 1, share + j + 1, m->count - j - 1);
     share[j] = m->r[j][j] * (right[j] - behind);
     share[0] -= share[j];
   }
@@ -175,11 +175,11 @@ static wide step_to_edge(const fl_mixture *m, const wide *wanted, int *is_inside
 
 /* Shares of the points whose mixture is nearest to a target; points without a share are left
    out. */
-static void mix(fl_mixture *m, const wide *target) {
+static void mix(fl_mixture *m, const wide *target_weighted) {
   while (m->count > 1) {
     wide wanted[FL_POINTS];
     int is_inside;
-    affine_shares(m, target, wanted);
+    affine_shares(m, target_weighted, wanted);
     const wide step = step_to_edge(m, wanted, &is_inside);
     if (is_inside) {
       memcpy(m->weight, wanted, sizeof wanted);
@@ -195,48 +195,48 @@ static void mix(fl_mixture *m, const wide *target) {
 }
 
 /* Sets the miss of a mixture: the way from its point to a target. Its length. */
-static wide find_miss(fl_mixture *m, const wide *target) {
-  memcpy(m->miss, target, sizeof m->miss);
-  for (int p = 0; p < m->count; p++) add(m->miss, -m->weight[p], m->point[p]);
-  return length_of(m->miss);
+static wide find_miss(fl_mixture *m, const wide *target_weighted) {
+  memcpy(m->miss, target_weighted, sizeof m->miss);
+  for (int p = 0; p < m->count; p++) add_scaled(m->miss, -m->weight[p], m->point[p]);
+  return norm_wide(m->miss);
 }
 
 /* What the point behind those of a mixture lies beyond the mixture along the miss, over no
    length. */
-static wide gain_of_last(const fl_mixture *m, const wide *target) {
+static wide gain_of_last(const fl_mixture *m, const wide *target_weighted) {
   wide way[6];
   memcpy(way, m->point[m->count], sizeof way);
-  add(way, -1, target);
-  add(way, 1, m->miss);
-  return product(way, m->miss, 6);
+  add_scaled(way, -1, target_weighted);
+  add_scaled(way, 1, m->miss);
+  return dot_wide(way, m->miss, 6);
 }
 
 /* Makes a mixture the point nearest to a target (6,); it begins at the mixture, where that
    has points. Up to the distance `close` a point is the nearest one; `apart` is the share of
    a miss to be proved. Where there is a miss, what is farthest along it follows the
    mixture's points. Returns the miss. */
-wide fl_nearest_point(const real *block, const fl_work *work, const wide *target, wide close,
-                      wide apart, fl_mixture *m) {
+wide fl_nearest_point(const real *block, const fl_work *work, const wide *target_weighted,
+                      wide close, wide apart, fl_mixture *m) {
   wide last_miss = 1e300;
   if (m->count == 0) {
-    append_farthest(block, work, target, m);
+    append_farthest(block, work, target_weighted, m);
     m->count = 1;
     m->basis_count = 0;
     m->weight[0] = 1;
   }
   for (int k = 1;; k++) {
-    const wide miss = find_miss(m, target);
+    const wide miss = find_miss(m, target_weighted);
     if (miss <= close) return miss;
     if (m->count == FL_POINTS) drop(m, least_share(m)); /* more than an affine basis */
     append_farthest(block, work, m->miss, m);
-    const wide gain = gain_of_last(m, target);
+    const wide gain = gain_of_last(m, target_weighted);
     const int is_proved = gain <= larger_wide(close, apart * miss) * miss;
     const int has_stalled = miss >= last_miss * (1 - BARELY);
     if (is_proved || has_stalled || k == MOST_POINTS) return miss;
     last_miss = miss;
     m->weight[m->count] = 0;
     m->count++;
-    mix(m, target);
+    mix(m, target_weighted);
   }
 }
 
@@ -256,24 +256,24 @@ wide fl_farthest_along_ray(const real *block, const fl_work *work, const wide *f
   append_farthest(block, work, ray, m);
   for (int k = 0; k < MOST_SHARES; k++) {
     const wide *normal = m->miss;
-    const wide across = product(normal, ray, 6);
+    const wide across = dot_wide(normal, ray, 6);
     wide bound = least;
     if (across > 0) {
       const wide *farthest = m->point[m->count];
-      bound = (product(farthest, normal, 6) - product(from, normal, 6)) / across;
+      bound = (dot_wide(farthest, normal, 6) - dot_wide(from, normal, 6)) / across;
     }
     if (bound < size) {
       size = larger_wide(bound, least);
       memcpy(plane, normal, sizeof m->miss);
     }
-    wide target[6];
-    memcpy(target, from, sizeof target);
-    add(target, size, ray);
+    wide target_weighted[6];
+    memcpy(target_weighted, from, sizeof target_weighted);
+    add_scaled(target_weighted, size, ray);
     if (m->count < 1) m->count = 1;
-    const wide miss = fl_nearest_point(block, work, target, close, PROOF_OF_SHARE, m);
+    const wide miss = fl_nearest_point(block, work, target_weighted, close, PROOF_OF_SHARE, m);
     const int has_stalled = size >= last_size;
     if (size == least || miss <= 2 * close || (has_stalled && miss <= 1)) break;
-    if (has_stalled) size -= miss / (2 * length_of(ray));
+    if (has_stalled) size -= miss / (2 * norm_wide(ray));
     last_size = size;
   }
   return size;

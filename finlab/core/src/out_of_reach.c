@@ -10,13 +10,12 @@
 #define REACH_PARTS 96     /* parts that a policy may look at, of any robot */
 #define REACH_PARTS_EACH 8 /* the same, for each of its actuators */
 
-/* Distance, on the yardstick, up to which the point of a part is the nearest one. */
+/* Distance, over the wrench scale, up to which the point of a part is the nearest one. */
 #define ROUGHLY (NEARLY / 10)
 #define HELD 1e3  /* weight of an axis that is held over one of the group that is served */
 #define PULL 2e-3 /* miss of a group for which held axes give way by a millionth at a curved rim */
 /* Scaled wrench by which an answer at the rim may be off: what it gives is then what is served. */
 #define AT_RIM (R(0.1) * NEARLY)
-#define NONE R(1e30) /* power that no answer reaches */
 
 /* Whether so many bytes are the same, one of which was copied from the other. Not memcmp:
    WebAssembly has no library. */
@@ -31,35 +30,36 @@ static int are_same(const void *one, const void *other, size_t size) {
 
 static real rounded(real value) { return FLOOR(value / NEARLY + R(0.5)) * NEARLY; }
 
-static wide on_yardstick(const real *block, const real *wrench, int k) {
+static wide over_wrench_scale(const real *block, const real *wrench, int k) {
   return (wide)wrench[k] / (wide)HEAD(block)->wrench_scale[k];
 }
 
 static void serve_closest(const real *block, fl_work *work, const real *wrench,
                           const fl_policy *policy, real *score) {
   wide weight[6];
-  wide target[6];
+  wide target_weighted[6];
   for (int k = 0; k < 6; k++) {
-    weight[k] = fl_larger(policy->axis_weight[k], CLOSE);
-    target[k] = weight[k] * on_yardstick(block, wrench, k);
+    weight[k] = larger(policy->axis_weight[k], CLOSE);
+    target_weighted[k] = weight[k] * over_wrench_scale(block, wrench, k);
   }
   fl_weigh_axes(block, work, weight);
   work->mixture.count = 0;
-  const wide miss = fl_nearest_point(block, work, target, work->distance_enough, 0, &work->mixture);
+  const wide miss =
+      fl_nearest_point(block, work, target_weighted, work->distance_enough, 0, &work->mixture);
   score[0] = rounded((real)miss);
 }
 
-/* The ray of a wrench, on the yardstick, within the range of the effectiveness. */
+/* The ray of a wrench, over the wrench scale, within the range of the effectiveness. */
 static void ray_of(const real *block, const fl_work *work, const real *wrench, wide *ray) {
   real along[6];
-  real target[6];
+  real target_reduced[6];
   for (int k = 0; k < 6; k++) along[k] = wrench[k] + work->span.wrench_offset[k];
-  fl_reduce_wrench(work, along, target);
-  const int is_in_range = fl_is_in_range(work, along, target);
+  fl_reduce_wrench(work, along, target_reduced);
+  const int is_in_range = fl_is_in_range(work, along, target_reduced);
   for (int k = 0; k < 6; k++) {
     ray[k] = 0;
     /* What rounding has put beside the range is left out. */
-    if (is_in_range) ray[k] = fl_out_of_range(block, work, target, k);
+    if (is_in_range) ray[k] = fl_out_of_range(block, work, target_reduced, k);
   }
 }
 
@@ -85,15 +85,15 @@ static void serve_direction(const real *block, fl_work *work, const real *wrench
   wide from[6];
   wide ray[6];
   wide plane[6];
-  for (int k = 0; k < 6; k++) from[k] = -on_yardstick(block, work->span.wrench_offset, k);
+  for (int k = 0; k < 6; k++) from[k] = -over_wrench_scale(block, work->span.wrench_offset, k);
   ray_of(block, work, wrench, ray);
   fl_weigh_axes(block, work, weight);
   wide ray_share =
       fl_farthest_along_ray(block, work, from, ray, 0, 1, work->distance_enough, m, plane);
   /* What misses along the ray is a smaller share; what is across it counts more. */
-  const wide less = product(m->miss, ray, 6) / (product(ray, ray, 6) + 1e-300);
-  add(m->miss, -less, ray);
-  score[0] = rounded((real)length_of(m->miss));
+  const wide less = dot_wide(m->miss, ray, 6) / (dot_wide(ray, ray, 6) + 1e-300);
+  add_scaled(m->miss, -less, ray);
+  score[0] = rounded((real)norm_wide(m->miss));
   score[1] = (real)(1 - ray_share + less);
   if (ray_share > 0 || !(score[0] > 0)) return;
   ray_share = nearest_to_ray(block, work, from, ray, score);
@@ -106,7 +106,7 @@ static void remake_points(const real *block, const fl_work *work, fl_mixture *m)
   for (int p = 0; p < m->count; p++) fl_point_of_forces(block, work, m->force[p], m->point[p]);
 }
 
-/* Serves one group of axes, for a wrench on the yardstick, while those before it are held;
+/* Serves one group of axes, for a wrench over the wrench scale, while those before it are held;
    `missing` becomes what it lacks. Its length. A group that wants more than there is pulls
    at the held axes: then it weighs so much less that these give way by as little as they do
    for a miss of `PULL`. */
@@ -119,18 +119,18 @@ static wide serve_group(const real *block, fl_work *work, const wide *wanted,
   if (is_first) rounds = 1;
   for (int round = 0; round < rounds && missed >= PULL; round++) {
     wide weight[6];
-    wide target[6];
+    wide target_weighted[6];
     for (int k = 0; k < 6; k++) {
       weight[k] = HELD * held[k] + sqrt(PULL / missed) * group[k];
-      target[k] = weight[k] * wanted[k];
+      target_weighted[k] = weight[k] * wanted[k];
     }
     fl_weigh_axes(block, work, weight);
     remake_points(block, work, m);
-    fl_nearest_point(block, work, target, work->distance_enough, 0, m);
+    fl_nearest_point(block, work, target_weighted, work->distance_enough, 0, m);
     for (int k = 0; k < 6; k++) {
       if (group[k]) missing[k] = m->miss[k] / weight[k];
     }
-    missed = length_of(missing);
+    missed = norm_wide(missing);
   }
   return missed;
 }
@@ -138,8 +138,8 @@ static wide serve_group(const real *block, fl_work *work, const wide *wanted,
 static void serve_priority(const real *block, fl_work *work, const real *wrench,
                            const fl_policy *policy, real *score) {
   unsigned char held[6] = {0};
-  wide wanted[6]; /* on the yardstick; of held axes what they have got */
-  for (int k = 0; k < 6; k++) wanted[k] = on_yardstick(block, wrench, k);
+  wide wanted[6]; /* over the wrench scale; of held axes what they have got */
+  for (int k = 0; k < 6; k++) wanted[k] = over_wrench_scale(block, wrench, k);
   work->mixture.count = 0;
   for (int g = 0; g < policy->group_count; g++) {
     const unsigned char *group = policy->group[g];
@@ -222,25 +222,26 @@ static void cheapest_forces(const real *block, fl_work *work, real force[][2], c
   memcpy(out->force, force, (size_t)COUNT(block) * sizeof out->force[0]);
   memcpy(out->wrench_served, given, sizeof given);
   const real distance_inside = scaled_distance(work, given, inside);
-  real most_power = NONE;
+  real most_power = INFEASIBLE_COST;
   int first = WANTED;
   if (are_same(wanted, given, sizeof given)) first = GIVEN;
   for (int trial = first; trial < TRIALS; trial++) {
     real wrench[6];
-    real target[6];
+    real target_reduced[6];
     for (int k = 0; k < 6; k++) {
       const real share = (trial == INSIDE) * NEARLY;
-      wrench[k] = given[k] + share * (inside[k] - given[k]) / fl_larger(1, distance_inside);
+      wrench[k] = given[k] + share * (inside[k] - given[k]) / larger(1, distance_inside);
       if (trial == WANTED) wrench[k] = wanted[k];
     }
-    fl_reduce_wrench(work, wrench, target);
-    fl_dual_newton(block, work, target, 0, FL_STEPS_AT_KINK);
+    fl_reduce_wrench(work, wrench, target_reduced);
+    fl_dual_newton(block, work, target_reduced, 0, FL_STEPS_AT_KINK);
     const real dual_value = work->state_found->dual_value;
-    const int has_met = !(work->state_found->residual_size > fl_larger(AT_RIM, ENOUGH));
+    const int has_met = !(work->state_found->residual_size > larger(AT_RIM, ENOUGH));
     if (!has_met || dual_value > most_power) continue;
     take_answer(block, work, wrench, out);
     most_power = (1 - FINE) * dual_value;
-    const int is_steep = !(dot(out->lambda_reduced, target, 6) <= FINE / NEARLY * dual_value);
+    const int is_steep =
+        !(dot(out->lambda_reduced, target_reduced, 6) <= FINE / NEARLY * dual_value);
     if (trial != GIVEN || !is_steep) return;
   }
 }
@@ -338,8 +339,8 @@ static void wrench_wanted_of(const real *block, const fl_work *work, const real 
 }
 
 /* Looks for least power for an answer's wrench in other parts of sets with gaps. */
-static void cheapen_by_parts(const real *block, fl_work *work, const real *target, int status,
-                             fl_answer *out) {
+static void cheapen_by_parts(const real *block, fl_work *work, const real *target_reduced,
+                             int status, fl_answer *out) {
   if (status == FL_BEYOND) return;
   const size_t size = (size_t)COUNT(block) * sizeof out->force[0];
   fl_state *state = work->state_found;
@@ -351,7 +352,7 @@ static void cheapen_by_parts(const real *block, fl_work *work, const real *targe
     return;
   }
   real bound;
-  if (!fl_search_gaps(block, work, target, status, &bound)) return;
+  if (!fl_search_gaps(block, work, target_reduced, status, &bound)) return;
   memcpy(out->force, work->best_force, size);
   out->gap_power_bound = 0;
   if (!work->has_turn_cost)
@@ -377,17 +378,17 @@ void fl_out_of_reach(const real *block, fl_work *work, const real *wrench, const
   fl_restore_sets(block, work, work->set_before);
   if (!fl_may_have_gaps(block, work, out->force)) return;
 
-  real target[6];
-  fl_reduce_wrench(work, out->wrench_served, target);
+  real target_reduced[6];
+  fl_reduce_wrench(work, out->wrench_served, target_reduced);
   /* Another part of the sets may give it for less. */
-  const int status = fl_dual_newton(block, work, target, 0, FL_STEPS);
+  const int status = fl_dual_newton(block, work, target_reduced, 0, FL_STEPS);
   if (!work->has_drag) {
-    cheapen_by_parts(block, work, target, status, out);
+    cheapen_by_parts(block, work, target_reduced, status, out);
     return;
   }
   for (int k = 0; k < 6; k++)
-    work->wrench_target[k] = out->wrench_served[k] + work->span.wrench_offset[k];
-  const int is_met = fl_answer_with_drag(block, work, target, status, out);
+    work->wrench_wanted[k] = out->wrench_served[k] + work->span.wrench_offset[k];
+  const int is_met = fl_answer_with_drag(block, work, target_reduced, status, out);
   if (!keeps_direction) return;
   const real found = (real)is_met * ray_share;
   fl_largest_ray_share(block, work, wrench, found, most_ray_share, out);

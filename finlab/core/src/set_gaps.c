@@ -72,7 +72,7 @@ real fl_gap_of(const real *block, const fl_work *work, int i, const real *force,
   const real size = size_of(force);
   real amount = gap_in_band(a, set, force);
   if (set->force_max_reverse > 0 && !lambda)
-    return fl_larger(gap_between_ways(a, set, force, size), amount);
+    return larger(gap_between_ways(a, set, force, size), amount);
   const int is_hollow = set->force_min > HOLLOW * largest;
   if (!lambda && set->sector_half_angle > FLAT && is_hollow && size < set->force_min * (1 - NEARLY))
     amount += 1 - size / set->force_min;
@@ -97,7 +97,7 @@ real fl_largest_force(const real *block, real force[][2]) {
   for (int i = 0; i < COUNT(block); i++) {
     real size = FABS(force[i][0]);
     if (is_plane(ACTUATOR(block, i))) size = size_of(force[i]);
-    largest = fl_larger(largest, size);
+    largest = larger(largest, size);
   }
   return largest;
 }
@@ -300,7 +300,7 @@ fl_node *fl_last_open_cut(const real *block, fl_work *work, int *depth) {
 /* Freezes a plane at its least force, in the direction of a force or next to it in its arc. */
 void fl_fix_at_least_force(const real *block, int i, fl_set *set, const real *force) {
   const real angle =
-      fl_clipped(angle_from_middle(set, force), -set->sector_half_angle, set->sector_half_angle);
+      clipped(angle_from_middle(set, force), -set->sector_half_angle, set->sector_half_angle);
   const real direction = set->sector_center + angle;
   const real least[2] = {set->force_min * COS(direction), set->force_min * SIN(direction)};
   fl_fix_force(block, i, set, least);

@@ -137,10 +137,10 @@ static void window_of(const fl_set *set, real *low, real *high) {
 static int is_concave(const pod_at_price *x, const at_angle *start, real farthest) {
   const fl_set *set = x->set;
   const real p = size_of(x->price);
-  const real most_dv = fl_smaller(FABS(start->dv) + p * farthest, p);
-  const real least_v = fl_larger(start->v - p * farthest, -p);
+  const real most_dv = smaller(FABS(start->dv) + p * farthest, p);
+  const real least_v = larger(start->v - p * farthest, -p);
   real held = 0; /* T v'' of the least force */
-  if (set->force_min > 0) held = set->force_min * fl_larger(-least_v, 0);
+  if (set->force_min > 0) held = set->force_min * larger(-least_v, 0);
   const real kappa = set->turn_cost;
   return set->slope_max * most_dv * most_dv + held < kappa;
 }
@@ -149,10 +149,10 @@ static int is_concave(const pod_at_price *x, const at_angle *start, real farthes
    and of the roots of h' that cells show by a change of its sign. */
 static void go_to_best_cell(const pod_at_price *x, at_angle *best, real low, real high) {
   at_angle before;
-  look_at(x, fl_clipped(x->set->turn_origin, low, high), best);
+  look_at(x, clipped(x->set->turn_origin, low, high), best);
   look_at(x, low, &before);
   if (before.slope <= 0 && before.value > best->value) *best = before;
-  const int cells = (int)fl_clipped((high - low) / CELL + 2, 2, MOST_CELLS);
+  const int cells = (int)clipped((high - low) / CELL + 2, 2, MOST_CELLS);
   for (int k = 1; k <= cells && high > low; k++) {
     real to = high;
     if (k < cells) to = low + (high - low) * (real)k / (real)cells;
@@ -178,7 +178,7 @@ static at_angle best_angle(const pod_at_price *x, real low, real high) {
   } else {
     look_at(x, set->turn_origin, &best);
   }
-  if (is_concave(x, &best, fl_smaller(set->sector_half_angle, PI))) {
+  if (is_concave(x, &best, smaller(set->sector_half_angle, PI))) {
     go_to_root(x, &best, low, high, 1);
   } else {
     go_to_best_cell(x, &best, low, high);
@@ -210,7 +210,7 @@ response fl_response_with_turning(const real *block, int i, const fl_set *set, c
   real over_bend = 0; /* 1 / -h'' */
   if (is_inside && best.bend < 0) {
     const real least = NOTHING * (set->turn_cost + FABS(best.T) * size_of(price)) + TINY;
-    over_bend = 1 / fl_larger(-best.bend, least);
+    over_bend = 1 / larger(-best.bend, least);
   }
   response y;
   y.force[0] = best.T * b[0];

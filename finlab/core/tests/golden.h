@@ -7,7 +7,7 @@
 #include <string.h>
 
 #ifdef FL_SINGLE
-static const double met = 1e-5; /* error of commands on the yardstick */
+static const double met = 1e-5; /* error of commands over the wrench scale */
 #else
 static const double met = 2e-8;
 #endif
@@ -20,7 +20,7 @@ typedef struct {
   double power;      /* least power for it [W], by an oracle */
   fl_real beyond[6]; /* a wrench out of reach */
   double ray_share;  /* largest share of it that can be given, by an oracle */
-  double miss;       /* least distance from it on the yardstick, by an oracle */
+  double miss;       /* least distance from it over the wrench scale, by an oracle */
 } golden_question;
 
 typedef struct {
@@ -50,7 +50,7 @@ static const fl_actuator *actuators_of(const fl_real *block) {
   return (const fl_actuator *)(const void *)(head_of(block) + 1);
 }
 
-/* Distance between two wrenches on a robot's yardstick. */
+/* Distance between two wrenches over a robot's wrench scale. */
 static inline double distance(const fl_real *block, const fl_real *a, const fl_real *b) {
   double squared = 0;
   for (int k = 0; k < 6; k++) {

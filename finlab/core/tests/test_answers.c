@@ -92,7 +92,7 @@ static void test_closest(const golden_robot *robot, int k) {
   CHECK(fabs(miss - golden->miss) <= optimal * golden->miss + by_polygons, robot->name, k);
 }
 
-/* Length of a miss in some axes, on the yardstick. */
+/* Length of a miss in some axes, over the wrench scale. */
 static double miss_in(const fl_real *block, const fl_real *a, const fl_real *b, int first) {
   double squared = 0;
   for (int k = first; k < first + 3; k++) {

@@ -24,7 +24,6 @@ static void test_errors_have_sentences(void) {
     }
   }
   CHECK(strcmp(fl_error_text(FL_ERRORS), fl_error_text(1000)) == 0, "code", FL_ERRORS);
-  CHECK(strstr(fl_error_text(FL_TRUNCATED), "most_parts") != NULL, "code", FL_TRUNCATED);
 }
 
 static void test_damaged_blocks_are_refused(const golden_robot *robot) {

@@ -10,7 +10,7 @@ typedef struct {
   int policy;
   fl_real wrench[6];
   fl_real aim[6]; /* wrench that the library's commands give [N, N m] */
-  fl_real error;  /* of these commands, on the yardstick */
+  fl_real error;  /* of these commands, over the wrench scale */
   fl_real command[ROBOT_COUNT][3];
   const fl_real (*previous)[3]; /* commands of the tick before, 0 for none */
 } sample;
@@ -26,7 +26,7 @@ typedef struct {
 #define WEAK_FORCE 100  /* up to 1/100 of the largest force, an actuator's command matters little */
 #define DRAG_SLACK 10   /* where foils drag, a share of the ray may be off by so many times APART */
 #define FULL_TURN 6     /* an angle whose range is wider wraps; just below 2 pi [rad] */
-#define TICK_SLACK 1e-3 /* error, on the yardstick, that commands of a tick may have ... */
+#define TICK_SLACK 1e-3 /* error, over the wrench scale, that commands of a tick may have ... */
 #define TICK_FACTOR 1.02 /* ... beyond so many times the library's */
 #define GROUPS 3
 static const unsigned char group[6][6] = {{0, 0, 1}, {0, 0, 0, 1, 1, 1}, {1, 1}};
@@ -37,7 +37,7 @@ static fl_answer out;
 static int most_steps;
 static int others; /* samples with another command */
 
-/* The distance of two wrenches, on the yardstick, in some axes. */
+/* The distance of two wrenches, over the wrench scale, in some axes. */
 static double apart(const fl_real *a, const fl_real *b, const unsigned char *axes) {
   const fl_head *head = (const fl_head *)robot;
   double sum = 0;

@@ -25,7 +25,7 @@ from finlab.fit.columns import command_columns, commands_in, read_columns
 from finlab.layout import Layout, layout_to_dict, load_layout, parse_layout
 from finlab.layout.effectiveness import body_force
 from finlab.physics import Plant
-from finlab.physics.objective import yardstick
+from finlab.physics.objective import wrench_scale_of
 from finlab.whole_file import write_whole
 
 MAX_BYTES = 1_000_000_000
@@ -59,7 +59,7 @@ def left_by_laws(samples: Samples) -> LawResiduals:
     """Returns the residuals of samples under the laws, whatever interaction their layout names."""
     layout = replace(samples.layout, interaction=None)
     plant = Plant(layout)
-    scale = yardstick(layout)
+    scale = wrench_scale_of(layout)
     force = plant.force(samples.command)
     return LawResiduals(
         body_force(force, layout.frames), (samples.wrench - plant.wrench_of(force)) / scale, scale

@@ -14,7 +14,7 @@ from finlab.arrays import Array
 from finlab.fit.interaction.samples import Samples, left_by_laws
 from finlab.layout import Layout
 from finlab.layout.jet_geometry import jet_geometry_of
-from finlab.physics.objective import yardstick
+from finlab.physics.objective import wrench_scale_of
 
 
 def trained_surrogate(
@@ -68,7 +68,7 @@ def trained_surrogate(
         schedule.step()
 
     def model(layout: Layout) -> Callable[[Array], Array]:
-        scale = yardstick(layout)
+        scale = wrench_scale_of(layout)
 
         def function(force: Array) -> Array:
             with torch.no_grad():

@@ -1,8 +1,8 @@
 """Training of the networks of a learned interaction, from forward data of many robots.
 
-What the laws of the actuators leave of each measured wrench, on the robot's yardstick, is the sum
-of the messages. Their features and vectors do not depend on the weights, so they are made once; a
-step of training is two small networks on the rows of some samples.
+What the laws of the actuators leave of each measured wrench, over the robot's wrench scale, is the
+sum of the messages. Their features and vectors do not depend on the weights, so they are made once;
+a step of training is two small networks on the rows of some samples.
 """
 
 from collections.abc import Sequence
@@ -19,9 +19,9 @@ from finlab.fit.interaction.constants import parts_of_error
 from finlab.fit.interaction.samples import Samples, left_by_laws
 from finlab.interaction.interaction import JetGeometry
 from finlab.interaction.learned import LAYERS, MEMBERS, LearnedInteraction
-from finlab.interaction.messages import FORMS, Pairs, hull_rows, unpacked
+from finlab.interaction.messages import ROW_SIZES, JetPairs, pack_hull_rows, unpack_rows
 from finlab.layout.jet_geometry import jet_geometry_of
-from finlab.research.networks.trained import State
+from finlab.research.networks.trained import ArraysByName
 from finlab.research.training.device import workplace
 from finlab.research.training.loop import LoopSettings, Training, seeded_generator
 from finlab.whole_file import write_whole
@@ -29,7 +29,7 @@ from finlab.whole_file import write_whole
 WIDTH = 64
 """Of the hidden layers."""
 MESSAGE_MIN = 1e-4
-"""Size of a message's vectors, as a share of the yardstick, below which it is left out."""
+"""Size of a message's vectors, as a share of the wrench scale, below which it is left out."""
 HELD_OUT_SHARE = 0.1
 """Share of the robots by which the networks are told how far to trust them."""
 WEIGHTS_FILE = "interaction.safetensors"
@@ -48,7 +48,7 @@ class Rows(NamedTuple):
     features: Tensor
     """(R, m)."""
     vectors: Tensor
-    """What each vector of a message adds to the wrench on the yardstick (R, k, 6)."""
+    """What each vector of a message adds to the wrench over the wrench scale (R, k, 6)."""
     starts: Tensor
     """First row (N + 1,) of each sample."""
 
@@ -69,9 +69,9 @@ class InteractionSamples(NamedTuple):
     rows: dict[str, Rows]
     """Of `pair` and `hull`."""
     residual: Tensor
-    """What the laws leave of the wrenches (N, 6), on the yardsticks."""
+    """What the laws leave of the wrenches (N, 6), over the wrench scales."""
     size: Tensor
-    """Root mean squares (N, 6) of the wrenches of their robots, on the yardsticks."""
+    """Root mean squares (N, 6) of the wrenches of their robots, over the wrench scales."""
     robot: Tensor
     """The robot (N,) of each sample."""
 
@@ -79,7 +79,7 @@ class InteractionSamples(NamedTuple):
 def data_set(samples: Sequence[Samples]) -> InteractionSamples:
     """Returns samples as they are learned from. Raises DataError: there are fewer than ten robots,
     or none with a jet."""
-    parts: dict[str, list[tuple[AnyArray, AnyArray, AnyArray]]] = {name: [] for name in FORMS}
+    parts: dict[str, list[tuple[AnyArray, AnyArray, AnyArray]]] = {name: [] for name in ROW_SIZES}
     residuals = []
     sizes = []
     robots = []
@@ -114,15 +114,15 @@ def messages_of(
 ) -> dict[str, tuple[AnyArray, AnyArray, AnyArray]]:
     """Returns for `pair` and `hull` the features (R, m), the vectors as wrenches over the scale (R,
     k, 6), and how many rows each of forces (K, n, 3) [N] has (K,)."""
-    pairs = Pairs(geometry)
+    pairs = JetPairs(geometry)
     lever = LearnedInteraction({}, 1.0, geometry).lever / scale
     source = force[:, pairs.source]
     receiver = force[:, pairs.receiver]
     rows = {"pair": (pairs.rows(source, receiver), lever[pairs.receiver])}
-    rows["hull"] = hull_rows(geometry, force), lever * float(geometry.hull[1].all())
+    rows["hull"] = pack_hull_rows(geometry, force), lever * float(geometry.hull[1].all())
     result = {}
     for name, (packed, arms) in rows.items():
-        features, vectors = unpacked(name, packed)
+        features, vectors = unpack_rows(name, packed)
         wrenches = np.einsum("kpvb,pbw->kpvw", vectors, arms)
         counts = np.abs(wrenches).max(axis=(2, 3), initial=0.0) > MESSAGE_MIN
         result[name] = (
@@ -141,7 +141,7 @@ def train(
     resume: bool = False,
 ) -> float:
     """Trains three networks, writes their file, and log and state, into a folder, and returns the
-    root mean square error on robots that were held out, on the yardstick."""
+    root mean square error on robots that were held out, over the wrench scale."""
     data = data_set(samples)
     robots = torch.from_numpy(np.random.default_rng(seed).permutation(len(samples)))
     held = torch.isin(data.robot, robots[: max(1, int(HELD_OUT_SHARE * len(samples)))])
@@ -159,7 +159,7 @@ def train(
             total = total + (error**2).mean()
         return {"loss": total / MEMBERS}
 
-    def save(shipped: State, made: dict[str, Any]) -> None:
+    def save(shipped: ArraysByName, made: dict[str, Any]) -> None:
         write_network(folder / WEIGHTS_FILE, shipped, 1.0)
 
     with workplace("cpu", settings.batch_size) as place:
@@ -183,7 +183,7 @@ def predicted(
 ) -> Tensor:
     """What one network says that the laws leave of the wrenches of some samples (B, 6)."""
     result = torch.zeros((len(samples), 6))
-    for name in FORMS:
+    for name in ROW_SIZES:
         features, vectors, owner = data.rows[name].of(samples)
         for layer in range(LAYERS):
             features = (
@@ -199,7 +199,7 @@ def first_weights(seed: int) -> dict[str, Tensor]:
     """Weights to begin with."""
     draw = seeded_generator(seed, 1 << 40, torch.device("cpu"))
     weights = {}
-    for name, form in FORMS.items():
+    for name, form in ROW_SIZES.items():
         sizes = (form.features, *(WIDTH,) * (LAYERS - 1), form.vectors)
         for layer, (into, out) in enumerate(zip(sizes[:-1], sizes[1:], strict=True)):
             scale = (0.1 if layer + 1 == LAYERS else 1.0) / into**0.5
@@ -210,7 +210,7 @@ def first_weights(seed: int) -> dict[str, Tensor]:
     return weights
 
 
-def write_network(path: Path, weights: State, trust: float) -> None:
+def write_network(path: Path, weights: ArraysByName, trust: float) -> None:
     """Writes the file of a learned interaction; a `DataError` where it cannot be written."""
     from safetensors.numpy import save
 

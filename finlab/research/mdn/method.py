@@ -44,7 +44,8 @@ from finlab.research.networks.learned_method import LearnedMethod
 from finlab.research.networks.trained import TrainedWeights
 
 TYPICAL_SHARE = 0.1
-"""What a robot is mostly asked for, as a share of its yardstick; wrenches are divided by that."""
+"""What a robot is mostly asked for, as a share of its wrench scale; wrenches are divided by
+that."""
 CHUNK = 64
 """Targets that are solved together; keeps memory flat for any number of targets."""
 STEPS = Steps()

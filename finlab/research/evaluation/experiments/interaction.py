@@ -22,7 +22,7 @@ from finlab.layout import Layout
 from finlab.layout.effectiveness import body_force
 from finlab.layout.jet_geometry import jet_geometry_of
 from finlab.physics import Plant
-from finlab.physics.objective import yardstick
+from finlab.physics.objective import wrench_scale_of
 from finlab.research.evaluation.document import Column, Row
 from finlab.research.evaluation.experiment import Experiment, progress
 from finlab.research.evaluation.method_specs import own_function
@@ -125,7 +125,7 @@ def _row(
 ) -> Row:
     each = list[tuple[float, float, float]]()
     for layout, wrenches, samples in progress(cases, "robot", name):
-        scale = yardstick(layout)
+        scale = wrench_scale_of(layout)
         method = Dual(layout, DualSettings(), scale)
         told: Any = model(samples)
         method.plant = copy(method.plant)

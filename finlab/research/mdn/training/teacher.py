@@ -15,7 +15,7 @@ from torch import Tensor
 
 from finlab.arrays import AnyArray, Array
 from finlab.errors import DataError
-from finlab.physics.objective import yardstick
+from finlab.physics.objective import wrench_scale_of
 from finlab.physics.plant import Plant
 from finlab.research.mdn.answers import DUPLICATE_SCORE, EffortRobot, distinct, effort_robot
 from finlab.research.mdn.descent import EffortProblem, descend, realize, wrench
@@ -132,7 +132,7 @@ def write_answers(folder: Path, settings: AnswerSettings, seed: int, number: int
     for _ in range(settings.robots):
         n = int(rng.choice(counts, p=often / often.sum()))
         layout = random_fin_robot(rng, kinds, n)
-        robot = effort_robot(Plant(layout), yardstick(layout))
+        robot = effort_robot(Plant(layout), wrench_scale_of(layout))
         groups.setdefault(n, []).append(_answers(rng, robot, settings))
     arrays = {
         f"{n}.{name}": np.stack([robot[name] for robot in robots])

@@ -1,6 +1,6 @@
 /* Answers where actuators act on each other, Eq. 18, in outer iterations: the dual of the model
    made linear at the last forces, then Levenberg-Marquardt steps on the whole model (sequential
-   convex programming). finlab/allocation/dual/outer_iterations.py says why they settle. */
+   convex programming). finlab/allocation/dual/outer_iterations.py says where they converge. */
 #include "internal.h"
 
 /* Parts of sets with gaps that are looked at after the first iteration, which begins near
@@ -9,7 +9,7 @@
 #define MODEL_STEPS 4  /* steps on commands that make them exact on the whole model */
 #define TRIALS 4       /* shares of a step that are tried in one iteration */
 #define SHORTEN R(0.3) /* a step that gets no better is shortened to this share */
-/* Error on the yardstick that commands on the way may leave. */
+/* Error over the wrench scale that commands on the way may leave. */
 #define EXACT_ON_WAY (NEARLY / 10)
 
 /* Forces of commands along the laws' axes, and in the body frame, where a foil's drag at
@@ -25,7 +25,7 @@ static void forces_of_commands(const fl_coupled_robot *robot, const real *block,
     if (!fl_is_in_dead_band(a, command[i])) fl_force_of_command(block, i, command[i], force[i], 0);
     for (int c = 0; c < 3; c++) {
       real along = force[i][c];
-      if (a->command_kind == FL_FOIL && c == 1) along += a->pressure_area * a->zero_lift_drag;
+      if (fl_form_of(a)->has_drag && c == 1) along += a->pressure_area * a->zero_lift_drag;
       const real *axis = robot->frames + 9 * i + 3 * c;
       for (int b = 0; b < 3; b++) body[i][b] += along * axis[b];
     }
@@ -34,7 +34,7 @@ static void forces_of_commands(const fl_coupled_robot *robot, const real *block,
 
 /* Makes the wrench of a block linear at commands: its effectiveness becomes that of the laws
    and the slope of what the actuators do to each other, its offset what is left. Their
-   residual from a wrench, on the yardstick; its size. */
+   residual from a wrench, over the wrench scale; its size. */
 static real linearize_at(const fl_coupled_robot *robot, real *block, fl_work *work,
                          const real *wrench, real command[][3], real *residual) {
   const fl_span *span = &work->span;
@@ -158,7 +158,7 @@ static int answer_linear(real *block, fl_work *work, const fl_question *q, int i
   return code;
 }
 
-/* What an error as large as the yardstick is worth [W] at multipliers of the wrench: twice
+/* What an error as large as the wrench scale is worth [W] at multipliers of the wrench: twice
    that makes an exact penalty. */
 static real penalty_at(const real *block, const real *lambda) {
   real scaled[6];
@@ -179,13 +179,13 @@ typedef struct {
   const fl_coupled_robot *robot;
   real *block; /* the linear model */
   fl_work *work;
-  fl_question question; /* whose prices become those of the best answer */
+  fl_question question; /* whose multipliers become those of the best answer */
   real lambda[6];       /* that they point at */
   fl_box box;           /* of the commands by which the block is commanded now */
   real (*force)[2];     /* (n, 2) the best ones [N] */
   real power;           /* of these [W] */
-  real penalty;         /* what an error as large as the yardstick counts [W] */
-  real error;           /* of the wrench, on the yardstick */
+  real penalty;         /* what an error as large as the wrench scale counts [W] */
+  real error;           /* of the wrench, over the wrench scale */
   real newton_steps;
 } outer_search;
 
@@ -269,7 +269,7 @@ static int iterate(outer_search *search, int is_first, fl_answer *out, int *has_
   const int code = answer_linear(search->block, search->work, &search->question, is_first, &answer);
   if (code) return code;
   search->newton_steps += (real)answer.newton_steps;
-  search->penalty = fl_larger(search->penalty, penalty_at(search->block, answer.prices));
+  search->penalty = larger(search->penalty, penalty_at(search->block, answer.multipliers));
   const real merit = merit_of(search);
   if (is_first) *out = answer;
   box_now(search->block, search->work, &search->question, &search->box);
@@ -277,8 +277,8 @@ static int iterate(outer_search *search, int is_first, fl_answer *out, int *has_
   const int is_better = step_to_answer(search, &answer, merit);
   if (is_better) {
     *out = answer;
-    memcpy(search->lambda, answer.prices, sizeof search->lambda);
-    search->question.prices = search->lambda;
+    memcpy(search->lambda, answer.multipliers, sizeof search->lambda);
+    search->question.multipliers = search->lambda;
   }
   const real gain = merit - search->power - search->penalty * search->error;
   *has_ended = !is_better || gain <= CLOSE / 2 * merit;
@@ -297,9 +297,9 @@ static void finish_search(outer_search *search, fl_answer *out) {
   fl_clip_commands(search->block, &search->box, out->command);
 }
 
-int fl_settle(const fl_coupled_robot *robot, real *block, fl_work *work,
-              const fl_question *question, const fl_settle_limits *limits, real *force,
-              fl_answer *answer, fl_settle_result *result) {
+int fl_outer_iterations(const fl_coupled_robot *robot, real *block, fl_work *work,
+                        const fl_question *question, const fl_outer_limits *limits, real *force,
+                        fl_answer *answer, fl_outer_result *result) {
   outer_search search = {0};
   search.robot = robot;
   search.block = block;

@@ -30,7 +30,7 @@ FAULT_VERBS = {"weak": "Weaken", "torn": "Tear", "stuck": "Jam", "running": "Let
 """Kind of fault -> what undo calls the step that brings it about."""
 
 
-class Core:
+class BaseSession:
     """All of a session but changes of its layout. Undo is of the robot and its damage; wrench,
     method and policy stay as they are."""
 
@@ -215,7 +215,7 @@ class Core:
     def mend(self, name: str) -> None:
         """An actuator is whole again."""
         state = self.state
-        for kind in state.layout.part(name).KIND.faults:
+        for kind in state.layout.actuator(name).KIND.faults:
             state = state.with_fault(name, kind, None)
         if name in state.lost:
             state = state.with_loss_toggled(name)
