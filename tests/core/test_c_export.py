@@ -73,7 +73,7 @@ def test_self_test_holds(
     name: str, flow: tuple[float, ...] | None, compiler: str, tmp_path: Path
 ) -> None:
     words = (
-        f"{compiler} -std=c99 -O1 -Wall -Wextra -Werror *.c -lm -o {tmp_path}/it && {tmp_path}/it"
+        f"{compiler} -std=c99 -O0 -Wall -Wextra -Werror *.c -lm -o {tmp_path}/it && {tmp_path}/it"
     )
     assert ran(words, exported(name, 200, flow)).startswith("0 of 200 ")
 
@@ -81,13 +81,13 @@ def test_self_test_holds(
 @pytest.mark.exhaustive
 def test_single_precision_chooses_the_same_parts_of_sets_with_gaps(tmp_path: Path) -> None:
     """Of parts that all give a wrench, the miss is rounding, which is to choose no side."""
-    words = f"gcc -std=c99 -O1 -DFL_SINGLE *.c -lm -o {tmp_path}/it && {tmp_path}/it"
+    words = f"gcc -std=c99 -O0 -DFL_SINGLE *.c -lm -o {tmp_path}/it && {tmp_path}/it"
     assert ran(words, exported("torpedo", 2000, SPEED)).startswith("0 of 2000 ")
 
 
 def test_single_precision_goes_on_while_the_ridge_grows(tmp_path: Path) -> None:
     """From the first prices of foils at a kink, eight steps in a row are refused."""
-    words = f"gcc -std=c99 -O1 -DFL_SINGLE *.c -lm -o {tmp_path}/it && {tmp_path}/it"
+    words = f"gcc -std=c99 -O0 -DFL_SINGLE *.c -lm -o {tmp_path}/it && {tmp_path}/it"
     assert ran(words, exported("torpedo", 24, (1.5, 0.0, 0.0, 0.0, 0.0, 0.0))).startswith(
         "0 of 24 "
     )
@@ -123,8 +123,8 @@ def test_single_precision_answers_as_double_does(name: str, tmp_path: Path) -> N
 @pytest.mark.parametrize(
     ("name", "cases", "compiler"),
     [
-        ("catamaran", 4000, "gcc"),
-        ("torpedo", 1500, "clang -DFL_SINGLE"),
+        ("catamaran", 1500, "gcc"),
+        ("torpedo", 600, "clang -DFL_SINGLE"),
         pytest.param("catamaran", 12000, "gcc", marks=pytest.mark.exhaustive),
         pytest.param("torpedo", 3000, "clang -DFL_SINGLE", marks=pytest.mark.exhaustive),
         pytest.param("octo", 1000, "clang", marks=pytest.mark.exhaustive),

@@ -252,7 +252,7 @@ def wrong_in(kind: Kind, count: int, folder: Path) -> str:
     return "\n".join(f"{text} (number {k})" for text, k in said.items())
 
 
-@pytest.mark.parametrize("count", [12, pytest.param(2000, marks=pytest.mark.exhaustive)])
+@pytest.mark.parametrize("count", [8, pytest.param(2000, marks=pytest.mark.exhaustive)])
 @pytest.mark.filterwarnings("ignore")
 def test_damaged_files_are_read_or_refused(kinds: list[Kind], count: int, tmp_path: Path) -> None:
     wrong = [wrong_in(kind, count, tmp_path) for kind in kinds]

@@ -48,7 +48,7 @@ def test_unseen_robots_are_missed_by_less_than_half(network: Learned) -> None:
     laws = []
     learned = []
     expected = []
-    for layout, targets in unseen(8):
+    for layout, targets in unseen(5):
         known = replace(layout, interaction=network)
         for robot, errors in ((layout, laws), (known, learned)):
             allocator = finlab.Allocator(robot)
