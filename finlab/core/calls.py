@@ -380,30 +380,6 @@ class Core:
             )
         return command
 
-    def dual_value(self, wrench: Array, lambda_reduced: Array) -> tuple[Array, float]:
-        """Evaluates the dual function (Eq. 3) at reduced multipliers, in the state (losses, free
-        axes, limits) of the last question.
-
-        Args:
-            wrench: desired (6,) [N, N m].
-            lambda_reduced: multipliers (6,) [W] in the basis of what the actuators span.
-
-        Returns:
-            The responses (n, 2) [N] (Eq. 5), and the dual value [W].
-        """
-        wrench = np.ascontiguousarray(wrench)
-        lambda_reduced = np.ascontiguousarray(lambda_reduced)
-        force = np.empty((self._count, 2))
-        with self._lock:
-            value = self._core.fl_dual_value(
-                self._block_address,
-                self._work_address,
-                wrench.ctypes.data,
-                lambda_reduced.ctypes.data,
-                force.ctypes.data,
-            )
-        return force, value
-
     def conjugates(self, multipliers: Array, conditions: Conditions = NOMINAL) -> Conjugates:
         """Evaluates the conjugates of all costs (Eq. 4), by the core's tables.
 
