@@ -1,9 +1,8 @@
 """The answer of an allocation method: commands, what they give, and what is left undone.
 
-`Allocator` makes one; it is plain data, prints itself, and can be read where no allocator is.
+`Allocator` makes one; it is plain data, and can be read where no allocator is.
 """
 
-import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -14,11 +13,11 @@ from numpy.typing import NDArray
 
 from finlab.actuators.actuator import Command
 from finlab.allocation.policy import CLOSEST, Policy
+from finlab.allocation.report import allocation_blocks, doubts, next_measurement
 from finlab.allocation.settings import USUAL_PERIOD_S
 from finlab.allocation.solution import CANDIDATE_ARRAYS, Candidates, PlainData
 from finlab.arrays import Array
-from finlab.axes import AXES
-from finlab.display import Block, Table, html, text
+from finlab.display import html, text
 from finlab.layout.damage import Damage
 from finlab.layout.layout import Layout
 from finlab.physics.objective import REACHED, judged_effort, judged_power
@@ -31,14 +30,6 @@ Number = TypeVar("Number", float, Array)
 """A figure of one answer, or of each of many (N,)."""
 NOTHING_ASKED = 1e-14
 """Square of a normalized target below which nothing is asked."""
-PLAIN_GAP = 0.01
-"""Share by which the power may exceed its bound without a sentence."""
-NEARLY_ALL = 0.995
-"""Share of a wrench from which on it is printed as all of it."""
-COLUMNS = ("actuator", "type", "command", "force [N]")
-"""Columns of the table of actuators."""
-WRENCH_COLUMNS = ("", *(f"{axis} [{'N' if axis.startswith('F') else 'N m'}]" for axis in AXES))
-"""Columns of the table of wrenches."""
 CHUNK = 1024
 """Answers that are judged together; keeps memory flat for any number of targets."""
 
@@ -330,53 +321,14 @@ class Allocation(Answer[float]):
         return None if self.answered is None else _read_only_candidates(self.answered.samples())
 
     def _doubts(self) -> tuple[str, ...]:
-        """Sentences about what is not certain of an answer: its forces, and that no other takes
-        less power."""
-        sentences = (self.measure_next,) if self.measure_next else ()
-        if self.bound is None or self.power <= (1.0 + PLAIN_GAP) * self.bound:
-            return sentences
-        least = self.bound
-        calm_power = self.calm_power
-        if calm_power > PLAIN_GAP * self.power:
-            calm_percent = 100.0 * calm_power / self.power
-            sentences = (
-                *sentences,
-                f"of its power, {calm_percent:.0f} % goes into less turning (calm)",
-            )
-            least += calm_power
-        if self.power <= (1.0 + PLAIN_GAP) * least:
-            return sentences
-        gap = f"of its power, {100.0 * (1.0 - least / self.power):.0f} % may be more than needed"
-        if self.layout.interaction is not None:
-            cause = (
-                "the bound is that of the actuators' laws for what they push; what the jets take "
-                "is not in it"
-            )
-        else:
-            rates = "" if self.previous is None else ", or is held by its rates"
-            cause = (
-                "where an actuator cannot rest, or has a wide arc, a dead band, drag or a measured "
-                f"table{rates}, the least is not proved"
-            )
-        return (*sentences, f"{gap}: {cause}")
+        """Sentences about its forces, and about whether another one takes less power."""
+        return doubts(self)
 
     @cached_property
     def measure_next(self) -> str:
         """The sentence about what adds most to `expected_error`; empty where that is at most
         0.001."""
-        if self.expected_error <= REACHED:
-            return ""
-        from finlab.physics.expected_miss import sources_of_miss
-
-        sources = sources_of_miss(self._plant, self.command[None])
-        variances = np.array([(source.variance[0] / self.scale**2).sum() for source in sources])
-        largest = int(variances.argmax())
-        error_without = float(np.sqrt(variances.sum() - variances[largest]))
-        return (
-            f"the true wrench is expected to be off by {self.expected_error:.2g}; measure "
-            f"{sources[largest].words} next, without whose uncertainty {error_without:.2g} would "
-            "be left"
-        )
+        return "" if self.expected_error <= REACHED else next_measurement(self, self._plant)
 
     @cached_property
     def reachable(self) -> bool:
@@ -440,71 +392,13 @@ class Allocation(Answer[float]):
             f"W{effort}, reachable={self.reachable}, solve_ms={self.solve_ms:.1f})"
         )
 
-    def _blocks(self) -> list[Block]:
-        """The answer as two tables, of actuators and of wrenches, and sentences."""
-        actuator_rows: list[tuple[str, ...]] = []
-        for actuator, force in zip(self.layout.actuators, self.forces, strict=True):
-            command = self.commands[actuator.name]
-            words = "lost"
-            size = ""
-            if command is not None:
-                words = command.words
-                size = f"{math.hypot(*force):.3f}"
-            actuator_rows.append((actuator.name, actuator.type, words, size))
-        wrenches = {"asked": self.target, "delivered": self.wrench, "missing": self.unallocated}
-        if self.expected_error:
-            wrenches["uncertain"] = self.expected_miss
-        wrench_rows = [
-            (name, *(_component_words(component) for component in wrench))
-            for name, wrench in wrenches.items()
-        ]
-        is_text = (True, True, True, False)
-        actuators = Table(COLUMNS, actuator_rows, is_text)
-        wrench_table = Table(WRENCH_COLUMNS, wrench_rows, (True, *(False,) * 6))
-        return [actuators, wrench_table, "\n".join([self._summary(), *self._remarks()])]
-
-    def _summary(self) -> str:
-        """The figures of the answer in one line."""
-        source = f", checkpoint {self.checkpoint}" if self.checkpoint else ""
-        effort = "" if self.effort is None else f"effort {self.effort:.3f}   "
-        expected = f"expected_error {self.expected_error:.2e}   " if self.expected_error else ""
-        return (
-            f"err_norm {self.err_norm:.2e}   {expected}power {self.power:.3f} W   {effort}"
-            f"{self.solve_ms:.1f} ms   method {self.method}{source}"
-        )
-
-    def _remarks(self) -> list[str]:
-        """Sentences about a wrench that is not delivered, and what else the user should read."""
-        notes = list(self.notes)
-        if self.reachable or self.unknown_fins:
-            # With fins that the method does not know, what is missing says nothing about the robot.
-            return notes
-        limits = f"; {', '.join(self.binding)}" if self.binding else ""
-        return [f"not reached: {self._missing_words()}{limits}", *notes]
-
-    def _missing_words(self) -> str:
-        """What is missing, in words: the share that is there, or where that is nearly all, the
-        worst axis."""
-        if self.share < NEARLY_ALL:
-            return f"{100 * self.share:.0f} % of the wrench is delivered"
-        worst = int(np.argmax(np.abs(self.unallocated / self.scale)))
-        unit = "N" if worst < 3 else "N m"
-        return f"{AXES[worst]} is off by {abs(self.unallocated[worst]):.3g} {unit}"
-
     def __str__(self) -> str:
-        return text(self._blocks())
+        return text(allocation_blocks(self))
 
     def _repr_html_(self) -> str:
         from finlab.display.pictures import robot_picture
 
-        return html(self._blocks(), lambda: robot_picture(self.layout, self.forces))
-
-
-def _component_words(component: float) -> str:
-    """A component of a wrench [N, N m]; NaN is that of a free axis."""
-    if math.isnan(component):
-        return "free"
-    return f"{round(component, 3) + 0.0:.3f}"  # + 0.0 turns a rounded -0.0 into 0.0
+        return html(allocation_blocks(self), lambda: robot_picture(self.layout, self.forces))
 
 
 def _read_only_candidates(candidates: Candidates | None) -> Candidates | None:

@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from finlab.allocation.method import Method, MethodQuestion
-from finlab.allocation.notes import answer_notes
 from finlab.allocation.policy import Policy
+from finlab.allocation.report import answer_notes
 from finlab.allocation.solution import Candidates, Solution, among_all
 from finlab.arrays import Array
 from finlab.axes import AXES, mask_of

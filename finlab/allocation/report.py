@@ -1,16 +1,170 @@
-"""A result as plain values, for programs: the JSON object of an answer.
+"""What is said of an answer: two small tables and sentences for people, a JSON object for programs.
 
-The command line, the app and a robot's program write it.
+`print(result)`, the command line, the app and a robot's program say it in these words.
 """
 
-from typing import Any
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from msgspec import to_builtins
 
-from finlab.allocation.allocation import Allocation
-from finlab.arrays import Array
+from finlab.actuators.actuator import Actuator
+from finlab.actuators.fin.fin_laws import make_law
+from finlab.actuators.fin.fin_model import DOUBT, FinModelSpec, Limits
+from finlab.actuators.kinds import KINDS
+from finlab.actuators.law import FinLaw
+from finlab.arrays import NEARLY, Array
+from finlab.axes import AXES, axes_in
+from finlab.display import Block, Table
 from finlab.layout.layout import Layout
+from finlab.physics.plant import Plant
+
+if TYPE_CHECKING:
+    from finlab.allocation.method import Method
+
+Allocation = Any
+"""`finlab.allocation.Allocation`, which prints itself by what is here: it imports this module, so
+that this one cannot import it, not even for its type."""
+
+PLAIN_GAP = 0.01
+"""Share by which the power may exceed its bound without a sentence."""
+
+NEARLY_ALL = 0.995
+"""Share of a wrench from which on it is printed as all of it."""
+COLUMNS = ("actuator", "type", "command", "force [N]")
+"""Columns of the table of actuators."""
+WRENCH_COLUMNS = ("", *(f"{axis} [{'N' if axis.startswith('F') else 'N m'}]" for axis in AXES))
+"""Columns of the table of wrenches."""
+
+RESTLESS = 0.05
+"""Share of its largest force from which on a fin's least force is told of."""
+COMMANDS_ASKED = (5, 5, 16)
+"""Amplitudes, frequencies and zero directions at which a fin is asked for its smallest and largest
+force."""
+
+
+def summary(result: Allocation) -> str:
+    """Returns the figures of an answer in one line."""
+    source = f", checkpoint {result.checkpoint}" if result.checkpoint else ""
+    effort = "" if result.effort is None else f"effort {result.effort:.3f}   "
+    expected = f"expected_error {result.expected_error:.2e}   " if result.expected_error else ""
+    return (
+        f"err_norm {result.err_norm:.2e}   {expected}power {result.power:.3f} W   {effort}"
+        f"{result.solve_ms:.1f} ms   method {result.method}{source}"
+    )
+
+
+def remarks(result: Allocation) -> list[str]:
+    """Returns sentences about a wrench that is not delivered, and what else the user should
+    read."""
+    notes = list(result.notes)
+    if result.reachable or result.unknown_fins:
+        # With fins that the method does not know, what is missing says nothing about the robot.
+        return notes
+    limits = f"; {', '.join(result.binding)}" if result.binding else ""
+    return [f"not reached: {_missing_words(result)}{limits}", *notes]
+
+
+def _missing_words(result: Allocation) -> str:
+    """What is missing, in words: the share that is there, or where that is nearly all, the worst
+    axis."""
+    if result.share < NEARLY_ALL:
+        return f"{100 * result.share:.0f} % of the wrench is delivered"
+    worst = int(np.argmax(np.abs(result.unallocated / result.scale)))
+    unit = "N" if worst < 3 else "N m"
+    return f"{AXES[worst]} is off by {abs(result.unallocated[worst]):.3g} {unit}"
+
+
+def allocation_blocks(result: Allocation) -> list[Block]:
+    """Returns the answer as two tables, of actuators and of wrenches, and sentences."""
+    actuator_rows: list[tuple[str, ...]] = []
+    for actuator, force in zip(result.layout.actuators, result.forces, strict=True):
+        command = result.commands[actuator.name]
+        words = "lost"
+        size = ""
+        if command is not None:
+            words = command.words
+            size = f"{math.hypot(*force):.3f}"
+        actuator_rows.append((actuator.name, actuator.type, words, size))
+    wrenches = {"asked": result.target, "delivered": result.wrench, "missing": result.unallocated}
+    if result.expected_error:
+        wrenches["uncertain"] = result.expected_miss
+    wrench_rows = [
+        (name, *(_component_words(component) for component in wrench))
+        for name, wrench in wrenches.items()
+    ]
+    is_text = (True, True, True, False)
+    actuators = Table(COLUMNS, actuator_rows, is_text)
+    wrench_table = Table(WRENCH_COLUMNS, wrench_rows, (True, *(False,) * 6))
+    return [actuators, wrench_table, "\n".join([summary(result), *remarks(result)])]
+
+
+def _component_words(component: float) -> str:
+    """A component of a wrench [N, N m]; NaN is that of a free axis."""
+    if math.isnan(component):
+        return "free"
+    return f"{round(component, 3) + 0.0:.3f}"  # + 0.0 turns a rounded -0.0 into 0.0
+
+
+def doubts(result: Allocation) -> tuple[str, ...]:
+    """Returns sentences about what is not certain of an answer: its forces, and that no other takes
+    less power."""
+    sentences = (result.measure_next,) if result.measure_next else ()
+    if result.bound is None or result.power <= (1.0 + PLAIN_GAP) * result.bound:
+        return sentences
+    least = result.bound
+    calm_power = result.calm_power
+    if calm_power > PLAIN_GAP * result.power:
+        calm_percent = 100.0 * calm_power / result.power
+        sentences = (
+            *sentences,
+            f"of its power, {calm_percent:.0f} % goes into less turning (calm)",
+        )
+        least += calm_power
+    if result.power <= (1.0 + PLAIN_GAP) * least:
+        return sentences
+    gap = f"of its power, {100.0 * (1.0 - least / result.power):.0f} % may be more than needed"
+    if result.layout.interaction is not None:
+        cause = (
+            "the bound is that of the actuators' laws for what they push; what the jets take is "
+            "not in it"
+        )
+    else:
+        rates = "" if result.previous is None else ", or is held by its rates"
+        cause = (
+            "where an actuator cannot rest, or has a wide arc, a dead band, drag or a measured "
+            f"table{rates}, the least is not proved"
+        )
+    return (*sentences, f"{gap}: {cause}")
+
+
+def next_measurement(result: Allocation, plant: Plant) -> str:
+    """Returns the sentence about what adds most to the expected error of an answer.
+
+    Args:
+        result: the answer.
+        plant: of its robot, in its flow.
+
+    Returns:
+        Which uncertainty to measure next, and what is expected without it.
+    """
+    from finlab.physics.expected_miss import sources_of_miss
+
+    sources = sources_of_miss(plant, result.command[None])
+    variances = np.array([(source.variance[0] / result.scale**2).sum() for source in sources])
+    largest = int(variances.argmax())
+    error_without = float(np.sqrt(variances.sum() - variances[largest]))
+    return (
+        f"the true wrench is expected to be off by {result.expected_error:.2g}; measure "
+        f"{sources[largest].words} next, without whose uncertainty {error_without:.2g} would be "
+        "left"
+    )
+
 
 RECORD = (
     "lost",
@@ -82,3 +236,142 @@ def command_record(layout: Layout, command: Array, forces: Array) -> dict[str, o
         return {"actuators": records}
     rows = [None if np.isnan(row).any() else row.tolist() for row in command]
     return {"actuators": records, "fins": list(layout.names), "command": rows}
+
+
+def answer_notes(
+    layout: Layout, method: Method, flow: Array | None, target: Array, own: tuple[str, ...] = ()
+) -> tuple[str, ...]:
+    """Returns the sentences about answers of a method.
+
+    Args:
+        layout: the robot of the actuators that work.
+        method: what answered.
+        flow: velocity (6,) of the body relative to the water [m/s, rad/s]; None at rest.
+        target: desired wrenches (6,) or (N, 6) [N, N m].
+        own: sentences of the method about these very answers.
+
+    Returns:
+        Those of the method, those of `fin_notes`, its own, and what is asked of axes that nothing
+        drives or that do not count.
+    """
+    notes = fin_notes(layout, flow) + own
+    is_asked = (np.abs(target) > NEARLY * method.scale).reshape(-1, 6).any(axis=0)
+    asked = axes_in(np.asarray(is_asked))
+    undriven = [axis for axis in asked if axis in method.undriven]
+    if undriven:
+        axes = " or ".join(undriven)
+        notes = (*notes, f"no actuator gives {axes}: what is asked of it is left out")
+    uncommanded = [axis for axis in asked if axis not in layout.axes]
+    if uncommanded:
+        axes = " or ".join(uncommanded)
+        notes = (
+            *notes,
+            f"layout {layout.name} does not command {axes} (axes): what is asked of it does not "
+            "count",
+        )
+    return method.notes + notes
+
+
+def fin_notes(layout: Layout, flow: Array | None = None) -> tuple[str, ...]:
+    """Returns the sentences about a robot that its user should read before trusting an answer.
+
+    None is an error: a servo may be stuck, or a fin may have been damaged so that it runs on.
+
+    Args:
+        layout: the robot.
+        flow: velocity (6,) of the body relative to the water [m/s, rad/s]; None at rest.
+
+    Returns:
+        Why the layout itself is not to be trusted, where its description begins so; a sentence for
+        each fin that cannot rest, and for each that may leave its table; and one about the flow.
+    """
+    return _notes_at_rest(layout, layout.stamps) + _flow_notes(layout, flow)
+
+
+def _flow_notes(layout: Layout, flow: Array | None) -> tuple[str, ...]:
+    """What needs a flow and has none, what a flow leaves unknown, or that no actuator feels it."""
+    foils = [actuator for actuator in layout.actuators if actuator.KIND.driven_by_flow]
+    if flow is None:
+        return (_nothing_at_rest(foils),) if foils else ()
+    if layout.interaction is not None:
+        guessed = ", ".join(
+            actuator.name
+            for actuator in layout.actuators
+            if actuator.jet and actuator.advance is None
+        )
+        if not guessed:
+            return ()
+        return (f"what speed takes from {guessed} is guessed: no open_water is known of them",)
+    if not foils:
+        kind_by_flow = next(name for name, kind in KINDS.items() if kind.KIND.driven_by_flow)
+        return (
+            f"the flow is without effect: layout {layout.name} has no {kind_by_flow}, and what "
+            "speed through the water takes from other actuators is not known",
+        )
+    with_table = []
+    for actuator in layout.actuators:
+        model = getattr(actuator, "model", None)
+        if not actuator.KIND.driven_by_flow and model and model.type == "table":
+            with_table.append(actuator.name)
+    if not with_table:
+        return ()
+    names = ", ".join(with_table)
+    return (f"the tables of {names} hold forces at rest; what speed changes is not known",)
+
+
+def _nothing_at_rest(foils: Sequence[Actuator]) -> str:
+    """The sentence about foils that are asked without a flow."""
+    names = ", ".join(foil.name for foil in foils)
+    if len(foils) == 1:
+        they_give = f"{foils[0].type} {names} gives"
+    else:
+        they_give = f"{foils[0].type}s {names} give"
+    return f"{they_give} nothing at rest; tell how the robot moves through the water (flow)"
+
+
+@lru_cache(maxsize=256)
+def _notes_at_rest(layout: Layout, stamps: tuple[tuple[int, int] | None, ...]) -> tuple[str, ...]:
+    """The sentences about a layout in still water; tables whose files have changed (by their
+    stamps) are read again."""
+    first_line = layout.description.partition("\n")[0]
+    notes = [f"layout {layout.name} is {first_line}"] if first_line.startswith(DOUBT) else []
+    for fin in layout.fins:
+        notes_of_fin = _notes_of_model(fin.model, fin.limits, fin.stamp)
+        notes += [note.replace("{name}", fin.name) for note in notes_of_fin]
+    return tuple(notes)
+
+
+@lru_cache(maxsize=1024)
+def _notes_of_model(
+    model: FinModelSpec, limits: Limits, stamp: tuple[int, int] | None
+) -> tuple[str, ...]:
+    """The sentences about any fin of a model within limits, with `{name}` for its name."""
+    law = make_law(model)
+    doubtful = [
+        f"the model of fin {{name}} is {note}" for note in law.notes if note.startswith(DOUBT)
+    ]
+    notes = (*doubtful, *_restless(law, limits))
+    if not law.measured:
+        return notes
+    from finlab.allocation.table_notes import beyond_table
+
+    return (*notes, *beyond_table(law, limits))
+
+
+def _restless(law: FinLaw, limits: Limits) -> list[str]:
+    """The sentence about a fin that cannot rest; none about any other."""
+    axes = [
+        np.linspace(low, high, count)
+        for low, high, count in zip(limits.lower, limits.upper, COMMANDS_ASKED, strict=True)
+    ]
+    commands = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    size = np.linalg.norm(law.force(commands), axis=-1)
+    smallest = float(size.min())
+    largest = float(size.max())
+    if smallest <= RESTLESS * largest:
+        return []
+    return [
+        "fin {name} cannot rest: within its limits it always pushes with at least "
+        f"{smallest:.3g} N of at most {largest:.3g} N; wrenches that need less of it are out of "
+        "reach"
+    ]

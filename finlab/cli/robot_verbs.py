@@ -61,6 +61,7 @@ def allocate(
     """
     from finlab.allocation import Allocator
     from finlab.allocation.policy import policy_from
+    from finlab.allocation.report import allocation_record
     from finlab.layout.damage import Damage
 
     shared_options.check_json_file(json)
@@ -80,12 +81,7 @@ def allocate(
         raise FinlabError(f"bound: method {method!r} proves none; leave --bound out")
     if bound:
         lines.append(f"no exact answer takes less than {result.bound:.4g} W")
-    record: dict[str, object] = {}
-    if json is not None:
-        from finlab.allocation.report import allocation_record
-
-        record = allocation_record(result)
-    shared_options.put_json(record, json, "\n".join(lines))
+    shared_options.put_json(allocation_record(result), json, "\n".join(lines))
 
 
 def export(

@@ -14,7 +14,7 @@ from finlab.actuators.rudder import Rudder, RudderCommand
 from finlab.actuators.thrust_model import PowerTable
 from finlab.actuators.thruster import Thruster, ThrusterCommand
 from finlab.allocation import Allocator
-from finlab.allocation.notes import fin_notes
+from finlab.allocation.report import fin_notes
 from finlab.assets import shipped_checkpoints
 from finlab.errors import DataError
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout

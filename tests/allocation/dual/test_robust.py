@@ -7,7 +7,8 @@ import pytest
 from scipy.optimize import minimize
 
 from finlab.actuators.response import RadialTable, price_grid
-from finlab.allocation import Allocator, BatchAllocation
+from finlab.allocation import Allocator
+from finlab.allocation.allocation import BatchAllocation
 from finlab.arrays import Array
 from finlab.errors import AllocationError
 from finlab.layout import Layout, Uncertainty, load_layout
