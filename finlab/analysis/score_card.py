@@ -9,18 +9,10 @@ from numpy.typing import ArrayLike
 
 from finlab.allocation import Allocator
 from finlab.allocation.question import check_flow
-from finlab.analysis.authority import (
-    AXES,
-    Authority,
-    HeldAxes,
-    Loss,
-    MotionAxis,
-    authority,
-    held_axes,
-    losses,
-)
+from finlab.analysis.authority import AXES, Authority, HeldAxes, Loss, authority, held_axes, losses
 from finlab.analysis.card_text import card_blocks
 from finlab.arrays import Array
+from finlab.axes import MotionAxis
 from finlab.display import html, text
 from finlab.display.pictures import ranges_picture
 from finlab.forces.force_sets import MAX_CUT, force_sets, wide_arcs

@@ -15,7 +15,7 @@ from finlab.errors import FinlabError, printable
 
 if TYPE_CHECKING:
     from finlab.analysis import Improvement
-    from finlab.analysis.authority import MotionAxis
+    from finlab.axes import MotionAxis
 
 REMARKS = ("finlab.swim.vehicle.righting:righting_words",)
 """Functions that return a remark on a valid layout, or None, as `module:function`: the wings add

@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 from msgspec import to_builtins
 
-from finlab.analysis.authority import AXES as MOTIONS
 from finlab.arrays import Array
-from finlab.axes import AXES, UNITS
+from finlab.axes import AXES, MOTIONS, UNITS
 from finlab.layout import Layout
 from finlab.layout.save import layout_to_dict
 from finlab.log.replay import Replay

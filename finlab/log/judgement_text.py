@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from finlab.analysis.authority import AXES as MOTIONS
-from finlab.axes import AXES, UNITS
+from finlab.axes import AXES, MOTIONS, UNITS
 from finlab.display.figures import COLORS, panels
 from finlab.log.judgement import Judgement, Spell
 from finlab.research.evaluation.document import Column, ReportBlock, ReportTable, Row, to_text

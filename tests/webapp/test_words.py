@@ -15,7 +15,7 @@ from finlab.allocation import Allocation, Allocator
 from finlab.analysis import score_card
 from finlab.analysis.score_card import quick_check
 from finlab.assets import shipped_layouts
-from finlab.axes import AXES
+from finlab.axes import AXES, MOTIONS
 from finlab.errors import LayoutError
 from finlab.layout import FinModelSpec, Uncertainty, load_layout
 from finlab.research.networks.learned_method import LearnedMethod
@@ -39,7 +39,7 @@ from webapp.panels.status import corner
 from webapp.scene.wrench_nodes import ARROWS, LENGTH, NEWTONS, fitting
 from webapp.session import Session, files
 from webapp.session.lessons import TOUR
-from webapp.session.state import AXIS_WORDS, State
+from webapp.session.state import State
 from webapp.session.targets import PRESETS, axis_reach, full_thrust
 from webapp.tasks.analysing import AnalysisQuestion, analyse
 from webapp.tasks.comparing import Run
@@ -93,7 +93,7 @@ def test_all_that_is_said_of_an_answer_agrees(share: float, target: tuple[float,
     assert "100 %" not in said + verdict
     if verdict != "Exact":
         axis = int(np.argmax(np.abs((wrench - target) / answer.scale)))
-        assert AXIS_WORDS[axis] in said
+        assert MOTIONS[axis] in said
 
 
 def test_no_verdict_stands_beside_a_new_question() -> None:

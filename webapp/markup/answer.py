@@ -13,11 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
-from finlab.axes import AXES
+from finlab.axes import AXES, MOTIONS
 from finlab.layout import Actuator, Fin, Layout
 from finlab.layout.damage import WHOLE, Damage
 from webapp.markup.words import damage_words, html, saturated
-from webapp.session.state import AXIS_WORDS
 from webapp.theme import DEAD, css, fin_color, ink
 
 FIN_HEADER = Markup(
@@ -120,7 +119,7 @@ def _bar_row(axis: int, demanded: float | None, delivered: float | None, scale: 
     if demanded is not None and delivered is not None and is_missing:
         bars.append((delivered, demanded, 8, "missing"))
     markup = [
-        f"<span>{AXIS_WORDS[axis]} <span class='dim'>{AXES[axis]}</span></span>"
+        f"<span>{MOTIONS[axis]} <span class='dim'>{AXES[axis]}</span></span>"
         f"<div class='track'>{MIDDLE}"
     ]
     for start, end, top, color in bars:

@@ -11,12 +11,12 @@ from markupsafe import Markup
 
 from finlab.analysis import AXES, Authority, ScoreCard
 from finlab.analysis.score_card import QuickCheck
+from finlab.axes import UNITS
 from finlab.layout import Layout
 from finlab.swim.hull import hull_of
 from webapp.markup.answer import swatch
 from webapp.markup.words import html, in_app, listed, row, three_digits
 from webapp.scene.actuator_shapes import SPAN
-from webapp.session.state import AXIS_UNITS
 
 FIGURES: dict[str, Callable[[ScoreCard], float | None]] = {
     "weakest direction [N]": lambda card: card.authority.weakest,
@@ -123,7 +123,7 @@ def _axes(card: ScoreCard, old_card: ScoreCard | None) -> str:
         power = card.unit_power[k]
         rows.append(
             row(
-                html("{} <span class='dim'>{}</span>", word, AXIS_UNITS[k]),
+                html("{} <span class='dim'>{}</span>", word, UNITS[k]),
                 *[_range_words(each.largest[k], each.most_negative[k]) for each in authorities],
                 f"{100 * min(shares):.0f} %" if shares else "–",
                 "–" if power is None else three_digits(power),

@@ -10,9 +10,10 @@ import numpy as np
 from markupsafe import Markup
 
 from finlab.allocation.allocation import Allocation
+from finlab.axes import MOTIONS, UNITS
 from finlab.physics.objective import REACHED
 from webapp.markup.words import authority_sentence, in_app, listed, three_digits, unlearned_sentence
-from webapp.session.state import AXIS_UNITS, AXIS_WORDS, State
+from webapp.session.state import State
 from webapp.session.targets import axis_reach
 from webapp.theme import DELIVERED, MISSING, NEARLY, UNLEARNED, Rgb
 
@@ -169,7 +170,7 @@ def _remarks_sentence(allocation: Allocation, searching: bool) -> str:
 
 
 def _amount(value: float, axis: int) -> str:
-    return f"{three_digits(abs(value))} {AXIS_UNITS[axis]} of {AXIS_WORDS[axis]}"
+    return f"{three_digits(abs(value))} {UNITS[axis]} of {MOTIONS[axis]}"
 
 
 def _warning(text: str) -> Markup:

@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 from finlab.actuators.kinds import free_angles
 from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
+from finlab.axes import MOTIONS
 from finlab.layout import Layout
 from finlab.layout.damage import WHOLE, Damage
 from finlab.swim.vehicle.fossen import complete_body
 from finlab.swim.vehicle.righting import righting_words
 from finlab.swim.vehicle.vehicle import Vehicle
-from webapp.session.state import AXIS_WORDS
 
 SAFE = (Markup, int, float, np.float64)
 """Types of values that `html` takes as they are: none of them can hold a sign of markup."""
@@ -213,7 +213,7 @@ def authority_sentence(layout: Layout, lost: tuple[str, ...], reach: Array) -> s
     is_blind = reach < 1e-6
     if not is_blind.any():
         return None
-    blind = [AXIS_WORDS[k] for k in range(6) if is_blind[k]]
+    blind = [MOTIONS[k] for k in range(6) if is_blind[k]]
     subject = "This"
     if lost:
         subject = f"Without {fins_words([layout.index(name) for name in lost], layout)} this"

@@ -8,13 +8,11 @@ import numpy as np
 import viser
 from markupsafe import Markup
 
-from finlab.analysis import AXES as MOTIONS
-from finlab.axes import AXES
+from finlab.axes import AXES, MOTIONS, UNITS
 from webapp.handles import add_html, placed, press, set_properties
 from webapp.markup.plot import cost_axis, exact_axis, over_time
 from webapp.markup.words import html, in_app, marker, row, three_digits
 from webapp.page import Page
-from webapp.session.state import AXIS_UNITS
 from webapp.tasks.log_reading import SUFFIXES
 from webapp.theme import ASKED, DELIVERED, fin_color
 
@@ -135,7 +133,7 @@ def _losses(judgement: "Judgement | None", log_moment: float | None) -> str:
 def _impulse_rows(judgement: "Judgement") -> list[str]:
     """What each axis was asked for, what was missing of that [N s, N m s], and for how long [s]."""
     rows = []
-    for k, (motion, unit) in enumerate(zip(MOTIONS, AXIS_UNITS, strict=True)):
+    for k, (motion, unit) in enumerate(zip(MOTIONS, UNITS, strict=True)):
         asked = judgement.asked[k]
         if asked > 0.0:
             impulse = three_digits(asked), three_digits(judgement.missing[k])
@@ -192,7 +190,7 @@ def log_plots(judgement: "Judgement | None", log_moment: float | None) -> str:
     plots = []
     for k in _asked_axes(judgement):
         curves = [timeline.demand[:, k], timeline.given[:, k]]
-        up = cost_axis(f"{MOTIONS[k]} [{AXIS_UNITS[k]}]", np.append((-1e-3, 1e-3), curves), 4)
+        up = cost_axis(f"{MOTIONS[k]} [{UNITS[k]}]", np.append((-1e-3, 1e-3), curves), 4)
         colors = (ASKED, DELIVERED)
         words = ("asked", "given")
         plots.append(over_time(across, timeline.time, up, curves, colors, words, log_moment))
@@ -231,7 +229,7 @@ def replays_table(judgement: "Judgement | None") -> str:
         "<th>power [W]</th>"
         "<th>short [s]</th></tr>",
         MOTIONS[axis],
-        AXIS_UNITS[axis],
+        UNITS[axis],
     )
     legend = Markup(
         "<div class='said'><span class='given'>Green</span>: holds what was lost, at least "

@@ -6,7 +6,7 @@ import numpy as np
 from markupsafe import Markup
 
 from finlab.allocation.allocation import Allocation
-from finlab.axes import AXES
+from finlab.axes import AXES, UNITS
 from finlab.physics.objective import REACHED
 from webapp.handles import set_properties
 from webapp.markup.verdict import COLORS, WORKING, verdict_of, verdict_sentence
@@ -15,7 +15,7 @@ from webapp.page import Page
 from webapp.scene.stage import arrow_size
 from webapp.scene.wrench_nodes import Scale, set_scale
 from webapp.session.looking import Display
-from webapp.session.state import AXIS_UNITS, LEAST, State
+from webapp.session.state import LEAST, State
 from webapp.tasks.analysing import Analysis
 from webapp.tasks.solver import Modes
 from webapp.tasks.swimmer import ERROR, Moment, Swimmer
@@ -182,7 +182,7 @@ def _figures(
     color = DEAD if refined else COLORS[verdict_of(allocation, in_reach)]
     sentence = refined or verdict_sentence(allocation, in_reach)
     pill = "pill long" if len(sentence) > LONG else "pill"
-    missing = zip(AXES, allocation.unallocated.tolist(), AXIS_UNITS, strict=True)
+    missing = zip(AXES, allocation.unallocated.tolist(), UNITS, strict=True)
     rest = ", ".join([f"{axis} {value:+.2g} {unit}" for axis, value, unit in missing]).replace(
         "-", "−"
     )

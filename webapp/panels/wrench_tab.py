@@ -10,7 +10,7 @@ from markupsafe import Markup
 
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.policy import POLICY_NAMES
-from finlab.axes import AXES
+from finlab.axes import AXES, MOTIONS, UNITS
 from finlab.forces.reach import Ranges
 from finlab.layout import Layout
 from webapp.handles import add_html, placed, press
@@ -21,7 +21,7 @@ from webapp.markup.words import SPEED, error_digits, html, listed, marker, row, 
 from webapp.memoized import Memoized
 from webapp.page import Page
 from webapp.panels.damage import add_fin_buttons
-from webapp.session.state import AXIS_UNITS, AXIS_WORDS, MAX_SPEED, Flow, State
+from webapp.session.state import MAX_SPEED, Flow, State
 from webapp.session.targets import PRESETS, axis_reach, full_thrust, slider_end
 from webapp.tasks.solver import JetComparison
 
@@ -95,7 +95,7 @@ def add_target(page: Page) -> None:
             if able.commanded[k]:
                 slider.hint = _hint(k, ranges.low[k], axis_reaches[k])
             else:
-                slider.hint = AXIS_WORDS[k].capitalize()
+                slider.hint = MOTIONS[k].capitalize()
         hinted = hints
 
     page.add_html(mark)
@@ -117,8 +117,8 @@ def add_speed(page: Page) -> None:
 def _add_slider(page: Page, axis: int) -> viser.GuiSliderHandle[float]:
     session = page.session
     step = 0.01 if axis < 3 else 0.001
-    label = f"{AXES[axis]} [{AXIS_UNITS[axis]}]"
-    hint = AXIS_WORDS[axis].capitalize()
+    label = f"{AXES[axis]} [{UNITS[axis]}]"
+    hint = MOTIONS[axis].capitalize()
     page.add_html(lambda layout: _switch(axis, bool(layout.commanded[axis])))
     slider = page.gui.add_slider(label, -10.0, 10.0, step, 0.0, hint=hint, marks=())
     page.board.show(slider, disabled=lambda layout: not layout.commanded[axis])
@@ -159,8 +159,8 @@ def _ranges_error(ranges_error: str | None) -> str:
 
 
 def _hint(axis: int, low: float, reach: float) -> str:
-    word = AXIS_WORDS[axis].capitalize()
-    unit = AXIS_UNITS[axis]
+    word = MOTIONS[axis].capitalize()
+    unit = UNITS[axis]
     at_most = f"±{three_digits(reach)} {unit} if nothing else is asked to stay"
     if not np.isfinite(low):
         return f"{word}: the other five are out of reach as they are; {at_most}."

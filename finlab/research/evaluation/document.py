@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from finlab.display import aligned
+from finlab.display import aligned, decimals
 
 Row = dict[str, Any]
 WIDTH = 110
@@ -30,7 +30,7 @@ def three(value: float, count: int = 3) -> str:
     """Three significant digits, or another number of them: 2.86, 0.0857, 178."""
     if value == 0 or not math.isfinite(value):
         return "0" if value == 0 else "–"
-    digits = max(0, count - 1 - math.floor(math.log10(abs(value))))
+    digits = decimals(value, count)
     return f"{value:.{digits}f}" if digits < 7 else f"{value:.2e}"
 
 
@@ -58,7 +58,11 @@ FORMATS: dict[str, Callable[[Any], str]] = {
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a table: which key of its rows it shows, under which title, and how."""
+    """A column of a table: which key of its rows it shows, under which title, and how.
+
+    Rows of experiments come from JSON files as well as from a run, so that a column names a key
+    and a format, where one of `finlab.display` has functions of a typed item.
+    """
 
     key: str
     title: str
