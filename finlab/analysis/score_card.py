@@ -122,13 +122,19 @@ def score_card(
         lost=tuple(name for name in layout.names if name in lost_names),
         flow=None if water is None else tuple(water.tolist()),
         n_actuators=layout.n - len(lost_names),
-        counted=layout.without(lost_names).counted if len(lost_names) < layout.n else "0 actuators",
+        counted=_counted(layout, lost_names),
         authority=present,
         losses=losses(layout, lost, present, water),
         unit_wrench=UNIT_WRENCH,
         unit_power=tuple(None if np.isnan(value) else float(value) for value in power),
         notes=_notes(layout, lost, water),
     )
+
+
+def _counted(layout: Layout, lost: Collection[str]) -> str:
+    """The working actuators by type, such as `8 thrusters`."""
+    has_some = any(name not in lost for name in layout.names)
+    return layout.without(set(lost)).counted if has_some else "0 actuators"
 
 
 def _rank_of_loss(loss: Loss) -> tuple[float, ...]:
@@ -173,6 +179,8 @@ def _notes(layout: Layout, lost: Collection[str], flow: Array | None) -> tuple[s
 class QuickCheck(HeldAxes):
     """Axes along which the working actuators can push, and those that a loss costs."""
 
+    actuators: str
+    """The working actuators by type, such as `8 thrusters`."""
     lost: tuple[tuple[str, tuple[MotionAxis, ...]], ...]
     """Working actuators with the axes that the loss of each costs; those that cost none are left
     out."""
@@ -203,5 +211,7 @@ def quick_check(
         for name, after in zip(single_losses, after_losses, strict=True)
     }
     return QuickCheck(
-        **vars(present), lost=tuple((name, axes) for name, axes in costs.items() if axes)
+        **vars(present),
+        actuators=_counted(layout, lost),
+        lost=tuple((name, axes) for name, axes in costs.items() if axes),
     )

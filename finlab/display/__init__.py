@@ -25,20 +25,8 @@ SMALLEST_PLAIN = 1e-3
 """Size from which a number is written without an exponent."""
 LARGEST_PLAIN = 1e4
 """Size up to which a number is written without an exponent."""
-
-
-def decimals(value: float, digits: int) -> int:
-    """Returns how many decimals a number has when it is written with significant digits.
-
-    Args:
-        value: a finite number.
-        digits: how many significant digits.
-    """
-    if value == 0.0:
-        return digits - 1
-    # Rounded first: 9.996 is 10.0, not 10.00.
-    rounded = float(f"{abs(value):.{digits - 1}e}")
-    return max(digits - 1 - math.floor(math.log10(rounded)), 0)
+LARGEST_WITH_DECIMALS = 999.5
+"""Size from which a number with three digits is rounded to a whole one of four."""
 
 
 def three_digits(value: float | None) -> str:
@@ -51,7 +39,10 @@ def three_digits(value: float | None) -> str:
         return NO_NUMBER
     if value != 0.0 and not SMALLEST_PLAIN <= abs(value) < LARGEST_PLAIN:
         return f"{value:.2e}"
-    return f"{value:.{decimals(value, 3)}f}"
+    if abs(value) >= LARGEST_WITH_DECIMALS:
+        return f"{value:.0f}"
+    # With # zeros at the end stay, and so does the point after three digits before it.
+    return f"{value:#.3g}".rstrip(".")
 
 
 def percent(share: float | None) -> str:

@@ -81,12 +81,12 @@ def test_show_has_a_row_for_each_actuator(
 @pytest.mark.parametrize(
     ("argv", "words"),
     [
-        (["A"], ["4 fins push in 6 of 6 independent directions."]),
+        (["A"], ["4 fins push in 6 of 6 independent directions"]),
         (["no_yaw"], ["Not commanded, free: yaw."]),
-        (["torpedo"], ["1 thruster and 4 rudders push in 1 of 3 independent directions.",
+        (["torpedo"], ["1 thruster and 4 rudders push in 1 of 3 independent directions",
                        "At rest rudder_top, rudder_bottom, elevator_left, elevator_right give nothing"]),
         (["torpedo", "--flow", "1.5", *"00000"], ["push in 3 of 3 independent directions"]),
-        (["D", "--lost", "back"], ["2 fins push in 4 of 6 independent directions.", "Lost: back.",
+        (["D", "--lost", "back"], ["2 fins push in 4 of 6 independent directions", "Lost: back.",
                                      "Out of reach: sway", "Weakest direction: 0.00 N",
                                      "Share of the largest wrench that is left without one fin"]),
     ],

@@ -3,6 +3,7 @@
 import ast
 import re
 from dataclasses import replace
+from html import unescape
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -13,9 +14,11 @@ import pytest
 import finlab
 from finlab.allocation import Allocation, Allocator
 from finlab.analysis import score_card
+from finlab.analysis.card_text import AXIS_COLUMNS, axis_rows, held_remarks
 from finlab.analysis.score_card import quick_check
 from finlab.assets import shipped_layouts
 from finlab.axes import AXES, MOTIONS
+from finlab.display import NO_NUMBER
 from finlab.errors import LayoutError
 from finlab.layout import FinModelSpec, Uncertainty, load_layout
 from finlab.research.networks.learned_method import LearnedMethod
@@ -224,7 +227,7 @@ def test_cards_say_what_a_layout_can_do() -> None:
         "any layout may stand beside"
     )
     table = score_table(ucat, found.card, None)
-    assert "6 of 6" in table and table.count("without") == 3
+    assert "6 of 6" in table and table.count("swatch") == 3
     both = score_table(ucat, score_card(ucat), score_card(blind))
     assert "before" in both and "▲" in both and "none" in both
     single = ucat.without(ucat.names[1:])
@@ -232,6 +235,19 @@ def test_cards_say_what_a_layout_can_do() -> None:
     assert re.search(r"worst loss \[N\]</td><td>–</td><td>[\d.]+</td><td></td>", beside)
     card = check_card(quick_check(blind), True, ("<b>",))
     assert "yaw" in card and "&lt;b&gt;" in card
+
+
+@pytest.mark.parametrize("name", ["A", "D", "no_yaw", "turtle_hybrid"])
+def test_the_panel_shows_what_the_command_line_prints(name: str) -> None:
+    layout = load_layout(shipped_layouts()[name])
+    card = score_card(layout)
+    panel = unescape(score_table(layout, card, None)).replace("−", "-")
+    for remark in held_remarks(card.authority, card.counted):
+        assert remark.text in panel and remark.text in str(card)
+    for axis_row in axis_rows(card):
+        for column in AXIS_COLUMNS[2:]:
+            cell = column.cell(axis_row)
+            assert cell in str(card) and (cell in panel or cell == NO_NUMBER)
 
 
 def test_no_option_of_a_command_is_named_where_the_page_has_a_control() -> None:

@@ -14,10 +14,12 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
+import finlab.display
 from finlab.actuators.kinds import free_angles
 from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
 from finlab.axes import MOTIONS
+from finlab.display import NO_NUMBER
 from finlab.layout import Layout
 from finlab.layout.damage import WHOLE, Damage
 from finlab.swim.vehicle.fossen import complete_body
@@ -82,6 +84,8 @@ def button_colors(name: str, colors: Sequence[tuple[str, str]]) -> str:
     return html("<style>{}</style>{}", rules, marker(name))
 
 
+DASH = "–"
+"""What stands in place of a number that there is none of."""
 SPEED = "Speed through the water [m/s]"
 """Label of the control that tells how the robot moves."""
 CONVERT = "finlab layout convert"
@@ -135,7 +139,7 @@ def small(value: float) -> str:
     """A number that is small when all is well: `3.10e−05`, and `16.2` where it is not."""
     if 0.1 <= abs(value) < 1e4:
         return three_digits(value)
-    return f"{value:.2e}".replace("-", "−") if math.isfinite(value) else "–"
+    return f"{value:.2e}".replace("-", "−") if math.isfinite(value) else DASH
 
 
 def error_digits(value: float) -> str:
@@ -149,14 +153,10 @@ def degrees(angle: float) -> str:
 
 
 def three_digits(value: float | None) -> str:
-    """Three significant digits: `2.32`, `0.0410`, `12.5`; small and large ones as `small` has
-    them."""
-    if value is None or not math.isfinite(value):
-        return "–"
-    if value != 0 and not 1e-3 <= abs(value) < 1e4:
-        return small(value)
-    digits = math.floor(math.log10(float(f"{abs(value):.2e}"))) if value else 0
-    return f"{value:.{max(2 - digits, 0)}f}".replace("-", "−")
+    """Three significant digits, as the library writes them, with a real minus sign; a dash where
+    there is no number."""
+    text = finlab.display.three_digits(value)
+    return DASH if text == NO_NUMBER else text.replace("-", "−")
 
 
 def source_words(sources: Sequence[str]) -> str:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from finlab.display import aligned, decimals
+from finlab.display import aligned
 
 Row = dict[str, Any]
 WIDTH = 110
@@ -30,7 +30,9 @@ def three(value: float, count: int = 3) -> str:
     """Three significant digits, or another number of them: 2.86, 0.0857, 178."""
     if value == 0 or not math.isfinite(value):
         return "0" if value == 0 else "–"
-    digits = decimals(value, count)
+    # Rounded first: 9.996 is 10.0, not 10.00.
+    rounded = float(f"{abs(value):.{count - 1}e}")
+    digits = max(0, count - 1 - math.floor(math.log10(rounded)))
     return f"{value:.{digits}f}" if digits < 7 else f"{value:.2e}"
 
 
