@@ -50,6 +50,18 @@ def percent(share: float | None) -> str:
     return NO_NUMBER if share is None else f"{100.0 * share:.0f} %"
 
 
+def listed(items: Sequence[str]) -> str:
+    """Returns `a`, `a and b`, `a, b and c`."""
+    if len(items) == 1:
+        return items[0]
+    return f"{', '.join(items[:-1])} and {items[-1]}"
+
+
+def as_sentence(words: str) -> str:
+    """Returns a remark of the library as a sentence: with a capital letter and a full stop."""
+    return f"{words[:1].upper()}{words[1:]}." if words else ""
+
+
 @dataclass(frozen=True)
 class Column:
     """A column of a table whose rows are items of one type."""

@@ -13,6 +13,7 @@ import pytest
 
 import finlab
 from finlab.allocation import Allocation, Allocator
+from finlab.allocation.report import bound_words, missing_words
 from finlab.analysis import score_card
 from finlab.analysis.card_text import AXIS_COLUMNS, axis_rows, held_remarks
 from finlab.analysis.score_card import quick_check
@@ -30,8 +31,6 @@ from webapp.markup.verdict import (
     WORKING,
     Verdict,
     answer_sentence,
-    bound_sentence,
-    missing_sentence,
     verdict_of,
     verdict_sentence,
 )
@@ -62,21 +61,21 @@ def test_reachable_and_not() -> None:
     allocator = Allocator(layout, StandIn)
     easy = allocator.allocate(PRESETS["Turn"])
     assert easy.reachable and verdict_sentence(easy, True) == "Exact"
-    assert missing_sentence(easy) == "Nothing is left undone."
+    assert missing_words(easy) == "nothing is left undone"
     hard = allocator.allocate([0, 0, 60, 0, 0, 0])
     assert not hard.reachable
     assert verdict_sentence(hard, False) == "Out of reach, closest"
     state = State(layout, target=(0.0, 0.0, 60.0, 0.0, 0.0, 0.0), method="sqp")
     assert not Solver().reply(state).in_reach
-    assert "N of heave is left undone" in missing_sentence(hard)
+    assert "N of heave is left undone" in missing_words(hard)
     told = {"reachable": False, "scale": np.ones(6), "target": np.array([0.0, 0.0, 5.0, 0, 0, 0])}
     beside: Any = SimpleNamespace(unallocated=np.array([0.0, -2.0, 1.0, 0, 0, 0]), **told)
     assert (
-        missing_sentence(beside)
-        == "1.00 N of heave is left undone; 2.00 N of sway comes along unasked."
+        missing_words(beside)
+        == "1.00 N of heave is left undone; 2.00 N of sway comes along unasked"
     )
     beside.unallocated = np.array([0.0, -2.0, -1.0, 0, 0, 0])  # more heave than asked
-    assert missing_sentence(beside) == "2.00 N of sway and 1.00 N of heave come along unasked."
+    assert missing_words(beside) == "2.00 N of sway and 1.00 N of heave come along unasked"
 
 
 @pytest.mark.parametrize("share", [0.0, 0.5, 0.93, 0.985, 0.999, 1.0, 1.02, 1.5])
@@ -118,7 +117,7 @@ def test_how_far_the_watts_may_be_from_the_least_is_told() -> None:
     dearer = replace(answer)
     vars(dearer)["bound"] = answer.power / 1.25
     assert "at most 25 % above the least" in answer_sentence(state, dearer, False)
-    assert bound_sentence(Allocator(layout, StandIn).allocate(PRESETS["Turn"])) == ""
+    assert bound_words(Allocator(layout, StandIn).allocate(PRESETS["Turn"])) == ""
 
 
 def test_what_is_exact_by_an_uncertain_model_says_so() -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
+from finlab.display import as_sentence
 from webapp.markup.words import fins_words, html, row, three_digits, unlearned_sentence
 from webapp.tasks.fitting import FitResult
 from webapp.tasks.swimmer import Moment, Swimmer
@@ -122,7 +123,7 @@ def fit_card(result: FitResult) -> str:
         text = html(sentence, name, result.upload.actuator.name)
         return html("<div class='fl said'>{}</div>", text)
     if isinstance(fit, ThrusterFit):
-        lines = [html("<div class='said'>{}</div>", _sentence(line)) for line in summary(fit)]
+        lines = [html("<div class='said'>{}</div>", as_sentence(line)) for line in summary(fit)]
         return html("<div class='fl'>{}</div>", lines)
     return _fin_fit_card(fit)
 
@@ -142,7 +143,7 @@ def _fin_fit_card(fit: "FinFit") -> str:
     markup = [html("<div class='said'>{}</div><table>{}</table>", verdict, rows)]
     markup.append(html("<div class='said'>{}</div>", _outliers_sentence(fit.outliers)))
     for note in fit.measurements.notes:
-        markup.append(html("<div class='said dim'>{}</div>", _sentence(note)))
+        markup.append(html("<div class='said dim'>{}</div>", as_sentence(note)))
     return html("<div class='fl'>{}</div>", markup)
 
 
@@ -156,8 +157,3 @@ def _outliers_sentence(outliers: Sequence[str]) -> str:
         names += " …"
     verb = "sample contradicts" if count == 1 else "samples contradict"
     return f"{count} {verb} the others: {names}."
-
-
-def _sentence(note: str) -> str:
-    """A note of the library with a capital letter and a full stop."""
-    return f"{note[:1].upper() + note[1:]}."

@@ -19,7 +19,7 @@ from finlab.actuators.kinds import free_angles
 from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
 from finlab.axes import MOTIONS
-from finlab.display import NO_NUMBER
+from finlab.display import NO_NUMBER, as_sentence, listed
 from finlab.layout import Layout
 from finlab.layout.damage import WHOLE, Damage
 from finlab.swim.vehicle.fossen import complete_body
@@ -121,13 +121,6 @@ AT_LIMIT = 0.995
 """Share of the upper limit from which a command counts as saturated."""
 
 
-def listed(items: Sequence[str]) -> str:
-    """`a`, `a and b`, `a, b and c`."""
-    if len(items) == 1:
-        return items[0]
-    return f"{', '.join(items[:-1])} and {items[-1]}"
-
-
 def fins_words(numbers: Sequence[int], layout: Layout | None = None) -> str:
     """`fin 2`, `fins 1 and 3`: fins, or actuators of a layout with others, by their places from 0
     in it."""
@@ -222,8 +215,8 @@ def authority_sentence(layout: Layout, lost: tuple[str, ...], reach: Array) -> s
 
 def righting_sentences(layout: Layout) -> tuple[str, ...]:
     """What there is to say of a robot that nothing rights; nothing where a moment does."""
-    sentence = righting_words(layout)
-    return () if sentence is None else (f"{sentence[0].upper()}{sentence[1:]}.",)
+    words = righting_words(layout)
+    return () if words is None else (as_sentence(words),)
 
 
 def trim_sentence(layout: Layout, reach: Array) -> str | None:
@@ -237,14 +230,12 @@ def trim_sentence(layout: Layout, reach: Array) -> str | None:
         return None
     motion = "rises" if lift > 0.0 else "sinks"
     direction = "down" if lift > 0.0 else "up"
-    sentence = f"By its mass and buoyancy this robot {motion} with {three_digits(abs(lift))} N"
+    clause = f"By its mass and buoyancy this robot {motion} with {three_digits(abs(lift))} N"
     limit = f"{three_digits(heave_reach)} N" if heave_reach >= 1e-6 else "nothing"
     if abs(lift) < heave_reach:
-        return (
-            f"{sentence}; of the {limit} that its working fins can push {direction}, that is most."
-        )
+        return f"{clause}; of the {limit} that its working fins can push {direction}, that is most."
     return (
-        f"{sentence}, and its working fins can push {direction} with {limit} at most: it cannot "
+        f"{clause}, and its working fins can push {direction} with {limit} at most: it cannot "
         "keep its depth."
     )
 

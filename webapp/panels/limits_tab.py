@@ -9,9 +9,10 @@ from markupsafe import Markup
 
 from finlab.analysis import AXES, Improvement, Progress
 from finlab.analysis.goals import MISSION, UNREACHED
+from finlab.display import listed
 from webapp.handles import add_html
 from webapp.markup.score_card import score_table
-from webapp.markup.words import fins_words, html, listed, marker, three_digits
+from webapp.markup.words import fins_words, html, marker, three_digits
 from webapp.page import Page
 from webapp.panels.damage import add_fin_buttons
 from webapp.session.looking import DRAWN, GOAL_UNITS, GOAL_WORDS, MOVE_RANGE, SearchRequest

@@ -14,13 +14,13 @@ from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import MethodChoice, choose_method
 from finlab.allocation.policy import POLICY_NAMES, Policy
+from finlab.allocation.report import is_proved_least
 from finlab.allocation.solution import Candidates
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.physics import plant_of
 from finlab.research.networks.checkpoint import network_features, resolve_checkpoint
 from finlab.research.paper.network import NetworkConfig
-from webapp.markup.verdict import is_proved
 from webapp.markup.words import ANSWER_SOURCE, fins_words
 from webapp.session.state import DRAWING, State, one_of
 from webapp.tasks.modes import Mode, find_modes, force_sizes, mode_signature, same_signature
@@ -271,7 +271,7 @@ class Solver:
             own = Candidates(
                 answer.command[None], answer.wrench[None], error, *costs, (ANSWER_SOURCE,)
             )
-            badge = "optimum" if is_proved(answer) else state.method
+            badge = "optimum" if is_proved_least(answer) else state.method
         ways = self.allocator(replace(state, method="mdn")).refinement(answer)
         return modes_of(answer, own.followed_by(ways[-1].exact(ALTERNATIVE_ERROR)), badge, ways)
 
