@@ -137,7 +137,7 @@ def test_optimize_writes_a_better_layout(
     ]
     assert main(arguments) == 0
     out, err = capsys.readouterr()
-    assert "weakest_direction: 11.54 -> " in out
+    assert "Weakest direction: 11.5 N before, " in out
     assert out.endswith(f"{output}: written.\n")
     assert err == ""  # no progress bar outside of a terminal
     assert load_layout(output).names == load_layout("layouts/A.yaml").names
@@ -152,7 +152,7 @@ def test_optimize_within_reach(tmp_path: Path, capsys: pytest.CaptureFixture[str
     arguments = ["--fins", "front_right", "--rounds", "1", "--seed", "2", "--no-mirror"]
     assert main(["layout", "optimize", "A", *arguments, *box, *mission, "-o", str(output)]) == 0
     told = capsys.readouterr().out
-    assert told.startswith("mission_power: ") and "\nfront_right " in told
+    assert told.startswith("Power for a mission: ") and "\nfront_right " in told
     moved = np.subtract(load_layout(output).fins[0].position, load_layout("A").fins[0].position)
     assert np.abs(moved).max() <= 0.03 + 1e-9
 

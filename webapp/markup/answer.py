@@ -1,8 +1,9 @@
 """Markup of an answer: six bars of the wrench, and the table of commands, a row per actuator.
 
 The panel of the wrench (`panels/wrench_tab.py`) shows both. The command line has tables of its own
-for them (`finlab/allocation/report.py`), with words in place of bars, loads and colours. These are written at every step of a
-slider, so rows are joined as plain strings of ours, which need no escaping, in few calls.
+for them (`finlab/allocation/report.py`), with words in place of bars, loads and colours. These are
+written at every step of a slider, so rows are joined as plain strings of ours, which need no
+escaping, in few calls.
 """
 
 import math

@@ -13,7 +13,7 @@ from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.swim.hull import hull_of
 from webapp.scene.actuator_shapes import CHORD, ROOT, SPAN
-from webapp.session.looking import GOAL_WORDS, SearchRequest
+from webapp.session.looking import GOALS_BY_WORDS, SearchRequest
 from webapp.session.state import State
 from webapp.tasks.context import Context
 from webapp.tasks.slot import Slot, Work
@@ -99,7 +99,7 @@ class Improver(Slot[Search, Improvement]):
             raise FinlabError("a search is running already; cancel it first")
         bounds = request.bounds(state.layout.without(state.lost))
         self.forget()
-        self.ask(Search(state, GOAL_WORDS[request.goal], bounds))
+        self.ask(Search(state, GOALS_BY_WORDS[request.goal], bounds))
 
 
 def improve(search: Search, work: Work[Search]) -> Improvement:
