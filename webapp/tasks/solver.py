@@ -81,6 +81,7 @@ class Modes:
 
 
 NO_MODES = Modes((), 0)
+"""The modes of an answer that has none."""
 
 
 def modes_of(
@@ -129,14 +130,17 @@ def _resting_words(mode: Mode) -> str:
 
 
 Load = Callable[..., MethodChoice]
-KEPT = 24
-"""Allocators that are kept: to make one takes as long as a hundred answers."""
+"""Loads a method by its name, as `choose_method` does."""
+MAX_ALLOCATORS = 24
+"""Most allocators in the cache: to make one takes as long as a hundred answers."""
 ALTERNATIVE_ERROR = 1e-4
 """Normalized error up to which another answer is an alternative."""
 SHIPPED = NetworkConfig.shipped
+"""Name of the shipped network of method `paper`."""
 POLICIES: dict[str, Policy] = {kind: Policy(kind) for kind in POLICY_NAMES}
+"""Name of each policy that the page offers -> the policy."""
 RUNS = "runs"
-"""Folder in the one where the app was started, whose folders are looked at."""
+"""Folder with the checkpoints of trainings, in the one where the app was started."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,6 +148,7 @@ class Reply:
     """An answer and what belongs to it."""
 
     state: State
+    """The question."""
     answer: Allocation
     in_reach: bool
     """Whether any command of the working fins gives what is asked."""
@@ -174,7 +179,7 @@ class Solver:
         """The network that method `paper` begins with."""
 
     @cached_property
-    def aside(self) -> "Solver":
+    def for_other_thread(self) -> "Solver":
         """Another solver with the same checkpoint, for another thread."""
         return Solver(self._checkpoint, self._load)
 
@@ -186,7 +191,11 @@ class Solver:
         if self._checkpoint is not None:
             folders.append(resolve_checkpoint(self._checkpoint))
         names = [SHIPPED, *map(str, folders[1:])]
-        return {n: folder for n, folder in zip(names, folders, strict=True) if _is_papers(folder)}
+        networks = {}
+        for name, folder in zip(names, folders, strict=True):
+            if _is_papers(folder):
+                networks[name] = folder
+        return networks
 
     def allocator(self, state: State) -> Allocator:
         """The allocator for a state's robot, method and settings, one of the last few or made now;
@@ -204,7 +213,7 @@ class Solver:
                 settings = replace(settings, **{"temperature": temperature})
             allocator = Allocator.of_choice(layout, replace(choice, settings=settings))
         self._made[key] = allocator  # the newest is last
-        while len(self._made) > KEPT:
+        while len(self._made) > MAX_ALLOCATORS:
             self._made.pop(next(iter(self._made)))
         return allocator
 
@@ -287,6 +296,7 @@ class Solver:
 
 
 def _is_papers(folder: Path) -> bool:
+    """Whether a folder holds a network of method `paper`."""
     try:
         return network_features(folder) == NetworkConfig.features
     except FinlabError:  # a folder of something else is no choice
