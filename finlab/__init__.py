@@ -55,25 +55,36 @@ __all__ = [
     "save_layout",
 ]
 
-_KINDS = ("Fin", "Thruster", "Azimuth", "Tilt", "Rudder")
-_OF_LAYOUTS = (*_KINDS, "Body", "Damage", "Layout", "Limits", "load_layout", "save_layout")
-_HOME = dict.fromkeys(_OF_LAYOUTS, "finlab.layout") | {
-    "PowerLaw": "finlab.actuators.thrust_model",
-    "PowerTable": "finlab.actuators.thrust_model",
+_MODULE_OF_NAME = {
     "Allocation": "finlab.allocation.allocation",
     "Allocator": "finlab.allocation.allocator",
-    "Policy": "finlab.allocation.policy",
+    "Azimuth": "finlab.layout",
+    "Body": "finlab.layout",
+    "Damage": "finlab.layout",
+    "Fin": "finlab.layout",
     "FinlabError": "finlab.errors",
+    "Layout": "finlab.layout",
+    "Limits": "finlab.layout",
+    "Policy": "finlab.allocation.policy",
+    "PowerLaw": "finlab.actuators.thrust_model",
+    "PowerTable": "finlab.actuators.thrust_model",
+    "Rudder": "finlab.layout",
+    "Thruster": "finlab.layout",
+    "Tilt": "finlab.layout",
+    "load_layout": "finlab.layout",
+    "save_layout": "finlab.layout",
 }
+"""Public name -> the module that has it, which is imported when the name is first used."""
 
 
 def __getattr__(name: str) -> object:
-    if name not in _HOME:
-        raise AttributeError(
-            f"module 'finlab' has no attribute {name!r}; it has {', '.join(sorted(_HOME))}"
-        )
-    return resolve_name(f"{_HOME[name]}:{name}")
+    """Imports a public name on first use (PEP 562)."""
+    if name not in _MODULE_OF_NAME:
+        known = ", ".join(sorted(_MODULE_OF_NAME))
+        raise AttributeError(f"module 'finlab' has no attribute {name!r}; it has {known}")
+    return resolve_name(f"{_MODULE_OF_NAME[name]}:{name}")
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *_HOME])
+    """Lists public names that have not been imported yet, too, for completion."""
+    return sorted([*globals(), *_MODULE_OF_NAME])

@@ -1,5 +1,8 @@
-"""Types of arrays, relative tolerances, and what numpy, torch and CasADi have in common; all of
-finlab uses it."""
+"""Types of arrays, relative tolerances, and what numpy, torch and CasADi have in common.
+
+All rooms use it. The tolerances have the same names and values in the C core
+(`finlab/core/src/internal.h`); a test holds both against docs/theory/numbers.md.
+"""
 
 import sys
 from contextlib import suppress
@@ -31,8 +34,7 @@ ROUNDS = 12
 
 
 def library_of(value: Any) -> Any:
-    """Returns the module whose `sin`, `cos` ... work on `value`; numpy for arrays and plain
-    numbers.
+    """Returns the module whose `sin`, `cos` ... work on a value: `numpy`, `torch` or `casadi`.
 
     Whoever made a tensor or a symbol has loaded its library; nothing is imported here.
     """
@@ -42,7 +44,7 @@ def library_of(value: Any) -> Any:
     return sys.modules[module] if module in ("torch", "casadi") else np
 
 
-def solve(matrix: Array, right: Array) -> AnyArray:
+def solve_or_nan(matrix: Array, right: Array) -> AnyArray:
     """Solves linear systems, of which some may be singular.
 
     Args:
@@ -55,6 +57,7 @@ def solve(matrix: Array, right: Array) -> AnyArray:
     try:
         return np.linalg.solve(matrix, right)
     except np.linalg.LinAlgError:
+        # numpy says that one of them is singular, and not which: solve them one by one.
         batch = np.broadcast_shapes(matrix.shape[:-2], right.shape[:-2])
     matrices = np.broadcast_to(matrix, (*batch, *matrix.shape[-2:]))
     rights = np.broadcast_to(right, (*batch, *right.shape[-2:]))

@@ -1,15 +1,16 @@
-"""Installed things: shipped layouts, checkpoints and the web app, and the extras that bring more.
+"""What is installed with finlab: shipped layouts, checkpoints and the web app, and the extras that
+bring optional packages.
 
-Shipped folders lie at the top of a source tree, in a wheel inside the package.
+The shipped folders stand at the top of a source tree, and inside the package in a wheel.
 """
 
 from pathlib import Path
 
 from finlab.errors import CheckpointError
 
-NAME = "finlab-marine"
+DISTRIBUTION = "finlab-marine"
 """Name of the distribution; the package that is imported is called `finlab`."""
-EXTRAS = {
+EXTRA_OF_PACKAGE = {
     "torch": "train",
     "matplotlib": "plot",
     "viser": "app",
@@ -17,48 +18,48 @@ EXTRAS = {
     "casadi": "ipopt",
     "distributed": "cluster",
 }
-"""Packages that some parts need beside the base install, and the extra that brings each."""
-
-
-def install(extra: str) -> str:
-    """The command that installs an extra."""
-    return f"pip install '{NAME}[{extra}]'"
-
+"""Optional package -> the extra of the distribution that brings it."""
+PAPER_LAYOUTS = ("A", "B", "C", "D")
+"""The shipped layouts that are the paper's."""
 
 _PACKAGE = Path(__file__).resolve().parent
 
 
-def shipped(folder: str) -> Path:
-    """A folder of the source tree (`layouts`, `checkpoints`, `webapp`), or its copy in an installed
-    wheel."""
-    in_wheel = _PACKAGE / "shipped" / folder
-    return in_wheel if in_wheel.is_dir() else _PACKAGE.parent / folder
+def install_command(extra: str) -> str:
+    """Returns the command that installs an extra, for error messages."""
+    return f"pip install '{DISTRIBUTION}[{extra}]'"
 
 
-PAPER_LAYOUTS = ("A", "B", "C", "D")
-"""The shipped layouts that are the paper's."""
+def shipped_folder(name: str) -> Path:
+    """Returns the path of a shipped folder: `layouts`, `checkpoints` or `webapp`.
+
+    It is the folder of the source tree, or its copy in an installed wheel.
+    """
+    in_wheel = _PACKAGE / "shipped" / name
+    return in_wheel if in_wheel.is_dir() else _PACKAGE.parent / name
 
 
 def shipped_layouts() -> dict[str, Path]:
-    """Shipped layouts: file name without its ending, to path; sorted by name."""
-    return {path.stem: path for path in sorted(shipped("layouts").glob("*.yaml"))}
+    """Returns the shipped layouts: file name without its ending, to path; sorted by name."""
+    return {path.stem: path for path in sorted(shipped_folder("layouts").glob("*.yaml"))}
 
 
 def shipped_checkpoints() -> dict[str, Path]:
-    """Shipped checkpoints: name to folder; sorted by name."""
-    return {
-        path.parent.name: path.parent
-        for path in sorted(shipped("checkpoints").glob("*/config.json"))
-    }
+    """Returns the shipped checkpoints: name to folder; sorted by name."""
+    configs = sorted(shipped_folder("checkpoints").glob("*/config.json"))
+    return {config.parent.name: config.parent for config in configs}
 
 
 def checkpoint_path(name: str = "default") -> Path:
-    """The folder of a shipped checkpoint; a `CheckpointError` where none of that name is
-    shipped."""
+    """Returns the folder of a shipped checkpoint.
+
+    Raises:
+        CheckpointError: none of that name is shipped.
+    """
     known = shipped_checkpoints()
     if name not in known:
         raise CheckpointError(
             f"checkpoint {name!r} is not among the shipped ones ({', '.join(known) or 'none'}) in "
-            f"{shipped('checkpoints')}; name one of them, or pass the folder of your own"
+            f"{shipped_folder('checkpoints')}; name one of them, or pass the folder of your own"
         )
     return known[name]

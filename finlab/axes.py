@@ -43,23 +43,23 @@ TURN = 2.0 * math.pi
 FULL_TURN_TOLERANCE = 1e-6
 """Most by which an arc may be less than a full turn and still count as one [rad]."""
 FILE_TURN_TOLERANCE = 1e-3
-"""The same of zero directions in a file, which are rounded; they may exceed a turn as much
-[rad]."""
-ROUNDED = 1e-3
-"""Most by which a unit vector in a file may be longer or shorter than 1, and two at a right angle
-may miss it [rad]: three decimals or more."""
-EXACT = 1e-14
-"""Deviations up to this one are rounding; such vectors stay as they are."""
-SHORT = 1e-6
-"""Length below which a vector has no direction, and an axis no component along another one."""
-DIGITS = 12
+"""As `FULL_TURN_TOLERANCE`, for zero directions in a file, which are rounded; they may exceed a
+turn as much [rad]."""
+FILE_UNIT_TOLERANCE = 1e-3
+"""Largest difference from 1 of the length of a unit vector in a file [1], and from a right angle of
+two axes [rad]: people write three decimals or more."""
+UNIT_ROUNDING = 1e-14
+"""Differences up to this one are rounding [1, rad]: such vectors stay as they are, bit for bit."""
+MIN_LENGTH = 1e-6
+"""Length below which a vector has no direction, and an axis no component along another one [1]."""
+DECIMALS = 12
 """Decimals to which axes and points are rounded after a rotation."""
-DEGREES_ROUNDED = 1e-6
+FULL_TURN_TOLERANCE_DEG = 1e-6
 """Most by which an arc in degrees may be less than a full turn and be printed as one [deg]."""
 
-MIRROR = np.array([1.0, -1.0, 1.0])
+MIRROR_SIGNS = np.array([1.0, -1.0, 1.0])
 """Signs (3,) of a vector's components in its mirror image in the plane y = 0."""
-AHEAD = np.array([1.0, 0.0, 0.0])
+FORWARD = np.array([1.0, 0.0, 0.0])
 """The x axis of the body frame (3,)."""
 UP = np.array([0.0, 0.0, 1.0])
 """The z axis of the body frame (3,)."""
@@ -75,21 +75,23 @@ def wrapped(angle: ArrayLike) -> Array:
     return np.asarray(np.mod(np.asarray(angle) + math.pi, TURN) - math.pi)
 
 
-def feasible(command: AnyArray, lower: Array, upper: Array, angle: NDArray[np.bool_]) -> AnyArray:
-    """Returns commands brought within their limits exactly.
+def feasible(
+    command: AnyArray, lower: Array, upper: Array, is_angle: NDArray[np.bool_]
+) -> AnyArray:
+    """Returns the commands within limits that are nearest to given ones.
 
     Args:
-        command: commands (..., n, 3) [rad, Hz or N, by kind].
+        command: commands (..., n, 3) [rad, Hz or N, by kind of actuator].
         lower: least command (n, 3).
         upper: greatest command (n, 3).
-        angle: which numbers (n, 3) are angles; these are first wrapped to within half a turn of
+        is_angle: which numbers (n, 3) are angles; these are first wrapped to within half a turn of
             the middle of their limits.
 
     Returns:
-        Commands (..., n, 3) within the limits.
+        Commands (..., n, 3), at a limit exactly where they were beyond it.
     """
     seam = 0.5 * (lower + upper) - math.pi
-    wrapped_command = np.where(angle, np.mod(command - seam, TURN) + seam, command)
+    wrapped_command = np.where(is_angle, np.mod(command - seam, TURN) + seam, command)
     return np.asarray(np.clip(wrapped_command, lower, upper))
 
 
@@ -108,100 +110,131 @@ def command_change(command: ArrayLike) -> Array:
 
 
 def unit_vector(key: str, vector: Vector3 | None) -> Vector3:
-    """Returns a unit vector of a file with length 1 to rounding.
+    """Returns a unit vector of a file, with length 1 to rounding.
 
     Args:
         key: the argument or key that it belongs to, for the message.
         vector: the vector, body frame; None where the file has none.
 
     Raises:
-        LayoutError: it is missing, or its length is not 1 within `ROUNDED`.
+        LayoutError: it is missing, or its length is not 1 within `FILE_UNIT_TOLERANCE`.
     """
     if vector is None:
         raise LayoutError("is missing, expected a unit vector", key)
     length = math.hypot(*vector)
-    if abs(length - 1.0) > ROUNDED:
+    if abs(length - 1.0) > FILE_UNIT_TOLERANCE:
         raise LayoutError(
             f"expected a unit vector, got one of length {length:.6g}; divide it by that", key
         )
-    if abs(length - 1.0) < EXACT:
+    if abs(length - 1.0) < UNIT_ROUNDING:
         return vector
-    x, y, z = (value / length for value in vector)
+    x, y, z = (component / length for component in vector)
     return x, y, z
 
 
-def axes_across(
+def perpendicular_axes(
     first: tuple[str, Vector3 | None], second: tuple[str, Vector3 | None]
 ) -> tuple[Vector3, Vector3]:
-    """Returns two unit vectors of a file at a right angle to rounding; the second is turned.
+    """Returns two unit vectors of a file at a right angle to rounding.
+
+    The first one keeps its direction, the second one is rotated (Gram-Schmidt).
 
     Args:
-        first: key and vector, body frame.
-        second: key and vector that is to be across the first.
+        first: its key and vector, body frame.
+        second: key and vector of the axis that is to be perpendicular to it.
+
+    Returns:
+        Both unit vectors, body frame.
 
     Raises:
         LayoutError: one is missing or no unit vector, or the angle is not a right one within
-            `ROUNDED`.
+            `FILE_UNIT_TOLERANCE`.
     """
     a = unit_vector(*first)
     b = unit_vector(*second)
-    along = sum(x * y for x, y in zip(a, b, strict=True))
-    if abs(along) > ROUNDED:
-        degrees = math.degrees(math.acos(max(-1.0, min(1.0, along))))
+    cosine = sum(a_k * b_k for a_k, b_k in zip(a, b, strict=True))
+    if abs(cosine) > FILE_UNIT_TOLERANCE:
+        degrees = math.degrees(math.acos(max(-1.0, min(1.0, cosine))))
         raise LayoutError(
             f"must stand across {first[0]}, got {degrees:.4g} degrees between them", second[0]
         )
-    if abs(along) < EXACT:
+    if abs(cosine) < UNIT_ROUNDING:
         return a, b
-    across = (b[0] - along * a[0], b[1] - along * a[1], b[2] - along * a[2])
-    return a, unit_vector(second[0], across)
+    # b - (a . b) a
+    rejection = (b[0] - cosine * a[0], b[1] - cosine * a[1], b[2] - cosine * a[2])
+    return a, unit_vector(second[0], rejection)
 
 
 def cross(a: Vector3, b: Vector3) -> Vector3:
-    """Returns the cross product a x b."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+    """Returns the cross product a x b of two vectors (3,)."""
+    x = a[1] * b[2] - a[2] * b[1]
+    y = a[2] * b[0] - a[0] * b[2]
+    z = a[0] * b[1] - a[1] * b[0]
+    return x, y, z
 
 
 def rotation(axis: ArrayLike, angle: float) -> Array:
-    """Returns the rotation matrix (3, 3) about a unit vector (3,) by an angle [rad].
+    """Returns a rotation matrix, by Rodrigues' formula.
 
-    Rodrigues' formula, R = I + sin(angle) K + (1 - cos(angle)) K^2, where K v = axis x v.
+    R = I + sin(angle) K + (1 - cos(angle)) K^2, where K v = axis x v.
+
+    Args:
+        axis: unit vector (3,) about which it rotates.
+        angle: angle of the rotation [rad].
+
+    Returns:
+        The matrix (3, 3).
     """
     x, y, z = np.asarray(axis, dtype=np.float64)
     K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.asarray(np.eye(3) + math.sin(angle) * K + (1.0 - math.cos(angle)) * K @ K)
 
 
-def across(axis: Array, wanted: Array) -> Array:
-    """Returns the unit vector (3,) at a right angle to a unit vector `axis` (3,) that is nearest to
-    the vector `wanted` (3,)."""
+def perpendicular(axis: Array, wanted: Array) -> Array:
+    """Returns the unit vector perpendicular to an axis that is nearest to a wanted vector.
+
+    Args:
+        axis: unit vector (3,).
+        wanted: vector (3,) of any length, not along the axis.
+
+    Returns:
+        Unit vector (3,).
+    """
     rejection = wanted - (wanted @ axis) * axis
     return np.asarray(rejection / np.linalg.norm(rejection))
 
 
-def least_turn(old: Array, new: Array, half_turn_axis: Array) -> Array:
-    """Returns the rotation matrix (3, 3) of least angle that turns one unit vector to another.
+def least_rotation(old: Array, new: Array, half_turn_axis: Array) -> Array:
+    """Returns the rotation of least angle that takes one unit vector to another.
 
     Args:
         old: unit vector (3,).
         new: unit vector (3,).
-        half_turn_axis: unit vector (3,) about which it turns where the two are opposite.
+        half_turn_axis: unit vector (3,) about which it rotates where the two are opposite.
+
+    Returns:
+        The matrix (3, 3).
     """
     axis = np.cross(old, new)
     sine = float(np.linalg.norm(axis))
     cosine = float(old @ new)
-    if sine < SHORT:
+    if sine < MIN_LENGTH:
         return np.eye(3) if cosine > 0.0 else rotation(half_turn_axis, math.pi)
     return rotation(axis / sine, math.atan2(sine, cosine))
 
 
 def arc_words(low: float, high: float) -> str:
-    """Returns an arc [rad] in degrees, for a cell of a printed table."""
-    low = math.degrees(low)
-    high = math.degrees(high)
-    if high - low >= 360.0 - DEGREES_ROUNDED:
+    """Returns an arc in words, for a cell of a printed table: degrees, or "any direction".
+
+    Args:
+        low: where the arc begins [rad].
+        high: where it ends [rad].
+    """
+    low_deg = math.degrees(low)
+    high_deg = math.degrees(high)
+    if high_deg - low_deg >= 360.0 - FULL_TURN_TOLERANCE_DEG:
         return "any direction"
-    return f"{low:.0f}..{high:.0f} deg"
+    return f"{low_deg:.0f}..{high_deg:.0f} deg"
 
 
 def vector_words(values: Sequence[float]) -> str:
@@ -210,10 +243,10 @@ def vector_words(values: Sequence[float]) -> str:
 
 
 def mask_of(axes: Sequence[str]) -> NDArray[np.bool_]:
-    """Returns which axes of a wrench (6,) are among some."""
+    """Returns the mask (6,) of axes of a wrench: True for those named."""
     return np.array([axis in axes for axis in AXES])
 
 
 def axes_in(mask: NDArray[np.bool_]) -> tuple[Axis, ...]:
-    """Returns the names of the axes that are set in a mask (6,)."""
+    """Returns the names of the axes that are True in a mask (6,); the inverse of `mask_of`."""
     return tuple(axis for axis, is_set in zip(AXES, mask, strict=True) if is_set)

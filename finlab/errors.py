@@ -14,11 +14,18 @@ from contextlib import contextmanager, nullcontext, redirect_stdout, suppress
 
 
 def printable(text: str) -> str:
-    """Returns a text with whatever a terminal would obey, or not show, as Python's escapes: names
-    in it may come from a stranger."""
+    """Returns a text whose control characters are Python's escapes, such as `\\x1b`.
+
+    Names in a message may come from a stranger's file, and a terminal obeys control characters.
+    Line ends and non-breaking spaces stay.
+    """
     if text.isprintable():
         return text
-    return "".join(c if c.isprintable() or c in "\n\u00a0" else ascii(c)[1:-1] for c in text)
+    characters = []
+    for character in text:
+        is_shown = character.isprintable() or character in "\n\u00a0"
+        characters.append(character if is_shown else ascii(character)[1:-1])
+    return "".join(characters)
 
 
 class FinlabError(Exception):
@@ -29,8 +36,14 @@ class FinlabError(Exception):
         super().__init__(printable(text))
 
     @classmethod
-    def at(cls, source: str, problem: str, key: str = "") -> "FinlabError":
-        """Returns an error about a file that is called `source`, at a key in it."""
+    def in_file(cls, source: str, problem: str, key: str = "") -> "FinlabError":
+        """Returns an error about a file.
+
+        Args:
+            source: what to call the file, such as its path.
+            problem: what was got and what was expected.
+            key: path of the key in the file that is wrong; empty where it is the whole file.
+        """
         return cls(": ".join(part for part in (source, key, problem) if part))
 
 
@@ -51,25 +64,30 @@ class LayoutError(FinlabError):
             source: the file.
             actuator: whose argument or key it is, such as `thruster 'lift'`.
         """
-        place = " of ".join(part for part in (key, actuator) if part)
-        super().__init__(": ".join(part for part in (source, place, problem) if part))
+        location = " of ".join(part for part in (key, actuator) if part)
+        super().__init__(": ".join(part for part in (source, location, problem) if part))
         self.problem = problem
         self.key = key
         self.source = source
         self.actuator = actuator
 
     @classmethod
-    def at(cls, source: str, problem: str, key: str = "") -> "LayoutError":
-        """Returns an error about a file that is called `source`, at a key in it."""
+    def in_file(cls, source: str, problem: str, key: str = "") -> "LayoutError":
+        """Returns an error about a file; arguments as for `FinlabError.in_file`."""
         return cls(problem, key, source)
 
-    def under(self, prefix: str, source: str = "") -> "LayoutError":
-        """Returns the same error seen from further out: `prefix` goes before the key."""
+    def with_prefix(self, prefix: str, source: str = "") -> "LayoutError":
+        """Returns the same error with a longer path of its key.
+
+        Args:
+            prefix: path of the part of the file in which the error was found; goes before the key.
+            source: the file, where it is not known yet.
+        """
         if prefix and self.key and not self.key.startswith("["):
             prefix += "."
         return LayoutError(self.problem, prefix + self.key, source or self.source, self.actuator)
 
-    def about(self, actuator: str) -> "LayoutError":
+    def for_actuator(self, actuator: str) -> "LayoutError":
         """Returns the same error with the actuator that it is about, unless that is known
         already."""
         return LayoutError(self.problem, self.key, self.source, self.actuator or actuator)
@@ -92,26 +110,33 @@ class DataError(FinlabError):
 
 
 @contextmanager
-def under(key: str = "", source: str = "") -> Iterator[None]:
-    """Puts `key` before the keys of layout errors raised inside, and `source`, their file, before
-    that."""
+def layout_errors_at(key: str = "", source: str = "") -> Iterator[None]:
+    """Adds to layout errors that are raised inside where they were found.
+
+    Args:
+        key: path of the part of a file that is read inside; goes before the keys of the errors.
+        source: the file.
+    """
     try:
         yield
     except LayoutError as error:
-        raise error.under(key, source) from None
+        raise error.with_prefix(key, source) from None
 
 
-FAILED = 2
+EXIT_ERROR = 2
 """Exit code after an error that is printed in one sentence."""
-INTERRUPTED = 130
+EXIT_INTERRUPTED = 130
 """128 + SIGINT, as shells report it."""
-BROKEN_PIPE = 141
+EXIT_BROKEN_PIPE = 141
 """128 + SIGPIPE, as shells report it."""
 
 
 class ClosedOutput(io.TextIOBase):
-    """Standard output of a command that was started without it, as by `>&-`: Python has None in its
-    place, and `print` then says nothing and succeeds, as if somebody had read it."""
+    """Standard output of a command that was started without it, as by `>&-`.
+
+    Python has None in its place, with which `print` does nothing and succeeds, as if somebody had
+    read it. This one refuses to be written to, so that the command fails.
+    """
 
     def writable(self) -> bool:
         return False
@@ -121,11 +146,17 @@ class ClosedOutput(io.TextIOBase):
 
 
 def exit_code(program: str, work: Callable[[], int]) -> int:
-    """The exit code of a command: that of its work, or one of the above after one sentence on
-    stderr.
+    """Runs a command, and returns its exit code.
 
-    Standard output that is full or closed is an error like any other; a reader that ended early,
-    such as `head`, has what it wanted, and gets no words.
+    Standard output that is full or closed is an error like any other. A reader that ended early,
+    such as `head`, has what it wanted: the command ends without a message.
+
+    Args:
+        program: name of the command, with which its messages begin.
+        work: what the command does; returns its exit code.
+
+    Returns:
+        The exit code of the work, or one of the constants above after one sentence on stderr.
     """
     output = nullcontext() if sys.stdout is not None else redirect_stdout(ClosedOutput())
     with output:
@@ -133,6 +164,7 @@ def exit_code(program: str, work: Callable[[], int]) -> int:
 
 
 def _code_of(program: str, work: Callable[[], int]) -> int:
+    """As `exit_code`, with a standard output that is there or `ClosedOutput`."""
     try:
         code = work()
         sys.stdout.flush()
@@ -140,26 +172,27 @@ def _code_of(program: str, work: Callable[[], int]) -> int:
     except FinlabError as error:
         return _fail(program, str(error))
     except KeyboardInterrupt:
-        return INTERRUPTED
+        return EXIT_INTERRUPTED
     except OSError as error:
-        if error.filename is not None:
+        if error.filename is not None:  # a file of the command's own, not standard output
             return _fail(program, f"{error.filename}: {error.strerror}")
         _drop_output()
         if isinstance(error, BrokenPipeError):
-            return BROKEN_PIPE
+            return EXIT_BROKEN_PIPE
         return _fail(
             program, f"cannot print: {error.strerror or error}; write the output to another place"
         )
 
 
 def _fail(program: str, sentence: str) -> int:
+    """Prints an error on stderr, unless that is closed, and returns the exit code."""
     if sys.stderr is not None:
         with suppress(OSError):
             print(f"{program}: error: {sentence}", file=sys.stderr)
-    return FAILED
+    return EXIT_ERROR
 
 
 def _drop_output() -> None:
-    """Give standard output somewhere to write: Python flushes it once more at exit."""
+    """Redirects standard output to nowhere, since Python flushes it once more at exit."""
     with suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

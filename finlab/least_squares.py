@@ -1,8 +1,10 @@
-"""Levenberg-Marquardt for one least-squares problem, or for many side by side.
+"""Levenberg-Marquardt for one least-squares problem, or for many side by side (Levenberg, 1944;
+Marquardt, 1963).
 
+The allocation methods refine commands with it, `finlab.swim.identification` fits robots to logs.
 The caller knows the problem: how to evaluate it, and its Gauss-Newton step at a given damping. Here
-is what all share: a step that makes a row worse is undone and that row's damping is raised; else it
-is lowered.
+is what all share: a step that raises the cost of a problem is undone and its damping is raised;
+after any other step the damping is lowered.
 """
 
 from collections.abc import Callable
@@ -14,92 +16,97 @@ import numpy as np
 from finlab.arrays import AnyArray
 
 
-class Point(Protocol):
-    """R problems at one point of each: a named tuple of arrays with R rows; of one problem, any
-    object."""
+class Iterate(Protocol):
+    """Where R problems are between two steps: a named tuple of arrays with R rows, so that single
+    rows can be undone. Of one problem, any object with a cost (1,)."""
 
     @property
     def cost(self) -> AnyArray:
-        """Sum of squares (R,)."""
+        """Sum of squared residuals (R,)."""
 
 
-At = TypeVar("At", bound=Point)
+IterateT = TypeVar("IterateT", bound=Iterate)
 
 
 @dataclass(frozen=True)
-class Damping:
-    """How the damping of a row follows from its steps."""
+class DampingRule:
+    """How the damping of a problem changes from step to step."""
 
-    first: float = 1e-6
-    """Of the first step."""
-    better: float = 0.3
-    """Factor after a step that lowers the cost."""
-    worse: tuple[float, float] = (30.0, 1e-4)
-    """Factor after another, and what is added."""
-    least: float = 0.0
-    """Never below this."""
-    most: float = np.inf
-    """The search ends where all rows are above this."""
+    initial: float = 1e-6
+    """Damping of the first step."""
+    accepted_factor: float = 0.3
+    """Factor after a step that does not raise the cost."""
+    refused_factor: float = 30.0
+    """Factor after a step that is undone."""
+    refused_increment: float = 1e-4
+    """What is added after that factor, so that a damping near 0 grows, too."""
+    minimum: float = 0.0
+    """Smallest damping after an accepted step."""
+    maximum: float = np.inf
+    """The search ends where the damping of all problems is above this."""
 
 
-USUAL = Damping()
-"""For problems whose step is bounded by limits as well."""
+DEFAULT_RULE = DampingRule()
+"""Rule for problems whose step is bounded by limits as well."""
 
 
 def levenberg_marquardt(
-    at: At,
-    moved: Callable[[At, AnyArray, bool], At],
-    steps: int,
-    rule: Damping = USUAL,
-    settled: float = 0.0,
-    enough: float = 0.0,
-) -> At:
-    """Lower the cost of R problems (Levenberg, 1944; Marquardt, 1963), and return where they end.
+    start: IterateT,
+    take_step: Callable[[IterateT, AnyArray, bool], IterateT],
+    max_steps: int,
+    rule: DampingRule = DEFAULT_RULE,
+    gain_tolerance: float = 0.0,
+    cost_tolerance: float = 0.0,
+) -> IterateT:
+    """Lowers the cost of R least-squares problems.
 
     Args:
-        at: where they begin.
-        moved: the problems after one step, from where they are, the damping (R,) of each, and
+        start: where the problems begin.
+        take_step: gives the next iterate from an iterate, the damping (R,) of each problem, and
             whether it is the last step, after which no derivatives are needed.
-        steps: most steps, those included that are undone.
-        rule: of the damping.
-        settled: relative gain at or below which a step that helps is the last one; 0 to take all
-        steps.
-        enough: cost at or below which a row takes no further step.
+        max_steps: largest number of steps, those included that are undone.
+        rule: how the damping changes.
+        gain_tolerance: relative decrease of the cost at or below which an accepted step is the last
+            one, if all problems are so; 0 to take all steps.
+        cost_tolerance: cost at or below which a problem takes no further step.
+
+    Returns:
+        The iterate in which each problem has the least cost on its way.
     """
-    damping = np.full(len(at.cost), rule.first)
-    for step in range(steps):
-        finished = at.cost <= enough
-        if finished.all():
+    iterate = start
+    damping = np.full(len(iterate.cost), rule.initial)
+    for step in range(max_steps):
+        is_solved = iterate.cost <= cost_tolerance
+        if is_solved.all():
             break
-        new = moved(at, damping, step == steps - 1)
-        worse = finished | ~(new.cost <= at.cost)  # a cost that is not a number is no improvement
-        done = (
-            settled > 0.0
-            and not worse.any()
-            and bool((at.cost - new.cost <= settled * at.cost).all())
-        )
-        at = _better(at, new, worse)
-        if done:
+        candidate = take_step(iterate, damping, step == max_steps - 1)
+        # Written as a negation, since a cost that is not a number is no decrease.
+        is_refused = is_solved | ~(candidate.cost <= iterate.cost)
+        is_settled = False
+        if gain_tolerance > 0.0 and not is_refused.any():
+            gain = iterate.cost - candidate.cost
+            is_settled = bool((gain <= gain_tolerance * iterate.cost).all())
+        iterate = _undo_rows(iterate, candidate, is_refused)
+        if is_settled:
             break
-        factor, added = rule.worse
-        damping = np.where(
-            worse, damping * factor + added, np.maximum(damping * rule.better, rule.least)
-        )
-        if (damping > rule.most).all():
+        raised = damping * rule.refused_factor + rule.refused_increment
+        lowered = np.maximum(damping * rule.accepted_factor, rule.minimum)
+        damping = np.where(is_refused, raised, lowered)
+        if (damping > rule.maximum).all():
             break
-    return at
+    return iterate
 
 
-def _better(old: At, new: At, worse: AnyArray) -> At:
-    """Of each row the old point where the new one is worse."""
-    if not worse.any():
-        return new
-    if worse.all():
-        return old
-    fields = [
-        np.where(worse.reshape(-1, *(1,) * (kept.ndim - 1)), kept, tried)
-        for kept, tried in zip(
-            cast(tuple[AnyArray, ...], old), cast(tuple[AnyArray, ...], new), strict=True
-        )
-    ]
-    return type(old)(*fields)
+def _undo_rows(previous: IterateT, candidate: IterateT, is_refused: AnyArray) -> IterateT:
+    """The candidate, with the rows (R,) whose step is refused as they were before."""
+    if not is_refused.any():
+        return candidate
+    if is_refused.all():
+        return previous
+    fields = []
+    for before, after in zip(
+        cast(tuple[AnyArray, ...], previous), cast(tuple[AnyArray, ...], candidate), strict=True
+    ):
+        is_refused_row = is_refused.reshape(-1, *(1,) * (before.ndim - 1))
+        fields.append(np.where(is_refused_row, before, after))
+    return type(previous)(*fields)

@@ -16,6 +16,6 @@ from finlab.errors import DataError, FinlabError, LayoutError, printable
 )
 def test_what_a_terminal_would_obey_is_escaped(name: str, shown: str) -> None:
     assert printable(name) == shown == printable(shown)
-    assert str(FinlabError(name)) == str(DataError.at(name, "")) == shown
-    error = LayoutError("is wrong", name).under("body", "a.yaml")
+    assert str(FinlabError(name)) == str(DataError.in_file(name, "")) == shown
+    error = LayoutError("is wrong", name).with_prefix("body", "a.yaml")
     assert str(error) == f"a.yaml: body.{shown}: is wrong" and error.key == f"body.{name}"

@@ -2,8 +2,8 @@
 
 import torch
 
-from finlab.research.networks.trained import State
+from finlab.research.networks.trained import ArraysByName
 
 
-def arrays_of(weights: dict[str, torch.Tensor]) -> State:
+def arrays_of(weights: dict[str, torch.Tensor]) -> ArraysByName:
     return {name: value.detach().numpy() for name, value in weights.items()}

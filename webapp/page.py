@@ -12,7 +12,7 @@ import viser
 
 from finlab.actuators.kinds import KINDS
 from finlab.allocation.allocation import Allocation
-from finlab.bundle_files import LARGEST_BUNDLE
+from finlab.bundle_files import MAX_BUNDLE_BYTES
 from webapp.board import Board
 from webapp.handles import Asking, Presses, on_user_change
 from webapp.intents import Intents
@@ -57,7 +57,7 @@ class Page:
             {k.capitalize(): partial(self.designs.new, k) for k in KINDS},
         )
         """Asks what a new design begins with."""
-        hold_uploads(client.gui, LARGEST_BUNDLE, partial(intents.notify, "Not possible"))
+        hold_uploads(client.gui, MAX_BUNDLE_BYTES, partial(intents.notify, "Not possible"))
 
     @property
     def shown_allocation(self) -> Allocation | None:

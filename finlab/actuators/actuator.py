@@ -257,14 +257,14 @@ class Actuator(Checked, ABC):
             super().__post_init__()
             self.check_together()
         except LayoutError as error:
-            raise error.about(f"{self.type} {self.name!r:.66}") from None
+            raise error.for_actuator(f"{self.type} {self.name!r:.66}") from None
 
     def check_together(self) -> None:
         """Checks arguments against each other, each being right by itself, and makes axes exactly
         orthonormal. Raises LayoutError: the message names the argument."""
         if len(self.KIND.axes) == 2:
             first_name, second_name = self.KIND.axes
-            first, second = axes.axes_across(
+            first, second = axes.perpendicular_axes(
                 (first_name, getattr(self, first_name)), (second_name, getattr(self, second_name))
             )
             object.__setattr__(self, first_name, first)
@@ -496,8 +496,8 @@ class Actuator(Checked, ABC):
             changes[self.KIND.arc] = (-high + 0.0, -low + 0.0)
         if hasattr(self, "torque_per_newton"):
             changes["torque_per_newton"] = -self.torque_per_newton + 0.0
-        frame = np.array(self.frame) * axes.MIRROR
-        position = np.array(self.position) * axes.MIRROR
+        frame = np.array(self.frame) * axes.MIRROR_SIGNS
+        position = np.array(self.position) * axes.MIRROR_SIGNS
         return self.turned(frame, position, **changes)
 
     def facing(self, towards: Vector3) -> Self:
@@ -505,17 +505,17 @@ class Actuator(Checked, ABC):
         turns along by the least rotation, or as its kind has it. Raises FinlabError: the vector has
         no length."""
         length = math.hypot(*towards)
-        if not axes.SHORT < length < math.inf:
+        if not axes.MIN_LENGTH < length < math.inf:
             raise FinlabError(
                 f"direction of {self.name}: expected a vector with a length, got {towards}"
             )
         wanted = np.array(towards) / length
         frame = np.array(self.frame)
         row = self.KIND.pointed_row
-        if np.abs(wanted - frame[row]).max() < axes.SHORT:
+        if np.abs(wanted - frame[row]).max() < axes.MIN_LENGTH:
             return self
         half_turn_axis = frame[2 if row == 0 else 0]
-        frame = frame @ axes.least_turn(frame[row], wanted, half_turn_axis).T
+        frame = frame @ axes.least_rotation(frame[row], wanted, half_turn_axis).T
         frame[row] = wanted
         return self.turned(self.settled(frame))
 
@@ -533,11 +533,11 @@ class Actuator(Checked, ABC):
         frame = np.array(self.frame)
         wanted = np.array(towards, dtype=np.float64)
         row = self.KIND.pointed_row
-        if not axes.SHORT < np.linalg.norm(np.cross(frame[row], wanted)) < math.inf:
+        if not axes.MIN_LENGTH < np.linalg.norm(np.cross(frame[row], wanted)) < math.inf:
             raise FinlabError(
                 f"{self.name}: expected a direction across its {self.KIND.pointed}, got {towards}"
             )
-        frame[1 - row] = axes.across(frame[row], wanted)
+        frame[1 - row] = axes.perpendicular(frame[row], wanted)
         return self.turned(frame)
 
 
@@ -561,7 +561,7 @@ def weakened(interval: tuple[float, float], share: float | None) -> tuple[float,
 
 def _rounded(values: ArrayLike) -> Any:
     """Lists of numbers without digits of rounding, and without minus zeros, as files have them."""
-    return (np.round(np.asarray(values, dtype=np.float64), axes.DIGITS) + 0.0).tolist()
+    return (np.round(np.asarray(values, dtype=np.float64), axes.DECIMALS) + 0.0).tolist()
 
 
 def _row_of(numbers: list[Any], missing: float) -> CommandRow:

@@ -39,7 +39,7 @@ from finlab.actuators.response import CELLS, POINTS, Form, Group, Line, RadialTa
 from finlab.actuators.thrust_model import lower_hull
 from finlab.actuators.thrust_power import ConvexCurve, radial_table
 from finlab.arrays import NOTHING, Array, Values
-from finlab.axes import AHEAD, SHORT, Direction3, Vector3, across, arc_words
+from finlab.axes import FORWARD, MIN_LENGTH, Direction3, Vector3, arc_words, perpendicular
 from finlab.errors import LayoutError
 from finlab.files.schema import Name
 
@@ -547,6 +547,6 @@ class Rudder(Actuator):
 
     def settled(self, frame: Array) -> Array:
         """See `Actuator`: the leading edge points ahead, as near as the shaft allows."""
-        if math.hypot(*frame[0, 1:]) > SHORT:
-            frame[1] = across(frame[0], AHEAD)
+        if math.hypot(*frame[0, 1:]) > MIN_LENGTH:
+            frame[1] = perpendicular(frame[0], FORWARD)
         return frame

@@ -37,7 +37,7 @@ from finlab.allocation.solution import Candidates, Rows, Solution, joined
 from finlab.arrays import Array
 from finlab.axes import Axis, axes_in
 from finlab.errors import AllocationError
-from finlab.layout.damage import WHOLE, Damage
+from finlab.layout.damage import NO_DAMAGE, Damage
 from finlab.layout.layout import Layout
 from finlab.physics.objective import wrench_scale_of
 from finlab.physics.plant import plant_of
@@ -140,7 +140,7 @@ class Allocator:
         self._layout = layout
         self._choice = choice
         self._scale = wrench_scale_of(layout)
-        self._whole = self._make_state(WHOLE)
+        self._whole = self._make_state(NO_DAMAGE)
         self._states: dict[object, RobotState] = {}
         """States that were asked for, by damage and free axes; the one asked for last is last."""
 
@@ -410,7 +410,7 @@ class Allocator:
     def _state(self, damage: Damage, free: Sequence[str] = ()) -> RobotState:
         """Returns the robot with a damage, asked for all axes but some: from the cache, or prepared
         now."""
-        if damage == WHOLE and not len(free):
+        if damage == NO_DAMAGE and not len(free):
             return self._whole
         mask = free_mask(self._layout, free)
         key = damage, None if mask is None else mask.tobytes()

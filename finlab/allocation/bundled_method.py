@@ -1,7 +1,7 @@
 """The method that a bundle's robot answers with, from what the bundle's files say."""
 
 from finlab.allocation.methods import METHODS_ON_BOARD, MethodChoice, checked_settings, method_class
-from finlab.bundle_files import ABOUT, FORMAT, NETWORKS, Files
+from finlab.bundle_files import CHECKPOINT_FOLDER, FORMAT, MANIFEST_FILE, Files
 from finlab.errors import AllocationError, DataError
 from finlab.files import parse_json
 from finlab.files.guarded import decoded
@@ -23,8 +23,8 @@ def bundled_method(files: Files, source: str) -> MethodChoice:
         DataError: the bundle is of another format, has a method that runs on no robot, or settings
             that no robot should try.
     """
-    where = f"{source}/{ABOUT}"
-    document = parse_json(decoded(files[ABOUT], where, "JSON"), where)
+    where = f"{source}/{MANIFEST_FILE}"
+    document = parse_json(decoded(files[MANIFEST_FILE], where, "JSON"), where)
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise DataError(f"{where}: expected format {FORMAT}; a bundle is made by `finlab export`")
     method = document.get("method")
@@ -41,9 +41,11 @@ def bundled_method(files: Files, source: str) -> MethodChoice:
     except AllocationError as error:
         raise DataError(f"{where}: settings: {error}") from None
     network_files = {
-        path.removeprefix(NETWORKS): content
+        path.removeprefix(CHECKPOINT_FOLDER): content
         for path, content in files.items()
-        if path.startswith(NETWORKS)
+        if path.startswith(CHECKPOINT_FOLDER)
     }
-    networks = kind.networks_in(network_files, f"{source}/{NETWORKS.rstrip('/')}", checkpoint)
+    networks = kind.networks_in(
+        network_files, f"{source}/{CHECKPOINT_FOLDER.rstrip('/')}", checkpoint
+    )
     return MethodChoice(kind, settings, networks)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.arrays import NOTHING, AnyArray, Array, solve
+from finlab.arrays import NOTHING, AnyArray, Array, solve_or_nan
 from finlab.axes import feasible
 from finlab.physics.plant import Plant
 
@@ -183,7 +183,7 @@ def refine(
         For each row the best command on the way, never worse than the first one within the limits.
     """
     # Most answers of the default method need no step: `finlab allocate` is to load few files.
-    from finlab.least_squares import Damping, levenberg_marquardt
+    from finlab.least_squares import DampingRule, levenberg_marquardt
 
     def after_step(at: _Iterate, damping: AnyArray, is_last: bool) -> _Iterate:
         # (R, n, 3, 6): change of the normalized wrench per unit of each limit range.
@@ -198,7 +198,8 @@ def refine(
     # turn or a rounding error.
     known_jacobian = None if steps else _NO_JACOBIAN
     start = _iterate(problem, target, problem.feasible(command), known_jacobian)
-    best = levenberg_marquardt(start, after_step, steps, Damping(FIRST_DAMPING), enough=enough**2)
+    rule = DampingRule(initial=FIRST_DAMPING)
+    best = levenberg_marquardt(start, after_step, steps, rule, cost_tolerance=enough**2)
     return RefinedCommands(best.command, best.wrench, np.sqrt(best.cost))
 
 
@@ -270,4 +271,4 @@ def _smallest_change(jacobian: AnyArray, residual: AnyArray, damping: AnyArray) 
     # again, or rises from rest.
     trace = np.einsum("ri->r", diagonal)
     diagonal += (damping + RIDGE[0] + RIDGE[1] * trace)[:, None]
-    return np.asarray(jacobian @ solve(gram, residual))
+    return np.asarray(jacobian @ solve_or_nan(gram, residual))

@@ -133,9 +133,9 @@ class Method(ABC):
     def check_robot(cls, layout: Layout) -> None:
         """Raise a `LayoutError` at an actuator that the method does not take."""
         if cls.takes == "thrusters":
-            layout.only(f"method {cls.name}", "thruster")
+            layout.require_kind(f"method {cls.name}", "thruster")
         elif cls.takes != "any actuator":
-            layout.only(f"method {cls.name}", horizontal=cls.takes == "horizontal fins")
+            layout.require_kind(f"method {cls.name}", horizontal=cls.takes == "horizontal fins")
 
     @classmethod
     def fits(cls, layout: Layout) -> bool:

@@ -26,7 +26,7 @@ from finlab.allocation.solution import Candidates, Solution, among_all
 from finlab.arrays import Array
 from finlab.axes import AXES, mask_of
 from finlab.errors import AllocationError, CommandError
-from finlab.layout.damage import WHOLE, Damage, lost_names
+from finlab.layout.damage import NO_DAMAGE, Damage, lost_names
 from finlab.layout.layout import Layout
 from finlab.physics.plant import Plant
 
@@ -285,7 +285,7 @@ def damage_of(damage: Damage | None, lost: Sequence[str]) -> Damage:
         AllocationError: `damage` is no `Damage`, or `lost` is no list of names.
     """
     if damage is None:
-        known = WHOLE
+        known = NO_DAMAGE
     elif isinstance(damage, Damage):
         known = damage
     else:

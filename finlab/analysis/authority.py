@@ -141,7 +141,7 @@ def _authorities(
     held_of = [_held(commanded_axes(layout), *pair) for pair in zip(values, vectors, strict=True)]
     axes = np.concatenate([np.eye(6), -np.eye(6)])
     size, _ = max_wrench_along_exactly(sets, axes)
-    if flow is not None and layout.by_flow:
+    if flow is not None and layout.flow_driven:
         # The hull of a rudder's lift and drag has drag without lift, which pushes alone what
         # nothing does.
         pushed_alone = np.array(

@@ -99,8 +99,8 @@ def make_goal(
         if sum(counts) - max(counts) < len(axis_indices):
             raise LayoutError(
                 f"the goal {name} needs {len(axis_indices)} directions after a loss, and layout "
-                f"{layout.name} has {layout.counted}, which push in {sum(counts)}; none can fail "
-                "without losing an axis"
+                f"{layout.name} has {layout.counts_in_words}, which push in {sum(counts)}; "
+                "none can fail without losing an axis"
             )
         return after_worst_failure
     if name == "mission_power":

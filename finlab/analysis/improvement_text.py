@@ -59,4 +59,6 @@ def improvement_remarks(improvement: Improvement) -> list[Remark]:
 
 def moved_table(improvement: Improvement) -> Table:
     """Returns where the actuators that could move are, and their directions."""
-    return table_of(MOVED_COLUMNS, [improvement.layout.part(name) for name in improvement.moved])
+    return table_of(
+        MOVED_COLUMNS, [improvement.layout.actuator(name) for name in improvement.moved]
+    )

@@ -18,7 +18,7 @@ from finlab.actuators.actuator import Actuator
 from finlab.actuators.kinds import laws_of
 from finlab.analysis.authority import held_axes
 from finlab.arrays import Array
-from finlab.axes import MIRROR
+from finlab.axes import MIRROR_SIGNS
 from finlab.errors import LayoutError
 from finlab.forces.force_sets import SCALE, ForceSets, assembled, shapes_of
 from finlab.layout import Layout
@@ -114,9 +114,9 @@ def is_mirrored(first: Actuator, second: Actuator, tolerance: float = MIRROR_TOL
             point the same way, other axes may point either way.
     """
     count = len(first.KIND.axes)
-    image = np.array(first.frame)[:count] * MIRROR
+    image = np.array(first.frame)[:count] * MIRROR_SIGNS
     axes = np.array(second.frame)[:count]
-    distance = np.abs(np.subtract(second.position, MIRROR * first.position)).max()
+    distance = np.abs(np.subtract(second.position, MIRROR_SIGNS * first.position)).max()
     angle = np.linalg.norm(np.cross(image, axes), axis=-1).max()
     same_way = first.type != "fin" or image[0] @ axes[0] > 0.0
     return first.type == second.type and same_way and bool(max(distance, angle) <= tolerance)
@@ -240,7 +240,9 @@ class Moves:
         frames[:, self._leader_rows] = frames[:, self._leader_rows] @ turns
         follows = self._twin_rows >= 0
         twin = self._twin_rows[self._twin_rows >= 0]
-        frames[:, twin] = frames[:, twin] @ (turns[:, follows] * MIRROR * MIRROR[:, None])
+        # The mirror image of a rotation R is S R S, with S = diag(MIRROR_SIGNS).
+        mirrored_turns = turns[:, follows] * MIRROR_SIGNS * MIRROR_SIGNS[:, None]
+        frames[:, twin] = frames[:, twin] @ mirrored_turns
         return self._positions(numbers), frames
 
     def _numbers(self, vectors: Array) -> Array:
@@ -254,7 +256,7 @@ class Moves:
         position = np.tile(self.start_position, (len(numbers), 1, 1))
         position[:, self._leader_rows] = numbers[..., :3]
         follows = self._twin_rows >= 0
-        position[:, self._twin_rows[follows]] = numbers[:, follows, :3] * MIRROR
+        position[:, self._twin_rows[follows]] = numbers[:, follows, :3] * MIRROR_SIGNS
         return position
 
     def mirrored(self, vectors: Array) -> Array:
@@ -267,13 +269,13 @@ class Moves:
                 column_2 = self.leaders.index(name_2)
                 i = self._leader_rows[column_1]
                 j = self._leader_rows[column_2]
-                sign = np.sign(self.layout.frames[i, 0] * MIRROR @ self.layout.frames[j, 0])
+                sign = np.sign(self.layout.frames[i, 0] * MIRROR_SIGNS @ self.layout.frames[j, 0])
                 image = (numbers[:, column_1, 3:] - [self._azimuths[i], 0.0]) * [-1.0, sign] + [
                     self._azimuths[j],
                     0.0,
                 ]
                 numbers[:, column_2] = np.concatenate(
-                    [numbers[:, column_1, :3] * MIRROR, image], axis=-1
+                    [numbers[:, column_1, :3] * MIRROR_SIGNS, image], axis=-1
                 )
         return np.clip(numbers.reshape(len(vectors), -1)[:, self._free], self.lower, self.upper)
 
@@ -304,7 +306,9 @@ class Moves:
         position, frames = self.geometry(vector[None])
         result = self.layout
         for i in self.layout.indices(self.names):
-            result = result.with_part(self.layout.actuators[i].turned(frames[0, i], position[0, i]))
+            result = result.with_actuator(
+                self.layout.actuators[i].turned(frames[0, i], position[0, i])
+            )
         return result
 
 

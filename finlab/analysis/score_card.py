@@ -122,7 +122,7 @@ def score_card(
         lost=tuple(name for name in layout.names if name in lost_names),
         flow=None if water is None else tuple(water.tolist()),
         n_actuators=layout.n - len(lost_names),
-        counted=_counted(layout, lost_names),
+        counted=_counts_in_words(layout, lost_names),
         authority=present,
         losses=losses(layout, lost, present, water),
         unit_wrench=UNIT_WRENCH,
@@ -131,10 +131,11 @@ def score_card(
     )
 
 
-def _counted(layout: Layout, lost: Collection[str]) -> str:
-    """The working actuators by type, such as `8 thrusters`."""
-    has_some = any(name not in lost for name in layout.names)
-    return layout.without(set(lost)).counted if has_some else "0 actuators"
+def _counts_in_words(layout: Layout, lost: Collection[str]) -> str:
+    """Number of actuators of each type that are not lost, such as `3 fins`."""
+    if len(lost) == layout.n:
+        return "0 actuators"
+    return layout.without(lost).counts_in_words
 
 
 def _rank_of_loss(loss: Loss) -> tuple[float, ...]:
@@ -156,7 +157,7 @@ def _notes(layout: Layout, lost: Collection[str], flow: Array | None) -> tuple[s
             f"{subject} of the convex hull: some arcs are wider than half a turn but not full "
             "circles."
         )
-    pushed_by_flow = [name for name in layout.by_flow if name not in lost]
+    pushed_by_flow = [name for name in layout.flow_driven if name not in lost]
     if flow is not None and pushed_by_flow:
         notes.append("Forces of the flow count with the convex hull of their lift and drag.")
     if flow is None and pushed_by_flow:
@@ -212,6 +213,6 @@ def quick_check(
     }
     return QuickCheck(
         **vars(present),
-        actuators=_counted(layout, lost),
+        actuators=_counts_in_words(layout, set(lost)),
         lost=tuple((name, axes) for name, axes in costs.items() if axes),
     )

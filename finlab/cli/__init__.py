@@ -18,9 +18,9 @@ import tyro
 from tyro.extras import SubcommandApp
 
 from finlab import __version__
-from finlab.assets import EXTRAS, install
+from finlab.assets import EXTRA_OF_PACKAGE, install_command
 from finlab.cli.shared_options import with_json_file
-from finlab.errors import FAILED, FinlabError, exit_code
+from finlab.errors import EXIT_ERROR, FinlabError, exit_code
 
 EXAMPLES: dict[str, tuple[str, ...]] = {
     "": ("finlab allocate A --wrench 1 0 0.5 0 0 0.1", "finlab app"),
@@ -111,9 +111,10 @@ def _run(argv: list[str]) -> int:
         return _run_parsed(with_json_file(argv))
     except ModuleNotFoundError as error:
         package = str(error.name).split(".")[0]
-        if package not in EXTRAS:
+        if package not in EXTRA_OF_PACKAGE:
             raise
-        raise FinlabError(f"{package} is not installed; run: {install(EXTRAS[package])}") from None
+        command = install_command(EXTRA_OF_PACKAGE[package])
+        raise FinlabError(f"{package} is not installed; run: {command}") from None
 
 
 def _run_parsed(argv: list[str]) -> int:
@@ -121,7 +122,7 @@ def _run_parsed(argv: list[str]) -> int:
     try:
         code: int | None = _run_verb(argv)
     except SystemExit as exit_:
-        return exit_.code if isinstance(exit_.code, int) else FAILED
+        return exit_.code if isinstance(exit_.code, int) else EXIT_ERROR
     return code or 0
 
 

@@ -24,18 +24,19 @@ def app(
         host: address to listen on; the default is reachable from this machine only.
         port: port to listen on.
     """
-    from finlab.assets import install, shipped
+    from finlab.assets import install_command, shipped_folder
 
     # In a wheel it travels inside this package: an installation has no top-level package of so
     # plain a name.
-    if (home := str(shipped("webapp").parent)) not in sys.path:
+    if (home := str(shipped_folder("webapp").parent)) not in sys.path:
         sys.path.insert(0, home)
     try:
         from webapp.serving import serve
     except ModuleNotFoundError as error:
         if str(error.name).split(".")[0] in ("finlab", "webapp"):
             raise
+        command = install_command("app")
         raise FinlabError(
-            f"the web app needs {error.name!r}, which is not installed; run: {install('app')}"
+            f"the web app needs {error.name!r}, which is not installed; run: {command}"
         ) from error
     serve(host=host, port=port, layout=layout, checkpoint=checkpoint)

@@ -40,7 +40,7 @@ def check(layouts: Annotated[Positional[tuple[str, ...]], arg(metavar="LAYOUT...
             print(f"finlab: error: {error}", file=sys.stderr)
             n_bad += 1
         else:
-            print(f"{text}: ok, layout {layout.name} with {layout.counted}")
+            print(f"{text}: ok, layout {layout.name} with {layout.counts_in_words}")
             for remark in REMARKS:
                 if (words := resolve_name(remark)(layout)) is not None:
                     print(f"{text}: {words}")
@@ -101,7 +101,7 @@ def convert_layout(
     exchange = Exchange(fins, thrusters, origin, force, frame, rows, model)
     layout, notes = in_worker(convert, file, output, to, exchange)
     lines = [
-        f"{output}: {layout.name} with {layout.counted}",
+        f"{output}: {layout.name} with {layout.counts_in_words}",
         *(f"- {printable(note)}" for note in notes),
     ]
     print("\n".join(lines))

@@ -129,16 +129,19 @@ def export(
         from finlab.deploy.robot_graph import write_graph
 
         write_graph(left, graph)
-        print(f"{graph}: {robot.counted}, {left.n} nodes")
+        print(f"{graph}: {robot.counts_in_words}, {left.n} nodes")
     if c is not None:
         from finlab.deploy.c_sources import c_sources, write_c
 
         files = c_sources(left, flow=flow)
         write_c(files, c)
-        print(f"{c}: {left.counted}, {len(files)} files; try: cc -std=c99 {c}/*.c -lm && ./a.out")
-        if flow is None and left.by_flow:
+        print(
+            f"{c}: {left.counts_in_words}, {len(files)} files; "
+            f"try: cc -std=c99 {c}/*.c -lm && ./a.out"
+        )
+        if flow is None and left.flow_driven:
             print(
-                f"{', '.join(left.by_flow)}: no force at rest; --flow says of which speed the "
+                f"{', '.join(left.flow_driven)}: no force at rest; --flow says of which speed the "
                 "files are"
             )
     if output is None:
@@ -153,5 +156,5 @@ def export(
     else:
         bundle.write(output)
     size = sum(map(len, bundle.files.values())) / 1e6
-    print(f"{output}: {robot.counted}, {len(bundle.files)} files, {size:.2f} MB")
+    print(f"{output}: {robot.counts_in_words}, {len(bundle.files)} files, {size:.2f} MB")
     print(f"check it on the robot: finlab-runtime check {output.name}")

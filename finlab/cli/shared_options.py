@@ -74,14 +74,14 @@ def open_robot(text: str, lost: tuple[str, ...] = ()) -> tuple[Layout, tuple[str
     not work: those that a bundle marks as lost and those named now, each once. Raises LayoutError:
     neither a readable file nor a shipped layout."""
     from finlab.assets import shipped_layouts
-    from finlab.layout.load import layout_and_lost
+    from finlab.layout.load import load_layout_and_lost
 
     if text in shipped_layouts():
-        layout, known = layout_and_lost(text)
+        layout, known = load_layout_and_lost(text)
     else:
         from finlab.files.worker import in_worker
 
-        layout, known = in_worker(layout_and_lost, text)
+        layout, known = in_worker(load_layout_and_lost, text)
     return layout, tuple(dict.fromkeys([*known, *lost]))
 
 

@@ -255,7 +255,7 @@ def monitored(loop: ClosedLoop) -> str:
         words += ["that it cannot tell: the robot moves otherwise than its model"]
     words += [f"{name} torn" for name in (*damage.torn, *damage.weak)]
     for name, value in damage.stuck.items():
-        is_angle = loop.layout.part(name).KIND.sticks_at_angle
+        is_angle = loop.layout.actuator(name).KIND.sticks_at_angle
         words.append(
             f"{name} stuck at "
             + (f"{math.degrees(value):.0f} deg" if is_angle else f"{value:.3g} N")

@@ -17,17 +17,16 @@ import finlab
 from finlab import bundle_files
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import METHODS_ON_BOARD, method_class
-from finlab.assets import NAME
-from finlab.bundle_files import named_content
+from finlab.assets import DISTRIBUTION
+from finlab.bundle_files import read_named_file
 from finlab.deploy.deployed_robot import self_tests
 from finlab.errors import AllocationError, DataError
 from finlab.files.guarded import packed
-from finlab.interaction.learned import MAX_BYTES as LARGEST_NETWORK
-from finlab.interaction.learned import NETWORK_SUFFIX, WHAT
+from finlab.interaction.learned import EXPECTED_NETWORK_FILE, MAX_NETWORK_BYTES, NETWORK_SUFFIX
 from finlab.layout import Layout
-from finlab.layout.bundled_robot import Robot
+from finlab.layout.bundled_robot import BundledRobot
 from finlab.layout.save import layout_to_dict
-from finlab.whole_file import PART, write_folder, write_whole
+from finlab.whole_file import TEMPORARY_SUFFIX, write_folder, write_whole
 
 
 @dataclass(frozen=True)
@@ -49,18 +48,21 @@ class Bundle:
         names = {
             file: file.relative_to(path).as_posix()
             for file in present
-            if not file.name.endswith(PART)
+            if not file.name.endswith(TEMPORARY_SUFFIX)
         }
         try:
             # The checksums come last: what a kill leaves is refused.
-            foreign = (file for file, name in names.items() if bundle_files.largest(name) < 0)
+            foreign = []
+            for file, name in names.items():
+                if bundle_files.max_file_bytes(name) < 0:
+                    foreign.append(file)
             write_folder(path, self.files, foreign, "a bundle")
             for file in set(present) - {path / name for name in self.files}:
                 file.unlink()
         except OSError as error:
             raise DataError(f"{error.filename}: cannot be written: {error.strerror}") from None
         finally:
-            if is_new and not (path / bundle_files.CHECKSUMS).exists():
+            if is_new and not (path / bundle_files.CHECKSUM_FILE).exists():
                 rmtree(path, ignore_errors=True)
 
     def write_zip(self, file: str | os.PathLike[str]) -> None:
@@ -100,21 +102,21 @@ def make_bundle(allocator: Allocator, lost: tuple[str, ...] = ()) -> Bundle:
     embedded, tables = with_tables_inside(layout)
     sha256, networks = method_class(allocator.method).networks_for_bundle(allocator.networks)
     files = {
-        bundle_files.ROBOT: _robot_bytes(Robot(embedded, lost, sha256, cases)),
-        bundle_files.ABOUT: _settings_bytes(allocator),
+        bundle_files.ROBOT_FILE: _robot_bytes(BundledRobot(embedded, lost, sha256, cases)),
+        bundle_files.MANIFEST_FILE: _settings_bytes(allocator),
         **tables,
-        **{bundle_files.NETWORKS + name: content for name, content in networks.items()},
-        bundle_files.README: _readme(allocator, lost).encode(),
+        **{bundle_files.CHECKPOINT_FOLDER + name: content for name, content in networks.items()},
+        bundle_files.README_FILE: _readme(allocator, lost).encode(),
     }
-    if sum(map(len, files.values())) > bundle_files.LARGEST_BUNDLE:
+    if sum(map(len, files.values())) > bundle_files.MAX_BUNDLE_BYTES:
         raise DataError(
             f"layout {layout.name!r}: its bundle would be larger than "
-            f"{bundle_files.LARGEST_BUNDLE:,} bytes"
+            f"{bundle_files.MAX_BUNDLE_BYTES:,} bytes"
         )
-    return Bundle({**files, bundle_files.CHECKSUMS: bundle_files.checksums(files)})
+    return Bundle({**files, bundle_files.CHECKSUM_FILE: bundle_files.checksums(files)})
 
 
-def _robot_bytes(robot: Robot) -> bytes:
+def _robot_bytes(robot: BundledRobot) -> bytes:
     """The content of the file of the robot."""
     values = {**to_builtins(robot, builtin_types=(Layout,)), "layout": layout_to_dict(robot.layout)}
     return (json.dumps(values, indent=1, allow_nan=False, ensure_ascii=False) + "\n").encode()
@@ -150,11 +152,11 @@ def with_tables_inside(layout: Layout) -> tuple[Layout, dict[str, bytes]]:
     interaction = layout.interaction
     for path in layout.files:
         if interaction is not None and path == interaction.reads:
-            content = named_content(path, LARGEST_NETWORK, WHAT)
+            content = read_named_file(path, MAX_NETWORK_BYTES, EXPECTED_NETWORK_FILE)
             suffix = NETWORK_SUFFIX
         else:
             table = "a table of forces for a bundle"
-            content = named_content(path, bundle_files.LARGEST_TABLE, table)
+            content = read_named_file(path, bundle_files.MAX_TABLE_BYTES, table)
             suffix = ".csv"
         names[path] = bundle_files.table_name(content, suffix)
         contents[names[path]] = content
@@ -184,7 +186,7 @@ def _readme(allocator: Allocator, lost: tuple[str, ...]) -> str:
     return template.format(
         name=allocator.layout.name,
         version=finlab.__version__,
-        wheel=NAME.replace("-", "_"),
+        wheel=DISTRIBUTION.replace("-", "_"),
         method=allocator.method,
         networks=""
         if allocator.checkpoint is None

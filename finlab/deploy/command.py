@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from finlab import __version__
-from finlab.errors import FAILED, FinlabError, exit_code
+from finlab.errors import EXIT_ERROR, FinlabError, exit_code
 
 if TYPE_CHECKING:
     from finlab.deploy.deployed_robot import DeployedRobot
@@ -27,7 +27,7 @@ def _run(argv: Sequence[str] | None) -> int:
     try:
         arguments = _parser().parse_args(argv)
     except SystemExit as end:  # help, version, or a wrong call, which argparse has printed
-        return end.code if isinstance(end.code, int) else FAILED
+        return end.code if isinstance(end.code, int) else EXIT_ERROR
     # Before numpy is loaded: every product here is too small to be shared among cores.
     for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
@@ -48,7 +48,7 @@ def check(arguments: argparse.Namespace) -> int:
 
     robot = _robot(arguments)
     print(
-        f"{arguments.bundle}: {robot.layout.name}, {robot.layout.counted}, method "
+        f"{arguments.bundle}: {robot.layout.name}, {robot.layout.counts_in_words}, method "
         f"{robot.allocator.method}, ready in {time.perf_counter() - arguments.started:.2f} s"
     )
     findings = [*self_check(robot), extremes(robot)]

@@ -24,7 +24,7 @@ from finlab.axes import AXES
 from finlab.bundle_files import Files, check_bundle_files, is_bundle, read_bundle_files
 from finlab.errors import DataError
 from finlab.layout import Layout
-from finlab.layout.bundled_robot import Case, robot_of
+from finlab.layout.bundled_robot import SelfTestCase, robot_of
 from finlab.layout.load import parse_layout
 from finlab.physics import plant_of
 from finlab.physics.objective import REACHED
@@ -49,7 +49,7 @@ class DeployedRobot:
     """The allocator of the bundle's settings and, where there are any, networks."""
     lost: tuple[str, ...] = ()
     """Actuators that the bundle names as lost."""
-    self_test: tuple[Case, ...] = ()
+    self_test: tuple[SelfTestCase, ...] = ()
     """Targets with the answers of the computer that made the bundle."""
 
     @property
@@ -150,7 +150,7 @@ class Finding(NamedTuple):
         return self.value <= self.limit
 
 
-def self_tests(allocator: Allocator, lost: tuple[str, ...]) -> tuple[Case, ...]:
+def self_tests(allocator: Allocator, lost: tuple[str, ...]) -> tuple[SelfTestCase, ...]:
     """Returns targets within reach, wrenches of random commands, with an allocator's answers.
 
     They depend on the layout and the allocator alone.
@@ -174,7 +174,7 @@ def self_tests(allocator: Allocator, lost: tuple[str, ...]) -> tuple[Case, ...]:
             None if name in lost else tuple(row)
             for name, row in zip(layout.names, answer.tolist(), strict=True)
         ]
-        cases.append(Case(tuple(target.tolist()), tuple(rows), tuple(delivered.tolist())))
+        cases.append(SelfTestCase(tuple(target.tolist()), tuple(rows), tuple(delivered.tolist())))
     return tuple(cases)
 
 

@@ -15,11 +15,11 @@ from finlab.axes import AXES
 from finlab.errors import LayoutError
 from finlab.layout import Actuator, Fin, Layout
 from finlab.layout.graph_file import (
+    COMMAND_SCALES,
     POSITION_SCALE,
-    SCALES,
-    Data,
     Edge,
     Graph,
+    GraphAttributes,
     Normalization,
     edges_of,
 )
@@ -58,15 +58,15 @@ def graph_of(layout: Layout) -> Graph:
         name = record.pop("name")
         nodes.append({"id": name, **record, "features": features_of(actuator)})
     # Scales of a fin's ten features: position, mounting angle, then both limits of each number.
-    scales = [POSITION_SCALE] * 3 + [SCALES[2]]
-    for scale in SCALES:
+    scales = [POSITION_SCALE] * 3 + [COMMAND_SCALES[2]]
+    for scale in COMMAND_SCALES:
         scales += [scale, scale]
     names = features_of(Fin("fin", (0.0, 0.0, 0.0), 0.0))
     wrench = dict(zip(AXES, wrench_scale_of(layout).tolist(), strict=True))
     return Graph(
         directed=False,
         multigraph=False,
-        graph=Data(
+        graph=GraphAttributes(
             layout={**head, "format": LAYOUT_FORMAT, "version": 2},
             normalization=Normalization(dict(zip(names, scales, strict=True)), wrench),
         ),

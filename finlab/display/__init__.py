@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from finlab.assets import install
+from finlab.assets import install_command
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -183,5 +183,5 @@ def _image(picture: Callable[[], Figure]) -> str:
     try:
         content = b64encode(figure_bytes(picture, "png")).decode()
     except ImportError:
-        return _html(f"A picture needs matplotlib; run: {install('plot')}")
+        return _html(f"A picture needs matplotlib; run: {install_command('plot')}")
     return f"<img alt='picture' src='data:image/png;base64,{content}'>"

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from finlab.arrays import Array
-from finlab.assets import install
+from finlab.assets import install_command
 from finlab.errors import DataError
 from finlab.whole_file import write_whole
 
@@ -78,7 +78,9 @@ def check_figure_file(path: Path | None) -> None:
     try:
         import matplotlib  # noqa: F401
     except ImportError as error:
-        raise DataError(f"plot: matplotlib is not installed; run: {install('plot')}") from error
+        raise DataError(
+            f"plot: matplotlib is not installed; run: {install_command('plot')}"
+        ) from error
 
 
 def write_figure(make: Callable[[], Figure], path: Path) -> None:

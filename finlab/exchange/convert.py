@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from finlab.assets import shipped_layouts
-from finlab.errors import CommandError, LayoutError, under
+from finlab.errors import CommandError, LayoutError, layout_errors_at
 from finlab.exchange import motor_factors
 from finlab.exchange.description_layout import read_description
 from finlab.exchange.description_text import SDF, URDF, description_text
@@ -113,7 +113,7 @@ def read_any(file: str, exchange: Exchange) -> Layout:
         path, MAX_BYTES, "a robot description, parameters, a matrix or a layout", LayoutError
     )
     exchange.path = path.resolve()
-    with under(source=file):
+    with layout_errors_at(source=file):
         return read_robot(text, path.name, exchange)
 
 

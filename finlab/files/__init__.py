@@ -52,11 +52,13 @@ def parse_json(content: str, source: str, error: type[FinlabError] = DataError) 
             json.dumps(values, ensure_ascii=False).encode()
         return values
     except json.JSONDecodeError as problem:
-        raise error.at(source, f"is not valid JSON: line {problem.lineno}: {problem.msg}") from None
+        raise error.in_file(
+            source, f"is not valid JSON: line {problem.lineno}: {problem.msg}"
+        ) from None
     except RecursionError:
-        raise error.at(source, "is nested too deeply") from None
+        raise error.in_file(source, "is nested too deeply") from None
     except ValueError as problem:
-        raise error.at(source, str(problem)[:160]) from None
+        raise error.in_file(source, str(problem)[:160]) from None
 
 
 def parse_yaml(content: str, source: str, error: type[FinlabError] = DataError) -> Any:
@@ -79,9 +81,9 @@ def parse_yaml(content: str, source: str, error: type[FinlabError] = DataError) 
         mark = getattr(problem, "problem_mark", None)
         message = getattr(problem, "problem", None) or str(problem).splitlines()[0]
         line = f"line {mark.line + 1}: " if mark else ""
-        raise error.at(source, f"is not valid YAML: {line}{message}"[:200]) from None
+        raise error.in_file(source, f"is not valid YAML: {line}{message}"[:200]) from None
     except ValueError as problem:
-        raise error.at(source, str(problem)[:200]) from None
+        raise error.in_file(source, str(problem)[:200]) from None
 
 
 def yaml_text(values: Any) -> str:

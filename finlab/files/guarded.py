@@ -55,21 +55,23 @@ def read_file(
         with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as file:
             status = os.fstat(file.fileno())
             if stat.S_ISDIR(status.st_mode):
-                raise error.at(str(path), f"is a folder, expected {expected}")
+                raise error.in_file(str(path), f"is a folder, expected {expected}")
             if not stat.S_ISREG(status.st_mode):
-                raise error.at(str(path), f"is not a regular file, expected {expected}")
+                raise error.in_file(str(path), f"is not a regular file, expected {expected}")
             content = None
             if status.st_size <= max_bytes:
                 content = _read(file, max_bytes if head is None else head - 1)
     except FileNotFoundError:
-        raise error.at(str(path), f"no such file, expected {expected}") from None
+        raise error.in_file(str(path), f"no such file, expected {expected}") from None
     except IsADirectoryError:
-        raise error.at(str(path), f"is a folder, expected {expected}") from None
+        raise error.in_file(str(path), f"is a folder, expected {expected}") from None
     except (OSError, ValueError) as problem:  # ValueError: a NUL byte in the name
         reason = getattr(problem, "strerror", None) or problem
-        raise error.at(str(path)[:300], f"cannot be read: {reason}") from None
+        raise error.in_file(str(path)[:300], f"cannot be read: {reason}") from None
     if content is None or len(content) > max_bytes:
-        raise error.at(str(path), f"is larger than {max_bytes:,} bytes, too large for {expected}")
+        raise error.in_file(
+            str(path), f"is larger than {max_bytes:,} bytes, too large for {expected}"
+        )
     return content
 
 
@@ -117,9 +119,9 @@ def decoded(
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise error.at(source, f"is not UTF-8 text, expected {expected}") from None
+        raise error.in_file(source, f"is not UTF-8 text, expected {expected}") from None
     if "\0" in text:
-        raise error.at(source, f"is a binary file, expected {expected}")
+        raise error.in_file(source, f"is a binary file, expected {expected}")
     return text
 
 
@@ -167,12 +169,12 @@ def unpacked(
     """
     files: dict[str, bytes] = {}
     if content.count(_ENTRY_SIGNATURE) > MAX_FILES:  # before a list of them is made
-        raise error.at(source, f"holds more than {MAX_FILES} files; pack it again")
+        raise error.in_file(source, f"holds more than {MAX_FILES} files; pack it again")
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             entries = {entry.filename: entry for entry in archive.infolist() if not entry.is_dir()}
             if len(set(archive.namelist())) < len(archive.namelist()):
-                raise error.at(source, "holds a file twice; pack it again")
+                raise error.in_file(source, "holds a file twice; pack it again")
             for name, entry in entries.items():
                 max_size = max_size_of(name)
                 if max_size is None:
@@ -184,11 +186,11 @@ def unpacked(
                     with archive.open(entry) as stream:
                         files[name] = stream.read(room + 1)
                 if entry.file_size > room or len(files[name]) > room:
-                    raise error.at(source, f"{name[-60:]} in it is larger than {room:,} bytes")
+                    raise error.in_file(source, f"{name[-60:]} in it is larger than {room:,} bytes")
                 max_bytes -= len(files[name])
     except _DAMAGE_ERRORS as problem:
         reason = str(problem).splitlines()[0][:80] if str(problem) else type(problem).__name__
-        raise error.at(source, f"cannot be read as a zip archive ({reason})") from None
+        raise error.in_file(source, f"cannot be read as a zip archive ({reason})") from None
     return files
 
 

@@ -89,7 +89,7 @@ def checked(
     path = ".".join(step for step in (path.lstrip("."), fault.key) if step)
     if key and path:
         path = key + ("" if path.startswith("[") else ".") + path
-    raise error.at(source, fault.sentence, path or key)
+    raise error.in_file(source, fault.sentence, path or key)
 
 
 def _plain(value: Any) -> Any:

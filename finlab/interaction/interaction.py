@@ -1,5 +1,7 @@
 """The contract of an interaction: how the jets of a robot's actuators change its wrench.
 
+What a layout says is an `InteractionModel`; the plant asks it for the `Interaction` of one robot.
+
 A robot's layout names a model of interaction, a formula or a network
 (`finlab.interaction.INTERACTIONS`). From the forces of all actuators it gives a further force at
 the point of each, and so the wrench offset. The plant adds it. Forces are in the body frame;
@@ -19,13 +21,13 @@ from finlab.files.schema import Checked
 
 DENSITY = 1000.0
 """Density of the water [kg/m^3]."""
-STILL = 0.03
-"""Speed of a jet below which it counts as none [m/s]; it keeps derivatives finite at rest."""
-LEAST_AREA = 1e-12
+MIN_JET_SPEED = 0.03
+"""Speed of the jet of an actuator at rest [m/s]: a floor that keeps derivatives finite there."""
+MIN_DISC_AREA = 1e-12
 """Area added to each disc, so that an actuator without one divides by no zero [m^2]."""
-CONSTANTS = 10
-"""Numbers of the formula of jets that the core takes."""
-STEP = 1e-30
+N_CONSTANTS = 10
+"""How many constants of the formula of jets the core takes, in the order of its table."""
+IMAGINARY_STEP = 1e-30
 """Imaginary step of derivatives: those of smooth formulas are exact (Squire and Trapp, 1998)."""
 
 
@@ -61,9 +63,12 @@ def jets_of(force: AnyArray, diameter: Array) -> Jet:
     Args:
         force: forces (..., n, 3), body frame [N], real or complex.
         diameter: diameters (n,) of the jets [m].
+
+    Returns:
+        The jets, with complex numbers where the forces are complex.
     """
-    area = 0.25 * np.pi * diameter**2 + LEAST_AREA
-    thrust_at_rest = 0.5 * DENSITY * area * STILL**2
+    area = 0.25 * np.pi * diameter**2 + MIN_DISC_AREA
+    thrust_at_rest = 0.5 * DENSITY * area * MIN_JET_SPEED**2
     thrust = np.sqrt((force * force).sum(-1) + thrust_at_rest * thrust_at_rest)
     speed = np.sqrt(2.0 * thrust / (DENSITY * area))
     return Jet(thrust, force / thrust[..., None], speed)
@@ -87,8 +92,15 @@ class Interaction(ABC):
 
     @abstractmethod
     def effect(self, force: Array, inflow: Array | None = None) -> tuple[Array, Array]:
-        """Returns `offset` (..., 6), and its derivatives (..., n, 3, 6) by the forces [1, m];
-        arguments as for `offset`."""
+        """Returns the wrench offset and its derivatives.
+
+        Args:
+            force: as for `offset`.
+            inflow: as for `offset`.
+
+        Returns:
+            `offset` (..., 6) [N, N m], and its derivatives (..., n, 3, 6) by the forces [1, m].
+        """
 
     @property
     def core_constants(self) -> Array | None:
@@ -98,8 +110,15 @@ class Interaction(ABC):
 
     @abstractmethod
     def deviation(self, force: Array) -> Array:
-        """Returns the standard deviation (..., 6) of the wrench offset [N, N m] at forces (..., n,
-        3) [N], from what is uncertain of the model."""
+        """Returns how uncertain the wrench offset is.
+
+        Args:
+            force: forces of the actuators (..., n, 3), body frame [N].
+
+        Returns:
+            Standard deviation (..., 6) of the wrench offset [N, N m], from what is uncertain of the
+            model.
+        """
 
 
 class PointInteraction(Interaction):
@@ -110,18 +129,19 @@ class PointInteraction(Interaction):
 
         Args:
             geometry: points and jets of its n actuators, and its hull.
-            constants: the `CONSTANTS` numbers of the formula of jets; None for a model with another
-                one, of which the core then computes the loss by speed alone.
+            constants: the `N_CONSTANTS` numbers of the formula of jets; None for a model with
+                another one, of which the core then computes the loss by speed alone.
         """
         self.geometry = geometry
-        arms = np.cross(geometry.position[:, None], np.eye(3))
-        axes = np.broadcast_to(np.eye(3), arms.shape)
-        self.lever: Array = np.concatenate([axes, arms], axis=-1)
+        axes = np.eye(3)
+        torques = np.cross(geometry.position[:, None], axes)  # r x a of 1 N along each axis a
+        forces = np.broadcast_to(axes, torques.shape)
+        self.lever: Array = np.concatenate([forces, torques], axis=-1)
         """Wrench (n, 3, 6) of 1 N along the body's axes at each point [1, m]."""
         n = len(self.lever)
         has_formula = constants is not None
-        numbers = np.zeros(CONSTANTS) if constants is None else constants
-        head = [n, has_formula, DENSITY, STILL, *numbers]
+        numbers = np.zeros(N_CONSTANTS) if constants is None else constants
+        head = [n, has_formula, DENSITY, MIN_JET_SPEED, *numbers]
         rows = np.column_stack([geometry.position, geometry.diameter, geometry.advance])
         self.table: Array = np.concatenate(
             [head, geometry.hull.ravel(), rows.ravel()], dtype=np.float64
@@ -130,10 +150,16 @@ class PointInteraction(Interaction):
 
     @abstractmethod
     def at_rest(self, force: Array) -> Array:
-        """Returns the further forces (..., n, 3) [N] at forces (..., n, 3) [N] in still water, body
-        frame."""
+        """Returns the further forces of an interaction, of a robot at rest in still water.
 
-    def by_core(
+        Args:
+            force: forces of the actuators (..., n, 3), body frame [N].
+
+        Returns:
+            Forces (..., n, 3) at the points of the actuators, body frame [N].
+        """
+
+    def compute_in_core(
         self, force: Array, inflow: Array | None, with_slope: bool
     ) -> tuple[Array, Array, Array]:
         """Returns what the core computes: the formula of jets, where the model has its constants,
@@ -173,8 +199,14 @@ class InteractionModel(Checked, ABC):
 
     @abstractmethod
     def of(self, geometry: JetGeometry) -> PointInteraction:
-        """Returns the interaction of a robot's actuators. Raises FinlabError: a file that it reads
-        is bad."""
+        """Returns the interaction of one robot's actuators.
+
+        Args:
+            geometry: points and jets of the actuators, and the hull.
+
+        Raises:
+            FinlabError: a file that it reads is missing or damaged.
+        """
 
     @property
     def reads(self) -> str | None:
@@ -192,12 +224,14 @@ class InteractionModel(Checked, ABC):
         return file_stamp(self.reads)
 
     def reading(self, path: str) -> Self:
-        """Returns it with another file that it reads."""
+        """Returns the model with another path of its file; itself where it reads none."""
         return self
 
 
 def complex_slope(function: Callable[[AnyArray], Any], values: Array) -> tuple[Array, Array]:
-    """Returns a smooth function and its derivatives, by imaginary steps.
+    """Returns the values of a smooth function and its derivatives, by imaginary steps.
+
+    f'(x) = Im f(x + i h) / h, exact to rounding for a tiny h (Squire and Trapp, 1998).
 
     Args:
         function: from vectors (..., n, k) to an array (..., n, m), each row of which depends on one
@@ -208,13 +242,21 @@ def complex_slope(function: Callable[[AnyArray], Any], values: Array) -> tuple[A
         Values (..., n, m) and derivatives (..., n, k, m).
     """
     k = values.shape[-1]
-    steps = np.eye(k).reshape(k, *(1,) * (values.ndim - 1), k) * (1j * STEP)
+    steps = np.eye(k).reshape(k, *(1,) * (values.ndim - 1), k) * (1j * IMAGINARY_STEP)
     result = function(values + steps)
-    return result[0].real, np.moveaxis(result.imag, 0, -2) / STEP
+    return result[0].real, np.moveaxis(result.imag, 0, -2) / IMAGINARY_STEP
 
 
 def with_diagonal(slope: Array, diagonal: Array) -> Array:
-    """Returns derivatives (..., n, 3, n, 3) of changes by forces, with those of each change by its
-    own force (..., n, 3, 3) added."""
+    """Returns derivatives of further forces with those by the own forces added.
+
+    Args:
+        slope: derivatives (..., n, 3, n, 3) of the further force of each actuator by the forces of
+            the others [1].
+        diagonal: derivatives (..., n, 3, 3) of each further force by the actuator's own force [1].
+
+    Returns:
+        The sum (..., n, 3, n, 3).
+    """
     n = diagonal.shape[-3]
     return slope + diagonal[..., :, :, None, :] * np.eye(n)[:, None, :, None]

@@ -1,5 +1,5 @@
-"""Jets by a formula of eight constants: how they spread, what they take from whatever stands in
-them.
+"""Jets by a formula of eight constants: how they spread, and what they take from actuators and
+hull.
 
 Behind a disc of diameter D with thrust T flows a jet of speed `V0 = sqrt(2 T / (rho A))` (actuator
 disc at rest) that spreads and slows down as `D / x` (Blaauw and van de Kaa, 1978). An actuator that
@@ -7,8 +7,8 @@ takes in the water of others loses thrust, by a curve through the tests of two t
 turned (Dang and Laheij, 2004), and turns the water that comes from the side (momentum); its housing
 is dragged along; a jet that meets the hull pushes it back (Nienhuis, 1992). The constants' usual
 values were fitted to the formulas of Dang and Laheij as they are quoted; they hold to 0.05 at
-distances from 2 to 16 D, turned by up to 30 degrees. The formula itself is in
-finlab/core/src/jets.c.
+distances from 2 to 16 D, turned by up to 30 degrees. The formula is given in
+docs/theory/interaction.md and computed in finlab/core/src/jets.c; here are its constants.
 """
 
 from dataclasses import astuple, dataclass
@@ -22,14 +22,14 @@ from finlab.interaction.interaction import InteractionModel, JetGeometry, PointI
 
 Positive = Annotated[float, Meta(ge=1e-3, le=1e3)]
 """A constant above 0 [1]."""
-Share = Annotated[float, Meta(ge=0.0, le=10.0)]
+Coefficient = Annotated[float, Meta(ge=0.0, le=10.0)]
 """A share, or a coefficient [1]."""
-BEHIND = 0.2
+ONSET_LENGTH = 0.2
 """Distance over which a jet begins, in diameters [1]."""
-GRAZING = 0.3
+RIM_WIDTH = 0.3
 """Width of a jet's rim on the hull, over its squared distance from the centre [1]."""
-MISSED = 0.1
-"""Share of an actuator's force that may be lost where the formula has no loss [1]."""
+UNMODELLED_SHARE = 0.1
+"""Coefficient of an actuator's force that may be lost where the formula has no loss [1]."""
 
 
 @dataclass(frozen=True)
@@ -59,10 +59,10 @@ class Jets(InteractionModel):
     spread: Positive = 37.0
     lag: Positive = 0.62
     most: Positive = 0.78
-    side: Share = 0.3
-    housing: Share = 0.05
-    hull: Share = 0.6
-    uncertain: Share = 0.0
+    side: Coefficient = 0.3
+    housing: Coefficient = 0.05
+    hull: Coefficient = 0.6
+    uncertain: Coefficient = 0.0
 
     def of(self, geometry: JetGeometry) -> "JetInteraction":
         """Returns the interaction of a robot's actuators."""
@@ -73,9 +73,14 @@ class JetInteraction(PointInteraction):
     """The formula of jets for one robot, which the core computes."""
 
     def __init__(self, constants: Jets, geometry: JetGeometry) -> None:
-        """Takes the constants of the formula, and points and jets of the n actuators."""
-        *of_formula, _uncertain = astuple(constants)
-        super().__init__(geometry, (*of_formula, BEHIND, GRAZING))
+        """Prepares one robot.
+
+        Args:
+            constants: of the formula.
+            geometry: points and jets of its n actuators, and its hull.
+        """
+        *formula_constants, _uncertain = astuple(constants)
+        super().__init__(geometry, (*formula_constants, ONSET_LENGTH, RIM_WIDTH))
         self.constants = constants
 
     @property
@@ -83,16 +88,19 @@ class JetInteraction(PointInteraction):
         return self.table
 
     def at_rest(self, force: Array) -> Array:
-        return self.by_core(force, None, False)[0]
+        return self.compute_in_core(force, None, False)[0]
 
     def offset(self, force: Array, inflow: Array | None = None) -> Array:
-        return self.by_core(force, inflow, False)[1]
+        return self.compute_in_core(force, inflow, False)[1]
 
     def effect(self, force: Array, inflow: Array | None = None) -> tuple[Array, Array]:
-        return self.by_core(force, inflow, True)[1:]
+        return self.compute_in_core(force, inflow, True)[1:]
 
     def deviation(self, force: Array) -> Array:
-        taken = np.einsum("...ib,ibw->...iw", self.at_rest(force), self.lever) ** 2
-        # A jet may meet an actuator that it misses by the formula.
-        missed = (MISSED**2 / 3.0) * np.einsum("...ib,icw->...iw", force**2, self.lever**2)
-        return np.asarray(self.constants.uncertain * np.sqrt((taken + missed).sum(axis=-2)))
+        modelled = np.einsum("...ib,ibw->...iw", self.at_rest(force), self.lever)
+        # A jet may meet an actuator that it misses by the formula. In which direction that force
+        # goes is unknown: each axis of the body has a third of its variance.
+        variance_per_axis = UNMODELLED_SHARE**2 / 3.0
+        unmodelled = variance_per_axis * np.einsum("...ib,icw->...iw", force**2, self.lever**2)
+        variance = (modelled**2 + unmodelled).sum(axis=-2)
+        return np.asarray(self.constants.uncertain * np.sqrt(variance))

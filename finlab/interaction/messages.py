@@ -1,5 +1,6 @@
-"""Features and vectors of the messages between actuators, and between an actuator and the hull; the
-networks of `finlab.interaction.learned` read them.
+"""Features and vectors of the messages between actuators, and between an actuator and the hull.
+
+The networks of `finlab.interaction.learned` read them; they are trained on the same rows.
 
 The choice of frame matters: features are invariants in the frame of a source's jet (distances along
 and across it in diameters, cosines, ratios), and a message is a sum of vectors along the pair's own
@@ -15,11 +16,18 @@ from finlab.arrays import AnyArray
 from finlab.interaction.interaction import JetGeometry, jets_of
 
 MIN_DIAMETER = 1e-3
-"""Floor of the diameters and half axes by which is divided [m]."""
+"""Floor of the diameters and half axes that are divisors [m]."""
+SOFTENING = 1e-4
+"""Added to a squared distance from a jet's axis, in squared diameters [1]: the direction away from
+the axis has derivatives on it, too."""
+HULL_SOFTENING = 1e-9
+"""The same of squared lengths in half axes of the hull [1]."""
+FAR = 4.0
+"""Distance along a jet at which it counts as far from its source, in diameters [1]."""
 
 
-class Form(NamedTuple):
-    """Contents of a packed row."""
+class RowSizes(NamedTuple):
+    """How many numbers a packed row holds."""
 
     features: int
     """Number of features."""
@@ -27,79 +35,90 @@ class Form(NamedTuple):
     """Number of vectors, of three components each."""
 
 
-FORMS = {"pair": Form(11, 4), "hull": Form(6, 2)}
+ROW_SIZES = {"pair": RowSizes(11, 4), "hull": RowSizes(6, 2)}
 """Rows of pairs of actuators, and of an actuator and the hull."""
 
 
-class Pairs:
-    """Pairs of a source with a jet and a receiver."""
+class JetPairs:
+    """All pairs of a source that has a jet, and a receiver, of one robot."""
 
     def __init__(self, geometry: JetGeometry) -> None:
-        size = np.maximum(geometry.diameter, MIN_DIAMETER)
-        self.source, self.receiver = np.nonzero(
-            ~np.eye(len(size), dtype=bool) & (geometry.diameter > 0.0)[:, None]
-        )
-        """Indices (p,) of the two."""
-        self._source_diameter = size[self.source]
-        self._receiver_diameter = size[self.receiver]
-        self._displacement = (
-            geometry.position[self.receiver] - geometry.position[self.source]
-        ) / self._source_diameter[:, None]
+        """Takes the points and jets of n actuators; p pairs of them have a source with a jet."""
+        diameter = np.maximum(geometry.diameter, MIN_DIAMETER)
+        has_jet = geometry.diameter > 0.0
+        is_other = ~np.eye(len(diameter), dtype=bool)
+        self.source, self.receiver = np.nonzero(is_other & has_jet[:, None])
+        """Indices (p,) of the two actuators of each pair."""
+        self._source_diameter = diameter[self.source]
+        self._receiver_diameter = diameter[self.receiver]
+        displacement = geometry.position[self.receiver] - geometry.position[self.source]
+        self._displacement = displacement / self._source_diameter[:, None]
+        """From source to receiver (p, 3), body frame, in diameters of the source [1]."""
 
     def rows(self, source: AnyArray, receiver: AnyArray) -> Any:
-        """Returns rows (..., p, 11 + 4 * 3) of forces (..., p, 3) [N] of the sources and of the
-        receivers."""
+        """Returns packed rows of the pairs, real or complex.
+
+        Args:
+            source: forces (..., p, 3) of the sources, body frame [N].
+            receiver: forces (..., p, 3) of the receivers, body frame [N].
+
+        Returns:
+            Rows (..., p, 11 + 4 * 3).
+        """
         thrust, ahead, _ = jets_of(source, self._source_diameter)
         receiver_thrust, facing, _ = jets_of(receiver, self._receiver_diameter)
+        # The receiver seen from the source: along the jet, which flows against the force, and off
+        # its axis, in diameters of the source.
         along = -(self._displacement * ahead).sum(-1)
         radial = self._displacement + along[..., None] * ahead
         squared_radius = (radial * radial).sum(-1)
-        radius = np.sqrt(squared_radius + 1e-4)
+        radius = np.sqrt(squared_radius + SOFTENING)
         outward = radial / radius[..., None]
-        far_distance = np.sqrt(16.0 + along * along)
+        distance = np.sqrt(FAR * FAR + along * along)
+        squared_width = 1.0 + 0.05 * along * along  # of a jet that spreads
+        diameter_ratio = self._receiver_diameter / self._source_diameter
         features = [
-            along / far_distance,
-            4.0 / far_distance,
+            along / distance,
+            FAR / distance,
             np.tanh(2.0 * along),
             radius / np.sqrt(1.0 + squared_radius),
-            np.exp(-squared_radius / (1.0 + 0.05 * along * along)),
-            np.exp(-4.0 * squared_radius / (1.0 + 0.05 * along * along)),
+            np.exp(-squared_radius / squared_width),
+            np.exp(-4.0 * squared_radius / squared_width),
             (ahead * facing).sum(-1),
             (outward * facing).sum(-1),
             (receiver_thrust - thrust) / (receiver_thrust + thrust),
             np.sqrt(thrust / (receiver_thrust + thrust)),
-            np.log(self._receiver_diameter / self._source_diameter),
+            np.log(diameter_ratio),
         ]
-        window = (
-            0.5
-            * (1.0 + np.tanh(2.0 * along + 1.0))
-            * np.exp(-squared_radius / (3.0 + 0.15 * along * along))
-        )
-        strength = (
-            np.sqrt(thrust * (receiver_thrust + thrust))
-            * window
-            * (self._receiver_diameter / self._source_diameter)
-        )
-        return _packed(features, [ahead, facing, outward, _cross(ahead, outward)], strength)
+        # Messages fade out before the source, and away from the axis, whatever the networks give.
+        onset = 0.5 * (1.0 + np.tanh(2.0 * along + 1.0))
+        window = onset * np.exp(-squared_radius / (3.0 + 0.15 * along * along))
+        strength = np.sqrt(thrust * (receiver_thrust + thrust)) * window * diameter_ratio
+        return _pack_rows(features, [ahead, facing, outward, _cross(ahead, outward)], strength)
 
 
-def hull_rows(geometry: JetGeometry, force: AnyArray) -> Any:
-    """Returns rows (..., n, 6 + 2 * 3) of actuators with forces (..., n, 3) [N] and the hull."""
+def pack_hull_rows(geometry: JetGeometry, force: AnyArray) -> Any:
+    """Returns packed rows of actuators and the hull, real or complex.
+
+    Args:
+        geometry: points and jets of n actuators, and the hull.
+        force: forces (..., n, 3), body frame [N].
+
+    Returns:
+        Rows (..., n, 6 + 2 * 3).
+    """
     center = geometry.hull[0]
     half_axes = np.maximum(geometry.hull[1], MIN_DIAMETER)
     thrust, ahead, _ = jets_of(force, np.maximum(geometry.diameter, MIN_DIAMETER))
-    position_scaled = (geometry.position - center) / half_axes
-    direction_scaled = -ahead / half_axes
-    towards = -(position_scaled * direction_scaled).sum(-1) / np.sqrt(
-        (direction_scaled * direction_scaled).sum(-1) + 1e-9
-    )
-    squared_radius = (position_scaled * position_scaled).sum(-1)
-    squared_offset = squared_radius - towards * towards  # of the axis from the centre
-    normal = (
-        position_scaled
-        / half_axes
-        / np.sqrt(((position_scaled / half_axes) ** 2).sum(-1, keepdims=True) + 1e-9)
-    )
+    # Coordinates in which the ellipsoid is the unit sphere.
+    position = (geometry.position - center) / half_axes
+    direction = -ahead / half_axes
+    length = np.sqrt((direction * direction).sum(-1) + HULL_SOFTENING)
+    towards = -(position * direction).sum(-1) / length
+    squared_radius = (position * position).sum(-1)
+    squared_offset = squared_radius - towards * towards  # of the jet's axis from the centre
+    gradient = position / half_axes
+    normal = gradient / np.sqrt((gradient**2).sum(-1, keepdims=True) + HULL_SOFTENING)
     features = [
         np.tanh(2.0 * (squared_offset - 1.0)),
         np.exp(-squared_offset),
@@ -108,16 +127,24 @@ def hull_rows(geometry: JetGeometry, force: AnyArray) -> Any:
         (normal * ahead).sum(-1),
         np.tanh(2.0 * geometry.diameter / half_axes.mean()),
     ]
-    return _packed(features, [ahead, normal], thrust)
+    return _pack_rows(features, [ahead, normal], thrust)
 
 
-def unpacked(name: str, rows: AnyArray) -> tuple[AnyArray, AnyArray]:
-    """Returns features (..., m) and vectors (..., k, 3) [N] of packed rows."""
-    m, k = FORMS[name]
+def unpack_rows(name: str, rows: AnyArray) -> tuple[AnyArray, AnyArray]:
+    """Returns the contents of packed rows.
+
+    Args:
+        name: which rows, a key of `ROW_SIZES`.
+        rows: packed rows (..., m + 3 k), or their derivatives.
+
+    Returns:
+        Features (..., m) and vectors (..., k, 3) [N].
+    """
+    m, k = ROW_SIZES[name]
     return rows[..., :m], rows[..., m:].reshape(*rows.shape[:-1], k, 3)
 
 
-def _packed(features: list[Any], vectors: list[Any], strength: Any) -> Any:
+def _pack_rows(features: list[Any], vectors: list[Any], strength: Any) -> Any:
     """Rows (..., m + 3 k) of m features (...,) and k vectors (..., 3), times a strength (...,)
     [N]."""
     vectors = [vector * strength[..., None] for vector in vectors]

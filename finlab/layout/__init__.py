@@ -53,7 +53,7 @@ __all__ = [
     "save_layout",
 ]
 
-_HOMES = {
+_MODULE_OF_NAME = {
     "Actuator": "finlab.actuators.actuator",
     "Uncertainty": "finlab.actuators.actuator",
     "Azimuth": "finlab.actuators.azimuth",
@@ -76,10 +76,11 @@ _HOMES = {
     "layout_to_dict": "finlab.layout.save",
     "save_layout": "finlab.layout.save",
 }
-"""Public name -> the module in which it stands."""
+"""Public name -> the module that defines it, which is imported when the name is first used."""
 
 
 def __getattr__(name: str) -> object:
-    if name not in _HOMES:
+    """Imports a public name on first use (PEP 562)."""
+    if name not in _MODULE_OF_NAME:
         raise AttributeError(f"module 'finlab.layout' has no attribute {name!r}")
-    return resolve_name(f"{_HOMES[name]}:{name}")
+    return resolve_name(f"{_MODULE_OF_NAME[name]}:{name}")

@@ -1,4 +1,8 @@
-"""Damage of actuators (lost, weak, torn, stuck, running), and the layout that it leaves."""
+"""Damage of actuators (lost, weak, torn, stuck, running), and the layout that it leaves.
+
+`Allocator.allocate`, the command line and the app take a `Damage`, the fault monitor of
+`finlab.swim.control` makes one. `Damage.applied_to` turns it into limits of a layout.
+"""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -14,14 +18,14 @@ from finlab.files.schema import checked
 from finlab.layout.layout import Layout
 
 FaultKind = Literal["lost", "weak", "torn", "stuck", "running", "whole"]
-"""State of an actuator."""
-Share = Annotated[float, Meta(gt=0.0, le=1.0)]
-"""A share of a force [1]."""
+"""What is wrong with an actuator; `whole` where a repair is meant."""
+ForceShare = Annotated[float, Meta(gt=0.0, le=1.0)]
+"""Share of a force that is left [1]."""
 CommandNumber = Annotated[float, Meta(ge=-1e6, le=1e6)]
 """A number of a command, such as an angle [rad] or a force [N]."""
-FAULT_VALUES: Mapping[str, Any] = {
-    "weak": Share,
-    "torn": Share,
+FAULT_VALUE_TYPES: Mapping[str, Any] = {
+    "weak": ForceShare,
+    "torn": ForceShare,
     "stuck": CommandNumber,
     "running": Annotated[tuple[CommandNumber, ...], Meta(min_length=1, max_length=3)],
 }
@@ -77,12 +81,13 @@ class Damage:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "lost", lost_names(self.lost))
-        for kind, value in FAULT_VALUES.items():
+        for kind, value_type in FAULT_VALUE_TYPES.items():
             faults = getattr(self, kind)
             unchecked = checked(faults, dict[str, Any], AllocationError, f"damage: {kind}")
             by_name = {}
             for name, fault in unchecked.items():
-                by_name[name] = checked(fault, value, AllocationError, f"damage: {kind} {name}")
+                source = f"damage: {kind} {name}"
+                by_name[name] = checked(fault, value_type, AllocationError, source)
             object.__setattr__(self, kind, by_name)
         contradictory = set(self.stuck) & set(self.running)
         if contradictory:
@@ -91,13 +96,18 @@ class Damage:
             )
 
     @property
-    def partly(self) -> dict[str, Mapping[str, Any]]:
-        """Faults by kind, and by name of the actuators that still work."""
-        return {kind: getattr(self, kind) for kind in FAULT_VALUES if getattr(self, kind)}
+    def faults_by_kind(self) -> dict[str, Mapping[str, Any]]:
+        """Faults of the actuators that still work: kind of fault -> name -> value."""
+        faults = {kind: getattr(self, kind) for kind in FAULT_VALUE_TYPES}
+        return {kind: by_name for kind, by_name in faults.items() if by_name}
 
-    def of(self, name: str) -> dict[str, Any]:
-        """Returns the faults of one actuator that still works, by kind."""
-        return {kind: by_name[name] for kind, by_name in self.partly.items() if name in by_name}
+    def faults_of(self, name: str) -> dict[str, Any]:
+        """Returns the faults of one actuator that still works: kind of fault -> value."""
+        faults = {}
+        for kind, by_name in self.faults_by_kind.items():
+            if name in by_name:
+                faults[kind] = by_name[name]
+        return faults
 
     def with_fault(self, name: str, kind: str, value: Any) -> "Damage":
         """Returns the damage with one fault set or repaired.
@@ -128,10 +138,13 @@ class Damage:
         return replace(self, **changes)
 
     def renamed(self, names: Mapping[str, str]) -> "Damage":
-        """Returns the damage by new names; `names` maps old ones to new ones, and actuators that it
-        does not have are dropped."""
+        """Returns the damage of actuators that have other names.
+
+        Args:
+            names: old name -> new name; faults of actuators that it does not have are dropped.
+        """
         faults: dict[str, Any] = {}
-        for kind, by_name in self.partly.items():
+        for kind, by_name in self.faults_by_kind.items():
             faults[kind] = {}
             for name, value in by_name.items():
                 if name in names:
@@ -140,14 +153,14 @@ class Damage:
         return Damage(lost, **faults)
 
     @classmethod
-    def known(
+    def representing(
         cls,
         layout: Layout,
         lost: Sequence[str],
         torn: Mapping[str, float],
         stuck: Mapping[str, float],
     ) -> "Damage":
-        """Returns the damage that represents known faults, within what each kind may have.
+        """Returns the damage that represents faults, within what each kind of actuator may have.
 
         An actuator whose kind cannot be stuck, a rudder, counts as lost. One that cannot be torn, a
         thruster, counts as weak: its controller can make up for it within the smaller limit; one
@@ -175,7 +188,7 @@ class Damage:
             else:
                 weak_shares[name] = share
         for name in set(weak_shares) & set(stuck_values):
-            if not layout.part(name).KIND.sticks_at_angle:
+            if not layout.actuator(name).KIND.sticks_at_angle:
                 stuck_values[name] *= weak_shares.pop(name)
         return cls((*lost, *lost_by_stop), weak_shares, torn_shares, stuck_values)
 
@@ -208,11 +221,11 @@ class Damage:
         torn_shares = _number_by_name("torn", torn)
         stuck_values: dict[str, float] = {}
         for name, value in _number_by_name("stuck", stuck).items():
-            is_angle = layout.part(name).KIND.sticks_at_angle
+            is_angle = layout.actuator(name).KIND.sticks_at_angle
             stuck_values[name] = math.radians(value) if is_angle else value
         commands: dict[str, tuple[float, ...]] = {}
         for name, values in _numbers_by_name("running", running, None).items():
-            commands[name] = _command_in_radians(layout.part(name), values)
+            commands[name] = _command_in_radians(layout.actuator(name), values)
         return cls(lost, weak_shares, torn_shares, stuck_values, commands)
 
     def applied_to(self, layout: Layout) -> Layout:
@@ -223,18 +236,19 @@ class Damage:
             AllocationError: its kind cannot have the fault, its command has another count of
                 numbers, or a thruster or a pod cannot give the force at which it is stuck.
         """
-        return _applied(self, layout) if self.partly else layout
+        return _applied(self, layout) if self.faults_by_kind else layout
 
 
-WHOLE = Damage()
+NO_DAMAGE = Damage()
 """No damage."""
 
 
 @lru_cache(maxsize=64)
 def _applied(damage: Damage, layout: Layout) -> Layout:
-    """As `Damage.applied_to`; cached, since every answer of a damaged robot asks for it."""
-    for kind, by_name in damage.partly.items():
-        damaged = [layout.part(name, f"damage: {kind}") for name in by_name]
+    """As `Damage.applied_to`, for damage beside losses; cached, since every answer of a damaged
+    robot asks for it."""
+    for kind, by_name in damage.faults_by_kind.items():
+        damaged = [layout.actuator(name, f"damage: {kind}") for name in by_name]
         for actuator in damaged:
             if kind not in actuator.KIND.faults:
                 possible = ", ".join((*actuator.KIND.faults, "lost"))
@@ -242,11 +256,11 @@ def _applied(damage: Damage, layout: Layout) -> Layout:
                     f"damage of {actuator.name!r}: {actuator.type}s may be {possible}, got {kind}"
                 )
     for name, command in damage.running.items():
-        _check_count(layout.part(name), command)
+        _check_count(layout.actuator(name), command)
     actuators = []
     for actuator in layout.actuators:
         try:
-            actuators.append(actuator.damaged(Faults(**damage.of(actuator.name))))
+            actuators.append(actuator.damaged(Faults(**damage.faults_of(actuator.name))))
         except LayoutError as error:
             raise LayoutError(error.problem, error.key, f"damage of {actuator.name!r}") from None
     return replace(layout, actuators=tuple(actuators))

@@ -1,5 +1,6 @@
-"""Geometry of forces, for numpy arrays and torch tensors: own axes, body frame, wrench. The plant,
-the methods and the networks use it.
+"""The effectiveness matrix B of Eq. 1: from forces along own axes to body frame and wrench.
+
+The plant, the methods and the networks use it, with numpy arrays and torch tensors.
 
 Fin frame x' = shaft, y' = e_h, z' = e_z (see `finlab.actuators.fin.fin`); body frame FLU about the
 centre of gravity. Wrench order [Fx, Fy, Fz, Tx, Ty, Tz] in N and N m.
@@ -43,6 +44,9 @@ def force_effectiveness(position: Any, mounting_angle: Any) -> Any:
 def own_effectiveness(layout: Layout) -> Array:
     """Returns the effectiveness of each actuator along its own axes.
 
+    Args:
+        layout: the robot.
+
     Returns:
         (n, 3, 6): wrench [Fx, Fy, Fz, Tx, Ty, Tz] about the origin of 1 N along each row of
         `layout.frames`, with the reaction torque of propellers about the direction of their force.
@@ -73,6 +77,9 @@ def moved_effectiveness(layout: Layout, position: Array, frames: Array) -> Array
 def layout_effectiveness(layout: Layout) -> Array:
     """Returns the effectiveness matrix of a layout, by the directions in which actuators push.
 
+    Args:
+        layout: the robot.
+
     Returns:
         (6, m): wrench [Fx, Fy, Fz, Tx, Ty, Tz] of 1 N, actuators side by side: of a fin along zero
         and along shaft x zero, which are e_h and e_z of a horizontal shaft, of a thruster along its
@@ -99,7 +106,7 @@ def body_force(own_force: Values, frames: Values) -> Values:
 
 
 def wrench_of_forces(fin_force: Values, effectiveness: Values) -> Values:
-    """Returns the wrenches of forces, w = sum_i B_i y_i.
+    """Returns the wrenches of forces, w = sum_i B_i y_i (Eq. 1).
 
     Args:
         fin_force: forces (..., n, 3), own frames [N]; an array or a tensor.

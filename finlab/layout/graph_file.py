@@ -1,5 +1,8 @@
-"""Layout graph files: the robot as the complete graph of its actuators, for networkx and
-learners."""
+"""Layout graph files: the robot as the complete graph of its actuators, for networkx and learners.
+
+`finlab.deploy.robot_graph` writes them, `finlab.layout.load` reads them. The scales are those of
+the paper's network, which `finlab.research.paper` feeds with the same features.
+"""
 
 import math
 from typing import Annotated, Any, Literal
@@ -12,7 +15,7 @@ from finlab.layout.layout import MAX_ACTUATORS
 
 POSITION_SCALE = 0.3
 """Divisor of positions [m] that makes them of order one: the paper's layouts lie within."""
-SCALES = (0.6, 2.1, math.pi)
+COMMAND_SCALES = (0.6, 2.1, math.pi)
 """Divisors of amplitude [rad], frequency [Hz] and zero direction [rad]."""
 
 
@@ -20,7 +23,9 @@ class Edge(Struct, forbid_unknown_fields=True):
     """An edge of the graph, between two actuators or from one to itself."""
 
     source: Name
+    """Name of an actuator."""
     target: Name
+    """Name of another one after it, or of the same."""
 
 
 class Normalization(Struct, forbid_unknown_fields=True):
@@ -33,7 +38,7 @@ class Normalization(Struct, forbid_unknown_fields=True):
     normalized."""
 
 
-class Data(Struct, forbid_unknown_fields=True):
+class GraphAttributes(Struct, forbid_unknown_fields=True):
     """Attributes of the graph."""
 
     layout: dict[str, Any]
@@ -53,12 +58,12 @@ class Graph(Struct, forbid_unknown_fields=True):
 
     directed: Literal[False]
     multigraph: Literal[False]
-    graph: Data
+    graph: GraphAttributes
     nodes: Annotated[list[dict[str, Any]], Meta(min_length=1, max_length=MAX_ACTUATORS)]
     edges: list[Edge]
 
 
-def layout_in_graph(data: Any) -> dict[str, Any]:
+def layout_data_in_graph(data: Any) -> dict[str, Any]:
     """Returns the plain values of the layout file that a graph file contains.
 
     Raises:
@@ -66,7 +71,8 @@ def layout_in_graph(data: Any) -> dict[str, Any]:
     """
     graph = checked(data, Graph)
     names = [node.get("id") for node in graph.nodes]
-    if [(edge.source, edge.target) for edge in graph.edges] != edges_of(names):
+    edges = [(edge.source, edge.target) for edge in graph.edges]
+    if edges != edges_of(names):
         raise LayoutError(
             "expected each actuator with itself and with those after it, in order", "edges"
         )

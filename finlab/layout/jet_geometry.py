@@ -1,5 +1,8 @@
-"""Points and jets of a layout's actuators, and its hull as an ellipsoid, as an interaction takes
-them."""
+"""What an interaction needs of a layout: points and jets of its actuators, its hull as an
+ellipsoid.
+
+The plant hands it to the layout's `InteractionModel`.
+"""
 
 import numpy as np
 
@@ -8,7 +11,7 @@ from finlab.actuators.propeller import Propeller
 from finlab.interaction.interaction import JetGeometry
 from finlab.layout.layout import Layout
 
-USUAL_ADVANCE = 1.26
+TYPICAL_ADVANCE = 1.26
 """`Actuator.advance` of a propeller of which nothing is known: Kt = 0.4 at rest, none at J = 0.8
 [1]."""
 
@@ -35,4 +38,4 @@ def _advance(actuator: Actuator) -> float:
     """Relative loss of thrust per relative speed, estimated where it is unknown [1]."""
     if actuator.advance is not None:
         return actuator.advance
-    return USUAL_ADVANCE if isinstance(actuator, Propeller) else 0.0
+    return TYPICAL_ADVANCE if isinstance(actuator, Propeller) else 0.0

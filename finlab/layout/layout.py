@@ -1,4 +1,7 @@
-"""The layout of a robot: its actuators, in order, and optionally its body."""
+"""The layout of a robot: its actuators, in order, and optionally its body and an interaction.
+
+What is asked of all actuators together, such as limits and own axes, is here as padded arrays.
+"""
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -20,7 +23,7 @@ from finlab.files.schema import Checked, Name
 if TYPE_CHECKING:
     from finlab.interaction.interaction import InteractionModel
     from finlab.layout.body import Body
-else:  # most robots have neither, and what checks a layout need not know more of them
+else:  # most robots have neither: their modules are imported only for those that do
     Body = InteractionModel = Checked
 
 MAX_ACTUATORS = 64
@@ -48,6 +51,8 @@ class Layout(Checked):
     """Model of the hydrodynamic interaction of the actuators; None to neglect it."""
 
     def __post_init__(self) -> None:
+        """Puts the axes in the order of a wrench. Raises LayoutError: a value does not fit, or a
+        name or an axis stands twice."""
         super().__post_init__()
         object.__setattr__(self, "actuators", tuple(self.actuators))
         if not 1 <= self.n <= MAX_ACTUATORS:
@@ -66,6 +71,7 @@ class Layout(Checked):
 
     @cached_property
     def _hash(self) -> int:
+        """Hash of all fields."""
         return hash(
             (self.name, self.actuators, self.description, self.body, self.axes, self.interaction)
         )
@@ -75,16 +81,18 @@ class Layout(Checked):
         return self._hash
 
     def __getstate__(self) -> dict[str, Any]:
-        # Hashes of text differ between processes, and arrays are quickly made again.
+        # Fields alone: hashes of text differ between processes, and arrays are quickly made again.
         return {field.name: self.__dict__[field.name] for field in fields(self)}
 
     def __str__(self) -> str:
+        """Returns the layout as a table of its actuators."""
         from finlab.display import text
         from finlab.layout.layout_text import layout_blocks
 
         return text(layout_blocks(self))
 
     def _repr_html_(self) -> str:
+        """Returns the layout as a notebook shows it: its table, and a picture."""
         from finlab.display import html
         from finlab.display.pictures import robot_picture
         from finlab.layout.layout_text import layout_blocks
@@ -102,7 +110,7 @@ class Layout(Checked):
         return np.array([isinstance(actuator, Fin) for actuator in self.actuators])
 
     @cached_property
-    def by_flow(self) -> tuple[str, ...]:
+    def flow_driven(self) -> tuple[str, ...]:
         """Names of the actuators that give nothing at rest: their force is that of the flow."""
         return tuple(actuator.name for actuator in self.actuators if actuator.KIND.driven_by_flow)
 
@@ -135,7 +143,7 @@ class Layout(Checked):
         """Whether all actuators are fins."""
         return self.n_fins == self.n
 
-    def only(self, what: str, kind: str = "fin", horizontal: bool = False) -> None:
+    def require_kind(self, what: str, kind: str = "fin", horizontal: bool = False) -> None:
         """Refuses a robot whose actuators are not all of one type.
 
         Args:
@@ -180,9 +188,12 @@ class Layout(Checked):
 
     @cached_property
     def mounting_angle(self) -> Array:
-        """Azimuth of each fin's shaft (n,) [rad]; read-only. Raises LayoutError: an actuator is no
-        fin, or its shaft is not horizontal."""
-        self.only("what asks for mounting angles", horizontal=True)
+        """Azimuth of each fin's shaft (n,) [rad]; read-only.
+
+        Raises:
+            LayoutError: an actuator is no fin, or its shaft is not horizontal.
+        """
+        self.require_kind("what asks for mounting angles", horizontal=True)
         return _read_only([fin.mounting_angle or 0.0 for fin in self.fins])
 
     @cached_property
@@ -201,7 +212,10 @@ class Layout(Checked):
         """Double poles of amplitude, frequency and zero direction of each fin (n, 3) [rad/s];
         read-only."""
         servos = [fin.servo for fin in self.fins]
-        return _read_only([(s.amplitude_pole, s.frequency_pole, s.direction_pole) for s in servos])
+        poles = [
+            (servo.amplitude_pole, servo.frequency_pole, servo.direction_pole) for servo in servos
+        ]
+        return _read_only(poles)
 
     @cached_property
     def rates(self) -> Array:
@@ -235,10 +249,14 @@ class Layout(Checked):
         return len(self.fins)
 
     @property
-    def counted(self) -> str:
+    def counts_in_words(self) -> str:
         """Number of actuators of each type in words, such as `4 fins and 2 thrusters`."""
         counts = Counter(actuator.type for actuator in self.actuators)
-        return " and ".join(f"{n} {kind}{'s' if n > 1 else ''}" for kind, n in counts.items())
+        terms = []
+        for kind, count in counts.items():
+            plural = "s" if count > 1 else ""
+            terms.append(f"{count} {kind}{plural}")
+        return " and ".join(terms)
 
     def index(self, name: str, argument: str = "") -> int:
         """Returns the index of an actuator.
@@ -259,15 +277,33 @@ class Layout(Checked):
         return self.names.index(name)
 
     def indices(self, names: Sequence[str], argument: str = "") -> tuple[int, ...]:
-        """Returns the indices of several actuators, in the order of their names; arguments and
-        errors as for `index`."""
+        """Returns the indices of several actuators.
+
+        Args:
+            names: the actuators.
+            argument: as for `index`.
+
+        Returns:
+            Their indices, in the order of the names.
+
+        Raises:
+            LayoutError: as for `index`.
+        """
         return tuple(self.index(name, argument) for name in names)
 
-    def part(self, name: str, argument: str = "") -> Actuator:
-        """Returns the actuator of a name; arguments and errors as for `index`."""
+    def actuator(self, name: str, argument: str = "") -> Actuator:
+        """Returns the actuator of a name.
+
+        Args:
+            name: the actuator.
+            argument: as for `index`.
+
+        Raises:
+            LayoutError: as for `index`.
+        """
         return self.actuators[self.index(name, argument)]
 
-    def with_part(self, actuator: Actuator, name: str = "") -> "Layout":
+    def with_actuator(self, actuator: Actuator, name: str = "") -> "Layout":
         """Returns the layout with one actuator replaced.
 
         Args:
@@ -300,9 +336,16 @@ class Layout(Checked):
         return replace(self, actuators=working)
 
     def replace_actuator(self, name: str, /, **changes: Any) -> "Layout":
-        """Returns the layout with some fields of one actuator changed, such as `position=(0.1, 0,
-        0)`; errors as for `with_part`, and those of the fields."""
-        return self.with_part(replace(self.part(name), **changes), name)
+        """Returns the layout with some fields of one actuator changed.
+
+        Args:
+            name: the actuator.
+            changes: new values by field, such as `position=(0.1, 0, 0)`.
+
+        Raises:
+            LayoutError: as for `with_actuator`, or a value does not fit its field.
+        """
+        return self.with_actuator(replace(self.actuator(name), **changes), name)
 
 
 def _read_only(values: ArrayLike) -> Array:

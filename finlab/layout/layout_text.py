@@ -1,11 +1,11 @@
-"""A layout as a table of its actuators."""
+"""A layout as a table of its actuators, for terminals and notebooks: `print(layout)` shows it."""
 
 from typing import Any
 
 from finlab.display import Block, Column, table_of
 
 Layout = Any
-"""`finlab.layout.Layout`, which prints itself by this module."""
+"""`finlab.layout.Layout`, which prints itself by this module, so that this one cannot import it."""
 
 
 def _metres(value: float) -> str:

@@ -1,4 +1,7 @@
-"""Writing of layouts: as the plain values of a layout file, and into a file."""
+"""Writing of layouts: as the plain values of a layout file, and into a file.
+
+The inverse of `finlab.layout.load`.
+"""
 
 import json
 import math
@@ -81,14 +84,20 @@ def plain(value: Any) -> Any:
 
 
 def degrees_of(value: Any) -> Any:
-    """Returns degrees of radians [rad], a number or a tuple, such that reading gives the same
-    radians: rounded to twelve digits, as a person would have written them, where that does."""
+    """Returns degrees such that reading them gives the same radians, bit for bit.
+
+    They are rounded to twelve digits, as a person would have written them, where that does.
+
+    Args:
+        value: a number or a tuple of numbers [rad].
+    """
     if isinstance(value, tuple):
         return tuple(map(degrees_of, value))
     exact = math.degrees(value)
     rounded = round(exact, 12)
-    neighbours = (math.nextafter(exact, math.inf), math.nextafter(exact, -math.inf))
-    for angle in (rounded, exact, *neighbours):
+    above = math.nextafter(exact, math.inf)
+    below = math.nextafter(exact, -math.inf)
+    for angle in (rounded, exact, above, below):
         if math.radians(angle) == value:
             return angle
     return rounded

@@ -16,7 +16,7 @@ from finlab.actuators.thrust_model import PowerTable
 from finlab.allocation.baselines.autopilots import ArduSub, Px4
 from finlab.allocation.solution import PlainData
 from finlab.arrays import Array
-from finlab.assets import install
+from finlab.assets import install_command
 from finlab.axes import AXES
 from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.files.guarded import read_file
@@ -104,7 +104,9 @@ def read_log(
     try:
         record = _read_record(file, demand, outputs)
     except ModuleNotFoundError as error:
-        raise DataError(f"{file}: {error.name} is not installed; run: {install('logs')}") from None
+        raise DataError(
+            f"{file}: {error.name} is not installed; run: {install_command('logs')}"
+        ) from None
     except FinlabError:
         raise
     except Exception as problem:  # of many kinds, by a file that is damaged
@@ -150,7 +152,7 @@ def _motor_signs(log_robot: Layout | None, robot: Layout) -> Array:
         return np.ones(robot.n)
     if log_robot.n != robot.n:
         raise LayoutError(
-            f"layout {robot.name!r:.60} has {robot.counted}, and the log's parameters have "
+            f"layout {robot.name!r:.60} has {robot.counts_in_words}, and the log's parameters have "
             f"{log_robot.n} motors"
         )
     cosine = np.einsum("nk,nk->n", _axes_of(log_robot), _axes_of(robot))
@@ -336,10 +338,10 @@ def commands_of(record: LogRecord, outputs: Array, robot: Layout, signs: Array) 
     if k < n or (k != n and record.form == "ros"):
         or_commands = "" if record.of_shares else f" or {3 * n}"
         raise LayoutError(
-            f"layout {robot.name!r:.60} has {robot.counted}, and the log {k} outputs, not "
+            f"layout {robot.name!r:.60} has {robot.counts_in_words}, and the log {k} outputs, not "
             f"{n}{or_commands}"
         )
-    robot.only("a log with one output for each actuator", "thruster")
+    robot.require_kind("a log with one output for each actuator", "thruster")
     values = outputs[:, :n] * signs
     command = np.zeros((len(values), n, 3))
     low = robot.lower[:, 0]

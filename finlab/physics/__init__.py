@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 __all__ = ["FinLaw", "Plant", "TableLaw", "make_law", "plant_of", "read_table", "write_table"]
 
-_HOMES = {
+_MODULE_OF_NAME = {
     "make_law": "finlab.actuators.fin.fin_laws",
     "write_table": "finlab.actuators.fin.force_table_file",
     "TableLaw": "finlab.actuators.fin.table_law",
@@ -30,6 +30,6 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> object:
-    if name not in _HOMES:
+    if name not in _MODULE_OF_NAME:
         raise AttributeError(f"module 'finlab.physics' has no attribute {name!r}")
-    return resolve_name(f"{_HOMES[name]}:{name}")
+    return resolve_name(f"{_MODULE_OF_NAME[name]}:{name}")

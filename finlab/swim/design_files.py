@@ -13,16 +13,22 @@ from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import NamedTuple
 
-from finlab.bundle_files import ABOUT, LARGEST, LARGEST_BUNDLE, LARGEST_TABLE, bundle_files_of
+from finlab.bundle_files import (
+    MANIFEST_FILE,
+    MAX_BUNDLE_BYTES,
+    MAX_FILE_BYTES,
+    MAX_TABLE_BYTES,
+    parse_bundle_archive,
+)
 from finlab.deploy.bundle import renamed
-from finlab.errors import DataError, LayoutError, under
+from finlab.errors import DataError, LayoutError, layout_errors_at
 from finlab.exchange import Exchange, read_robot
 from finlab.files.guarded import decoded, read_file, unpacked
 from finlab.interaction.learned import NETWORK_SUFFIX
 from finlab.layout import FinModelSpec, Layout
 from finlab.layout.body import MESH_SUFFIXES
 from finlab.layout.bundled_robot import robot_of
-from finlab.layout.load import A_LAYOUT, MAX_BYTES, layout_in, parse_layout
+from finlab.layout.load import EXPECTED_LAYOUT_FILE, MAX_BYTES, parse_layout, parse_layout_text
 from finlab.swim.hull.mesh_file import MAX_FACES, read_mesh, simplified, stl_of
 from finlab.whole_file import make_folder, write_whole
 
@@ -53,7 +59,7 @@ def with_hull_inside(layout: Layout) -> tuple[Layout, dict[str, bytes]]:
     if layout.body is None or hull is None or hull.mesh is None:
         return layout, {}
     path = Path(hull.mesh)
-    content = read_file(path, LARGEST_TABLE, "the hull's mesh; import it again")
+    content = read_file(path, MAX_TABLE_BYTES, "the hull's mesh; import it again")
     name = f"hull{path.suffix.lower()}"
     return replace(layout, body=replace(layout.body, hull=replace(hull, mesh=name))), {
         name: content
@@ -81,13 +87,14 @@ def read_archive(source: str, content: bytes, folder: Path) -> Opened:
     is none, or names a table that is not in it; DataError: a bundle that was changed, or a table
     that cannot be read."""
     inside = Path(os.path.abspath(source))
-    if unpacked(content, source, {ABOUT: LARGEST[ABOUT]}.get, LARGEST_BUNDLE, LayoutError):
-        parts = bundle_files_of(content, source)
+    manifest_alone = {MANIFEST_FILE: MAX_FILE_BYTES[MANIFEST_FILE]}.get
+    if unpacked(content, source, manifest_alone, MAX_BUNDLE_BYTES, LayoutError):
+        parts = parse_bundle_archive(content, source)
         robot = robot_of(parts, source, parse_layout)
         layout = robot.layout
         lost = robot.lost
     else:
-        parts = unpacked(content, source, partial(_largest, source), LARGEST_BUNDLE, LayoutError)
+        parts = unpacked(content, source, partial(_largest, source), MAX_BUNDLE_BYTES, LayoutError)
         layouts = [name for name in parts if name.endswith(LAYOUTS)]
         if len(layouts) != 1:
             raise LayoutError(
@@ -107,7 +114,7 @@ def read_design(source: str, content: bytes, folder: Path) -> Opened:
     file. Raises LayoutError: it is none of these, or something in it is wrong."""
     exchange = Exchange()
     text = decoded(content, source, A_DESIGN, LayoutError)
-    with under(source=source):
+    with layout_errors_at(source=source):
         layout = read_robot(text, source, exchange)
     return adopted(layout, {}, folder, source)._replace(notes=tuple(exchange.notes))
 
@@ -115,8 +122,8 @@ def read_design(source: str, content: bytes, folder: Path) -> Opened:
 def layout_of(source: str, content: bytes, folder: Path | None = None) -> Layout:
     """The layout in the content of a file; what it names is taken to be in `folder`, and not looked
     at. Raises LayoutError: it is no text, or no layout."""
-    text = decoded(content, source, A_LAYOUT, LayoutError)
-    return layout_in(text, Path(source).suffix, source, folder, may_open=False)
+    text = decoded(content, source, EXPECTED_LAYOUT_FILE, LayoutError)
+    return parse_layout_text(text, Path(source).suffix, source, folder, may_open=False)
 
 
 def adopted(layout: Layout, parts: Mapping[str, bytes], folder: Path, source: str) -> Opened:
@@ -178,4 +185,4 @@ def _largest(source: str, name: str) -> int:
         raise LayoutError(
             f"holds {name!r:.60}, expected a layout file, CSV tables and a mesh", source=source
         )
-    return MAX_BYTES if name.endswith(LAYOUTS) else LARGEST_TABLE
+    return MAX_BYTES if name.endswith(LAYOUTS) else MAX_TABLE_BYTES

@@ -67,8 +67,8 @@ def test_it_is_answered_in_and_out_of_reach_and_damaged(boat: Layout) -> None:
     weak = allocator.allocate([100, 0, 0, 0, 0, 0], damage=Damage(weak={"jet_left": 0.5}))
     assert weak.command[:, 1] == pytest.approx([10.0, 20.0], abs=1e-6)
     assert "water_jet" in str(weak) and weak.commands["jet_left"].force == pytest.approx(10.0)
-    mirrored = boat.part("jet_left").image()
-    assert mirrored.position == boat.part("jet_right").position and mirrored.value("arc") == (
+    mirrored = boat.actuator("jet_left").image()
+    assert mirrored.position == boat.actuator("jet_right").position and mirrored.value("arc") == (
         -1.0,
         1.0,
     )
@@ -127,9 +127,9 @@ def test_the_app_shows_and_edits_it(boat: Layout, capsys: pytest.CaptureFixture[
     tab.on_loop(lambda: tab.view.do(lambda: session.damage(name, "weak", 0.5)))
     tab.on_loop(lambda: tab.view.do(lambda: session.set_target(0, 3.0)))
     tab.settle()
-    part = session.state.layout.part(name)
+    part = session.state.layout.actuator(name)
     assert part.value("force") == (0.0, 10.0) and part.direction == pytest.approx((0.0, 1.0, 0.0))
-    assert session.state.able.part(name).upper[1] == pytest.approx(5.0)
+    assert session.state.able.actuator(name).upper[1] == pytest.approx(5.0)
     # Its inspector is made of its fields, since it has none of its own.
     boxes = {box.label: box for box in inspector_of(type(part)).limits}
     assert {*boxes} == {"Arc [°]", "Force [N]"} and boxes["Arc [°]"].degrees

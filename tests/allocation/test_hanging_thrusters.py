@@ -170,8 +170,8 @@ def test_jets_of_one_that_hangs_count() -> None:
 def test_a_propeller_that_hangs_is_the_same_propeller() -> None:
     layout = load_layout("bluerov2_heavy")
     name = layout.names[0]
-    part = Damage(stuck={name: 0.0}).applied_to(layout).part(name)
-    assert part.jet == pytest.approx(layout.part(name).jet)
+    part = Damage(stuck={name: 0.0}).applied_to(layout).actuator(name)
+    assert part.jet == pytest.approx(layout.actuator(name).jet)
 
 
 def test_no_file_says_that_a_thruster_hangs() -> None:
@@ -190,7 +190,7 @@ def test_no_file_says_that_a_thruster_hangs() -> None:
 def test_damage_known_of_a_thruster_that_sticks() -> None:
     layout = load_layout("bluerov2_heavy")
     first, second = layout.names[:2]
-    damage = Damage.known(layout, [], {first: 0.5, second: 0.8}, {first: 10.0})
+    damage = Damage.representing(layout, [], {first: 0.5, second: 0.8}, {first: 10.0})
     assert damage == Damage(weak={second: 0.8}, stuck={first: 5.0})
 
 

@@ -3,23 +3,26 @@
 import ast
 import re
 from pathlib import Path
+from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[2]
 ROW = re.compile(r"^\| `(\w+)` \| ([^|]+) \| `([^`|]+)` \| ([^|]+) \|$", re.MULTILINE)
 """A row of the page's table: name, value, file, reason."""
+PAGE = ROOT / "docs/theory/numbers.md"
 PYTHON = [
     ROOT / "finlab/arrays.py",
     ROOT / "finlab/allocation/levenberg_marquardt.py",
     *sorted((ROOT / "finlab/allocation/dual").glob("*.py")),
-    *(
-        ROOT / "finlab/actuators" / f"{name}.py"
-        for name in ("response", "fin/fin_response", "thruster")
-    ),
-    *(ROOT / "finlab/actuators" / f"{name}.py" for name in ("rudder", "thrust_power", "kinds")),
+    ROOT / "finlab/actuators/fin/fin_response.py",
+    ROOT / "finlab/actuators/kinds.py",
+    ROOT / "finlab/actuators/response.py",
+    ROOT / "finlab/actuators/rudder.py",
+    ROOT / "finlab/actuators/thrust_power.py",
+    ROOT / "finlab/actuators/thruster.py",
 ]
-
-
+"""Files in Python whose constants the page has."""
 CORE = sorted((ROOT / "finlab/core").rglob("*.[ch]"))
+"""Files in C whose constants the page has."""
 DEFINED = re.compile(r"^#define (\w+) (?:R\()?([\d.]+(?:e-?\d+)?)\b", re.MULTILINE)
 """A constant in C: name, value."""
 SINGLE = re.compile(r"^#ifdef FL_SINGLE\n.*?^#else\n", re.MULTILINE | re.DOTALL)
@@ -38,9 +41,23 @@ NO_CHOICE = {
 """Constants in C that nobody has chosen: sizes, versions, numbers of mathematics."""
 
 
+class Row(NamedTuple):
+    """A row of the page's table."""
+
+    name: str
+    value: str
+    file: str
+    reason: str
+
+
+def rows_of_page() -> list[Row]:
+    """The rows of the page's table, from top to bottom."""
+    return [Row(*cells) for cells in ROW.findall(PAGE.read_text())]
+
+
 def numbers(path: Path) -> dict[str, object]:
     """The public constants of a file that are numbers, or tuples of them."""
-    found = {}
+    constants = {}
     for line in ast.parse(path.read_text()).body:
         if not (isinstance(line, ast.Assign) and isinstance(line.targets[0], ast.Name)):
             continue
@@ -51,13 +68,13 @@ def numbers(path: Path) -> dict[str, object]:
             except ValueError:
                 continue
             if not isinstance(value, str):
-                found[name] = value
-    return found
+                constants[name] = value
+    return constants
 
 
 def test_the_page_has_every_number_with_a_reason() -> None:
-    rows = ROW.findall((ROOT / "docs" / "theory" / "numbers.md").read_text())
-    on_page = {(file, name): ast.literal_eval(value) for name, value, file, _ in rows}
+    rows = rows_of_page()
+    on_page = {(row.file, row.name): ast.literal_eval(row.value) for row in rows}
     in_code: dict[tuple[str, str], object] = {}
     for path in PYTHON:
         for name, value in numbers(path).items():
@@ -71,4 +88,9 @@ def test_the_page_has_every_number_with_a_reason() -> None:
                 in_code[str(path.relative_to(ROOT)), name] = ast.literal_eval(text)
     assert on_page == in_code
     assert len(rows) == len(on_page)
-    assert all(len(reason.split()) > 3 for *_, reason in rows)
+    assert all(len(row.reason.split()) > 3 for row in rows)
+
+
+def test_the_rows_of_the_page_are_sorted_by_file() -> None:
+    files = [row.file for row in rows_of_page()]
+    assert files == sorted(files)

@@ -16,11 +16,11 @@ import pytest
 import finlab
 from finlab.allocation import Allocator
 from finlab.bundle_files import (
-    ABOUT,
-    CHECKSUMS,
-    NETWORKS,
-    ROBOT,
-    TABLES,
+    CHECKPOINT_FOLDER,
+    CHECKSUM_FILE,
+    MANIFEST_FILE,
+    ROBOT_FILE,
+    TABLE_FOLDER,
     checksums,
     read_bundle_files,
     table_name,
@@ -44,8 +44,8 @@ def of_mdn() -> Bundle:
 
 def resealed(files: dict[str, bytes]) -> dict[str, bytes]:
     """Files with checksums that fit them, as a careful forger would leave them."""
-    rest = {name: content for name, content in files.items() if name != CHECKSUMS}
-    return rest | {CHECKSUMS: checksums(rest)}
+    rest = {name: content for name, content in files.items() if name != CHECKSUM_FILE}
+    return rest | {CHECKSUM_FILE: checksums(rest)}
 
 
 def edited(bundle: Bundle, name: str, change: Callable[[dict[str, Any]], Any]) -> dict[str, bytes]:
@@ -106,13 +106,13 @@ def test_networks_of_ones_own_travel(
     assert dict(again.files) == read_bundle_files(place)
     assert runtime(["check", str(place)]) == 0
     files = dict(again.files)
-    weights = NETWORKS + "model.safetensors"
+    weights = CHECKPOINT_FOLDER + "model.safetensors"
     for damaged in (files[weights][:-4], files[weights][:-4] + bytes(4)):
         with pytest.raises(
             CheckpointError, match="checkpoint/model.safetensors: its SHA-256 is not the one"
         ):
             parse_robot(resealed({**files, weights: damaged}))
-    del files[NETWORKS + "config.json"]
+    del files[CHECKPOINT_FOLDER + "config.json"]
     with pytest.raises(CheckpointError, match="checkpoint/config.json: no such file"):
         parse_robot(resealed(files))
 
@@ -169,14 +169,16 @@ def test_settings_no_robot_should_try_are_refused(
     change: dict[str, object], message: str, bundle: Bundle
 ) -> None:
     files = edited(
-        bundle, ABOUT, lambda d: (d if set(change) & set(d) else d["settings"]).update(change)
+        bundle,
+        MANIFEST_FILE,
+        lambda d: (d if set(change) & set(d) else d["settings"]).update(change),
     )
     with pytest.raises(FinlabError, match=message):
         parse_robot(files)
 
 
 def test_checksums_are_those_of_sha256sum(bundle: Bundle) -> None:
-    for line in bundle.files[CHECKSUMS].decode().splitlines():
+    for line in bundle.files[CHECKSUM_FILE].decode().splitlines():
         digest, name = line.split("  ")
         assert hashlib.sha256(bundle.files[name]).hexdigest() == digest
 
@@ -186,13 +188,13 @@ def test_a_changed_file_is_named(measured_bundle: Bundle) -> None:
     for name in files:
         content = bytearray(files[name])
         content[len(content) // 2] ^= 1
-        named = name if name != CHECKSUMS else ""
+        named = name if name != CHECKSUM_FILE else ""
         with pytest.raises(FinlabError, match=f"{named}.* does not fit SHA256SUMS"):
             parse_robot({**files, name: bytes(content)})
 
 
 def test_other_networks_than_those_of_the_desk_are_refused(of_mdn: Bundle) -> None:
-    other = edited(of_mdn, ROBOT, lambda d: d.update(weights_sha256="0" * 64))
+    other = edited(of_mdn, ROBOT_FILE, lambda d: d.update(weights_sha256="0" * 64))
     with pytest.raises(DataError, match="was made with other networks than this finlab's"):
         parse_robot(other)
 
@@ -225,7 +227,7 @@ def test_force_tables_travel_and_answer_from_folder_and_archive(
 
 
 @pytest.mark.parametrize(
-    "path", ["/etc/passwd", "../secret.csv", "tables/../../secret.csv", "secret.csv", ROBOT]
+    "path", ["/etc/passwd", "../secret.csv", "tables/../../secret.csv", "secret.csv", ROBOT_FILE]
 )
 @pytest.mark.parametrize("archive", [False, True])
 def test_a_force_table_outside_the_bundle_is_refused(
@@ -234,7 +236,9 @@ def test_a_force_table_outside_the_bundle_is_refused(
     (tmp_path / "secret.csv").write_text("A,f,phi,Fx,Fy,Fz\n")
     table = {"type": "table", "path": path}
     forged = Bundle(
-        edited(measured_bundle, ROBOT, lambda d: d["layout"]["actuators"][2].update(model=table))
+        edited(
+            measured_bundle, ROBOT_FILE, lambda d: d["layout"]["actuators"][2].update(model=table)
+        )
     )
     place = tmp_path / ("x.zip" if archive else "x")
     (forged.write_zip if archive else forged.write)(place)
@@ -258,9 +262,9 @@ def archive_of(path: Path, **files: bytes) -> Path:
         (lambda p: p / "nowhere", "no such file"),
         (lambda p: p, "robot.json is missing; a bundle is made by `finlab export"),
         (lambda p: archive_of(p / "a.zip", **{"../evil": b"x"}), "'../evil', which is no part of a bundle"),
-        (lambda p: archive_of(p / "a.zip", **{ROBOT: bytes(1_000_001)}), "larger than 1,000,000 bytes"),
+        (lambda p: archive_of(p / "a.zip", **{ROBOT_FILE: bytes(1_000_001)}), "larger than 1,000,000 bytes"),
         (lambda p: archive_of(p / "a.zip", **{table_name(b"%d" % k): b"" for k in range(501)}), "than 500"),
-        (lambda p: archive_of(p / "a.zip", **{f"{TABLES}../{'0' * 64}.csv": b""}), "is no part of a bundle"),
+        (lambda p: archive_of(p / "a.zip", **{f"{TABLE_FOLDER}../{'0' * 64}.csv": b""}), "is no part of a bundle"),
     ],
     ids=["missing", "empty", "out of the archive", "zip bomb", "tables", "out of tables"],
 )  # fmt: skip
@@ -284,7 +288,7 @@ def test_a_full_disk_leaves_nothing_under_the_final_name(
         files = (file for file in path.rglob("*") if file.is_file())
         return {str(file.relative_to(path)): file.read_bytes() for file in files}
 
-    large = Bundle({**bundle.files, ABOUT: np.random.default_rng(0).bytes(300_000)})
+    large = Bundle({**bundle.files, MANIFEST_FILE: np.random.default_rng(0).bytes(300_000)})
     (tmp_path / "old").mkdir()
     write(tmp_path / "old" / "bundle", bundle)
     before = held(tmp_path)
@@ -350,4 +354,4 @@ def test_a_robot_that_is_none_is_refused(
     change: Callable[[dict[str, Any]], None], message: str, bundle: Bundle
 ) -> None:
     with pytest.raises(FinlabError, match=message):
-        parse_robot(edited(bundle, ROBOT, change))
+        parse_robot(edited(bundle, ROBOT_FILE, change))

@@ -42,7 +42,7 @@ def test_every_name_of_the_package_has_a_page(site: Any) -> None:
     import reference
 
     pages = reference.python_pages()
-    assert {f"reference/python/finlab.{name}.md" for name in finlab._HOME} <= set(pages)
+    assert {f"reference/python/finlab.{name}.md" for name in finlab._MODULE_OF_NAME} <= set(pages)
     assert "reference/python/finlab.swim.simulation.ClosedLoop.md" in pages
 
 

@@ -20,7 +20,7 @@ import trimesh
 
 from finlab.actuators.fin.table_law import read_table
 from finlab.allocation import Allocator
-from finlab.bundle_files import CHECKSUMS, ROBOT, checksums
+from finlab.bundle_files import CHECKSUM_FILE, ROBOT_FILE, checksums
 from finlab.deploy.bundle import make_bundle
 from finlab.deploy.deployed_robot import load_robot
 from finlab.errors import FinlabError
@@ -83,9 +83,9 @@ def repacked(rng: np.random.Generator, content: bytes) -> bytes:
 
 def forged(parts: dict[str, bytes]) -> dict[str, bytes]:
     """The files of a bundle with checksums that fit again; other files as they are."""
-    if ROBOT in parts:
-        rest = {key: content for key, content in parts.items() if key != CHECKSUMS}
-        return {**rest, CHECKSUMS: checksums(rest)}
+    if ROBOT_FILE in parts:
+        rest = {key: content for key, content in parts.items() if key != CHECKSUM_FILE}
+        return {**rest, CHECKSUM_FILE: checksums(rest)}
     return parts
 
 

@@ -4,7 +4,7 @@ core."""
 import numpy as np
 
 from finlab.arrays import Array
-from finlab.interaction.interaction import DENSITY, STILL, JetGeometry
+from finlab.interaction.interaction import DENSITY, MIN_JET_SPEED, JetGeometry
 from finlab.interaction.jets import Jets
 
 
@@ -13,7 +13,7 @@ def offset(known: Jets, geometry: JetGeometry, force: Array, inflow: Array) -> A
     n = len(force)
     wrench = np.zeros(6)
     area = 0.25 * np.pi * geometry.diameter**2
-    least = 0.5 * DENSITY * area * STILL**2
+    least = 0.5 * DENSITY * area * MIN_JET_SPEED**2
     thrust = np.sqrt((force**2).sum(axis=1) + least**2)
     ahead = force / thrust[:, None]
     speed = np.sqrt(2.0 * thrust / (DENSITY * area))

@@ -13,7 +13,7 @@ from finlab.actuators.thrust_model import PowerTable
 from finlab.errors import LayoutError
 from finlab.files.schema import checked
 from finlab.layout import Azimuth, Fin, Rudder, Thruster, Tilt, parse_layout
-from finlab.layout.load import Reader, actuator_form
+from finlab.layout.load import PartReader, actuator_form
 from finlab.layout.save import plain
 
 THRUSTER = {
@@ -52,7 +52,7 @@ RUDDER = {
 
 
 def _read(data: Any, folder: Path | None = None) -> Any:
-    return Reader(folder).value(checked(data, actuator_form(tuple(KINDS.values()))))
+    return PartReader(folder).value(checked(data, actuator_form(tuple(KINDS.values()))))
 
 
 @pytest.mark.parametrize("data", [THRUSTER, {**THRUSTER, "model": TABLE}, AZIMUTH, TILT, RUDDER])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from finlab.assets import shipped
+from finlab.assets import shipped_folder
 from finlab.layout import layout_effectiveness, load_layout
 
 # The paper's table of layouts: x, y, z [m], alpha [deg] of each fin, in the paper's own axes.
@@ -23,7 +23,7 @@ SURGE_HEAVE_YAW = [0, 2, 5]
 
 @pytest.mark.parametrize("name", AS_PRINTED)
 def test_the_file_is_the_printed_layout_with_y_forward_and_alpha_the_shaft(name):
-    layout = load_layout(shipped("layouts") / f"{name}.yaml")
+    layout = load_layout(shipped_folder("layouts") / f"{name}.yaml")
     assert layout.name == name
     assert layout.n_fins == len(AS_PRINTED[name])
     for fin, (x, y, z, alpha) in zip(layout.fins, AS_PRINTED[name], strict=True):
@@ -35,7 +35,7 @@ def test_the_file_is_the_printed_layout_with_y_forward_and_alpha_the_shaft(name)
 
 @pytest.mark.parametrize("name", AS_PRINTED)
 def test_surge_heave_and_yaw_stay_controllable_after_any_single_loss(name):
-    layout = load_layout(shipped("layouts") / f"{name}.yaml")
+    layout = load_layout(shipped_folder("layouts") / f"{name}.yaml")
     for robot in [layout, *(layout.without([fin]) for fin in layout.names)]:
         rows = layout_effectiveness(robot)[SURGE_HEAVE_YAW]
         assert np.linalg.matrix_rank(rows, tol=1e-6) == 3, robot.names

@@ -247,13 +247,13 @@ def test_as_many_actuators_as_are_allowed():
 def test_what_works_for_fins_only_says_so():
     layout = parse_layout(GOOD)
     with pytest.raises(LayoutError, match="simulate works for .* 'lift' of .* is of type thruster"):
-        layout.only("simulate")
+        layout.require_kind("simulate")
     tail = layout.without(["side", "lift", "pod", "nose", "rudder"])
-    tail.only("simulate")
+    tail.require_kind("simulate")
     with pytest.raises(
         LayoutError, match="the app works for .* 'tail' .* has a shaft of its own direction"
     ):
-        tail.only("the app", horizontal=True)
+        tail.require_kind("the app", horizontal=True)
     with pytest.raises(LayoutError, match="'tail'"):
         _ = tail.mounting_angle
 

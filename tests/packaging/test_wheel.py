@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 from packaging.requirements import Requirement
 
-from finlab.assets import EXTRAS, NAME
+from finlab.assets import DISTRIBUTION, EXTRA_OF_PACKAGE
 
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
@@ -30,7 +30,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     command = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
-    return next(folder.glob(f"{NAME.replace('-', '_')}-*.whl"))
+    return next(folder.glob(f"{DISTRIBUTION.replace('-', '_')}-*.whl"))
 
 
 @pytest.fixture(scope="module")
@@ -76,8 +76,14 @@ def declared(*extras: str) -> set[str]:
     lines = [Requirement(line) for line in PROJECT["dependencies"]]
     for extra in extras:
         lines += map(Requirement, PROJECT["optional-dependencies"][extra])
-    inside = {extra for line in lines if line.name == NAME for extra in line.extras} - set(extras)
-    return declared(*extras, *inside) if inside else {normal(line.name) for line in lines} - {NAME}
+    inside = {extra for line in lines if line.name == DISTRIBUTION for extra in line.extras} - set(
+        extras
+    )
+    return (
+        declared(*extras, *inside)
+        if inside
+        else {normal(line.name) for line in lines} - {DISTRIBUTION}
+    )
 
 
 def bare_run(bare: Path, cwd: Path, *argv: str) -> subprocess.CompletedProcess[str]:
@@ -109,7 +115,7 @@ def test_asks_for_the_core_and_offers_extras(wheel: Path) -> None:
     archive = zipfile.ZipFile(wheel)
     name = next(n for n in archive.namelist() if n.endswith(".dist-info/METADATA"))
     about = email.message_from_bytes(archive.read(name))
-    assert about["Name"] == NAME == PROJECT["name"]
+    assert about["Name"] == DISTRIBUTION == PROJECT["name"]
     required = [line for line in about.get_all("Requires-Dist", []) if "extra ==" not in line]
     assert {normal(Requirement(line).name) for line in required} == CORE
     extras = {
@@ -127,7 +133,7 @@ def test_asks_for_the_core_and_offers_extras(wheel: Path) -> None:
         "dev",
     }
     assert extras == set(about.get_all("Provides-Extra", []))
-    assert set(EXTRAS.values()) <= extras
+    assert set(EXTRA_OF_PACKAGE.values()) <= extras
 
 
 def imported(package: str) -> Iterator[str]:
@@ -150,7 +156,9 @@ def test_what_is_imported_is_required(package: str, extra: str) -> None:
 
 def test_installed_package_finds_its_own_files(bare: Path, tmp_path: Path) -> None:
     code = "from finlab.assets import *; "
-    code += "print(shipped('layouts'), checkpoint_path(), shipped('webapp'), sep='\\n')"
+    code += (
+        "print(shipped_folder('layouts'), checkpoint_path(), shipped_folder('webapp'), sep='\\n')"
+    )
     done = bare_run(bare, tmp_path, "-c", code)
     assert done.returncode == 0, done.stderr
     site = next(bare.parents[1].glob("lib/python3*/site-packages"))
@@ -164,7 +172,7 @@ def test_without_extras_what_needs_one_says_so_in_a_sentence(bare: Path, tmp_pat
     for extra, words in {"train": "train mdn -o out --preset smoke", "app": "app"}.items():
         done = bare_run(bare, tmp_path, "-m", "finlab", *words.split())
         assert done.returncode == 2 and done.stderr.count("\n") == 1
-        assert done.stderr.endswith(f"run: pip install '{NAME}[{extra}]'\n")
+        assert done.stderr.endswith(f"run: pip install '{DISTRIBUTION}[{extra}]'\n")
 
 
 def test_without_extras_every_method_but_ipopt_allocates(bare: Path, tmp_path: Path) -> None:

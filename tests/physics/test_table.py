@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from finlab.bundle_files import CHECKSUMS, archive_around, checksums, table_name
+from finlab.bundle_files import CHECKSUM_FILE, archive_of_table, checksums, table_name
 from finlab.errors import DataError
 from finlab.layout import Fin, FinModelSpec, Layout
 from finlab.physics import Plant, make_law, plant_of, read_table, write_table
@@ -284,14 +284,16 @@ def test_tables_are_read_out_of_an_archive(soft_table: Path, tmp_path: Path) -> 
     needed = {"robot.json": b"", "bundle.json": b'{"version": 9}'}
     files = {**needed, table_name(content): content}
     with zipfile.ZipFile(tmp_path / "x.zip", "w") as archive:
-        for name, part in {**files, CHECKSUMS: checksums(files)}.items():
+        for name, part in {**files, CHECKSUM_FILE: checksums(files)}.items():
             archive.writestr(name, part)
     inside = tmp_path / "x.zip" / table_name(content)
-    assert archive_around(inside) == str(tmp_path / "x.zip") and archive_around(soft_table) is None
-    assert archive_around(tmp_path / "y.zip" / table_name(content)) is None, (
+    assert (
+        archive_of_table(inside) == str(tmp_path / "x.zip") and archive_of_table(soft_table) is None
+    )
+    assert archive_of_table(tmp_path / "y.zip" / table_name(content)) is None, (
         "there is no such archive"
     )
-    assert archive_around(tmp_path / "x.zip" / "other" / "x.csv") is None
+    assert archive_of_table(tmp_path / "x.zip" / "other" / "x.csv") is None
     command = np.array([[0.4, 1.1, 0.3]])
     np.testing.assert_array_equal(
         make_law(spec(inside)).force(command), make_law(spec(soft_table)).force(command)

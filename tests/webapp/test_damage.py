@@ -79,7 +79,7 @@ def test_every_actuator_has_the_faults_of_its_type_and_no_others(robot: str) -> 
         for kind, value in {**VALUES, "running": NO_FIN.get(part.type, VALUES["running"])}.items():
             if kind in part.KIND.faults:
                 session.damage(part.name, kind, value)
-                assert session.state.damage.of(part.name)[kind] == value
+                assert session.state.damage.faults_of(part.name)[kind] == value
             else:
                 with pytest.raises(FinlabError, match="fault of"):
                     session.damage(part.name, kind, value)
@@ -87,7 +87,7 @@ def test_every_actuator_has_the_faults_of_its_type_and_no_others(robot: str) -> 
     name = session.state.layout.names[0]
     known = session.state.damage
     session.rename(name, "other")
-    assert session.state.damage.of("other") == known.of(name)
+    assert session.state.damage.faults_of("other") == known.faults_of(name)
     session.mend_all()
     assert session.state.damage == Damage()
 

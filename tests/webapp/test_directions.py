@@ -24,7 +24,7 @@ MIRRORED = np.concatenate([POLAR, AXIAL])
 def wrenches(layout: Layout, names: tuple[str, ...], flow: Array) -> Array:
     """What an actuator can do at a few hundred commands, sorted so that their order does not
     count."""
-    plant = plant_of(Layout("part", tuple(layout.part(name) for name in names)))
+    plant = plant_of(Layout("part", tuple(layout.actuator(name) for name in names)))
     share = np.stack(np.meshgrid(*[np.linspace(0, 1, 5)] * 3, indexing="ij"), -1).reshape(-1, 1, 3)
     return np.asarray(plant.wrench(plant.lower + share * plant.width, flow=flow))
 
@@ -42,7 +42,7 @@ def test_copies_around_an_axis_do_what_the_first_does_turned(robot: str) -> None
         for name in session.state.layout.names:
             layout = session.state.layout
             session.select(name)
-            if np.linalg.norm(np.cross(axis, layout.part(name).position)) < 1e-3:
+            if np.linalg.norm(np.cross(axis, layout.actuator(name).position)) < 1e-3:
                 with pytest.raises(FinlabError, match="stands on the"):
                     session.ring(3, letter)
                 continue
@@ -77,7 +77,7 @@ def test_a_twin_follows_in_place_and_direction() -> None:
     session.mirror()
     assert session.selected == "front_right" and session.state.layout.n == 6
     session.point("front_left", (0.0, 3.0, 4.0))
-    left, right = (session.state.layout.part(name) for name in ("front_left", "front_right"))
+    left, right = (session.state.layout.actuator(name) for name in ("front_left", "front_right"))
     assert left.frame[0] == pytest.approx((0.0, 0.6, 0.8)) and right.frame[0] == pytest.approx(
         (0.0, -0.6, 0.8)
     )
@@ -93,7 +93,7 @@ def test_what_is_added_points_where_it_is_told_with_the_rest_across(kind: str) -
     ways = [*np.eye(3), *-np.eye(3), np.array([0.3, -0.5, 0.2])]
     for way in ways + ways[::-1]:
         session.point(name, tuple(way.tolist()))
-        part = session.state.layout.part(name)
+        part = session.state.layout.actuator(name)
         assert part.direction == pytest.approx(tuple(way / np.linalg.norm(way)))
         np.testing.assert_allclose(
             np.array(part.frame) @ np.array(part.frame).T, np.eye(3), atol=1e-9
@@ -110,7 +110,7 @@ def test_a_tail_begins_with_its_thrust_ahead_and_keeps_an_arc_it_has() -> None:
     session = Session(load_layout("ucat"))
     session.add("fin")
     session.point("fin", (0.0, 0.0, 1.0))
-    tail = session.state.layout.part("fin")
+    tail = session.state.layout.actuator("fin")
     assert tail.frame[1] == pytest.approx((1.0, 0.0, 0.0))
     session.set_value("zero_direction", (-1.0, 1.0))
     turns = [session.state.layout]
@@ -118,9 +118,9 @@ def test_a_tail_begins_with_its_thrust_ahead_and_keeps_an_arc_it_has() -> None:
         session.point("fin", way)
         turns.append(session.state.layout)
     for before, after in pairwise(turns):
-        assert after.part("fin").frame[1] == pytest.approx(before.part("fin").frame[1])
+        assert after.actuator("fin").frame[1] == pytest.approx(before.actuator("fin").frame[1])
     session.turn_about((0.0, 0.0, 5.0))
-    assert session.state.layout.part("fin").frame[1] == pytest.approx((0.0, 0.0, 1.0))
+    assert session.state.layout.actuator("fin").frame[1] == pytest.approx((0.0, 0.0, 1.0))
 
 
 def test_a_drag_of_the_direction_is_one_step() -> None:

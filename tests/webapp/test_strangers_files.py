@@ -171,18 +171,18 @@ def test_what_comes_along_is_kept_and_goes_along(tmp_path: Path, table: bytes, c
 def test_a_bundle_names_only_what_is_in_it(tmp_path: Path, table: bytes) -> None:
     import json
 
-    from finlab.bundle_files import CHECKSUMS, ROBOT, checksums
+    from finlab.bundle_files import CHECKSUM_FILE, ROBOT_FILE, checksums
     from finlab.deploy.bundle import make_bundle
 
     bundle = make_bundle(Allocator(load_layout("ucat"))).zip_bytes()
     with zipfile.ZipFile(io.BytesIO(bundle)) as archive:
         parts = {name: archive.read(name) for name in archive.namelist()}
     for path in secrets_of(tmp_path, table)[:9]:
-        robot = json.loads(parts[ROBOT])
+        robot = json.loads(parts[ROBOT_FILE])
         robot["layout"]["actuators"][0]["model"] = {"type": "table", "path": path}
-        forged = {**parts, ROBOT: json.dumps(robot).encode()}
-        del forged[CHECKSUMS]
-        forged[CHECKSUMS] = checksums(forged)
+        forged = {**parts, ROBOT_FILE: json.dumps(robot).encode()}
+        del forged[CHECKSUM_FILE]
+        forged[CHECKSUM_FILE] = checksums(forged)
         assert "not in the bundle" in refused("robot.zip", packed(forged))
         assert seen_of(tmp_path) == [], path
 

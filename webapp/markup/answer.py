@@ -17,7 +17,7 @@ from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
 from finlab.axes import AXES, MOTIONS
 from finlab.layout import Actuator, Fin, Layout
-from finlab.layout.damage import WHOLE, Damage
+from finlab.layout.damage import NO_DAMAGE, Damage
 from webapp.markup.words import damage_words, html, saturated
 from webapp.theme import DEAD, css, fin_color, ink
 
@@ -177,7 +177,7 @@ def fin_table(
         selected: name of the selected actuator, whose row is marked.
     """
     limits = None if allocation is None else saturated(allocation)
-    is_damaged = damage != WHOLE
+    is_damaged = damage != NO_DAMAGE
     rows = []
     for i, actuator in enumerate(layout.actuators):
         is_lost = allocation is not None and not np.isfinite(allocation.command[i, 0])

@@ -21,7 +21,7 @@ from finlab.arrays import Array
 from finlab.axes import MOTIONS
 from finlab.display import NO_NUMBER, as_sentence, listed
 from finlab.layout import Layout
-from finlab.layout.damage import WHOLE, Damage
+from finlab.layout.damage import NO_DAMAGE, Damage
 from finlab.swim.vehicle.fossen import complete_body
 from finlab.swim.vehicle.righting import righting_words
 from finlab.swim.vehicle.vehicle import Vehicle
@@ -274,10 +274,10 @@ def damage_words(damage: Damage, name: str, sticks_at_angle: bool = True) -> str
     Returns:
         Words; nothing for a whole actuator.
     """
-    if damage == WHOLE:
+    if damage == NO_DAMAGE:
         return ""
     faults = []
-    for kind, value in damage.of(name).items():
+    for kind, value in damage.faults_of(name).items():
         if kind == "weak":
             faults.append(f"weak {100 * value:.0f} %")
         elif kind == "torn":

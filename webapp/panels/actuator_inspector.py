@@ -205,7 +205,7 @@ def _headline(layout: Layout, selection: tuple[str, ...], selected: str | None) 
     badges = Markup().join(swatch(layout.index(name)) for name in selection)
     if len(selection) == 1:
         head = "<div class='fl head'>{}<b>{}</b> <span class='dim'>{}</span></div>"
-        return html(head, badges, selection[0], layout.part(selection[0]).type)
+        return html(head, badges, selection[0], layout.actuator(selection[0]).type)
     return html(
         "<div class='fl head'>{}<b>{} actuators</b><div class='dim'>The boxes show {}; what "
         "you change counts for all that have it.</div></div>",

@@ -52,7 +52,7 @@ NOMINAL = Fin("nominal", (0.0, 0.0, 0.0), 0.0)
 
 def selected_actuator(selected: str | None, layout: Layout) -> Actuator:
     """The actuator that was selected last; a nominal fin where none is."""
-    return NOMINAL if selected is None else layout.part(selected)
+    return NOMINAL if selected is None else layout.actuator(selected)
 
 
 def of_selected(value: Callable[[Actuator], Any]) -> Callable[[str | None, Layout], Any]:

@@ -232,7 +232,7 @@ def _add_running_command(page: Page, faults: _Faults) -> None:
 
 def _actuator(selected: str | None, layout: Layout) -> Actuator:
     """The actuator that the panel is about: the selected one, or the first."""
-    return layout.part(selected or layout.names[0])
+    return layout.actuator(selected or layout.names[0])
 
 
 def _may_have(kind: str) -> Callable[[str | None, Layout], bool]:
@@ -251,7 +251,7 @@ def _has(
 
     def has(selected: str | None, layout: Layout, damage: Damage) -> bool:
         actuator = _actuator(selected, layout)
-        return kind in damage.of(actuator.name) and matches(actuator)
+        return kind in damage.faults_of(actuator.name) and matches(actuator)
 
     return has
 
@@ -266,7 +266,7 @@ def _fault(kind: str, default: Any, unit: Any) -> Callable[[str | None, Layout, 
     """
 
     def value(selected: str | None, layout: Layout, damage: Damage) -> Any:
-        fault = damage.of(_actuator(selected, layout).name).get(kind, default)
+        fault = damage.faults_of(_actuator(selected, layout).name).get(kind, default)
         if np.shape(fault) != np.shape(default):  # the command of an actuator that is no fin
             fault = default
         scaled = np.multiply(fault, unit)

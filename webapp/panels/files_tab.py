@@ -106,10 +106,10 @@ def _damage_options(layout: Layout, damage: Damage) -> list[str]:
     for name, share in damage.torn.items():
         words += ["--torn", f"{name}={share:g}"]
     for name, stuck_at in damage.stuck.items():
-        is_angle = layout.part(name).KIND.sticks_at_angle
+        is_angle = layout.actuator(name).KIND.sticks_at_angle
         words += ["--stuck", f"{name}={math.degrees(stuck_at) if is_angle else stuck_at:g}"]
     for name, command in damage.running.items():
-        kind = layout.part(name).KIND
+        kind = layout.actuator(name).KIND
         numbers = list(command)
         if kind.sticks_at_angle:
             numbers[kind.stuck_number] = math.degrees(numbers[kind.stuck_number])

@@ -165,7 +165,7 @@ def _switch(axis: int, counts: bool) -> str:
 
 
 def _at_rest(layout: Layout, flow: Flow | None) -> str:
-    rudders = layout.by_flow
+    rudders = layout.flow_driven
     if flow is not None or not rudders:
         return ""
     verb = "gives" if len(rudders) == 1 else "give"

@@ -215,7 +215,7 @@ class Core:
     def mend(self, name: str) -> None:
         """An actuator is whole again."""
         state = self.state
-        for kind in state.layout.part(name).KIND.faults:
+        for kind in state.layout.actuator(name).KIND.faults:
             state = state.with_fault(name, kind, None)
         if name in state.lost:
             state = state.with_loss_toggled(name)

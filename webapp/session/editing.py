@@ -214,14 +214,14 @@ class Session(Core):
         """The selected actuator at another position [m]; others that are selected take the
         coordinates that have changed."""
         names = self._chosen()
-        old_position = self.state.layout.part(names[-1]).position
+        old_position = self.state.layout.actuator(names[-1]).position
         has_changed = [
             abs(new - old) > layout_edits.UNTOUCHED
             for new, old in zip(position, old_position, strict=True)
         ]
 
         def placed(layout: Layout, name: str) -> Layout:
-            coordinates = list(layout.part(name).position)
+            coordinates = list(layout.actuator(name).position)
             for axis in range(3):
                 if has_changed[axis]:
                     coordinates[axis] = position[axis]
@@ -237,7 +237,7 @@ class Session(Core):
             [
                 name
                 for name in self._chosen()
-                if getattr(layout.part(name), "mounting_angle", None) is not None
+                if getattr(layout.actuator(name), "mounting_angle", None) is not None
             ]
         )
         turned = partial(layout_edits.with_mounting_angle, angle=angle)
@@ -295,7 +295,7 @@ class Session(Core):
         """One step that changes all selected actuators alike; twins follow."""
 
         def changed(layout: Layout, name: str) -> Layout:
-            return layout.with_part(change(layout.part(name)))
+            return layout.with_actuator(change(layout.actuator(name)))
 
         self._for_each(verb, self._chosen(), changed)
 

@@ -51,7 +51,7 @@ def moved(layout: Layout, name: str, position: Vector3) -> Layout:
 def with_mounting_angle(layout: Layout, name: str, angle: float) -> Layout:
     """The layout with a fin whose shaft is horizontal at another mounting angle [rad]."""
     checked = number(angle, f"mounting angle of {name} [rad]", -100.0, 100.0)
-    actuator = layout.part(name)
+    actuator = layout.actuator(name)
     if not isinstance(actuator, Fin) or actuator.mounting_angle is None:
         raise FinlabError(f"{name} has no mounting angle; give a direction")
     change = math.remainder(checked - actuator.mounting_angle, math.tau)
@@ -63,7 +63,7 @@ def with_mounting_angle(layout: Layout, name: str, angle: float) -> Layout:
 def pointed(layout: Layout, name: str, direction: Vector3) -> Layout:
     """The layout with an actuator along a direction of any length, see `Actuator.facing`."""
     x, y, z = (number(value, f"direction of {name}", -1e6, 1e6) for value in direction)
-    return layout.with_part(layout.part(name).facing((x, y, z)))
+    return layout.with_actuator(layout.actuator(name).facing((x, y, z)))
 
 
 def keeping_hull(old_layout: Layout, layout: Layout) -> Layout:
@@ -86,7 +86,7 @@ def _describes_hull(layout: Layout) -> bool:
 def mirrored(layout: Layout, name: str) -> tuple[Layout, str]:
     """The layout with an actuator's image on the other side of the robot, and the image's name. One
     that already stands there is taken for the image, and nothing is added."""
-    actuator = layout.part(name)
+    actuator = layout.actuator(name)
     if abs(actuator.position[1]) < 1e-3:
         raise FinlabError(f"{name} sits on the mirror plane (y = 0), so its mirror image is itself")
     for other in layout.actuators:
@@ -107,7 +107,7 @@ def ring(layout: Layout, name: str, count: int, around: str) -> Layout:
     Raises:
         FinlabError: the actuator stands on the axis, or there is no such axis.
     """
-    actuator = layout.part(name)
+    actuator = layout.actuator(name)
     axis = np.eye(3)["xyz".index(one_of(around, "axis", tuple("xyz")))]
     if np.linalg.norm(np.cross(axis, actuator.position)) < 1e-3:
         raise FinlabError(
@@ -129,7 +129,7 @@ def _rotated(actuator: Actuator, axis: Array, angle: float) -> Actuator:
 def duplicated(layout: Layout, name: str) -> tuple[Layout, str]:
     """The layout with a copy of an actuator above it, `STEP_UP` or the first position that is free,
     and the copy's name."""
-    actuator = layout.part(name)
+    actuator = layout.actuator(name)
     x, y, z = actuator.position
     for k in range(1, MAX_ACTUATORS + 1):
         position = (x, y, round(z + STEP_UP * k, 9))
@@ -318,10 +318,10 @@ def with_twin(old_layout: Layout, layout: Layout, links: Links, name: str) -> La
     twin_name = partner(links, name)
     if twin_name is None or twin_name not in layout.names:
         return layout
-    image = layout.part(name).image()
-    twin = layout.part(twin_name)
-    old_image = np.array(old_layout.part(name).image().frame)
+    image = layout.actuator(name).image()
+    twin = layout.actuator(twin_name)
+    old_image = np.array(old_layout.actuator(name).image().frame)
     # Row by row the cosine between each axis of the old image and of the old twin.
-    cosines = np.sum(old_image * old_layout.part(twin_name).frame, axis=1)
+    cosines = np.sum(old_image * old_layout.actuator(twin_name).frame, axis=1)
     frame = np.array(image.frame) * np.where(cosines < 0.0, -1.0, 1.0)[:, None]
-    return layout.with_part(twin.turned(frame[: len(twin.KIND.axes)], image.position))
+    return layout.with_actuator(twin.turned(frame[: len(twin.KIND.axes)], image.position))

@@ -14,7 +14,7 @@ from finlab.allocation.policy import POLICY_NAMES
 from finlab.axes import AXES, UNITS
 from finlab.errors import FinlabError
 from finlab.layout import Actuator, Fin, Layout
-from finlab.layout.damage import WHOLE, Damage
+from finlab.layout.damage import NO_DAMAGE, Damage
 from finlab.physics import plant_of
 from finlab.research.mdn.method import MdnSettings
 from finlab.research.paper.pipeline import PaperSettings
@@ -43,7 +43,7 @@ class State:
     """A layout, its damage and the question asked of it."""
 
     layout: Layout
-    damage: Damage = WHOLE
+    damage: Damage = NO_DAMAGE
     target: tuple[float, float, float, float, float, float] = (0.0,) * 6
     """Desired wrench [N, N m], body frame."""
     temperature: float | None = None
@@ -67,7 +67,7 @@ class State:
     @cached_property
     def able(self) -> Layout:
         """The layout with the limits that are left to damaged fins."""
-        return self.layout if self.damage == WHOLE else self.damage.applied_to(self.layout)
+        return self.layout if self.damage == NO_DAMAGE else self.damage.applied_to(self.layout)
 
     @cached_property
     def lost(self) -> tuple[str, ...]:
@@ -104,7 +104,7 @@ class State:
     def with_fault(self, name: str, kind: str, value: Any) -> "State":
         """An actuator with a fault of its type, see `Kind.faults`; None, and a share of 1, mend
         that."""
-        actuator = self.layout.part(name)
+        actuator = self.layout.actuator(name)
         one_of(kind, f"fault of {name}, a {actuator.type}", actuator.KIND.faults)
         checked = None if value is None else _checked_fault(actuator, kind, value)
         return self._with_damage(self.damage.with_fault(name, kind, checked))

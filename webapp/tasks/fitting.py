@@ -83,7 +83,7 @@ class Fitting(Slot[Upload, FitResult]):
                 f"{short}: has {len(content):,} bytes, expected at most {MAX_BYTES:,}; cut it "
                 "into shorter series, write cycle means, or use `finlab fit fin`"
             )
-        actuator = self._session.state.layout.part(actuator_name)
+        actuator = self._session.state.layout.actuator(actuator_name)
         if not actuator.KIND.models:
             raise FinlabError(
                 f"{actuator_name} is a {actuator.type}, without a table; type its coefficients"
@@ -120,7 +120,7 @@ class Fitting(Slot[Upload, FitResult]):
         session = self._session
         name = upload.actuator.name
         layout = session.state.layout
-        if name not in layout.names or _model(layout.part(name)) != _model(upload.actuator):
+        if name not in layout.names or _model(layout.actuator(name)) != _model(upload.actuator):
             self.forget()
             raise FinlabError(f"{name} is no longer what {upload.name} was for; upload it again")
         session.set_model([name], **fit_result.fields)

@@ -160,5 +160,5 @@ def improve(search: Search, work: Work[Search]) -> Improvement:
     )
     layout = state.layout
     for actuator in improvement.layout.actuators:
-        layout = layout.with_part(actuator)
+        layout = layout.with_actuator(actuator)
     return replace(improvement, layout=layout)

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from finlab.assets import install
+from finlab.assets import install_command
 from finlab.errors import FinlabError
 from finlab.files.worker import in_worker
 from finlab.layout import Layout
@@ -90,6 +90,6 @@ def judge_upload(file: LogFile, work: Work[LogFile]) -> "Judgement":
         with as_file(file.name, file.content) as path:
             log = in_worker(read_log, path, file.robot)
     except ModuleNotFoundError as error:
-        raise FinlabError(f"{file.name} needs {error.name}; {install('logs')}") from None
+        raise FinlabError(f"{file.name} needs {error.name}; {install_command('logs')}") from None
     work.report("asking other methods and policies the same")
     return judge(log)

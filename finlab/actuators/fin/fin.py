@@ -194,7 +194,7 @@ class Fin(Actuator):
             return
         if self.mounting_angle is not None:
             raise LayoutError("give either a mounting angle, or shaft and zero, not both", "shaft")
-        shaft, zero = axes.axes_across(("shaft", self.shaft), ("zero", self.zero))
+        shaft, zero = axes.perpendicular_axes(("shaft", self.shaft), ("zero", self.zero))
         object.__setattr__(self, "shaft", shaft)
         object.__setattr__(self, "zero", zero)
         if math.dist(zero, (-shaft[1], shaft[0], 0.0)) < SAME_AXIS:
@@ -336,7 +336,7 @@ class Fin(Actuator):
         """See `Actuator`: a horizontal shaft keeps its mounting angle, so that `zero` of the image
         is the mirrored one reversed."""
         is_level = self.mounting_angle is not None
-        frame = np.array(self.frame) * axes.MIRROR
+        frame = np.array(self.frame) * axes.MIRROR_SIGNS
         if is_level:
             frame = frame * [[1.0], [-1.0], [1.0]]
         limits = self.limits
@@ -345,16 +345,16 @@ class Fin(Actuator):
             center = float(axes.wrapped((math.pi if is_level else 0.0) - 0.5 * (low + high)))
             half_angle = 0.5 * (high - low)
             limits = replace(limits, zero_direction=(center - half_angle, center + half_angle))
-        return self.turned(frame, np.array(self.position) * axes.MIRROR, limits=limits)
+        return self.turned(frame, np.array(self.position) * axes.MIRROR_SIGNS, limits=limits)
 
     def settled(self, frame: Array) -> Array:
         """See `Actuator`: a fin that turns all round has zero as with a mounting angle, or, if its
         shaft is not horizontal, as near to ahead as the shaft allows."""
         low, high = self.limits.zero_direction
         if axes.is_full_turn(high - low):
-            is_level = abs(frame[0, 2]) < axes.SHORT
+            is_level = abs(frame[0, 2]) < axes.MIN_LENGTH
             if is_level:
                 frame[1] = np.cross(axes.UP, frame[0])
             else:
-                frame[1] = axes.across(frame[0], axes.AHEAD)
+                frame[1] = axes.perpendicular(frame[0], axes.FORWARD)
         return frame

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from finlab.actuators.fin.fin_model import MAX_AMPLITUDE, MAX_FREQUENCY
 from finlab.arrays import Array
 from finlab.axes import FILE_TURN_TOLERANCE, TURN
-from finlab.bundle_files import named_content
+from finlab.bundle_files import read_named_file
 from finlab.errors import DataError
 from finlab.files.csv_table import CsvTable
 
@@ -106,7 +106,7 @@ def table_text(
 def table_bytes(path: str | os.PathLike[str]) -> bytes:
     """Returns the contents of a table's file, which may lie in the zip archive of a bundle. Raises
     DataError: there is no such file, or it is too large."""
-    return named_content(path, MAX_BYTES, "a CSV table of fin forces")
+    return read_named_file(path, MAX_BYTES, "a CSV table of fin forces")
 
 
 def _read_rows(

@@ -23,7 +23,7 @@ from finlab.allocation.baselines.pseudo_inverse import (
 )
 from finlab.allocation.settings import number
 from finlab.arrays import Array
-from finlab.assets import install
+from finlab.assets import install_command
 from finlab.axes import TURN
 from finlab.errors import AllocationError
 
@@ -371,6 +371,6 @@ def import_casadi() -> Any:
         import casadi
     except ImportError as error:
         raise AllocationError(
-            f"method ipopt needs CasADi, which is not installed; run: {install('ipopt')}"
+            f"method ipopt needs CasADi, which is not installed; run: {install_command('ipopt')}"
         ) from error
     return casadi

@@ -150,7 +150,7 @@ class ModelBased(LeastErrorMethod):
         self.objective: Name = getattr(self.settings, "objective", "power")
         """What is kept least."""
         if self.objective == "effort":
-            self.layout.only("objective 'effort'")
+            self.layout.require_kind("objective 'effort'")
         self.asked_scale = USUAL_SHARE * self.scale
         """What wrenches (6,) are divided by: what a robot is mostly asked for."""
 

@@ -23,14 +23,23 @@ from finlab.errors import DataError
 from finlab.research.evaluation.document import Column, ReportBlock, ReportTable, Row
 
 EXPERIMENTS = (
-    *("wrench", "thrusters", "latency", "ablation", "temperature"),
-    *("trajectory", "faults", "velocity", "swims", "interaction"),
+    "wrench",
+    "thrusters",
+    "latency",
+    "ablation",
+    "temperature",
+    "trajectory",
+    "faults",
+    "velocity",
+    "swims",
+    "interaction",
 )
 """Names, those of their modules in `finlab.research.evaluation.experiments`, in the order of the
 report."""
-# largest whole number of an option, and of a seed
-MOST = 1_000_000
-MOST_SEED = 2**63 - 1
+MAX_NUMBER = 1_000_000
+"""Largest whole number of an option that is no seed."""
+MAX_SEED = 2**63 - 1
+"""Largest seed."""
 Item = TypeVar("Item")
 
 
@@ -39,12 +48,12 @@ class Experiment:
     """A question, what is run to answer it, and the columns of its rows."""
 
     name: str
-    """Of the verb and of the report's section."""
+    """Name of the verb and of the report's section."""
     question: str
     """One sentence, in Markdown, which is the help of the verb, too."""
     columns: tuple[Column, ...]
-    """Of the table. Rows may have more keys, which are in the JSON alone; intervals [low, high] are
-    under `<key>_interval`."""
+    """Columns of the table. Rows may have more keys, which are in the JSON alone; intervals
+    [low, high] are under `<key>_interval`."""
     run: Callable[..., Iterable[Row]]
     """From keyword options to rows of plain values. The options of the verb are its parameters:
     their types (int, float, bool, str, Literal, a tuple of str, int or float, each perhaps None),
@@ -65,37 +74,40 @@ class Experiment:
     """Options that give the picture its rows."""
 
     def options(self) -> dict[str, inspect.Parameter]:
-        """The parameters of `run`, with their types resolved."""
+        """Returns the parameters of `run` by name, with their types resolved."""
         types = get_type_hints(self.run, include_extras=True)
-        parameters = inspect.signature(self.run).parameters
-        return {name: each.replace(annotation=types[name]) for name, each in parameters.items()}
+        options = {}
+        for name, parameter in inspect.signature(self.run).parameters.items():
+            options[name] = parameter.replace(annotation=types[name])
+        return options
 
     def check(self, chosen: Mapping[str, Any]) -> dict[str, Any]:
-        """All options: those chosen, and the defaults of the others. Raises DataError: an unknown
-        option, or a number out of range."""
+        """Returns the values of all options: those chosen, and the defaults of the others.
+
+        Args:
+            chosen: values by option.
+
+        Raises:
+            DataError: an unknown option, or a number out of range.
+        """
         options = self.options()
-        if unknown := [name for name in chosen if name not in options]:
-            raise DataError(
-                f"{self.name}: expected options among {', '.join(options)}, got {unknown[0]!r}"
-            )
-        values = {name: chosen.get(name, each.default) for name, each in options.items()}
-        for name, value in values.items():
-            least = 0 if options[name].default == 0 else 1
-            most = MOST_SEED if name == "seed" else MOST
-            if type(value) is int and not least <= value <= most:
-                said = f"at least {least}" if value < least else f"at most {most}"
+        for name in chosen:
+            if name not in options:
                 raise DataError(
-                    f"{name.replace('_', '-')}: expected a number of {said}, got {value}"
+                    f"{self.name}: expected options among {', '.join(options)}, got {name!r}"
                 )
-            for number in value if isinstance(value, tuple) else (value,):
-                if isinstance(number, float) and not math.isfinite(number):
-                    raise DataError(
-                        f"{name.replace('_', '-')}: expected a finite number, got {number}"
-                    )
+        values = {}
+        for name, option in options.items():
+            values[name] = chosen.get(name, option.default)
+            _check_number(name, values[name], minimum=0 if option.default == 0 else 1)
         return values
 
     def command(self, options: Mapping[str, Any]) -> str:
-        """The line that prints the table: the verb with those options that are not the defaults."""
+        """Returns the command line that prints the table.
+
+        Args:
+            options: values by option; those that are the defaults are left out.
+        """
         words = ["finlab", "eval", self.name]
         for name, option in self.options().items():
             value = options.get(name, option.default)
@@ -110,70 +122,123 @@ class Experiment:
         return shlex.join(words)
 
     def each_row(self, **chosen: Any) -> Iterator[Row]:
-        """Run it, row by row; options as in `check`. A number that is not finite becomes None.
-        Raises DataError: as `check`, and options that the run itself refuses; AllocationError: an
-        unknown method."""
+        """Runs the experiment, row by row; a number that is not finite becomes None.
+
+        Args:
+            chosen: values by option.
+
+        Raises:
+            DataError: as for `check`, and options that the run itself refuses.
+            AllocationError: an unknown method.
+        """
         yield from map(_finite, self.run(**self.check(chosen)))
 
     def rows(self, **chosen: Any) -> list[Row]:
-        """All rows of `each_row`."""
+        """Returns all rows of `each_row`."""
         return list(self.each_row(**chosen))
 
     def table(self, rows: Sequence[Row]) -> ReportTable:
-        """The rows of the default method stand out; below them are those that the paper prints."""
-        ours = [
-            {**row, "_kind": "ours"} if str(row.get("method")) == "dual" else row for row in rows
-        ]
-        printed = [] if self.printed is None else self.printed(rows)
-        return ReportTable(self.columns, [*ours, *printed])
+        """Returns the table of rows; those of the default method stand out, and below are those
+        that the paper prints."""
+        table_rows = []
+        for row in rows:
+            is_ours = str(row.get("method")) == "dual"
+            table_rows.append({**row, "_kind": "ours"} if is_ours else row)
+        if self.printed is not None:
+            table_rows += self.printed(rows)
+        return ReportTable(self.columns, table_rows)
 
     def words(self) -> list[ReportBlock]:
-        """Blocks of heading and question, which stand before the results."""
+        """Returns heading and question as blocks, which stand before the results."""
         return [f"## {self.name.capitalize()}", self.question]
 
     def results(self, rows: Sequence[Row]) -> list[ReportBlock]:
-        """Blocks of the table of rows and of the note on how to read it."""
-        return [self.table(rows), f"*{self.note}*"] if self.note else [self.table(rows)]
+        """Returns the table of rows, and the note on how to read it, as blocks."""
+        blocks: list[ReportBlock] = [self.table(rows)]
+        if self.note:
+            blocks.append(f"*{self.note}*")
+        return blocks
+
+
+def _check_number(option: str, value: Any, minimum: int) -> None:
+    """Refuses whole numbers out of range, and numbers that are not finite, in tuples, too. Raises
+    DataError."""
+    flag = option.replace("_", "-")
+    if type(value) is int:
+        maximum = MAX_SEED if option == "seed" else MAX_NUMBER
+        if value < minimum:
+            raise DataError(f"{flag}: expected a number of at least {minimum}, got {value}")
+        if value > maximum:
+            raise DataError(f"{flag}: expected a number of at most {maximum}, got {value}")
+    for number in value if isinstance(value, tuple) else (value,):
+        if isinstance(number, float) and not math.isfinite(number):
+            raise DataError(f"{flag}: expected a finite number, got {number}")
 
 
 def check_names(option: str, names: Sequence[str], known: Collection[str]) -> None:
-    """Refuse unknown names before the work. Raises DataError: one of the names is not known."""
-    if unknown := [name for name in names if name not in known]:
-        raise DataError(f"{option}: expected some of {', '.join(known)}, got {unknown[0]!r:.60}")
+    """Refuses unknown names, before hours of work.
+
+    Args:
+        option: the option that holds the names, for the message.
+        names: what the user has written.
+        known: the names that there are.
+
+    Raises:
+        DataError: one of the names is not known.
+    """
+    for name in names:
+        if name not in known:
+            raise DataError(f"{option}: expected some of {', '.join(known)}, got {name!r:.60}")
 
 
 def progress(items: Iterable[Item], unit: str, title: str | None = None) -> Iterable[Item]:
-    """The items one by one, with a bar on stderr that is gone at the end; none where that is no
-    terminal."""
+    """Returns items one by one, with a progress bar on stderr that is gone at the end.
+
+    Args:
+        items: the items.
+        unit: what one of them is called.
+        title: words before the bar.
+    """
     # disable=None: a bar on a terminal, nothing elsewhere
     return tqdm(items, title, unit=unit, disable=None, leave=False, file=sys.stderr)
 
 
 def begin(words: str) -> None:
-    """Say on a terminal what has begun, until the first bar stands in its place."""
+    """Prints on a terminal what has begun, until the first progress bar takes its place."""
     if sys.stderr.isatty():
         print(f"{words} ...", end="\r", file=sys.stderr, flush=True)
 
 
 def _finite(value: Any) -> Any:
-    """Rows and lists without numbers that JSON does not know."""
+    """A row or a part of one, with None in place of numbers that JSON does not know."""
     if isinstance(value, dict):
-        return {key: _finite(each) for key, each in value.items()}
+        return {key: _finite(item) for key, item in value.items()}
     if isinstance(value, list):
-        return [_finite(each) for each in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+        return [_finite(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
 
 
 def item_type(kind: Any) -> tuple[Any, bool]:
-    """The type of an option, or of its items, without None; and whether its values are several."""
+    """Returns the type of one value of an option, without None, and whether the option is a list.
+
+    Args:
+        kind: annotation of the parameter.
+    """
     if NoneType in get_args(kind):
-        kind = next(part for part in get_args(kind) if part is not NoneType)
-    several = get_origin(kind) is tuple
-    return get_args(kind)[0] if several else kind, several
+        kind = next(member for member in get_args(kind) if member is not NoneType)
+    if get_origin(kind) is tuple:
+        return get_args(kind)[0], True
+    return kind, False
 
 
 def load_experiment(name: str) -> Experiment:
-    """The experiment of that name. Raises DataError: there is none."""
+    """Returns the experiment of a name.
+
+    Raises:
+        DataError: there is none.
+    """
     if name not in EXPERIMENTS:
         raise DataError(f"eval: expected one of {', '.join(EXPERIMENTS)}, got {name!r}")
     value = import_module(f"finlab.research.evaluation.experiments.{name}").experiment
@@ -183,7 +248,7 @@ def load_experiment(name: str) -> Experiment:
 
 @cache
 def paper_figures() -> Any:
-    """Figures that the paper prints, by table; the file names the source of each."""
+    """Returns the figures that the paper prints, by table; the file names the source of each."""
     import yaml
 
     figures = files("finlab.research.evaluation").joinpath("paper_figures.yaml")

@@ -31,30 +31,30 @@ from finlab.physics.objective import Name
 SLOW = ("ipopt",)
 """Methods that take a tenth of a second per target, each from several starts; they run on a
 subsample."""
-NEEDS = {"ipopt": "casadi"}
-"""Packages without which a method cannot run."""
+PACKAGE_OF_METHOD = {"ipopt": "casadi"}
+"""Method -> the package without which it cannot run."""
 PATIENCE_S = 60.0
 """Processor time [s] that a target may take where answers count and not times; starts and steps end
 every method long before."""
-KNOWN = ("targets", "layout", "sigma", "previous")
-"""Parameters that a function may have."""
-TOLERANCE = 1e-6
+FUNCTION_PARAMETERS = ("targets", "layout", "sigma", "previous")
+"""Parameters that a user's function may ask for."""
+LIMIT_TOLERANCE = 1e-6
 """By how much a command may leave its limits, as a share of what they span and of one of its
 unit."""
 
 
 def installed_methods(layout: Layout) -> list[str]:
-    """All methods of the library that can run here and take a robot."""
-    return [
-        name
-        for name in methods.METHODS
-        if can_run(name) and methods.method_class(name).fits(layout)
-    ]
+    """Returns the names of all methods of the library that can run here and take a robot."""
+    names = []
+    for name in methods.METHODS:
+        if can_run(name) and methods.method_class(name).fits(layout):
+            names.append(name)
+    return names
 
 
 def can_run(name: str) -> bool:
-    """Whether the package that a method needs is installed."""
-    return name not in NEEDS or find_spec(NEEDS[name]) is not None
+    """Returns whether the package that a method needs is installed."""
+    return name not in PACKAGE_OF_METHOD or find_spec(PACKAGE_OF_METHOD[name]) is not None
 
 
 @dataclass(frozen=True)
@@ -62,16 +62,27 @@ class MethodSpec:
     """A method, as the user has written it, with its settings and networks, for any robot."""
 
     name: str
+    """As the user has written it."""
     choice: methods.MethodChoice
+    """Its class, settings and networks."""
 
     def on(self, layout: Layout) -> Allocator:
-        """The allocator of the method for a robot. Raises AllocationError: the method does not take
-        it."""
+        """Returns the allocator of the method for a robot.
+
+        Raises:
+            AllocationError: the method does not take it.
+        """
         return Allocator.of_choice(layout, self.choice)
 
     def with_settings(self, **changes: Any) -> "MethodSpec":
-        """The same method with those of some settings changed that it knows. Raises
-        AllocationError: a value that it may not have."""
+        """Returns the same method with other settings.
+
+        Args:
+            changes: new values by setting; those that the method does not know are dropped.
+
+        Raises:
+            AllocationError: a value that a setting may not have.
+        """
         kind = self.choice.kind
         known = {name: value for name, value in changes.items() if name in kind.option_names()}
         settings = methods.checked_settings(kind, {**vars(self.choice.settings), **known})
@@ -85,9 +96,19 @@ def load_method_specs(
     *,
     patient: bool = False,
 ) -> dict[str, MethodSpec]:
-    """Methods by name, in the order of the names; arguments and errors as for `load_method_spec`.
-    Those that stop after a time get `PATIENCE_S` for each target where `patient`, so that the same
-    question has the same answer on a busy machine."""
+    """Returns methods by name, in the order of the names.
+
+    Args:
+        names: as for `load_method_spec`; a name that stands twice counts once.
+        checkpoint: as for `load_method_spec`.
+        objective: as for `load_method_spec`.
+        patient: whether methods that stop after a time get `PATIENCE_S` for each target, so that
+            the same question has the same answer on a busy machine.
+
+    Raises:
+        AllocationError: as for `load_method_spec`.
+        DataError: as for `load_method_spec`.
+    """
     specs = [load_method_spec(name, checkpoint, objective) for name in dict.fromkeys(names)]
     if patient:
         specs = [spec.with_settings(time_limit_s=PATIENCE_S) for spec in specs]
@@ -97,9 +118,17 @@ def load_method_specs(
 def load_method_spec(
     name: str, checkpoint: str | Path | None = None, objective: Name | None = None
 ) -> MethodSpec:
-    """The method of a name, or of `file.py:function` as this module says; learned ones with a
-    checkpoint as for `finlab.Allocator`, those that can choose with an objective, if there is one.
-    Raises AllocationError: unknown method; DataError: a function that is none."""
+    """Returns the method of a name.
+
+    Args:
+        name: a method of the library, or `file.py:function` or `module:function` of a user.
+        checkpoint: of learned methods, as for `finlab.Allocator`; others have none.
+        objective: of methods that can choose; None for their default.
+
+    Raises:
+        AllocationError: there is no such method.
+        DataError: there is no such function, or it has other parameters.
+    """
     if ":" in name:
         kind = own_method(name)
         return MethodSpec(kind.name, methods.MethodChoice(kind, kind.settings_class()))
@@ -110,77 +139,104 @@ def load_method_spec(
 
 
 def own_method(name: str) -> type[Method]:
-    """The method of a function, given as `module:function` or `file.py:function`. Raises DataError:
-    there is no such function, or one of its parameters is none of `KNOWN`."""
+    """Returns the method of a user's function.
+
+    Args:
+        name: `module:function` or `file.py:function`.
+
+    Raises:
+        DataError: there is no such function, or one of its parameters is none of
+            `FUNCTION_PARAMETERS`.
+    """
     function = own_function(name)
     try:
-        wanted = inspect.signature(function).parameters
+        parameters = inspect.signature(function).parameters
     except ValueError:
         raise DataError(f"{name}: its parameters are not known; wrap it in a function") from None
-    if unknown := [p.name for p in wanted.values() if p.default is p.empty and p.name not in KNOWN]:
-        raise DataError(f"{name}: expected parameters among {', '.join(KNOWN)}, got {unknown[0]!r}")
-    own = {
+    for parameter in parameters.values():
+        is_required = parameter.default is parameter.empty
+        if is_required and parameter.name not in FUNCTION_PARAMETERS:
+            raise DataError(
+                f"{name}: expected parameters among {', '.join(FUNCTION_PARAMETERS)}, got "
+                f"{parameter.name!r}"
+            )
+    attributes = {
         "name": name.rpartition("/")[2],
         "function": staticmethod(function),
-        "wanted": tuple(wanted),
+        "parameters": tuple(parameters),
     }
-    return type("OwnMethod", (_OwnMethod,), own)
+    return type("FunctionMethod", (_FunctionMethod,), attributes)
 
 
-class _OwnMethod(Method):
-    """A function as a method; the rest of a method's errors are its own."""
+class _FunctionMethod(Method):
+    """A user's function as a method; `own_method` makes a class of it for each function."""
 
     every_policy = False
     function: ClassVar[Callable[..., Any]]
-    wanted: ClassVar[tuple[str, ...]]
+    """The user's function, from targets to commands."""
+    parameters: ClassVar[tuple[str, ...]]
+    """Names of its parameters."""
 
     def solve(self, question: MethodQuestion) -> Solution:
-        """See `Method`. AllocationError: the function raised, or what it gave are no commands
-        within the limits."""
-        known = {
+        """Calls the function.
+
+        Raises:
+            AllocationError: the function raised, or what it returned are no commands within the
+                limits.
+        """
+        arguments = {
             "targets": question.targets,
             "layout": self.layout,
             "sigma": self.scale,
             "previous": question.previous,
         }
         try:
-            answer = self.function(**{key: known[key] for key in self.wanted if key in known})
-            command = np.asarray(answer, dtype=np.float64)
+            wanted = {key: value for key, value in arguments.items() if key in self.parameters}
+            command = np.asarray(self.function(**wanted), dtype=np.float64)
         except Exception as error:  # a stranger's function may fail in any way
-            words = f"{type(error).__name__}: {error}"
+            problem = f"{type(error).__name__}: {error}"
             raise AllocationError(
-                f"{self.name}: layout {self.layout.name!r:.60}: {words:.300}"
+                f"{self.name}: layout {self.layout.name!r:.60}: {problem:.300}"
             ) from error
         shape = (len(question.targets), self.layout.n, 3)
         if command.shape != shape or not np.isfinite(command).all():
             raise AllocationError(
                 f"{self.name}: expected finite commands of shape {shape}, got shape {command.shape}"
             )
-        within = self.plant.feasible(command)
-        away = np.abs(command - within)
-        away[..., 2] = np.where(self.plant.full_turn, 0.0, away[..., 2])  # these may be any angle
-        if (away > TOLERANCE * np.maximum(self.plant.width, 1.0)).any():
-            part = self.layout.names[int(away.max(axis=(0, 2)).argmax())]
+        feasible = self.plant.feasible(command)
+        excess = np.abs(command - feasible)
+        # An angle without limits may be given with any number of turns.
+        excess[..., 2] = np.where(self.plant.full_turn, 0.0, excess[..., 2])
+        if (excess > LIMIT_TOLERANCE * np.maximum(self.plant.width, 1.0)).any():
+            actuator = self.layout.names[int(excess.max(axis=(0, 2)).argmax())]
             raise AllocationError(
-                f"{self.name}: a command of {part!r:.60} is {away.max():.3g} out of its limits"
+                f"{self.name}: a command of {actuator!r:.60} is {excess.max():.3g} out of its "
+                "limits"
             )
-        return Solution(within)
+        return Solution(feasible)
 
 
 def own_function(name: str) -> Callable[..., Any]:
-    """Returns the function of `module:function` or `file.py:function`. Raises DataError: there is
-    none."""
-    place, _, attribute = name.rpartition(":")
+    """Returns a user's function.
+
+    Args:
+        name: `module:function` or `file.py:function`; modules are looked up in the current folder,
+            too.
+
+    Raises:
+        DataError: the file or module cannot be loaded, or has no such function.
+    """
+    module, _, attribute = name.rpartition(":")
     try:
-        if place.endswith(".py"):
-            sys.path.insert(0, str(Path(place).resolve().parent))
-            loaded = runpy.run_path(place).get(attribute)
+        if module.endswith(".py"):
+            sys.path.insert(0, str(Path(module).resolve().parent))
+            loaded = runpy.run_path(module).get(attribute)
         else:
             sys.path.insert(0, os.getcwd())
-            loaded = getattr(import_module(place), attribute, None)
+            loaded = getattr(import_module(module), attribute, None)
     except Exception as error:  # a stranger's file may fail in any way
-        raise DataError(f"{place}: cannot be loaded: {type(error).__name__}: {error}") from None
+        raise DataError(f"{module}: cannot be loaded: {type(error).__name__}: {error}") from None
     if not callable(loaded):
-        raise DataError(f"{place}: holds no function {attribute!r}")
+        raise DataError(f"{module}: holds no function {attribute!r}")
     function: Callable[..., Any] = loaded
     return function

@@ -19,14 +19,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MARKERS = "osD^v<>"
-"""Of the splits of one color."""
+"""Markers of the splits of one method, which has one color."""
 ERROR_MIN = 1e-12
 """Errors below this one are drawn there: a logarithmic axis has no 0."""
 
 
 def temperature_picture(rows: Sequence[Row]) -> Figure:
-    """Diversity of the candidates and the best J over the temperature (the paper's figure A,
-    left)."""
+    """Returns a figure of the candidates' diversity and best J over the temperature (the paper's
+    figure A, left), from the rows of experiment `temperature`."""
     rows = sorted(rows, key=lambda row: row["temperature"])
     figure, left = _axes("Candidates of the mixture over the temperature of the draw")
     right = left.twinx()
@@ -63,29 +63,33 @@ def temperature_picture(rows: Sequence[Row]) -> Figure:
 
 
 def candidates_picture(rows: Sequence[Row]) -> Figure:
-    """Effort over error of raw and refined candidates (the paper's figure A, right).
+    """Returns a figure of effort over error, of raw and refined candidates (the paper's figure A,
+    right).
 
     Args:
-        rows: of the experiment; "points" of one is a list with an entry for each robot, which has
-            under "raw" and "refined" a list (S, 2) of candidates, the best first: normalized error
-            and effort of each.
+        rows: of experiment `ablation`; "points" of one is a list with an entry for each robot,
+            which has under "raw" and "refined" a list (S, 2) of candidates, the best first:
+            normalized error and effort of each.
 
     Raises:
         DataError: no row has any.
     """
     figure, axes = _axes("Candidates before and after their refinement")
-    marks = {"raw": (COLORS[0], 7, 0.35), "refined": (COLORS[1], 22, 0.9)}
-    points = [each for row in rows for each in row.get("points", ())]
-    if not points:
+    robots: list[dict[str, Any]] = []
+    for row in rows:
+        robots.extend(row.get("points", ()))
+    if not robots:
         raise DataError("plot: no candidates to draw; take variant ours")
-    for name, (color, size, alpha) in marks.items():
-        error, effort = np.concatenate([each[name] for each in points]).T
-        about: dict[str, Any] = {"s": size, "color": color, "alpha": alpha, "linewidths": 0}
-        axes.scatter(
-            np.maximum(error, ERROR_MIN), effort, label=f"{name} ({len(error):,})", **about
-        )
-    for k, each in enumerate(points):
-        error, effort = np.transpose([each["raw"][0], each["refined"][0]])
+    styles: dict[str, dict[str, Any]] = {
+        "raw": {"color": COLORS[0], "s": 7, "alpha": 0.35},
+        "refined": {"color": COLORS[1], "s": 22, "alpha": 0.9},
+    }
+    for name, style in styles.items():
+        error, effort = np.concatenate([candidates[name] for candidates in robots]).T
+        style["label"] = f"{name} ({len(error):,})"
+        axes.scatter(np.maximum(error, ERROR_MIN), effort, linewidths=0, **style)
+    for k, candidates in enumerate(robots):
+        error, effort = np.transpose([candidates["raw"][0], candidates["refined"][0]])
         label = None if k else "from the best raw one to the best refined one"
         axes.plot(
             np.maximum(error, ERROR_MIN), effort, color="0.5", linewidth=0.7, label=label, zorder=1
@@ -96,22 +100,37 @@ def candidates_picture(rows: Sequence[Row]) -> Figure:
 
 
 def fins_picture(rows: Sequence[Row]) -> Figure:
-    """Error by number of fins, of each split and method (the paper's figure B): median, and the
-    range from the 5th to the 95th percentile."""
+    """Returns a figure of the error by number of fins, for each split and method (the paper's
+    figure B): median, and the range from the 5th to the 95th percentile. From the rows of
+    experiment `wrench`."""
     rows = [row for row in rows if row.get("fins") is not None]
     figure, axes = _axes("Wrench error by number of fins")
-    series = sorted({(row["split"], row["method"]) for row in rows}, key=lambda pair: pair[::-1])
-    splits, methods = (list(dict.fromkeys(row[key] for row in rows)) for key in ("split", "method"))
+    series = sorted({(row["method"], row["split"]) for row in rows})
+    splits = list(dict.fromkeys(row["split"] for row in rows))
+    methods = list(dict.fromkeys(row["method"] for row in rows))
     counts = sorted({row["fins"] for row in rows})
-    for k, pair in enumerate(series):
-        some = [row for row in rows if (row["split"], row["method"]) == pair]
-        place = [counts.index(row["fins"]) + 0.7 * ((k + 0.5) / len(series) - 0.5) for row in some]
-        keys = "err_norm_p05", "err_norm_median", "err_norm_p95"
-        low, middle, high = np.maximum([[row[key] for key in keys] for row in some], ERROR_MIN).T
-        color = COLORS[methods.index(pair[1]) % len(COLORS)]
-        bars: dict[str, Any] = {"yerr": [middle - low, high - middle], "color": color, "capsize": 3}
-        bars["fmt"] = MARKERS[splits.index(pair[0]) % len(MARKERS)]
-        axes.errorbar(place, middle, label=f"{pair[1]}, {pair[0]}", markersize=5, **bars)
+    for k, (method, split) in enumerate(series):
+        # Series stand side by side within 0.7 of the width that a number of fins has.
+        shift = 0.7 * ((k + 0.5) / len(series) - 0.5)
+        x = []
+        percentiles = []
+        for row in rows:
+            if (row["method"], row["split"]) == (method, split):
+                x.append(counts.index(row["fins"]) + shift)
+                percentiles.append(
+                    (row["err_norm_p05"], row["err_norm_median"], row["err_norm_p95"])
+                )
+        low, median, high = np.maximum(percentiles, ERROR_MIN).T
+        axes.errorbar(
+            x,
+            median,
+            yerr=[median - low, high - median],
+            fmt=MARKERS[splits.index(split) % len(MARKERS)],
+            color=COLORS[methods.index(method) % len(COLORS)],
+            markersize=5,
+            capsize=3,
+            label=f"{method}, {split}",
+        )
     axes.set_xticks(range(len(counts)), [str(count) for count in counts])
     axes.set(yscale="log", xlabel="number of fins", ylabel="err_norm: median, 5 to 95 %")
     axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
@@ -119,7 +138,7 @@ def fins_picture(rows: Sequence[Row]) -> Figure:
 
 
 def _axes(title: str) -> tuple[Figure, Axes]:
-    """A figure of one panel."""
+    """A figure of one panel with a title, and its axes."""
     figure, axes = panels((7.0, 4.4))
     axes[0, 0].set_title(title)
     return figure, axes[0, 0]

@@ -23,12 +23,13 @@ from finlab.research.evaluation.experiment import (
 )
 from finlab.whole_file import make_folder, write_whole
 
-# what a report's folder holds
-PAGE = "report.md"
-TABLES = "tables.json"
-# of a report, unless another one is given; kept apart from those on which methods were developed
+PAGE_FILE = "report.md"
+"""The page in a report's folder."""
+ROWS_FILE = "tables.json"
+"""The rows of all experiments in a report's folder."""
 SEED = 6143
-ABOUT = (
+"""Default seed of a report; methods were developed on others."""
+INTRODUCTION = (
     "Every answer is scored by the plant: the fins' own laws or tables. All methods but `paper`, "
     "which has learned one fin law from samples, were given these, so errors show how well "
     "methods solve, not how well a model fits a fin in the water. No robot swam and no fin was "
@@ -41,10 +42,23 @@ Size = Literal["quick", "full"]
 def make_report(
     out: Path, *, size: Size = "full", seed: int = SEED, names: Sequence[str] = ("all",)
 ) -> Path:
-    """Make the report. Page and rows are written after each experiment, so that they are there if
-    it is stopped; each runs on one thread, so that times are of one core. Returns the page in the
-    folder `out`, which is made if need be. Raises DataError: an unknown name of an experiment, or a
-    file that cannot be written."""
+    """Runs experiments, and writes a page and all rows.
+
+    Both are written after each experiment, so that they are there if it is stopped. Each experiment
+    runs on one thread, so that times are of one core.
+
+    Args:
+        out: folder of the report, which is made if need be.
+        size: whether experiments have their options of the quick or of the full report.
+        seed: of the experiments that have one.
+        names: names of experiments, or `all`.
+
+    Returns:
+        Path of the page.
+
+    Raises:
+        DataError: an unknown name of an experiment, or a file that cannot be written.
+    """
     check_names("sections", names, ("all", *EXPERIMENTS))
     make_folder(out)
     chosen = [name for name in EXPERIMENTS if "all" in names or name in names]
@@ -52,28 +66,34 @@ def make_report(
     rows = dict[str, list[Row]]()
     blocks = list[ReportBlock]()
     commit = _commit()
-    command = f"finlab eval report -o {out}" + (" --quick" if size == "quick" else "")
-    command += "" if "all" in names else f" --sections {','.join(chosen)}"
-    command += f" --seed {seed}" if seed != SEED else ""
+    command = f"finlab eval report -o {out}"
+    if size == "quick":
+        command += " --quick"
+    if "all" not in names:
+        command += f" --sections {','.join(chosen)}"
+    if seed != SEED:
+        command += f" --seed {seed}"
     note = "" if size == "full" else " A quick look on few cases: intervals are wide."
     head = [
         "# finlab evaluation",
         f"Allocation methods and simulated swims, side by side.{note}",
-        ABOUT,
+        INTRODUCTION,
     ]
     for name in progress(chosen, "experiment", "report"):
         experiment = load_experiment(name)
         options = dict(experiment.quick if size == "quick" else experiment.full)
-        options |= {"seed": seed} if "seed" in experiment.options() else {}
+        if "seed" in experiment.options():
+            options["seed"] = seed
         with threadpool_limits(1):
             rows[name] = experiment.rows(**options)
         blocks += [*experiment.words(), *experiment.results(rows[name])]
         blocks.append(f"Made by `{experiment.command(options)}` at {commit}.")
         minutes = (time.process_time() - start) / 60.0
-        made = f"Command `{command}` at {commit}, {minutes:.0f} minutes of one core"
-        write_whole(out / PAGE, to_markdown(*head, *blocks, *_end(made)), DataError)
-        write_whole(out / TABLES, json.dumps(rows, indent=1) + "\n", DataError)
-    return out / PAGE
+        origin = f"Command `{command}` at {commit}, {minutes:.0f} minutes of one core"
+        page = to_markdown(*head, *blocks, *_origin_blocks(origin))
+        write_whole(out / PAGE_FILE, page, DataError)
+        write_whole(out / ROWS_FILE, json.dumps(rows, indent=1) + "\n", DataError)
+    return out / PAGE_FILE
 
 
 def _commit() -> str:
@@ -89,12 +109,13 @@ def _commit() -> str:
     return version if described.returncode else f"commit {described.stdout.strip()}"
 
 
-def _end(made: str) -> list[str]:
-    versions = {"finlab": finlab, "numpy": np, "scipy": scipy}
+def _origin_blocks(origin: str) -> list[str]:
+    """The last section of the page: the command and commit that made it, machine and versions."""
+    modules = {"finlab": finlab, "numpy": np, "scipy": scipy}
+    versions = ", ".join(f"{name} {module.__version__}" for name, module in modules.items())
     lines = [
-        made,
-        f"On {platform.machine()}, python {platform.python_version()}, "
-        + ", ".join(f"{name} {module.__version__}" for name, module in versions.items()),
+        origin,
+        f"On {platform.machine()}, python {platform.python_version()}, {versions}",
         "Printed figures are those of Y. Hamamatsu, M. Kruusmaa, A. Ristolainen, "
         "Layout-independent actuation allocator for fin-actuated marine robots",
     ]

@@ -21,19 +21,27 @@ from finlab.research.evaluation.splits import SplitCase
 from finlab.research.networks.checkpoint import read_normalization, resolve_checkpoint
 
 Columns = dict[str, AnyArray]
-"""Arrays of N entries by name."""
-LEVEL = 0.994426
+"""Scores of N answers: name of a column -> array (N,)."""
+CONFIDENCE_LEVEL = 0.994426
 """Share of a normal variable within sqrt(2) times 1.96 standard deviations."""
-REPLICATES = 2000
+BOOTSTRAP_SAMPLES = 2000
+"""How often the bootstrap draws all layouts again."""
 Interval = tuple[float, float]
-"""Its low and its high end."""
+"""Low and high end of a confidence interval."""
 
 
 def run_method(
     method: MethodSpec, case: SplitCase, *, number: int = 0, seed: int = 0, first: int | None = None
 ) -> Columns:
-    """The columns of `score` of a method's answers to a case, whose targets, or only the first so
-    many, are solved together; `number` is that of the layout in its split."""
+    """Returns the scores of a method's answers to a test case, whose targets are solved together.
+
+    Args:
+        method: the method.
+        case: a layout with its targets.
+        number: number of the layout in its split.
+        seed: of the method's random starts.
+        first: how many of the targets are solved, from the first on; None for all.
+    """
     targets = case.targets[:first]
     answer = method.on(case.layout).allocate_batch(targets, lost=case.lost, seed=seed)
     return score(case, targets, answer.command, answer.solve_ms, number=number)
@@ -42,10 +50,20 @@ def run_method(
 def score(
     case: SplitCase, targets: Array, command: Array, solve_ms: Array, *, number: int = 0
 ) -> Columns:
-    """Scores of answers (N, n, 3), which took `solve_ms` (N,), to targets (N, 6) of a case, whose
-    wrench the plant computes: arrays (N,) `layout`, its number in its split; `fins`, how many it
-    has; `err_norm`, the norm of what is missing over `sigma_of`, without axes that are free;
-    `err_phys`, the same in N and N m; `effort`, the paper's J_en; `power` [W]; `solve_ms`."""
+    """Returns the scores of answers to a test case, whose wrenches the plant computes.
+
+    Args:
+        case: the layout, and what its errors are divided by.
+        targets: desired wrenches (N, 6) [N, N m].
+        command: the answers (N, n, 3).
+        solve_ms: how long each took (N,) [ms].
+        number: number of the layout in its split.
+
+    Returns:
+        Arrays (N,): `layout`, that number; `fins`, how many actuators work; `err_norm`, norm of the
+        missing wrench over `sigma_of`, without axes that are free; `err_phys`, the same in N and
+        N m; `effort`, the paper's J_en; `power` [W]; `solve_ms` [ms].
+    """
     plant = plant_of(case.layout)
     missing = (plant.wrench(command) - targets) * case.layout.commanded
     return {
@@ -60,56 +78,74 @@ def score(
 
 
 def sigma_of(case: SplitCase) -> Array:
-    """What the errors of a case are divided by (6,) [N, N m]: its own standard deviation of
+    """Returns what the errors of a case are divided by (6,) [N, N m]: its own standard deviation of
     wrenches, or that of the paper's data set."""
     return paper_sigma() if case.sigma is None else case.sigma
 
 
 @lru_cache
 def paper_sigma() -> Array:
-    """Per-axis standard deviation (6,) [N, N m] of the wrenches of the paper's data set."""
+    """Returns the standard deviation (6,) [N, N m] of the wrenches of the paper's data set."""
     return read_normalization(resolve_checkpoint("default")).std
 
 
 def joined(parts: Sequence[Columns]) -> Columns:
-    """Columns of parts one after the other: arrays (N_1 + N_2 + ...,) by name."""
+    """Returns the scores of several parts, one after the other: arrays (N_1 + N_2 + ...,)."""
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
 def mean_interval(values: Array, group: NDArray[np.int64]) -> Interval:
-    """Of the mean of values (N,), whose layouts are numbered in group (N,)."""
+    """Returns the confidence interval of a mean.
+
+    Args:
+        values: values (N,).
+        group: number of the layout of each (N,).
+    """
     return ratio_interval(values, np.ones(len(values)), group)
 
 
 def ratio_interval(numerator: Array, denominator: Array, group: NDArray[np.int64]) -> Interval:
-    """Of the sum of numerators over the sum of denominators, each (N,); a lone layout is split into
-    its entries."""
-    layouts, member = np.unique(group, return_inverse=True)
-    member = member if len(layouts) > 1 else np.arange(len(group))
-    sums = [np.bincount(member, values) for values in (numerator, denominator)]
+    """Returns the confidence interval of a sum over another one.
+
+    Args:
+        numerator: terms (N,) of the one sum.
+        denominator: terms (N,) of the other.
+        group: number of the layout of each (N,). A lone layout is split into its entries.
+    """
+    layouts, group_index = np.unique(group, return_inverse=True)
+    if len(layouts) <= 1:
+        group_index = np.arange(len(group))
+    sums = [np.bincount(group_index, values) for values in (numerator, denominator)]
     if len(sums[0]) < 2:
         lone = float(numerator.sum() / denominator.sum()) if len(group) else float("nan")
         return lone, lone
 
-    def ratio(above: Array, below: Array, axis: int) -> Array:
-        return np.asarray(above.sum(axis) / below.sum(axis))
+    def ratio(numerators: Array, denominators: Array, axis: int) -> Array:
+        return np.asarray(numerators.sum(axis) / denominators.sum(axis))
 
-    drawn = bootstrap(
+    result = bootstrap(
         sums,
         ratio,
         paired=True,
-        n_resamples=REPLICATES,
-        confidence_level=LEVEL,
+        n_resamples=BOOTSTRAP_SAMPLES,
+        confidence_level=CONFIDENCE_LEVEL,
         method="percentile",
         rng=0,
     )
-    low, high = drawn.confidence_interval
+    low, high = result.confidence_interval
     return float(low), float(high)
 
 
 def share_interval(holds: NDArray[np.bool_], group: NDArray[np.int64]) -> Interval:
-    """Of the share of entries (N,) that hold; never narrower than Wilson's interval for N separate
-    draws, since a run without a single failure does not show that there are none."""
+    """Returns the confidence interval of the share of entries for which something holds.
+
+    It is never narrower than Wilson's interval for N separate draws: a run without a single failure
+    does not show that there are none.
+
+    Args:
+        holds: whether it holds, for each entry (N,).
+        group: number of the layout of each (N,).
+    """
     low, high = mean_interval(holds.astype(np.float64), group)
-    apart = binomtest(int(holds.sum()), len(holds)).proportion_ci(LEVEL, "wilson")
-    return min(low, float(apart.low)), max(high, float(apart.high))
+    wilson = binomtest(int(holds.sum()), len(holds)).proportion_ci(CONFIDENCE_LEVEL, "wilson")
+    return min(low, float(wilson.low)), max(high, float(wilson.high))

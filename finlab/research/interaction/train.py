@@ -19,9 +19,9 @@ from finlab.fit.interaction.constants import parts_of_error
 from finlab.fit.interaction.samples import Samples, left_by_laws
 from finlab.interaction.interaction import JetGeometry
 from finlab.interaction.learned import LAYERS, MEMBERS, LearnedInteraction
-from finlab.interaction.messages import FORMS, Pairs, hull_rows, unpacked
+from finlab.interaction.messages import ROW_SIZES, JetPairs, pack_hull_rows, unpack_rows
 from finlab.layout.jet_geometry import jet_geometry_of
-from finlab.research.networks.trained import State
+from finlab.research.networks.trained import ArraysByName
 from finlab.research.training.device import workplace
 from finlab.research.training.loop import LoopSettings, Training, seeded_generator
 from finlab.whole_file import write_whole
@@ -79,7 +79,7 @@ class InteractionSamples(NamedTuple):
 def data_set(samples: Sequence[Samples]) -> InteractionSamples:
     """Returns samples as they are learned from. Raises DataError: there are fewer than ten robots,
     or none with a jet."""
-    parts: dict[str, list[tuple[AnyArray, AnyArray, AnyArray]]] = {name: [] for name in FORMS}
+    parts: dict[str, list[tuple[AnyArray, AnyArray, AnyArray]]] = {name: [] for name in ROW_SIZES}
     residuals = []
     sizes = []
     robots = []
@@ -114,15 +114,15 @@ def messages_of(
 ) -> dict[str, tuple[AnyArray, AnyArray, AnyArray]]:
     """Returns for `pair` and `hull` the features (R, m), the vectors as wrenches over the scale (R,
     k, 6), and how many rows each of forces (K, n, 3) [N] has (K,)."""
-    pairs = Pairs(geometry)
+    pairs = JetPairs(geometry)
     lever = LearnedInteraction({}, 1.0, geometry).lever / scale
     source = force[:, pairs.source]
     receiver = force[:, pairs.receiver]
     rows = {"pair": (pairs.rows(source, receiver), lever[pairs.receiver])}
-    rows["hull"] = hull_rows(geometry, force), lever * float(geometry.hull[1].all())
+    rows["hull"] = pack_hull_rows(geometry, force), lever * float(geometry.hull[1].all())
     result = {}
     for name, (packed, arms) in rows.items():
-        features, vectors = unpacked(name, packed)
+        features, vectors = unpack_rows(name, packed)
         wrenches = np.einsum("kpvb,pbw->kpvw", vectors, arms)
         counts = np.abs(wrenches).max(axis=(2, 3), initial=0.0) > MESSAGE_MIN
         result[name] = (
@@ -159,7 +159,7 @@ def train(
             total = total + (error**2).mean()
         return {"loss": total / MEMBERS}
 
-    def save(shipped: State, made: dict[str, Any]) -> None:
+    def save(shipped: ArraysByName, made: dict[str, Any]) -> None:
         write_network(folder / WEIGHTS_FILE, shipped, 1.0)
 
     with workplace("cpu", settings.batch_size) as place:
@@ -183,7 +183,7 @@ def predicted(
 ) -> Tensor:
     """What one network says that the laws leave of the wrenches of some samples (B, 6)."""
     result = torch.zeros((len(samples), 6))
-    for name in FORMS:
+    for name in ROW_SIZES:
         features, vectors, owner = data.rows[name].of(samples)
         for layer in range(LAYERS):
             features = (
@@ -199,7 +199,7 @@ def first_weights(seed: int) -> dict[str, Tensor]:
     """Weights to begin with."""
     draw = seeded_generator(seed, 1 << 40, torch.device("cpu"))
     weights = {}
-    for name, form in FORMS.items():
+    for name, form in ROW_SIZES.items():
         sizes = (form.features, *(WIDTH,) * (LAYERS - 1), form.vectors)
         for layer, (into, out) in enumerate(zip(sizes[:-1], sizes[1:], strict=True)):
             scale = (0.1 if layer + 1 == LAYERS else 1.0) / into**0.5
@@ -210,7 +210,7 @@ def first_weights(seed: int) -> dict[str, Tensor]:
     return weights
 
 
-def write_network(path: Path, weights: State, trust: float) -> None:
+def write_network(path: Path, weights: ArraysByName, trust: float) -> None:
     """Writes the file of a learned interaction; a `DataError` where it cannot be written."""
     from safetensors.numpy import save
 

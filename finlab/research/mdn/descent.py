@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from finlab.arrays import AnyArray, Array, solve
+from finlab.arrays import AnyArray, Array, solve_or_nan
 from finlab.axes import wrapped
 from finlab.research.mdn import effort_fins
 
@@ -90,7 +90,7 @@ def descend(
         residual = target - wrench(problem, shift)
         BMB = np.concatenate([a, b.real, b.imag], axis=1) @ problem.products
         BMB[:, ::7] += effort_fins.LEAST  # the diagonal
-        multiplier = solve(BMB.reshape(-1, 6, 6), residual[..., None])[..., 0]
+        multiplier = solve_or_nan(BMB.reshape(-1, 6, 6), residual[..., None])[..., 0]
         p = (multiplier @ problem.effectiveness.T).view(complex)  # B^T l
         y = shift + a * p + b * p.conj()
         if step >= FULL_STEPS:

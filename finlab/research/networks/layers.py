@@ -25,7 +25,16 @@ LEAK = 0.2
 
 
 def linear(w: Weights, name: str, x: Values) -> Values:
-    """Features (..., out) of features (..., in); a layer without a bias has none to add."""
+    """Returns the outputs of a linear layer, x W^T + b.
+
+    Args:
+        w: weights of the network.
+        name: of the layer; without a bias among the weights, none is added.
+        x: features (..., in).
+
+    Returns:
+        Features (..., out).
+    """
     xp = library_of(x)
     weight = w[f"{name}.weight"]
     bias = w.get(f"{name}.bias")
@@ -37,7 +46,16 @@ def linear(w: Weights, name: str, x: Values) -> Values:
 
 
 def layer_norm(w: Weights, name: str, x: Values) -> Values:
-    """Layer normalization of features (..., width), with scale and shift."""
+    """Returns normalized features, with scale and shift (Ba, Kiros, Hinton, 2016).
+
+    Args:
+        w: weights of the network.
+        name: of the layer.
+        x: features (..., width).
+
+    Returns:
+        Features (..., width).
+    """
     weight = w[f"{name}.weight"]
     bias = w[f"{name}.bias"]
     xp = library_of(x)
@@ -53,28 +71,52 @@ def layer_norm(w: Weights, name: str, x: Values) -> Values:
 
 
 def feed_forward(w: Weights, up: str, down: str, x: Values) -> Values:
-    """Two linear layers with a rectifier between them: features (..., width) of the same."""
+    """Returns the outputs of two linear layers with a rectifier between them.
+
+    Args:
+        w: weights of the network.
+        up: name of the first layer.
+        down: name of the second layer.
+        x: features (..., width).
+
+    Returns:
+        Features (..., width).
+    """
     hidden = linear(w, up, x)
-    return linear(w, down, np.maximum(hidden, 0) if library_of(x) is np else hidden.relu())
+    rectified = np.maximum(hidden, 0) if library_of(x) is np else hidden.relu()
+    return linear(w, down, rectified)
 
 
 def graph_attention(
     w: Weights, name: str, x: Values, pairs: Values | None = None, mask: Values | None = None
 ) -> Values:
-    """A GATv2 layer (Brody, Alon, Yahav, ICLR 2022) on complete graphs with self loops: features
-    (B, n, width) of the same; heads are concatenated. Features of pairs (B, n, n, F), where there
-    are any, count in what is scored, and what is scored is then the message, too. No node listens
-    to one where `mask` (B, n) is False."""
+    """Returns the outputs of a GATv2 layer (Brody, Alon, Yahav, ICLR 2022) on complete graphs with
+    self loops; heads are concatenated.
+
+    Args:
+        w: weights of the network.
+        name: of the layer.
+        x: features (B, n, width) of the nodes.
+        pairs: features (B, n, n, F) of pairs, target before source, which count in the scores; what
+            is scored is then the message, too. None for none.
+        mask: False for nodes (B, n) from which none receives a message; None for all.
+
+    Returns:
+        Features (B, n, width).
+    """
     xp = library_of(x)
     vectors = w[f"{name}.attention"]
-    source, target = (linear(w, f"{name}.{part}", x) for part in ("source", "target"))
-    seen = source[:, None] if pairs is None else linear(w, f"{name}.pair", pairs) + source[:, None]
-    hidden = leaky_relu(seen + target[:, :, None])  # (B, n, n, width)
+    source = linear(w, f"{name}.source", x)
+    target = linear(w, f"{name}.target", x)
+    sent = source[:, None]
+    if pairs is not None:
+        sent = linear(w, f"{name}.pair", pairs) + sent
+    hidden = leaky_relu(sent + target[:, :, None])  # (B, n, n, width)
     hidden = hidden.reshape(*hidden.shape[:-1], *vectors.shape)
     score = xp.einsum("...hc,hc->...h", hidden, vectors)
-    weight = softmax(
-        score if mask is None else xp.where(mask[:, None, :, None], score, -math.inf), 2
-    )
+    if mask is not None:
+        score = xp.where(mask[:, None, :, None], score, -math.inf)
+    weight = softmax(score, 2)
     if pairs is not None:
         return xp.einsum("bijh,bijhc->bihc", weight, hidden).reshape(x.shape)
     message = source.reshape(*source.shape[:2], *vectors.shape)
@@ -84,33 +126,53 @@ def graph_attention(
 def self_attention(
     w: Weights, name: str, heads: int, x: Values, mask: Values | None = None
 ) -> Values:
-    """Scaled dot-product attention of a Transformer (Vaswani et al., 2017): features (B, n, width)
-    of the same; `mask` as in `graph_attention`."""
+    """Returns the outputs of scaled dot-product attention (Vaswani et al., 2017).
+
+    Args:
+        w: weights of the network.
+        name: of the layer.
+        heads: number of heads.
+        x: features (B, n, width).
+        mask: as for `graph_attention`.
+
+    Returns:
+        Features (B, n, width).
+    """
     width = x.shape[-1]
     packed = {"in.weight": w[f"{name}.in_proj_weight"], "in.bias": w[f"{name}.in_proj_bias"]}
-    qkv = linear(packed, "in", x)
-    parts = (qkv[..., k * width : (k + 1) * width] for k in range(3))
-    q, k, v = (part.reshape(*x.shape[:2], heads, -1).swapaxes(1, 2) for part in parts)
+    qkv = linear(packed, "in", x)  # (B, n, 3 width)
+
+    def by_head(first: int) -> Values:
+        """Features (B, heads, n, width / heads) of `width` columns."""
+        columns = qkv[..., first : first + width]
+        return columns.reshape(*x.shape[:2], heads, -1).swapaxes(1, 2)
+
+    q = by_head(0)
+    k = by_head(width)
+    v = by_head(2 * width)
     score = (q @ k.swapaxes(2, 3)) * (width // heads) ** -0.5
     if mask is not None:
         score = library_of(score).where(mask[:, None, None], score, -math.inf)
-    return linear(w, f"{name}.out_proj", (softmax(score) @ v).swapaxes(1, 2).reshape(x.shape))
+    attended = (softmax(score) @ v).swapaxes(1, 2).reshape(x.shape)
+    return linear(w, f"{name}.out_proj", attended)
 
 
 def leaky_relu(x: Values) -> Values:
-    """x above zero, `LEAK` times x below."""
+    """Returns x above zero, `LEAK` times x below, of any shape."""
     xp = library_of(x)
     return np.maximum(x, LEAK * x) if xp is np else xp.nn.functional.leaky_relu(x, LEAK)
 
 
 def elu(x: Values) -> Values:
-    """x above zero, exp(x) - 1 below."""
+    """Returns x above zero, exp(x) - 1 below, of any shape."""
     xp = library_of(x)
-    return np.maximum(x, 0) + np.expm1(np.minimum(x, 0)) if xp is np else xp.nn.functional.elu(x)
+    if xp is not np:
+        return xp.nn.functional.elu(x)
+    return np.maximum(x, 0) + np.expm1(np.minimum(x, 0))
 
 
 def softmax(x: Values, axis: int = -1) -> Values:
-    """exp(x) over its sum along an axis."""
+    """Returns exp(x) over its sum along an axis."""
     if library_of(x) is not np:
         return x.softmax(axis)
     y = np.exp(x - np.maximum.reduce(x, axis=axis, keepdims=True))
@@ -119,28 +181,34 @@ def softmax(x: Values, axis: int = -1) -> Values:
 
 
 def log_sum_exp(x: Values, axis: int = -1) -> Values:
-    """log(sum(exp(x))) along an axis."""
+    """Returns log(sum(exp(x))) along an axis."""
     return np.logaddexp.reduce(x, axis=axis) if library_of(x) is np else x.logsumexp(axis)
 
 
 def log_softmax(x: Values) -> Values:
-    """Logarithm of the softmax along the last axis."""
+    """Returns the logarithm of the softmax along the last axis."""
     return x - log_sum_exp(x)[..., None]
 
 
 def take(x: Values, index: Values, axis: int) -> Values:
-    """Entries of x along an axis, as numpy's `take_along_axis`."""
+    """Returns entries along an axis, as numpy's `take_along_axis`.
+
+    Args:
+        x: values (...).
+        index: which entries, with as many axes as x.
+        axis: the axis along which they are taken.
+    """
     xp = library_of(x)
     return np.take_along_axis(x, index, axis) if xp is np else xp.take_along_dim(x, index, axis)
 
 
 def single_precision(weights: Mapping[str, Any]) -> dict[str, Any]:
-    """The weights of a network as numpy arrays in single precision."""
+    """Returns the weights of a network as numpy arrays in single precision."""
     return {name: np.asarray(value, dtype=np.float32) for name, value in weights.items()}
 
 
 def single_threaded_products() -> Callable[[], AbstractContextManager[object]]:
-    """A context in which numpy's products run on one thread.
+    """Returns a function that makes a context in which numpy's products run on one thread.
 
     Where threadpoolctl is missing, as on a robot that carries only the runtime, the context does
     nothing; there OPENBLAS_NUM_THREADS=1 in the environment has the same effect.

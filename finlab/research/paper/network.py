@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 from finlab.arrays import Values, library_of
-from finlab.layout.graph_file import POSITION_SCALE, SCALES
+from finlab.layout.graph_file import COMMAND_SCALES, POSITION_SCALE
 from finlab.research.networks import layers
 from finlab.research.networks.layers import Weights
 from finlab.research.networks.trained import Shapes, check_sizes, linear_shapes, norm_shapes
@@ -32,7 +32,7 @@ def raw_features(position: Values, mounting_angle: Values, lower: Values, upper:
     """
     xp = library_of(position)
     limits = []
-    for i, scale in enumerate(SCALES):
+    for i, scale in enumerate(COMMAND_SCALES):
         limits.append(lower[..., i] / scale)
         limits.append(upper[..., i] / scale)
     angle = mounting_angle[..., None] / math.pi

@@ -24,9 +24,9 @@ from tqdm import tqdm
 
 from finlab.display.figures import figure_bytes, panels
 from finlab.errors import DataError
-from finlab.research.networks.trained import Shapes, State
+from finlab.research.networks.trained import ArraysByName, Shapes
 from finlab.research.training.device import Workplace
-from finlab.whole_file import make_folder, sweep_parts, write_whole
+from finlab.whole_file import make_folder, remove_temporary_files, write_whole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -136,10 +136,10 @@ class Training:
         """Steps, and the time that they took, with all that went before them."""
         self.rows = list[dict[str, float]]()
         if place.rank == 0:
-            sweep_parts(folder)
+            remove_temporary_files(folder)
 
     @property
-    def shipped(self) -> State:
+    def shipped(self) -> ArraysByName:
         """The weights to ship, as arrays."""
         return {
             name: w.detach().cpu().numpy() for name, w in (self.average or self.weights).items()
@@ -171,7 +171,10 @@ class Training:
             )
 
     def run(
-        self, terms_of: Terms, save: Callable[[State, dict[str, Any]], None], spent: float = 0.0
+        self,
+        terms_of: Terms,
+        save: Callable[[ArraysByName, dict[str, Any]], None],
+        spent: float = 0.0,
     ) -> None:
         """Minimize the term `loss` to the end of the run. `save` takes the weights to ship and how
         far it is, now and then and at the end; `spent` are seconds that this call took so far, on
@@ -226,7 +229,7 @@ class Training:
         self.rows.append(about | {"seconds": self.seconds, "learning_rate": rate} | values)
         return values["loss"]
 
-    def _write(self, save: Callable[[State, dict[str, Any]], None]) -> float:
+    def _write(self, save: Callable[[ArraysByName, dict[str, Any]], None]) -> float:
         """Write all that the run leaves, the state last, as it may be killed in between; the time
         of it."""
         if self.place.rank == 0:

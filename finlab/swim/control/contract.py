@@ -178,7 +178,7 @@ def axes_of(layout: Layout) -> tuple[str, ...]:
     that push sideways hardly push ahead: with them sway is headed against. A robot that lifts by
     rudders alone dives by its pitch, and one that does not lift at all is steered in the plane."""
     surge_heave_yaw = ("Fx", "Fz", "Tz")
-    rudders = layout.by_flow
+    rudders = layout.flow_driven
     without_rudders = layout.without(rudders) if len(rudders) < layout.n else layout
     candidates: list[tuple[Layout, tuple[str, ...]]] = []
     if not layout.n_fins:

@@ -206,7 +206,7 @@ class FaultMonitor:
         self._reported_strength = np.where(is_far, rounded, self._reported_strength)
         torn = [k for k in np.flatnonzero(self._is_torn) if parts[k] not in self._tables]
         stuck = np.flatnonzero(~np.isnan(self._stuck_at) & ~self._is_lost)
-        return Damage.known(
+        return Damage.representing(
             self.layout,
             [names[k] for k in np.flatnonzero(self._is_lost)],
             {names[k]: float(self._reported_strength[k]) for k in torn},

@@ -104,7 +104,7 @@ class MotionObserver:
         self.inertia = np.array(self._vehicle.inertia)[AXES]
         """Mass and moment (4,) with those of the water that goes along [kg, kg m^2]."""
         strength = strongest_wrench(layout)[AXES] / self.inertia
-        force_noise = FORCE_NOISE_OF_RUDDERS if layout.by_flow else FORCE_NOISE
+        force_noise = FORCE_NOISE_OF_RUDDERS if layout.flow_driven else FORCE_NOISE
         drift_share = force_noise * FORCE_DRIFT / FORCE_NOISE
         variances = [
             (force_noise * strength) ** 2,

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from finlab.arrays import Array
 from finlab.axes import wrapped
-from finlab.least_squares import Damping, levenberg_marquardt
+from finlab.least_squares import DampingRule, levenberg_marquardt
 from finlab.swim.identification.robot_model import RobotModel
 from finlab.swim.identification.swim import ANGLES, STEP_S
 from finlab.swim.identification.unknowns import BASE, Unknowns
@@ -35,7 +35,14 @@ DIFFERENCE = 1e-3
 window's beginning."""
 MAX_STEPS = 16
 """Most Gauss-Newton steps of a fit."""
-DAMPING = Damping(first=1e-3, better=0.1, worse=(10.0, 0.0), least=1e-6, most=1e6)
+DAMPING = DampingRule(
+    initial=1e-3,
+    accepted_factor=0.1,
+    refused_factor=10.0,
+    refused_increment=0.0,
+    minimum=1e-6,
+    maximum=1e6,
+)
 """Levenberg's damping, and how it changes after accepted and refused steps."""
 CONVERGED = 1e-4
 """Relative gain of a step below which a fit ends."""

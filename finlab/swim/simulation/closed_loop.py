@@ -110,7 +110,7 @@ class ClosedLoop:
         )
         self._foresighted = controller if isinstance(controller, Foresighted) else None
         # Rudders that the flow leaves weak must not stop the propeller.
-        under_way = "closest" if layout.by_flow else allocator.policy_under_way
+        under_way = "closest" if layout.flow_driven else allocator.policy_under_way
         self.policy = as_policy(under_way if policy is None else policy)
         truth = layout if truth is None else checked_truth(layout, truth)
         self.vehicle = Vehicle(complete_body(truth), current)

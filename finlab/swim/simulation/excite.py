@@ -282,7 +282,7 @@ def excitation(
         current: velocity (3,) of the water in the world [m/s].
         seed: of the excitation and of the sensors' noise.
     """
-    if layout.by_flow:
+    if layout.flow_driven:
         raise FinlabError(
             f"--excite: rudders of layout {layout.name} give nothing on the spot; let it swim a "
             "wide path, such as --trajectory circle --scale 25, and fit that log"

@@ -166,4 +166,4 @@ def damage_of(layout: Layout, faults: Mapping[str, Fault], held: Array) -> Damag
         if fault.kind == "stuck"
     }
     lost = [name for name, fault in faults.items() if fault.kind == "lost"]
-    return Damage.known(layout, lost, torn, stuck)
+    return Damage.representing(layout, lost, torn, stuck)

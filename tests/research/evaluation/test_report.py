@@ -21,7 +21,7 @@ from finlab.research.evaluation import report_page
 from finlab.research.evaluation.document import FORMATS, Column, ReportTable, to_markdown, to_text
 from finlab.research.evaluation.experiment import EXPERIMENTS, load_experiment
 from finlab.research.evaluation.plots import candidates_picture, fins_picture, temperature_picture
-from finlab.research.evaluation.report_page import PAGE, TABLES, make_report
+from finlab.research.evaluation.report_page import PAGE_FILE, ROWS_FILE, make_report
 from tests.terminal import refused
 
 TINY: dict[str, dict[str, Any]] = {
@@ -60,8 +60,8 @@ def without_times(rows: Any) -> Any:
 
 
 def test_page_and_rows_say_the_same(folder: Path) -> None:
-    page = (folder / PAGE).read_text("utf-8")
-    tables = json.loads((folder / TABLES).read_text("utf-8"))
+    page = (folder / PAGE_FILE).read_text("utf-8")
+    tables = json.loads((folder / ROWS_FILE).read_text("utf-8"))
     assert list(tables) == list(TINY)
     for words in ("How far off are the wrenches", "0.086", "seed 3"):
         assert words in page
@@ -77,7 +77,7 @@ def test_each_table_has_the_command_that_makes_it_again(
         r"^Made by `finlab (.*)` at (?:commit [0-9a-f]{12}|version)", page_of(folder), re.M
     )
     assert [command.split()[1] for command in commands] == list(TINY)
-    tables = json.loads((folder / TABLES).read_text("utf-8"))
+    tables = json.loads((folder / ROWS_FILE).read_text("utf-8"))
     for name, command in zip(TINY, commands, strict=True):
         assert main([*shlex.split(command), "--json"]) == 0
         rows = json.loads(capsys.readouterr().out)["rows"]
@@ -102,13 +102,13 @@ def test_the_stored_report_knows_all_experiments_and_no_other() -> None:
 
 
 def page_of(folder: Path) -> str:
-    return (folder / PAGE).read_text("utf-8")
+    return (folder / PAGE_FILE).read_text("utf-8")
 
 
 def test_two_reports_of_one_seed_have_the_same_rows(folder: Path, tmp_path: Path) -> None:
     """Of some sections, too."""
     page = make_report(tmp_path, size="quick", seed=3, names=["temperature", "latency"])
-    first, second = (json.loads((out / TABLES).read_text("utf-8")) for out in (folder, tmp_path))
+    first, second = (json.loads((out / ROWS_FILE).read_text("utf-8")) for out in (folder, tmp_path))
     assert list(second) == ["latency", "temperature"]
     assert without_times(second) == without_times({name: first[name] for name in second})
     assert "--sections latency,temperature --seed 3" in page.read_text("utf-8")

@@ -13,7 +13,7 @@ from torch_geometric.nn import GATv2Conv
 from finlab.layout import Fin, Layout, Limits
 from finlab.research.networks.checkpoint import read_checkpoint, resolve_checkpoint
 from finlab.research.networks.layers import graph_attention
-from finlab.research.networks.trained import State
+from finlab.research.networks.trained import ArraysByName
 from finlab.research.paper.network import RAW_SIZE, Mixture, NetworkConfig, raw_features
 from finlab.research.random_layouts import random_layout
 
@@ -35,7 +35,7 @@ def arrays(weights: dict[str, torch.Tensor]) -> dict[str, np.ndarray]:
     return {name: value.numpy() for name, value in weights.items()}
 
 
-def tensors(weights: State) -> dict[str, torch.Tensor]:
+def tensors(weights: ArraysByName) -> dict[str, torch.Tensor]:
     return {name: torch.tensor(value) for name, value in weights.items()}
 
 

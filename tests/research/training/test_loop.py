@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from finlab.errors import CommandError, DataError
-from finlab.research.networks.trained import State
+from finlab.research.networks.trained import ArraysByName
 from finlab.research.training import loop
 from finlab.research.training.device import Workplace, workplace
 from finlab.research.training.loop import LoopSettings, Training, learning_rate, seeded_generator
@@ -31,12 +31,12 @@ def terms_with(weights: dict[str, Tensor]) -> loop.Terms:
 
 def run(
     folder: Path, settings: LoopSettings = SETTINGS, die_at: int = 10**9, **options: Any
-) -> State:
+) -> ArraysByName:
     """The weights of a run, which ends by an error at its second save after `die_at` steps."""
     weights = {name: torch.zeros(1, requires_grad=True) for name in ("slope", "shift")}
-    shipped: list[State] = []
+    shipped: list[ArraysByName] = []
 
-    def save(state: State, progress: dict[str, Any]) -> None:
+    def save(state: ArraysByName, progress: dict[str, Any]) -> None:
         if shipped and progress["steps_done"] > die_at:
             raise KeyboardInterrupt
         shipped.append(state)

@@ -93,7 +93,7 @@ def test_a_weak_fin_keeps_its_share(layout_a: Layout, analytic: AnyRobot) -> Non
     loop = swim(layout_a, analytic.on(layout_a), [Fault("back_left", 12.0, "torn", 0.4)])
     log = until(loop, 30.0)
     fin = layout_a.index("back_left")
-    assert loop.damage.lost == () and loop.damage.partly
+    assert loop.damage.lost == () and loop.damage.faults_by_kind
     assert log.strength[-1, fin] == pytest.approx(0.4, abs=0.12)
     assert loop.damage.torn["back_left"] == pytest.approx(0.4, abs=0.15)
     assert 0.0 < log.strength_std[-1, fin] < 0.15
@@ -102,7 +102,7 @@ def test_a_weak_fin_keeps_its_share(layout_a: Layout, analytic: AnyRobot) -> Non
 def test_a_stuck_fin_is_told_from_a_lost_one(layout_a: Layout, analytic: AnyRobot) -> None:
     loop = swim(layout_a, analytic.on(layout_a), [Fault("front_left", 12.0, "stuck")])
     log = until(loop, 20.0)
-    assert loop.damage.lost == () and loop.damage.partly
+    assert loop.damage.lost == () and loop.damage.faults_by_kind
     held = log.fin_motion[-1, layout_a.index("front_left"), 2]
     assert math.remainder(loop.damage.stuck["front_left"] - held, 2 * math.pi) == pytest.approx(
         0.0, abs=0.35

@@ -136,7 +136,9 @@ def test_what_becomes_of_fins_without_a_word(layout_a: Layout, analytic: AnyRobo
     log = swum(swim, 5.0)
     lost, weak, stuck = (layout_a.index(name) for name in ("front_left", "back_left", "back_right"))
     after = log.time >= 2.0
-    assert swim.damage.lost == () and not swim.damage.partly and swim.lost == ("front_left",)
+    assert (
+        swim.damage.lost == () and not swim.damage.faults_by_kind and swim.lost == ("front_left",)
+    )
     assert set(swim.broken) == {"front_left", "back_right"}
     assert np.isfinite(log.command).all(), "the allocator goes on as before"
     assert not log.alive[after, lost].any() and log.alive[~after].all()

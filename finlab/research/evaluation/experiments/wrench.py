@@ -8,7 +8,7 @@ import numpy as np
 from finlab.errors import DataError
 from finlab.files.worker import in_worker
 from finlab.layout import Layout, load_layout
-from finlab.layout.load import layout_and_lost
+from finlab.layout.load import load_layout_and_lost
 from finlab.physics import plant_of
 from finlab.research.evaluation.document import Column, Row
 from finlab.research.evaluation.experiment import Experiment, paper_figures
@@ -158,7 +158,7 @@ def _cases(
             f"split: a layout has none, got {','.join(split)!r} beside {layout!r:.60}; leave one "
             "of them out"
         )
-    robot, lost = in_worker(layout_and_lost, layout)
+    robot, lost = in_worker(load_layout_and_lost, layout)
     return {f"layout {robot.name}": [partial(own_case, robot, lost, targets, seed)]}
 
 

@@ -33,10 +33,10 @@ from finlab.research.networks.checkpoint import (
     resolve_checkpoint,
     write_checkpoint,
 )
-from finlab.research.networks.trained import State, TrainedWeights, sizes_for_file
+from finlab.research.networks.trained import ArraysByName, TrainedWeights, sizes_for_file
 from finlab.research.training.device import Workplace
 from finlab.research.training.loop import STATE_FILE, LoopSettings, Terms, Training, first_weights
-from finlab.whole_file import make_folder, sweep_parts
+from finlab.whole_file import make_folder, remove_temporary_files
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ def train_mdn(
         **{name: asdict(part) for name, part in parts.items()},
     }
 
-    def save(network: State, progress: dict[str, Any]) -> None:
+    def save(network: ArraysByName, progress: dict[str, Any]) -> None:
         trained = TrainedWeights(out.name, normalization, sizes_for_file(recipe.network), network)
         write_checkpoint(
             out, replace(trained, preset=preset, training={"mdn": identity | progress})
@@ -133,7 +133,7 @@ def answers_in(
 ) -> list[Path]:
     """The files of answers, in order; those that are missing are written first, on all cores, as
     many as are done at the time `until` of `time.monotonic`, but two at least."""
-    sweep_parts(folder)
+    remove_temporary_files(folder)
     write = partial(write_answers, folder, settings, seed)
     made = list[Path]()
     for path in map_parts(write, range(settings.files), "answers", jobs=cores()):

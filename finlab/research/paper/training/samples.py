@@ -28,7 +28,7 @@ from finlab.research.executor import cores, map_parts
 from finlab.research.networks.trained import WrenchNormalization
 from finlab.research.random_layouts import TRAINING_FINS, random_layout
 from finlab.research.training.loop import seeded_generator
-from finlab.whole_file import make_folder, sweep_parts, write_whole
+from finlab.whole_file import make_folder, remove_temporary_files, write_whole
 
 DATA_SEED = 20_000
 """Leads the seed of every layout; no evaluation's seed begins like this."""
@@ -76,7 +76,7 @@ def generate(folder: Path, settings: DataSettings) -> None:
     Raises DataError: the folder holds a set that was drawn otherwise, or a file cannot be
     written."""
     make_folder(folder)
-    sweep_parts(folder)
+    remove_temporary_files(folder)
     if (folder / DATA_FILE).exists() and about(folder)["settings"] != settings.as_values():
         raise DataError(
             f"{folder}: holds a data set that was drawn otherwise; take an empty folder"

@@ -17,7 +17,7 @@ from finlab.research.networks.checkpoint import (
     resolve_checkpoint,
     write_checkpoint,
 )
-from finlab.research.networks.trained import State, TrainedWeights, sizes_for_file
+from finlab.research.networks.trained import ArraysByName, TrainedWeights, sizes_for_file
 from finlab.research.paper.surrogate import SurrogateConfig
 from finlab.research.paper.training import modules
 from finlab.research.paper.training.recipes import PaperLoop, recipe, write_card
@@ -119,7 +119,7 @@ def train_surrogate(options: TrainingOptions) -> TrainedWeights:
 
         return terms
 
-    def checkpoint(samples: SampleSet, state: State) -> TrainedWeights:
+    def checkpoint(samples: SampleSet, state: ArraysByName) -> TrainedWeights:
         trained = TrainedWeights(
             name="",
             normalization=samples.normalization,
@@ -177,7 +177,7 @@ def train_allocator(options: TrainingOptions, surrogate: Path) -> TrainedWeights
 
         return terms
 
-    def checkpoint(samples: SampleSet, state: State) -> TrainedWeights:
+    def checkpoint(samples: SampleSet, state: ArraysByName) -> TrainedWeights:
         return replace(base, network_sizes=sizes_for_file(network), network=state)
 
     begin = partial(first_weights, network.shapes())
@@ -190,7 +190,7 @@ def _train(
     settings: PaperLoop,
     begin: Callable[[int, torch.device], Weights],
     terms_of: Callable[[Weights, BatchSource], Terms],
-    checkpoint: Callable[[SampleSet, State], TrainedWeights],
+    checkpoint: Callable[[SampleSet, ArraysByName], TrainedWeights],
     surrogate: str = "",
 ) -> TrainedWeights:
     """Train the weights that `begin` gives, and write the checkpoints that are made of them."""
@@ -205,7 +205,7 @@ def _train(
         identity = {"preset": options.preset, "seed": options.seed, "training": asdict(settings)}
         identity |= {"data": samples.settings, "surrogate_sha256": surrogate}
 
-        def save(state: State, progress: dict[str, Any]) -> None:
+        def save(state: ArraysByName, progress: dict[str, Any]) -> None:
             made = checkpoint(samples, state)
             history = {**made.training, verb: identity | progress}
             made = replace(made, name=output.name, preset=options.preset, training=history)

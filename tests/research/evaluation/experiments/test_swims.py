@@ -35,7 +35,9 @@ def test_what_is_true_is_not_what_is_believed(analytic: AnyRobot) -> None:
     braking = [loop.vehicle.derivative(motion, [0.0] * 6)[7] for loop in (damped, plain)]
     assert braking[0] == pytest.approx(2.0 * braking[1], rel=0.05) and braking[1] < 0.0
     torn = DAYS["weak"].swim(HardDaySwim("A", ("front_left",)), analytic, 0)
-    assert torn.broken["front_left"].share == 0.7 and not torn.told and not torn.damage.partly
+    assert (
+        torn.broken["front_left"].share == 0.7 and not torn.told and not torn.damage.faults_by_kind
+    )
 
 
 def test_a_body_that_is_drawn_too_small_and_who_steers_it(analytic: AnyRobot) -> None:
