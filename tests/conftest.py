@@ -8,7 +8,7 @@ from hypothesis import settings
 
 from finlab.assets import shipped_layouts
 from finlab.layout import Layout, load_layout
-from tests.any_robot import AnyRobot
+from tests.allocator_cache import AllocatorCache
 
 # Machines that run tests also run browsers and trainings: an example that takes long is no failure.
 settings.register_profile("finlab", deadline=None)
@@ -74,11 +74,12 @@ def untrained_mdn(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def layout_a() -> Layout:
+    """Robot A of the paper, four fins."""
     return load_layout(shipped_layouts()["A"])
 
 
 @pytest.fixture(scope="session")
-def analytic() -> AnyRobot:
+def analytic() -> AllocatorCache:
     """The quickest method; it takes only the normalization from a checkpoint."""
 
-    return AnyRobot("analytic")
+    return AllocatorCache("analytic")

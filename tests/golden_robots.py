@@ -17,12 +17,14 @@ from finlab.allocation.dual.compiled import Compiled
 from finlab.arrays import Array
 from finlab.core.fields import head_of
 from finlab.deploy.thin_block import thinned
-from tests.least_power import conic_optimum, farthest, least_miss, lower_bound
-from tests.mixed_robots import bluerov2_heavy, load, random_robot, with_rates, within
-from tests.own_plant import OwnPlant
+from tests.oracle_optima import conic_optimum, farthest, least_miss, lower_bound
+from tests.oracle_plant import OraclePlant
+from tests.random_robots import bluerov2_heavy, load, random_robot, with_rates, within
 
-FOLDER = Path(core.__path__[0]) / "tests"
+TEST_FOLDER = Path(core.__path__[0]) / "tests"
+"""Where the core's tests in C stand."""
 N_QUESTIONS = 6
+"""Questions of each robot."""
 TIMES_BEYOND = 1.7
 """How many times as far as a robot pushes the second wrench of each question is."""
 
@@ -42,7 +44,8 @@ class Question(NamedTuple):
     """Least distance from it, over the wrench scale."""
 
 
-def _question(plant: OwnPlant, rng: np.random.Generator) -> Question:
+def _question(plant: OraclePlant, rng: np.random.Generator) -> Question:
+    """A random question with what the oracles say to it."""
     wrench = within(plant, rng, 0.2, 0.9)
     if all(actuator.kind == "thruster" for actuator in plant.actuators):
         power = conic_optimum(plant, wrench)[0]
@@ -53,12 +56,14 @@ def _question(plant: OwnPlant, rng: np.random.Generator) -> Question:
 
 
 def _numbers(values: Array) -> str:
+    """Numbers as an initializer of an array in C, four in a line."""
     texts = [repr(float(value)) for value in values]
     rows = [", ".join(texts[k : k + 4]) for k in range(0, len(texts), 4)]
     return ",\n    ".join(rows)
 
 
 def _struct(question: Question) -> str:
+    """A question as an initializer of a struct in C."""
     parts = [
         "{" + _numbers(question.within) + "}",
         repr(float(question.power)),
@@ -77,7 +82,7 @@ def header(name: str, layout: dict[str, Any], seed: int) -> str:
         layout: mapping of its layout file.
         seed: of its questions.
     """
-    plant = OwnPlant(layout)
+    plant = OraclePlant(layout)
     has_no_gaps = not any(actuator.kind == "fin" for actuator in plant.actuators)
     rng = np.random.default_rng(seed)
     block = thinned(Compiled.of(load(layout)).robot.block)
@@ -125,5 +130,5 @@ def headers() -> dict[str, str]:
 
 if __name__ == "__main__":
     for file_name, text in headers().items():
-        (FOLDER / file_name).write_text(text)
-        print(FOLDER / file_name)
+        (TEST_FOLDER / file_name).write_text(text)
+        print(TEST_FOLDER / file_name)

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from functools import cache
+from itertools import chain
 from pathlib import Path
 from pkgutil import resolve_name
 
@@ -73,21 +74,21 @@ REGISTRIES = {
 """Modules outside of the wings that name what stands in these, in a string that is resolved when it
 is asked for."""
 
-LEVEL = {
-    room: (wing, level)
-    for wing, levels in {"core": CORE, **WINGS, "cli": (("cli",),)}.items()
-    for level, rooms in enumerate(levels)
-    for room in rooms
-}
+LEVEL = dict[str, tuple[str, int]]()
+for _name, _levels in {"core": CORE, **WINGS, "cli": (("cli",),)}.items():
+    for _level, _rooms in enumerate(_levels):
+        LEVEL |= dict.fromkeys(_rooms, (_name, _level))
 """Room -> its wing, and its level there."""
 
 
 def _sources(package: str) -> list[Path]:
+    """Files of Python in a package."""
     return sorted((ROOT / package).rglob("*.py"))
 
 
 @cache
 def _tree(path: Path) -> ast.Module:
+    """Syntax tree of a file."""
     return ast.parse(path.read_text(encoding="utf-8"))
 
 
@@ -120,10 +121,12 @@ def _room(module: str) -> str | None:
 
 
 def _wing(room: str) -> str:
+    """The wing of a room, or the core."""
     return "app" if room == "webapp" else LEVEL[room][0]
 
 
 def _module_of(path: Path, root: Path = ROOT) -> str:
+    """Dotted name of a module's file."""
     parts = path.relative_to(root).with_suffix("").parts
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
@@ -146,7 +149,7 @@ def _allowed(module: str, here: str, there: str) -> bool:
 def test_every_room_is_known() -> None:
     package = ROOT / "finlab"
     wings = [package / wing for wing in ("swim", "research")]
-    paths = [path for folder in (package, *wings) for path in folder.iterdir()]
+    paths = list(chain.from_iterable(folder.iterdir() for folder in (package, *wings)))
     rooms = {
         path.relative_to(package).with_suffix("").as_posix()
         for path in paths
@@ -192,9 +195,10 @@ def _names_of_wings(module: str, path: Path) -> Iterator[tuple[str, str]]:
 def test_wings_are_named_by_strings_in_registries_alone() -> None:
     named: dict[str, set[str]] = {}
     for module, path in _modules(ROOT).items():
-        if module.startswith("finlab") and (
-            wings := {wing for _, wing in _names_of_wings(module, path)}
-        ):
+        if not module.startswith("finlab"):
+            continue
+        wings = {wing for _, wing in _names_of_wings(module, path)}
+        if wings:
             named[module] = wings
     assert named == {module: wings for module, wings in REGISTRIES.items() if wings}
 
@@ -217,9 +221,7 @@ def test_what_registries_name_is_there() -> None:
 
 def _modules(root: Path) -> dict[str, Path]:
     """Every module of finlab and webapp by its full name."""
-    paths = [
-        path for package in ("finlab", "webapp") for path in sorted((root / package).rglob("*.py"))
-    ]
+    paths = [*sorted((root / "finlab").rglob("*.py")), *sorted((root / "webapp").rglob("*.py"))]
     return {_module_of(path, root): path for path in paths}
 
 
@@ -250,14 +252,12 @@ def _shortest_circles(graph: "nx.DiGraph[str]") -> list[list[str]]:
     last."""
     circles = []
     for group in nx.strongly_connected_components(graph):
-        found = [
-            [start, *nx.shortest_path(graph, then, start)]
-            for start in group
-            for then in graph.successors(start)
-            if then in group
-        ]
-        if found:
-            circles.append(min(found, key=lambda circle: (len(circle), circle)))
+        circles_of_group = []
+        for start in group:
+            for then in group.intersection(graph.successors(start)):
+                circles_of_group.append([start, *nx.shortest_path(graph, then, start)])
+        if circles_of_group:
+            circles.append(min(circles_of_group, key=lambda circle: (len(circle), circle)))
     return sorted(circles)
 
 
@@ -301,13 +301,13 @@ def test_circles_of_imports_are_found(tmp_path: Path) -> None:
 )
 def test_rooms_do_without(package: str, banned: tuple[str, ...]) -> None:
     door = "finlab/cli/app_verb.py"  # the one place that starts the web app
-    wrong = [
-        f"{path.relative_to(ROOT)}:{line} imports {module}"
-        for path in _sources(package)
-        if path.relative_to(ROOT).as_posix() != door
-        for module, line in _imports(path)
-        if any(module == name or module.startswith(name + ".") for name in banned)
-    ]
+    wrong = []
+    for path in _sources(package):
+        if path.relative_to(ROOT).as_posix() == door:
+            continue
+        for module, line in _imports(path):
+            if any(module == name or module.startswith(name + ".") for name in banned):
+                wrong.append(f"{path.relative_to(ROOT)}:{line} imports {module}")
     assert not wrong, "\n".join(wrong)
 
 
@@ -353,7 +353,7 @@ def test_allocating_loads_few_files_and_no_wing() -> None:
     )
     names = done.stdout.splitlines()[-1].split()
     ours = [name for name in names if name.partition(".")[0] in ("finlab", "webapp")]
-    rooms = {room for name in ours if (room := _room(name)) is not None}
+    rooms = {_room(name) for name in ours} - {None}
     assert not [room for room in rooms if _wing(room) not in ("core", "cli")]
     assert not {"torch", "scipy", "matplotlib", "safetensors", "tqdm"} & set(names)
     kinds = {name.rpartition(".")[2] for name in ours if name.startswith("finlab.actuators.")}

@@ -13,6 +13,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 @pytest.fixture(scope="module")
 def graph() -> ImportGraph:
+    """The graph of imports of this tree."""
     return ImportGraph(ROOT)
 
 
@@ -27,7 +28,7 @@ def graph() -> ImportGraph:
         ("finlab/actuators/thruster.py", "tests/actuators/test_laws.py"),
         ("finlab/layout/damage.py", "tests/allocation/test_damage_of_robots.py"),
         ("webapp/panels/swim_tab.py", "tests/webapp/test_app.py"),
-        ("tests/mixed_robots.py", "tests/allocation/dual/test_random_robots.py"),
+        ("tests/random_robots.py", "tests/allocation/dual/test_random_robots.py"),
     ],
 )
 def test_a_change_selects_its_tests(graph: ImportGraph, changed: str, nearest: str) -> None:

@@ -14,6 +14,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PATH = re.compile(r"(?<![\w/.-])(?:finlab|tests|webapp|tools)/[\w./*\[\]-]*\.(?:py|c|h)\b")
 """A path from the top of the tree, or a pattern of paths: `*` stands for a part of a name."""
 FOLDERS = ("finlab", "tests", "webapp", "tools", "examples", "docs")
+"""Folders whose comments and pages are read."""
 HISTORY = {"CHANGELOG.md"}
 """Pages that name what was there once."""
 

@@ -6,4 +6,5 @@ from finlab.research.networks.trained import ArraysByName
 
 
 def arrays_of(weights: dict[str, torch.Tensor]) -> ArraysByName:
+    """Weights as arrays."""
     return {name: value.detach().numpy() for name, value in weights.items()}

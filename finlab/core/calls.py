@@ -110,8 +110,15 @@ class PolicyFields(Protocol):
 
 
 @lru_cache(maxsize=64)
-def _policy_record(policy: PolicyFields) -> Record:
-    """The `fl_policy` (1,) of a policy; who hands its address to the core keeps the record."""
+def policy_record(policy: PolicyFields) -> Record:
+    """Returns a policy as the core reads it.
+
+    Args:
+        policy: kind, weights and groups of axes.
+
+    Returns:
+        One `fl_policy` (1,). Who hands its address to the core keeps the record alive.
+    """
     weights = np.array(policy.axis_weights)
     record = np.zeros(1, struct("fl_policy"))
     record["policy"] = constant(f"FL_{policy.kind.upper()}")
@@ -173,7 +180,7 @@ class QuestionRecord:
                 own.
             conditions: what holds.
         """
-        self._policy = None if policy is None else _policy_record(policy)
+        self._policy = None if policy is None else policy_record(policy)
         self._policy_pointer[0] = 0 if self._policy is None else self._policy.ctypes.data
         self._multipliers_pointer[0] = 0
         if multipliers is not None:
@@ -392,30 +399,6 @@ class Core:
                 command.ctypes.data,
             )
         return command
-
-    def dual_value(self, wrench: Array, lambda_reduced: Array) -> tuple[Array, float]:
-        """Evaluates the dual function (Eq. 3) at reduced multipliers, in the state (losses, free
-        axes, limits) of the last question.
-
-        Args:
-            wrench: desired (6,) [N, N m].
-            lambda_reduced: multipliers (6,) [W] in the basis of what the actuators span.
-
-        Returns:
-            The responses (n, 2) [N] (Eq. 5), and the dual value [W].
-        """
-        wrench = np.ascontiguousarray(wrench)
-        lambda_reduced = np.ascontiguousarray(lambda_reduced)
-        force = np.empty((self._count, 2))
-        with self._lock:
-            value = self._core.fl_dual_value(
-                self._block_address,
-                self._work_address,
-                wrench.ctypes.data,
-                lambda_reduced.ctypes.data,
-                force.ctypes.data,
-            )
-        return force, value
 
     def conjugates(self, multipliers: Array, conditions: Conditions = NOMINAL) -> Conjugates:
         """Evaluates the conjugates of all costs (Eq. 4), by the core's tables.

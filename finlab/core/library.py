@@ -21,7 +21,6 @@ SIGNATURES = {
     "fl_answer_one": "ipppp",
     "fl_answer_many": "ippppipppppppp",
     "fl_commands": "vpppipp",
-    "fl_dual_value": "rppppp",
     "fl_conjugates": "ippppip",
     "fl_reach": "vpppppirppp",
     "fl_jets": "vppipppp",

@@ -20,14 +20,18 @@ from finlab.arrays import Array
 from finlab.layout.effectiveness import own_effectiveness
 from finlab.layout.layout import Layout
 from finlab.physics.plant import Plant
+from tests.core.internal_functions import dual_function
 from tests.t200 import t200_rows
 
-TABLE = PowerTable(t200_rows(16), "us")
+T200 = PowerTable(t200_rows(16), "us")
+"""A measured thruster at 16 V, whose input is a width of pulse [us]."""
 UP = (0.0, 0.0, 1.0)
 AHEAD = (1.0, 0.0, 0.0)
 
 
 def thruster(force: tuple[float, float], model: Any, **more: Any) -> Thruster:
+    """A thruster with limits of force [N] and a law, in a direction that no axis of the body
+    has."""
     return Thruster(
         f"t{force}{model.type}{more}"[:60], (0.1, 0.2, 0.3), (0.0, 0.6, 0.8), force, model, **more
     )
@@ -37,27 +41,32 @@ THRUSTERS = [
     thruster((-39.0, 51.0), PowerLaw(0.997, 1.449)),
     thruster((0.0, 5.0), PowerLaw(2.0, exponent=2.0)),
     thruster((-8.0, 0.0), PowerLaw(2.0, 3.0, 1.3)),
-    thruster((-39.0, 51.0), TABLE),
-    thruster((-2.0, 0.0), TABLE, torque_per_newton=0.02),
+    thruster((-39.0, 51.0), T200),
+    thruster((-2.0, 0.0), T200, torque_per_newton=0.02),
 ]
+"""Either way and one way only, by a law and by a table."""
 AZIMUTHS = [
     Azimuth("full", (0, 0, 0), UP, AHEAD, (0.0, 40.0), PowerLaw(1.0)),
-    Azimuth("arc", (0, 0.2, 0), AHEAD, UP, (0.0, 20.0), TABLE, arc=(-0.2, 1.1)),
+    Azimuth("arc", (0, 0.2, 0), AHEAD, UP, (0.0, 20.0), T200, arc=(-0.2, 1.1)),
     Azimuth("runs", (0.3, 0, 0), UP, AHEAD, (2.0, 20.0), PowerLaw(1.0), arc=(1.0, 1.5)),
 ]
+"""Any angle; an arc and a table; an arc and a least force that is above zero."""
 RUDDERS = [
     Rudder("wide", (-0.6, 0, 0), UP, AHEAD, 0.01, (-0.5, 0.5), aspect_ratio=2.21),
     Rudder(
         "one side", (-0.6, 0, 0), (0, 1, 0), AHEAD, 0.02, (0.0, 0.3), aspect_ratio=1.0, stall=0.6
     ),
 ]
+"""Deflections either way, and to one side only with a stall of its own."""
 
 
-def columns(actuators: Sequence[Any]) -> Array:
+def effectiveness_of(actuators: Sequence[Any]) -> Array:
+    """Effectiveness (m, 3, 6) of actuators, along their own axes."""
     return own_effectiveness(Layout("robot", tuple(actuators)))
 
 
-def prices_of(group: Group, top: float) -> Array:
+def random_multipliers(group: Group, top: float) -> Array:
+    """Multipliers (6, 40) of the wrench, with a standard deviation of `top` [W/N, W/(N m)]."""
     return np.random.default_rng(0).normal(0.0, top, (6, 40))
 
 
@@ -72,9 +81,10 @@ def prepared(group: Group, wrench: Array, low: Array, high: Array) -> DualRobot:
 
 def answer(robot: DualRobot, price: Array) -> tuple[Array, float]:
     """Forces (m, 2) at multipliers (6,) of the wrench, and what they are worth less their power."""
-    inner = robot.basis.T @ (robot.axis_scale * price)
-    force, value = robot.core.dual_value(np.zeros(6), np.pad(inner, (0, 6 - len(inner))))
-    return force, -value
+    spanned = robot.basis.T @ (robot.axis_scale * price)
+    lambda_reduced = np.pad(spanned, (0, 6 - len(spanned)))
+    force, dual_value = dual_function(robot.block, np.zeros(6), lambda_reduced)
+    return force, -dual_value
 
 
 def check(
@@ -82,33 +92,33 @@ def check(
 ) -> None:
     """No command is worth more at random multipliers (6, N) than the answer, and its own command
     gives it."""
-    multipliers = prices_of(group, 5.0)
+    multipliers = random_multipliers(group, 5.0)
     m = len(group.responses)
     robot = prepared(group, wrench, low, high)
     force = np.array([answer(robot, price)[0] for price in multipliers.T])
     command = robot.core.commands(force)
     assert (command >= low).all() and (command <= high).all()
     given = law.force(command)
-    worth = np.einsum("nma,maw,wn->nm", given, wrench, multipliers) - law.power(command)
+    net_value = np.einsum("nma,maw,wn->nm", given, wrench, multipliers) - law.power(command)
     tried = low + np.random.default_rng(1).uniform(size=(400, m, 3)) * (high - low)
     others = np.einsum("tma,maw,wn->tnm", law.force(tried), wrench, multipliers)
     others -= law.power(tried)[:, None]
-    scale = np.abs(worth).max(axis=0) + 1e-9
-    assert (worth >= others.max(axis=0) - 5e-4 * scale).all()
+    scale = np.abs(net_value).max(axis=0) + 1e-9
+    assert (net_value >= others.max(axis=0) - 5e-4 * scale).all()
     most = [answer(robot, price)[1] for price in multipliers.T]
-    np.testing.assert_allclose(most, worth.sum(axis=1), atol=5e-4 * scale.sum())
+    np.testing.assert_allclose(most, net_value.sum(axis=1), atol=5e-4 * scale.sum())
 
 
 def test_thrusters_answer_with_what_is_worth_most() -> None:
     for part in THRUSTERS:
-        wrench = columns([part])
+        wrench = effectiveness_of([part])
         group = ThrusterGroup([part], wrench)
         check(group, ThrusterLaw([part]), wrench, np.array([part.lower]), np.array([part.upper]))
 
 
 def test_thrusters_of_one_model_answer_together() -> None:
     parts = [THRUSTERS[i] for i in (0, 1, 2)]
-    wrench = columns(parts)
+    wrench = effectiveness_of(parts)
     group = ThrusterGroup(parts, wrench)
     low, high = (np.array([getattr(part, end) for part in parts]) for end in ("lower", "upper"))
     check(group, ThrusterLaw(parts), wrench, low, high)
@@ -118,7 +128,7 @@ def test_thrusters_of_one_model_answer_together() -> None:
 
 def test_azimuths_answer_with_what_is_worth_most() -> None:
     for part in AZIMUTHS:
-        wrench = columns([part])
+        wrench = effectiveness_of([part])
         group = AzimuthGroup([part], wrench)
         check(group, AzimuthLaw([part]), wrench, np.array([part.lower]), np.array([part.upper]))
 
@@ -129,7 +139,7 @@ def test_azimuths_answer_with_what_is_worth_most() -> None:
 def test_rudders_answer_with_a_lift_that_their_deflections_give(
     flow: tuple[float, float, float],
 ) -> None:
-    wrench = columns(RUDDERS)
+    wrench = effectiveness_of(RUDDERS)
     frames = np.array([part.frame for part in RUDDERS])
     inflow = frames @ np.array(flow)
     group = RudderGroup(RUDDERS, wrench).at(inflow)
@@ -138,9 +148,9 @@ def test_rudders_answer_with_a_lift_that_their_deflections_give(
     robot = prepared(group, wrench, low, high)
     met = law.flow_at(inflow, inflow.shape)
     across = np.stack([0.0 * met.course, -np.sin(met.course), np.cos(met.course)], axis=-1)
-    for share in (0.0, 0.3, 1.0):
+    for fraction in (0.0, 0.3, 1.0):
         force = np.zeros((1, 2, 2))
-        force[0, :, 0] = robot.ends[:, 0] + share * (robot.ends[:, 1] - robot.ends[:, 0])
+        force[0, :, 0] = robot.ends[:, 0] + fraction * (robot.ends[:, 1] - robot.ends[:, 0])
         command = robot.core.commands(force)[0]
         assert (command >= low).all() and (command <= high).all()
         given = law.force(command, inflow)
@@ -156,7 +166,7 @@ def test_rudders_answer_with_a_lift_that_their_deflections_give(
 def test_a_rudder_answers_a_price_with_the_lift_whose_drag_it_pays() -> None:
     part = RUDDERS[0]
     inflow = np.array([[0.0, 1.5, 0.1]])
-    wrench = columns([part])
+    wrench = effectiveness_of([part])
     law = RudderLaw([part])
     group = RudderGroup([part], wrench).at(inflow)
     robot = prepared(group, wrench, *(np.array([end]) for end in (part.lower, part.upper)))
@@ -164,18 +174,18 @@ def test_a_rudder_answers_a_price_with_the_lift_whose_drag_it_pays() -> None:
     rows = np.linalg.pinv(
         robot.effectiveness[0]
     )  # multipliers at which lift has a price, and drag none
-    found = [answer(robot, rows @ [own, 0.0])[1] for own in price]
+    dual_values = [answer(robot, rows @ [own, 0.0])[1] for own in price]
     delta = np.linspace(-0.5, 0.5, 4001)[:, None, None] * [1.0, 0.0, 0.0]
     course = law.flow_at(inflow, inflow.shape).course[0]
     lift = law.force(delta, inflow)[:, 0] @ [0.0, -np.sin(course), np.cos(course)]
-    worth = price * lift[:, None] - law.power(delta, inflow)
-    np.testing.assert_allclose(found, worth.max(axis=0), rtol=0.02, atol=0.02)
+    net_value = price * lift[:, None] - law.power(delta, inflow)
+    np.testing.assert_allclose(dual_values, net_value.max(axis=0), rtol=0.02, atol=0.02)
 
 
 def test_a_price_of_drag_counts_in_the_answer_of_a_rudder() -> None:
     part = RUDDERS[0]
     inflow = np.array([[0.0, 1.5, 0.1]])
-    wrench = columns([part])
+    wrench = effectiveness_of([part])
     law = RudderLaw([part])
     multipliers = np.array([2.0, 3.0, 0.0, 0.0, 0.0, 0.5])
     group = RudderGroup([part], wrench).at(inflow)
@@ -191,16 +201,16 @@ def test_a_price_of_drag_counts_in_the_answer_of_a_rudder() -> None:
 
 
 def test_a_rudder_at_rest_offers_nothing() -> None:
-    group = RudderGroup(RUDDERS, columns(RUDDERS))
+    group = RudderGroup(RUDDERS, effectiveness_of(RUDDERS))
     lines = [line for line in group.responses if isinstance(line, Line)]
     assert [(line.low, line.high) for line in lines] == [(0.0, 0.0)] * 2
     assert not group.beside_of(np.zeros((3, 2, 2))).any()
 
 
 def test_an_azimuth_keeps_its_angle_where_no_force_is_asked_for() -> None:
-    group = AzimuthGroup(AZIMUTHS, columns(AZIMUTHS))
+    group = AzimuthGroup(AZIMUTHS, effectiveness_of(AZIMUTHS))
     low, high = (np.array([getattr(part, end) for part in AZIMUTHS]) for end in ("lower", "upper"))
-    core = prepared(group, columns(AZIMUTHS), low, high).core
+    core = prepared(group, effectiveness_of(AZIMUTHS), low, high).core
     rest = np.zeros((1, 3, 2))
     before = np.array([[3.0, 5.0, 0.0], [0.9, 0.0, 0.0], [1.2, 2.0, 0.0]])
     for previous, angles in (
@@ -215,9 +225,9 @@ def test_every_actuator_of_a_mixed_robot_is_in_one_group() -> None:
     robot = Layout(
         "robot", (RUDDERS[0], *THRUSTERS[:2], *AZIMUTHS, Fin("fin", (0.1, 0, 0), 0.3), RUDDERS[1])
     )
-    found = groups_of(robot.actuators, own_effectiveness(robot))
-    assert sorted(np.concatenate([places for places, _ in found])) == list(range(robot.n))
-    assert [len(group.responses) == len(group.forms) == len(places) for places, group in found]
+    groups = groups_of(robot.actuators, own_effectiveness(robot))
+    assert sorted(np.concatenate([places for places, _ in groups])) == list(range(robot.n))
+    assert [len(group.responses) == len(group.forms) == len(places) for places, group in groups]
     plant = Plant(robot)
     command = Compiled(robot, plant, np.ones(6)).robot.core.commands(np.zeros((2, robot.n, 2)))
     np.testing.assert_array_equal(plant.feasible(command), command)

@@ -11,6 +11,7 @@ from finlab.actuators.actuator import Actuator
 from finlab.layout import Servo, Uncertainty
 
 KINDS = [finlab.Fin, finlab.Thruster, finlab.Azimuth, finlab.Tilt, finlab.Rudder]
+"""The kinds of actuator that users make by hand."""
 LONGEST_SIGNATURE = 300
 """Most characters of a signature: three lines of a terminal."""
 MOST_LINES = 45

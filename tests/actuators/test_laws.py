@@ -20,32 +20,49 @@ from finlab.physics.plant import Plant
 from tests.t200 import t200_rows
 
 LAW = PowerLaw(0.997, 1.449)
-TABLE = PowerTable(t200_rows(16), "us")
-REMUS = {"area": 6.65e-3, "deflection": (-0.24, 0.24)}
+"""Power of a T200 thruster at 16 V, as a law: P = 0.997 F^1.449."""
+T200 = PowerTable(t200_rows(16), "us")
+"""The same thruster as its maker measured it."""
+REMUS_RUDDER = {"area": 6.65e-3, "deflection": (-0.24, 0.24)}
+"""Area [m2] and deflections [rad] of a rudder of the REMUS, as Prestero (2001) gives them."""
 
 
 def thruster(name: str = "t", model: Any = LAW, **changes: Any) -> Thruster:
-    told = {"position": (0.1, 0.2, 0.3), "axis": (0.0, 0.6, 0.8), "force": (-39.0, 51.0), **changes}
-    return Thruster(name=name, model=model, **told)
+    """A thruster with some of its fields changed."""
+    fields = {
+        "position": (0.1, 0.2, 0.3),
+        "axis": (0.0, 0.6, 0.8),
+        "force": (-39.0, 51.0),
+        **changes,
+    }
+    return Thruster(name=name, model=model, **fields)
 
 
 def azimuth(name: str = "a", model: Any = LAW, **changes: Any) -> Azimuth:
-    told = {"turn_axis": (0.0, 0.0, 1.0), "zero": (1.0, 0.0, 0.0), "force": (0.0, 40.0), **changes}
-    return Azimuth(name=name, position=(-0.5, 0.1, 0.0), model=model, **told)
+    """A pod with some of its fields changed."""
+    fields = {
+        "turn_axis": (0.0, 0.0, 1.0),
+        "zero": (1.0, 0.0, 0.0),
+        "force": (0.0, 40.0),
+        **changes,
+    }
+    return Azimuth(name=name, position=(-0.5, 0.1, 0.0), model=model, **fields)
 
 
 def rudder(name: str = "r", **changes: Any) -> Rudder:
-    told = {
+    """A rudder of the REMUS with some of its fields changed."""
+    fields = {
         "shaft": (0.0, 0.0, 1.0),
         "zero": (1.0, 0.0, 0.0),
         "aspect_ratio": 2.21,
-        **REMUS,
+        **REMUS_RUDDER,
         **changes,
     }
-    return Rudder(name=name, position=(-0.638, 0.0, 0.0), **told)
+    return Rudder(name=name, position=(-0.638, 0.0, 0.0), **fields)
 
 
 def random_commands(low: Array, high: Array) -> Array:
+    """Commands (50, ...) between limits."""
     rng = np.random.default_rng(3)
     return low + rng.uniform(size=(50, *low.shape)) * (high - low)
 
@@ -56,31 +73,31 @@ def random_commands(low: Array, high: Array) -> Array:
         (ThrusterLaw, [thruster(), thruster(force=(0.0, 5.0))]),
         (
             ThrusterLaw,
-            [thruster(model=TABLE), thruster(model=PowerTable(t200_rows(12)), force=(-20.0, 30.0))],
+            [thruster(model=T200), thruster(model=PowerTable(t200_rows(12)), force=(-20.0, 30.0))],
         ),
         (AzimuthLaw, [azimuth(), azimuth(force=(3.0, 20.0))]),
-        (AzimuthLaw, [azimuth(model=TABLE)] * 2),
+        (AzimuthLaw, [azimuth(model=T200)] * 2),
         (AzimuthLaw, [azimuth(force=(-30.0, 40.0), dead_band=15.0), azimuth(dead_band=8.0)]),
-        (ThrusterLaw, [thruster(dead_band=20.0), thruster(model=TABLE, dead_band=6.0)]),
+        (ThrusterLaw, [thruster(dead_band=20.0), thruster(model=T200, dead_band=6.0)]),
         (RudderLaw, [rudder(deflection=(-1.2, 1.2)), rudder(drag=0.1, stall=0.3)]),
     ],
 )
 def test_derivatives_are_those_of_finite_differences(law: type[Any], parts: list[Any]) -> None:
-    own: ActuatorLaw = law(parts)
+    actuator_law: ActuatorLaw = law(parts)
     command = random_commands(
         np.array([p.lower for p in parts]), np.array([p.upper for p in parts])
     )
     inflow = np.random.default_rng(4).normal(0.0, 2.0, command.shape)
-    force, jacobian = own.force_and_jacobian(command, inflow)
-    np.testing.assert_array_equal(force, own.force(command, inflow))
-    gradient = own.power_gradient(command, inflow)
+    force, jacobian = actuator_law.force_and_jacobian(command, inflow)
+    np.testing.assert_array_equal(force, actuator_law.force(command, inflow))
+    gradient = actuator_law.power_gradient(command, inflow)
     step = 1e-6
     for k in range(3):
         move = step * np.eye(3)[k]
-        by_force = (own.force(command + move, inflow) - own.force(command - move, inflow)) / (
-            2.0 * step
-        )
-        ahead, back = (own.power(command + s * move, inflow) for s in (1.0, -1.0))
+        by_force = (
+            actuator_law.force(command + move, inflow) - actuator_law.force(command - move, inflow)
+        ) / (2.0 * step)
+        ahead, back = (actuator_law.power(command + s * move, inflow) for s in (1.0, -1.0))
         scale = 1.0 + np.abs(force).max()
         np.testing.assert_allclose(jacobian[..., k, :], by_force, atol=2e-6 * scale)
         np.testing.assert_allclose(
@@ -131,7 +148,7 @@ def test_power_laws_of_the_t200_meet_its_tables(
 
 
 def test_a_table_answers_a_price_with_the_force_whose_marginal_cost_it_is() -> None:
-    curve = TableCurves(TABLE).sides[0].curve
+    curve = TableCurves(T200).sides[0].curve
     price = np.linspace(0.0, 13.0, 300)
     size = curve.response(price)
     power, marginal_cost = curve.power_and_marginal_cost(size)
@@ -190,7 +207,8 @@ def coefficients_with_stall(
 ) -> Array:
     """Coefficients (2,) of lift and drag by Beard and McLain (2012), section 4.2, with a sharpness
     of 50."""
-    below, above = math.exp(-50.0 * (a - stall)), math.exp(50.0 * (a + stall))
+    below = math.exp(-50.0 * (a - stall))
+    above = math.exp(50.0 * (a + stall))
     sigma = (1.0 + below + above) / ((1.0 + below) * (1.0 + above))
     lift = slope * a
     plate = (
@@ -205,23 +223,24 @@ def test_a_foil_stalls_as_its_source_says() -> None:
     rudders = [rudder(stall=0.3, drag=0.02), rudder(lift_slope=2.0, stall=0.6, aspect_ratio=4.0)]
     law = RudderLaw(rudders)
     for angle in np.linspace(-1.5, 1.5, 301):
-        told = law.coefficients(np.array([angle, angle]))
+        coefficients = law.coefficients(np.array([angle, angle]))
         for i, part in enumerate(rudders):
             expected = coefficients_with_stall(
                 part.slope, part.drag, part.induced, part.stall, float(angle)
             )
             np.testing.assert_allclose(
-                [told.lift[i], told.drag[i]], expected, rtol=1e-9, atol=1e-12
+                [coefficients.lift[i], coefficients.drag[i]], expected, rtol=1e-9, atol=1e-12
             )
 
 
 def hybrid() -> Layout:
+    """A robot that has every kind of actuator."""
     parts = (
         thruster("up", torque_per_newton=0.02),
         rudder(),
         Fin("fin", (0.2, 0.1, 0.0), 0.5),
         azimuth(torque_per_newton=-0.01),
-        thruster("table", model=TABLE, axis=(1.0, 0.0, 0.0)),
+        thruster("table", model=T200, axis=(1.0, 0.0, 0.0)),
     )
     return Layout("hybrid", parts)
 

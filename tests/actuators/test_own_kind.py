@@ -47,6 +47,7 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 
 @pytest.fixture(scope="module")
 def boat(home: Path) -> Layout:
+    """Two water jets astern, for surge and yaw, of the page's kind; `home` is its folder."""
     jets = [(f"jet_{side}", (-0.6, y, 0.0)) for side, y in (("left", 0.3), ("right", -0.3))]
     parts = tuple(KINDS["water_jet"](n, p, (0, 0, 1), (1, 0, 0)) for n, p in jets)  # type: ignore[call-arg]
     return Layout("jetboat", parts, axes=("Fx", "Tz"))
@@ -62,8 +63,10 @@ def test_it_is_answered_in_and_out_of_reach_and_damaged(boat: Layout) -> None:
         # Its watts by the page's own law: 2 F^2 of each.
         assert answer.power == pytest.approx(2.0 * (answer.command[:, 1] ** 2).sum(), rel=1e-9)
         assert answer.bound <= answer.power <= answer.bound * (1 + 1e-6)
-    far = allocator.allocate([100, 0, 0, 0, 0, 0])
-    assert far.wrench[0] == pytest.approx(40.0, abs=1e-6) and "at full thrust" in str(far)
+    out_of_reach = allocator.allocate([100, 0, 0, 0, 0, 0])
+    assert out_of_reach.wrench[0] == pytest.approx(40.0, abs=1e-6) and "at full thrust" in str(
+        out_of_reach
+    )
     weak = allocator.allocate([100, 0, 0, 0, 0, 0], damage=Damage(weak={"jet_left": 0.5}))
     assert weak.command[:, 1] == pytest.approx([10.0, 20.0], abs=1e-6)
     assert "water_jet" in str(weak) and weak.commands["jet_left"].force == pytest.approx(10.0)
@@ -105,12 +108,14 @@ def test_the_command_line_and_the_runtime_take_it(
     (tmp_path / "steps.py").write_text(script)
     text = json.dumps([list(map(str, step)) for step in steps])
     path = os.pathsep.join((str(home), str(ROOT)))
-    known = {**os.environ, "PYTHONPATH": path, "FINLAB_KINDS": "water_jet"}
+    environment = {**os.environ, "PYTHONPATH": path, "FINLAB_KINDS": "water_jet"}
     subprocess.run(
-        [sys.executable, tmp_path / "steps.py", text], env=known, check=True, timeout=120
+        [sys.executable, tmp_path / "steps.py", text], env=environment, check=True, timeout=120
     )
-    said = capfd.readouterr().out
-    assert "2 water_jets push in 2 of 2 independent directions" in said and "delivered" in said
+    printed = capfd.readouterr().out
+    assert (
+        "2 water_jets push in 2 of 2 independent directions" in printed and "delivered" in printed
+    )
     assert load_layout(tmp_path / "boat.json") == boat
     assert "jet_left" in (tmp_path / "boat.urdf").read_text()
     assert runtime(["check", str(tmp_path / "bundle")]) == 0
@@ -199,20 +204,20 @@ def test_a_module_of_kinds_that_is_none_is_one_sentence(
     (tmp_path / "jet_of_mine.py").write_text(text.replace(before, after))
     monkeypatch.syspath_prepend(str(tmp_path))
     monkeypatch.delitem(sys.modules, "jet_of_mine", raising=False)
-    known = dict(KINDS)
+    kinds = dict(KINDS)
     with pytest.raises(FinlabError, match="^FINLAB_KINDS: ") as caught:
         import_kinds("jet_of_mine")
     sentence = str(caught.value)
     assert "jet_of_mine" in sentence and said in sentence and "\n" not in sentence
-    assert known == KINDS
+    assert kinds == KINDS
 
 
 def test_a_module_of_kinds_that_is_not_there_is_one_sentence(tmp_path: Path) -> None:
-    known = {**os.environ, "PYTHONPATH": str(ROOT), "FINLAB_KINDS": "nowhere"}
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "FINLAB_KINDS": "nowhere"}
     for module in ("finlab", "finlab.deploy.command"):
         verb = ["layout", "check", "A"] if module == "finlab" else ["check", str(tmp_path)]
         ask = [sys.executable, "-m", module, *verb]
-        done = subprocess.run(ask, env=known, capture_output=True, text=True, timeout=60)
+        done = subprocess.run(ask, env=environment, capture_output=True, text=True, timeout=60)
         assert done.returncode == 2 and done.stderr.count("\n") == 1
         assert "FINLAB_KINDS: the module 'nowhere' cannot be imported" in done.stderr
     script = (
@@ -220,7 +225,9 @@ def test_a_module_of_kinds_that_is_not_there_is_one_sentence(tmp_path: Path) -> 
         "print(error)"
     )
     done = subprocess.run(
-        [sys.executable, "-c", "import finlab.errors\n" + script], env=known, capture_output=True
+        [sys.executable, "-c", "import finlab.errors\n" + script],
+        env=environment,
+        capture_output=True,
     )
     assert done.returncode == 0 and b"nowhere" in done.stdout
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.any_robot import AnyRobot
+from tests.allocator_cache import AllocatorCache
 
 
 @pytest.fixture
@@ -29,6 +29,6 @@ def force_table(tmp_path: Path) -> str:
 
 
 @pytest.fixture(scope="session")
-def search() -> AnyRobot:
+def search() -> AllocatorCache:
     """The product's default method."""
-    return AnyRobot()
+    return AllocatorCache()

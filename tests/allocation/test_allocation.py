@@ -15,11 +15,13 @@ from finlab.assets import shipped_checkpoints
 from finlab.errors import AllocationError, DataError
 from finlab.layout import Damage, Fin, FinModelSpec, Layout, load_layout
 from finlab.physics import Plant
-from tests.allocation.quick import OF_FINS, quick_allocator
-from tests.any_robot import AnyRobot
+from tests.allocation.quick_allocator import OF_FINS, quick_allocator
+from tests.allocator_cache import AllocatorCache
 
-SURGE = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
-FAR = [40.0, 5.0, -30.0, 1.0, 2.0, 3.0]
+WRENCH = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
+"""A wrench within reach of robot A: surge, heave and yaw [N, N m]."""
+WRENCH_OUT_OF_REACH = [40.0, 5.0, -30.0, 1.0, 2.0, 3.0]
+"""A wrench that no robot here can give [N, N m]."""
 
 pytestmark = pytest.mark.skipif(
     not {"default", "paper"} <= set(shipped_checkpoints()),
@@ -27,12 +29,13 @@ pytestmark = pytest.mark.skipif(
 )
 
 
-def round_trips(result: Allocation) -> list[Allocation]:
+def copies(result: Allocation) -> list[Allocation]:
+    """An answer after each way of copying it."""
     return [pickle.loads(pickle.dumps(result)), copy.copy(result), copy.deepcopy(result)]
 
 
 def test_every_field_counts_but_the_time() -> None:
-    result = AnyRobot("mdn").allocate(load_layout("A"), SURGE)
+    result = AllocatorCache("mdn").allocate(load_layout("A"), WRENCH)
     assert replace(result, solve_ms=1e3) == result
     assert result.candidates is not None
     for changed in (
@@ -44,14 +47,14 @@ def test_every_field_counts_but_the_time() -> None:
         {"seed": 1},
     ):
         assert replace(result, **changed) != result, changed
-    told = result.candidates
+    candidates_of_result = result.candidates
     for candidates, samples in (
-        (replace(told, power=told.power + 1e-12), None),
+        (replace(candidates_of_result, power=candidates_of_result.power + 1e-12), None),
         (None, None),
-        (told, told),
+        (candidates_of_result, candidates_of_result),
     ):
         assert result.with_candidates(candidates, samples) != result
-    assert result.with_candidates(told, result.samples) == result
+    assert result.with_candidates(candidates_of_result, result.samples) == result
     assert result != "an answer" and result is not None
     with pytest.raises(TypeError, match="unhashable"):
         hash(result)
@@ -74,29 +77,29 @@ def test_nan_equals_nan_and_kinds_differ() -> None:
 
 def test_an_answer_cannot_be_written_to_nor_what_comes_after_it() -> None:
     layout = load_layout("A")
-    search = AnyRobot("mdn")
-    first, second = (search.allocate(layout, SURGE) for _ in range(2))
+    search = AllocatorCache("mdn")
+    first, second = (search.allocate(layout, WRENCH) for _ in range(2))
     assert first.candidates is not None and first.candidates.command.base is not first.command
     with pytest.raises(ValueError, match="read-only"):
         first.command[:] = 0.0
-    assert search.allocate(layout, SURGE) == second
+    assert search.allocate(layout, WRENCH) == second
     assert first.candidates == second.candidates
 
 
 @pytest.mark.parametrize("n_fins", [1, 4, 16])
-def test_the_short_form_is_short(n_fins: int, search: AnyRobot) -> None:
+def test_the_short_form_is_short(n_fins: int, search: AllocatorCache) -> None:
     fins = tuple(Fin(f"{'long' * 14}_{i}", (0.1, 0.01 * i, 0.0), 0.3 * i) for i in range(n_fins))
     layout = Layout("the longest name of a layout that " + "x" * 30, fins)
-    result = search.allocate(layout, SURGE, lost=[fin.name for fin in fins[: n_fins // 2]])
+    result = search.allocate(layout, WRENCH, lost=[fin.name for fin in fins[: n_fins // 2]])
     assert len(repr(result)) <= 400 and "err_norm=" in repr(result)
-    batch = search.allocate_batch(layout, [SURGE] * 5)
+    batch = search.allocate_batch(layout, [WRENCH] * 5)
     assert len(repr(batch)) <= 400 and "5 targets" in repr(batch)
     assert "0 targets" in repr(search.allocate_batch(layout, np.empty((0, 6))))
 
 
-def test_another_command_is_judged_anew(search: AnyRobot) -> None:
+def test_another_command_is_judged_anew(search: AllocatorCache) -> None:
     layout = load_layout("A")
-    result = search.allocate(layout, SURGE, lost=["front_left"])
+    result = search.allocate(layout, WRENCH, lost=["front_left"])
     least = np.where(np.isnan(result.command), np.nan, layout.lower)
     other = result.with_command(least)
     np.testing.assert_allclose(other.wrench, Plant(layout).wrench(least), atol=1e-12)
@@ -113,14 +116,14 @@ def test_a_method_that_does_not_know_the_fins_blames_no_limit() -> None:
     strange = replace(
         layout, actuators=tuple(replace(f, model=FinModelSpec("lighthill")) for f in layout.fins)
     )
-    result = quick_allocator("paper").allocate(strange, SURGE)
+    result = quick_allocator("paper").allocate(strange, WRENCH)
     assert not result.reachable and result.binding == () and result.unknown_fins == layout.names
     assert "not reached" not in str(
         result
     ) and "the method does not know these fins: front_right" in str(result)
     for method in ("dual", "sqp"):
-        known = Allocator(strange, method).allocate(SURGE)
-        assert known.reachable and known.unknown_fins == ()
+        answer = Allocator(strange, method).allocate(WRENCH)
+        assert answer.reachable and answer.unknown_fins == ()
 
 
 @pytest.mark.parametrize("method", OF_FINS)
@@ -134,7 +137,9 @@ def test_without_its_force_table_no_method_answers(method: str, tmp_path: Path) 
         lambda *asked, **how: allocator.allocate_batch(*asked, **how),
     ):
         with pytest.raises(DataError, match=r"gone\.csv: no such file, expected a CSV table"):
-            answer(tables, SURGE if answer == allocator.allocate else [SURGE], lost=["front_left"])
+            answer(
+                tables, WRENCH if answer == allocator.allocate else [WRENCH], lost=["front_left"]
+            )
 
 
 def test_an_axis_that_nothing_drives_is_told_where_it_is_asked_for() -> None:
@@ -151,6 +156,7 @@ POLICIES = (
     Policy(axis_weights=(1.0, 1.0, 10.0, 1.0, 1.0, 0.1)),
     Policy("priority", order=(("Tz",), ("Fx", "Fz"))),
 )
+"""A policy of each kind, and weights of axes."""
 
 
 def wrenches(n: int = 6) -> np.ndarray:
@@ -160,7 +166,7 @@ def wrenches(n: int = 6) -> np.ndarray:
 
 
 def test_a_batch_errs_as_little_as_single_calls() -> None:
-    allocator = AnyRobot()
+    allocator = AllocatorCache()
     layout = load_layout("A")
     targets = wrenches(20)
     batch = allocator.allocate_batch(layout, targets)
@@ -169,7 +175,7 @@ def test_a_batch_errs_as_little_as_single_calls() -> None:
 
 
 def test_weights_move_the_error_off_the_heavy_axis() -> None:
-    allocator = AnyRobot()
+    allocator = AllocatorCache()
     layout = load_layout("A")
     targets = wrenches(20)
     batch = allocator.allocate_batch(layout, targets)
@@ -206,7 +212,7 @@ def test_batches_carry_the_note_about_unknown_fins(method: str) -> None:
 
 
 def test_a_method_that_does_not_know_the_policy_says_so_at_once() -> None:
-    allocator = AnyRobot("analytic")
+    allocator = AllocatorCache("analytic")
     layout = load_layout("A")
     for policy in ("priority", Policy(axis_weights=(2.0, 1.0, 1.0, 1.0, 1.0, 1.0))):
         with pytest.raises(AllocationError, match="minimizes the plain error"):

@@ -17,7 +17,7 @@ from finlab.allocation.methods import method_class
 from finlab.cli.robot_verbs import allocate
 from finlab.errors import AllocationError, CommandError, LayoutError
 from finlab.layout import Fin, Layout, load_layout
-from tests.any_robot import AnyRobot
+from tests.allocator_cache import AllocatorCache
 
 ROBOT = Layout(
     "robot",
@@ -27,7 +27,9 @@ ROBOT = Layout(
         Fin("stern", (-0.2, 0.0, 0.05), -1.0),
     ),
 )
+"""A robot of few fins, for which the method `Drawn` answers."""
 SURGE = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+"""A wrench straight ahead [N, N m]."""
 
 
 class Drawn(LeastErrorMethod):
@@ -41,16 +43,17 @@ class Drawn(LeastErrorMethod):
         seeds = [
             np.random.default_rng([seed, *np.abs(t).view(np.uint64).tolist()]) for t in targets
         ]
-        share = np.array([rng.uniform(size=(self.layout.n, 3)) for rng in seeds])
-        command = np.array([0.05, 0.1, -3.0]) + share * [0.5, 1.9, 6.0]
+        fraction = np.array([rng.uniform(size=(self.layout.n, 3)) for rng in seeds])
+        command = np.array([0.05, 0.1, -3.0]) + fraction * [0.5, 1.9, 6.0]
         few = Candidates(command, targets * 0, np.zeros(1), np.zeros(1), np.zeros(1), ("drawn",))
         return Solution(command, wrench=0.5 * targets, candidates=lambda: few)
 
 
 @pytest.fixture
-def method() -> AnyRobot:
+def method() -> AllocatorCache:
+    """The method `Drawn`, which has not been asked yet."""
     Drawn.asked.clear()
-    return AnyRobot(Drawn)
+    return AllocatorCache(Drawn)
 
 
 @pytest.mark.parametrize(
@@ -80,7 +83,9 @@ def method() -> AnyRobot:
         ({"Fx": 1}, "wrench: expected six numbers"),
     ],
 )
-def test_refuses_a_wrench_that_is_none(method: AnyRobot, wrench: object, sentence: str) -> None:
+def test_refuses_a_wrench_that_is_none(
+    method: AllocatorCache, wrench: object, sentence: str
+) -> None:
     with pytest.raises(CommandError) as caught:
         method.allocate(ROBOT, wrench)  # type: ignore[arg-type]
     assert sentence in str(caught.value) and "\n" not in str(caught.value)
@@ -88,7 +93,7 @@ def test_refuses_a_wrench_that_is_none(method: AnyRobot, wrench: object, sentenc
 
 
 @pytest.mark.parametrize("wrenches", [SURGE, [[1.0, 2.0]], [[SURGE]], [[math.nan] * 6]])
-def test_refuses_many_wrenches_that_are_none(method: AnyRobot, wrenches: object) -> None:
+def test_refuses_many_wrenches_that_are_none(method: AllocatorCache, wrenches: object) -> None:
     with pytest.raises(CommandError, match="wrench: "):
         method.allocate_batch(ROBOT, wrenches)  # type: ignore[arg-type]
 
@@ -113,13 +118,13 @@ def test_refuses_many_wrenches_that_are_none(method: AnyRobot, wrenches: object)
     ],
 )
 def test_refuses_what_is_no_question(
-    method: AnyRobot, options: dict[str, object], kind: type[Exception], sentence: str
+    method: AllocatorCache, options: dict[str, object], kind: type[Exception], sentence: str
 ) -> None:
     with pytest.raises(kind, match=sentence):
         method.allocate(ROBOT, SURGE, **options)  # type: ignore[arg-type]
 
 
-def test_failed_fins_leave_the_graph_and_come_back_as_nan(method: AnyRobot) -> None:
+def test_failed_fins_leave_the_graph_and_come_back_as_nan(method: AllocatorCache) -> None:
     result = method.allocate(ROBOT, SURGE, lost=["left"])
     assert Drawn.asked[0][0].names == ("bow", "stern")
     assert result.names == ("bow", "left", "stern") and result.lost == ("left",)
@@ -133,20 +138,20 @@ def test_failed_fins_leave_the_graph_and_come_back_as_nan(method: AnyRobot) -> N
     assert batch.command.shape == (2, 3, 3) and np.isnan(batch.command[:, 1]).all()
 
 
-def test_previous_commands_reach_the_method_without_the_failed_fins(method: AnyRobot) -> None:
+def test_previous_commands_reach_the_method_without_the_failed_fins(method: AllocatorCache) -> None:
     previous = np.arange(9.0).reshape(3, 3)
     previous[0] = np.nan
     method.allocate(ROBOT, SURGE, lost=["bow"], previous=previous)
     np.testing.assert_array_equal(Drawn.asked[0][1], [[3, 4, 5], [6, 7, 8]])
 
 
-def test_the_same_seed_gives_the_same_answer(method: AnyRobot) -> None:
+def test_the_same_seed_gives_the_same_answer(method: AllocatorCache) -> None:
     first, second, other = (method.allocate(ROBOT, SURGE, seed=seed).command for seed in (3, 3, 4))
     np.testing.assert_array_equal(first, second)
     assert not np.array_equal(first, other)
 
 
-def test_many_targets_get_the_answers_of_each(method: AnyRobot) -> None:
+def test_many_targets_get_the_answers_of_each(method: AllocatorCache) -> None:
     targets = np.random.default_rng(0).normal(size=(4, 6))
     batch = method.allocate_batch(ROBOT, targets, seed=2)
     for row, target in enumerate(targets):
@@ -156,14 +161,14 @@ def test_many_targets_get_the_answers_of_each(method: AnyRobot) -> None:
     assert batch.solve_ms.shape == (4,)
 
 
-def test_the_target_is_a_copy(method: AnyRobot) -> None:
+def test_the_target_is_a_copy(method: AllocatorCache) -> None:
     target = np.array(SURGE)
     result = method.allocate(ROBOT, target)
     target[0] = 99.0
     assert result.target[0] == 1.0
 
 
-def test_energy_counts_the_working_fins(method: AnyRobot) -> None:
+def test_energy_counts_the_working_fins(method: AllocatorCache) -> None:
     result = method.allocate(ROBOT, SURGE, lost=["left"])
     whole = 0.0
     for amplitude, frequency, direction in result.command[[0, 2]] / [0.6, 2.1, math.pi]:
@@ -175,7 +180,7 @@ def test_energy_counts_the_working_fins(method: AnyRobot) -> None:
     np.testing.assert_allclose([batch.power[0], batch.effort[0]], [result.power, result.effort])
 
 
-def test_a_method_without_candidates_says_so(method: AnyRobot) -> None:
+def test_a_method_without_candidates_says_so(method: AllocatorCache) -> None:
     result: Allocation = method.allocate(ROBOT, SURGE)
     assert result.samples is None
     assert result.candidates is not None and result.candidates.source == ("drawn",)
@@ -183,7 +188,7 @@ def test_a_method_without_candidates_says_so(method: AnyRobot) -> None:
 
 def test_unknown_methods_are_refused_with_the_names_that_exist() -> None:
     with pytest.raises(AllocationError) as caught:
-        AnyRobot("magic")
+        AllocatorCache("magic")
     assert str(caught.value) == f"method: expected one of {', '.join(METHODS)}, got 'magic'"
 
 
@@ -194,7 +199,7 @@ def test_the_command_line_names_every_method() -> None:
 
 def test_the_method_comes_first_and_the_checkpoint_by_keyword() -> None:
     for name in ("analytic", "qp"):
-        assert AnyRobot(name).name == name
+        assert AllocatorCache(name).name == name
     with pytest.raises(TypeError):
         Allocator(ROBOT, "dual", "default")  # type: ignore[misc]
     with pytest.raises(AllocationError, match="checkpoint: method 'dual' has no networks, only"):
@@ -206,7 +211,7 @@ def test_the_method_comes_first_and_the_checkpoint_by_keyword() -> None:
 
 
 def test_the_time_is_that_of_the_solver_shared_by_its_targets(
-    method: AnyRobot, monkeypatch: pytest.MonkeyPatch
+    method: AllocatorCache, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def clock() -> SimpleNamespace:
         return SimpleNamespace(perf_counter=iter([10.0, 40.0]).__next__)

@@ -14,11 +14,12 @@ from finlab.errors import CommandError, LayoutError
 from finlab.layout import Layout, load_layout
 from finlab.layout.load import parse_layout
 from finlab.layout.save import layout_to_dict
-from tests.least_power import lower_bound
-from tests.mixed_robots import layout_of
-from tests.own_plant import OwnPlant
+from tests.oracle_optima import lower_bound
+from tests.oracle_plant import OraclePlant
+from tests.random_robots import layout_of
 
 POLICIES = ("closest", "direction", "priority")
+"""The kinds of policy."""
 
 
 @pytest.mark.parametrize("policy", POLICIES)
@@ -52,8 +53,11 @@ def test_an_axis_is_freed_by_name_for_one_question(policy: str) -> None:
 
 
 def test_a_free_axis_takes_what_the_cheapest_answer_gives() -> None:
-    plant = OwnPlant(parts := layout_of("r", _three_thrusters()))
-    answer = Allocator(parse_layout(parts)).allocate([12.0, 0.0, 0.0, 0.0, 0.0, 9.0], free=("Tz",))
+    mapping = layout_of("robot", _three_thrusters())
+    plant = OraclePlant(mapping)
+    answer = Allocator(parse_layout(mapping)).allocate(
+        [12.0, 0.0, 0.0, 0.0, 0.0, 9.0], free=("Tz",)
+    )
     watts = [
         lower_bound(plant, np.array([12.0, 0, 0, 0, 0, yaw])) for yaw in np.linspace(-6, 6, 121)
     ]
@@ -62,6 +66,7 @@ def test_a_free_axis_takes_what_the_cheapest_answer_gives() -> None:
 
 
 def _three_thrusters() -> list[dict[str, object]]:
+    """Three thrusters side by side, each with another law, as a layout file says them."""
     laws = [0.5, 1.0, 2.0]
     return [
         {"name": f"m{k}", "type": "thruster", "position_m": [0.0, y, 0.0], "axis": [1.0, 0.0, 0.0]}
@@ -123,8 +128,8 @@ def test_priority_of_a_robot_that_commands_three_axes() -> None:
 def test_axes_in_files() -> None:
     layout = replace(load_layout("bluerov2"), axes=("Tz", "Fx"))
     assert layout.axes == ("Fx", "Tz")
-    again: Layout = parse_layout(json.loads(json.dumps(layout_to_dict(layout))))
-    assert again == layout and again != load_layout("bluerov2")
+    layout_read_back: Layout = parse_layout(json.loads(json.dumps(layout_to_dict(layout))))
+    assert layout_read_back == layout and layout_read_back != load_layout("bluerov2")
     with pytest.raises(LayoutError, match="named once"):
         replace(layout, axes=("Fx", "Fx"))
     with pytest.raises(LayoutError, match="axes"):

@@ -1,8 +1,10 @@
-"""What every method promises of every answer: kinds of robot, damage, policies and ticks in one
-table.
+"""The contract of all methods: what each promises of every answer, for every kind of robot and
+damage, policy, tick and free axis.
 
-The judge is `tests/own_plant.py`, a second set of laws, for robots that are whole or have lost
-actuators; of others the limits that damage leaves are checked.
+A new method is tested here as soon as it stands in `METHODS`, a new kind of robot as soon as it
+stands in `KINDS` of `tests/random_robots.py`. The judge is `tests/oracle_plant.py`, a second set of
+laws, for robots that are whole or have lost actuators; of others the limits that damage leaves are
+checked.
 """
 
 import copy
@@ -11,6 +13,7 @@ import pickle
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from functools import cache
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -23,19 +26,22 @@ from finlab.arrays import Array
 from finlab.axes import AXES
 from finlab.layout import Damage, Layout, parse_layout
 from finlab.physics.plant import plant_of
-from tests.allocation.quick import quick_allocator
-from tests.exhaustive import sampled
-from tests.mixed_robots import KINDS, random_flow, random_robot, with_dead_bands, with_rates
-from tests.own_plant import OwnPlant
+from tests.allocation.quick_allocator import quick_allocator
+from tests.oracle_plant import OraclePlant
+from tests.random_robots import KINDS, random_flow, random_robot, with_dead_bands, with_rates
+from tests.sampled_cases import sampled
 
 SEED = 58
 """Of the robots; another one than that of the tests of the default method."""
-DAMAGE = ("whole", "lost", "weak", "torn", "stuck", "running")
+DAMAGE_KINDS = ("whole", "lost", "weak", "torn", "stuck", "running")
+"""What may be wrong with an actuator, as the keywords of `Damage`, and "whole"."""
 POLICIES = ("closest", "direction", "priority")
+"""The kinds of policy."""
 REACHES = (0.0, 1.0, 30.0)
-"""How large wrenches are, in that of a command within limits: at 1 it can be delivered."""
+"""Sizes of the wrenches, as multiples of that of a command within limits: 0 is rest, 1 is within
+reach, 30 is beyond."""
 EXTREMES = (1e-6, 1e4)
-"""The same of wrenches that are asked for once."""
+"""The same of wrenches that are asked for by the default policy alone."""
 ARRAYS = (
     *("target", "command", "scale", "wrench", "forces", "unallocated", "expected_miss"),
     *(
@@ -57,7 +63,7 @@ class Robot:
     """A robot of a kind, and what judges its answers."""
 
     layout: Layout
-    plant: OwnPlant
+    plant: OraclePlant
     flow: Array | None
 
 
@@ -68,7 +74,7 @@ def robot_of(kind: str) -> Robot:
     rng = np.random.default_rng([SEED, KINDS.index(kind)])
     mapping = with_dead_bands(with_rates(random_robot(kind, number, SEED)), rng)
     flow = random_flow(kind, number, SEED)
-    return Robot(parse_layout(mapping), OwnPlant(mapping, flow), flow)
+    return Robot(parse_layout(mapping), OraclePlant(mapping, flow), flow)
 
 
 def fits(method: str, kind: str) -> bool:
@@ -76,26 +82,32 @@ def fits(method: str, kind: str) -> bool:
     return method_class(method).fits(robot_of(kind).layout)
 
 
-def damaged(layout: Layout, word: str) -> Damage | None:
-    """A robot whose first actuator that can be is damaged so; None where none can."""
-    if word == "whole":
+def damage_of_kind(layout: Layout, damage_kind: str) -> Damage | None:
+    """Damage of the first actuator that can have it; None where no actuator can."""
+    if damage_kind == "whole":
         return Damage()
-    if word == "lost":
+    if damage_kind == "lost":
         return Damage(lost=[layout.names[1]])
-    for part in layout.actuators:
-        if word not in part.KIND.faults:
+    for actuator in layout.actuators:
+        kind = actuator.KIND
+        if damage_kind not in kind.faults:
             continue
-        middle = 0.5 * (np.array(part.lower) + np.array(part.upper))
-        angle = middle[part.KIND.stuck_number] if part.KIND.stuck_number is not None else middle[0]
-        value = {"weak": 0.4, "torn": 0.4, "stuck": float(angle)}
-        kept = tuple(float(number) for number in middle[: len(part.KIND.numbers)])
-        return Damage(**{word: {part.name: kept if word == "running" else value[word]}})
+        middle = 0.5 * (np.array(actuator.lower) + np.array(actuator.upper))
+        command = middle[: len(kind.numbers)].tolist()
+        stuck_number = 0 if kind.stuck_number is None else kind.stuck_number
+        values: dict[str, Any] = {
+            "weak": 0.4,
+            "torn": 0.4,
+            "stuck": float(middle[stuck_number]),
+            "running": tuple(command),
+        }
+        return Damage(**{damage_kind: {actuator.name: values[damage_kind]}})
     return None
 
 
 SLOW_METHODS = ("ipopt", "paper", "sqp", "paper_sqp", "qp")
 """Methods that take so long that a share of their cases is asked every day."""
-ROWS_ALONE = ("mdn", "paper", "ipopt", "sqp", "paper_sqp", "qp")
+METHODS_WHOSE_ROWS_DIFFER = ("mdn", "paper", "ipopt", "sqp", "paper_sqp", "qp")
 """Methods whose rows share starts, time or single precision: many wrenches get answers as good as
 each alone, which are not the same numbers."""
 
@@ -106,164 +118,174 @@ def cases_of(method: str) -> list[Any]:
     always = list[Any]()
     others = list[Any]()
     for kind in KINDS:
-        for word in DAMAGE:
-            if not fits(method, kind) or damaged(robot_of(kind).layout, word) is None:
+        for damage_kind in DAMAGE_KINDS:
+            if not fits(method, kind) or damage_of_kind(robot_of(kind).layout, damage_kind) is None:
                 continue
-            case = pytest.param(method, kind, word, id=f"{method}-{kind.replace(' ', '_')}-{word}")
-            often = method == "dual" and word in ("whole", "lost")
-            (always if often else others).append(case)
+            name = f"{method}-{kind.replace(' ', '_')}-{damage_kind}"
+            case = pytest.param(method, kind, damage_kind, id=name)
+            if method == "dual" and damage_kind in ("whole", "lost"):
+                always.append(case)
+            else:
+                others.append(case)
     return [*always, *sampled(others, 7 if method in SLOW_METHODS else 4)]
 
 
-CASES = [case for method in METHODS for case in cases_of(method)]
+CASES = list(chain.from_iterable(map(cases_of, METHODS)))
+"""Method, kind of robot and kind of damage of every case."""
 
 
 @dataclass(frozen=True)
 class Question:
-    """What is asked of a robot."""
+    """One call of `allocate`."""
 
-    about: str
+    description: str
+    """What a failure says of it."""
     wrench: Array
     """Wrench (6,) [N, N m]."""
-    asked: dict[str, Any]
+    arguments: dict[str, Any]
     """Other arguments of `allocate`."""
-    known: Array | None = None
-    """A command (n, 3) that gives the wrench; None where none has to."""
+    delivering: Array | None = None
+    """A command (n, 3) that gives the wrench; None where none is known."""
 
 
 def questions(
     method: str, allocator: Allocator, robot: Robot, damage: Damage
 ) -> Iterator[Question]:
-    """What is asked: each policy of the method, within reach and beyond, outside of ticks and in
-    one, with all axes and with one that is free."""
+    """Questions by each policy of the method: within reach and beyond, outside of ticks and in one,
+    with all axes and with one that is free."""
     layout = damage.applied_to(allocator.layout)
     plant = plant_of(layout).at(robot.flow)
     lost = [name in damage.lost for name in layout.names]
     rng = np.random.default_rng([SEED, len(method)])
 
-    def drawn() -> Array:
+    def random_command() -> Array:
+        """A command (n, 3) within the limits, NaN of lost actuators."""
         command = plant.sample(rng, (1,))[0]
         command[lost] = np.nan
         return command
 
     policies = POLICIES if method_class(method).every_policy else POLICIES[:1]
     for number, policy in enumerate(policies):
-        asked: dict[str, Any] = {"policy": policy, "damage": damage}
+        arguments: dict[str, Any] = {"policy": policy, "damage": damage}
         for reach in REACHES:
-            command = drawn()
+            command = random_command()
             wrench = reach * plant.wrench(command)
-            about = f"{policy}, {reach:g} of a command"
-            yield Question(about, wrench, asked, command if reach == 1.0 else None)
-            yield Question(f"{about}, in a tick", wrench, asked | {"previous": drawn()})
+            description = f"{policy}, {reach:g} of a command"
+            yield Question(description, wrench, arguments, command if reach == 1.0 else None)
+            in_tick = arguments | {"previous": random_command()}
+            yield Question(f"{description}, in a tick", wrench, in_tick)
         free = AXES[number : number + 1]
         if set(layout.axes) - set(free):
-            yield Question(f"{policy}, {free} free", wrench, asked | {"free": free})
+            yield Question(f"{policy}, {free} free", wrench, arguments | {"free": free})
     for size in EXTREMES:
-        yield Question(f"{size:g} of a command", size * plant.wrench(drawn()), {"damage": damage})
+        wrench = size * plant.wrench(random_command())
+        yield Question(f"{size:g} of a command", wrench, {"damage": damage})
 
 
-@pytest.mark.parametrize(("method", "kind", "word"), CASES)
-def test_what_every_answer_keeps(method: str, kind: str, word: str) -> None:
+@pytest.mark.parametrize(("method", "kind", "damage_kind"), CASES)
+def test_what_every_answer_keeps(method: str, kind: str, damage_kind: str) -> None:
     robot = robot_of(kind)
-    damage = damaged(robot.layout, word)
+    damage = damage_of_kind(robot.layout, damage_kind)
     assert damage is not None
     allocator = quick_allocator(method).on(robot.layout)
     first: Allocation | None = None
     for question in questions(method, allocator, robot, damage):
-        given = question.wrench.copy()
-        answer = allocator.allocate(given, flow=robot.flow, **question.asked)
+        target = question.wrench.copy()
+        answer = allocator.allocate(target, flow=robot.flow, **question.arguments)
         try:
-            np.testing.assert_array_equal(given, question.wrench)
-            check_answer(answer, robot, word)
-            check_figures(answer, question.wrench, question.asked.get("free", ()))
+            np.testing.assert_array_equal(target, question.wrench)  # not written to
+            check_answer(answer, robot, damage_kind)
+            check_figures(answer, question.wrench, question.arguments.get("free", ()))
             if method == "dual":
-                check_default(answer, question, robot, word)
+                check_default(answer, question, robot, damage_kind)
         except AssertionError as error:
-            raise AssertionError(f"{question.about}: {error}") from error
+            raise AssertionError(f"{question.description}: {error}") from error
         if first is None:
             first = answer
-            asked_first = question
+            first_question = question
     assert first is not None
     check_frozen(first)
     check_frozen(answer)
     check_copies(answer)
     # What was asked in between leaves no trace, and another allocator says the same.
     for other in (allocator, allocator.on(robot.layout)):
-        assert other.allocate(asked_first.wrench, flow=robot.flow, **asked_first.asked) == first
+        assert (
+            other.allocate(first_question.wrench, flow=robot.flow, **first_question.arguments)
+            == first
+        )
 
 
-@pytest.mark.parametrize(("method", "kind", "word"), CASES)
-def test_many_wrenches_get_the_answers_of_each(method: str, kind: str, word: str) -> None:
+@pytest.mark.parametrize(("method", "kind", "damage_kind"), CASES)
+def test_many_wrenches_get_the_answers_of_each(method: str, kind: str, damage_kind: str) -> None:
     robot = robot_of(kind)
-    damage = damaged(robot.layout, word)
+    damage = damage_of_kind(robot.layout, damage_kind)
     assert damage is not None
     allocator = quick_allocator(method).on(robot.layout)
-    together: dict[str, list[Array]] = {}
+    wrenches_of_policy: dict[str, list[Array]] = {}
     for question in questions(method, allocator, robot, damage):
-        together.setdefault(question.asked.get("policy", POLICIES[0]), []).append(question.wrench)
-    for policy, wrenches in together.items():
-        asked: dict[str, Any] = {"policy": policy, "damage": damage, "flow": robot.flow}
-        given = np.array(wrenches)
-        batch = allocator.allocate_batch(given, **asked)
-        np.testing.assert_array_equal(given, wrenches)
+        policy = question.arguments.get("policy", POLICIES[0])
+        wrenches_of_policy.setdefault(policy, []).append(question.wrench)
+    for policy, wrenches in wrenches_of_policy.items():
+        arguments: dict[str, Any] = {"policy": policy, "damage": damage, "flow": robot.flow}
+        targets = np.array(wrenches)
+        batch = allocator.allocate_batch(targets, **arguments)
+        np.testing.assert_array_equal(targets, wrenches)  # not written to
         assert len(batch) == len(wrenches)
         assert (batch.wrench_expected is not None) == (method == "paper")
         check_frozen(batch)
         for row, wrench in enumerate(wrenches):
-            check_row(
-                batch, row, allocator.allocate(wrench, **asked), alike=method not in ROWS_ALONE
-            )
+            answer = allocator.allocate(wrench, **arguments)
+            check_row(batch, row, answer, is_same=method not in METHODS_WHOSE_ROWS_DIFFER)
     assert pickle.loads(pickle.dumps(batch)) == batch
 
 
-def check_row(batch: BatchAllocation, row: int, answer: Allocation, alike: bool) -> None:
+def check_row(batch: BatchAllocation, row: int, answer: Allocation, is_same: bool) -> None:
     """An answer of many is what a question of its own gets, and keeps what that keeps."""
     assert batch.reachable[row] == answer.reachable
-    if alike or (batch.method == "mdn" and not answer.reachable):
+    if is_same or (batch.method == "mdn" and not answer.reachable):
         np.testing.assert_allclose(batch.command[row], answer.command, rtol=1e-9, atol=1e-9)
         for figure in ("wrench", "forces", "unallocated", "err_norm", "power", "expected_error"):
-            told = getattr(batch, figure)[row]
-            np.testing.assert_allclose(
-                told, getattr(answer, figure), rtol=1e-9, atol=1e-9, err_msg=figure
-            )
+            of_row = getattr(batch, figure)[row]
+            of_answer = getattr(answer, figure)
+            np.testing.assert_allclose(of_row, of_answer, rtol=1e-9, atol=1e-9, err_msg=figure)
     else:
         works = ~np.isnan(answer.command).any(axis=1)
         command = batch.command[row][works]
-        assert (command >= batch.layout.lower[works]).all() and (
-            command <= batch.layout.upper[works]
-        ).all()
+        assert (command >= batch.layout.lower[works]).all()
+        assert (command <= batch.layout.upper[works]).all()
         error = np.linalg.norm((batch.target[row] - batch.wrench[row]) / batch.scale)
         assert batch.err_norm[row] == pytest.approx(error, rel=1e-9, abs=1e-12)
     if batch.bound is not None:
         assert 0.0 <= batch.bound[row] <= batch.power[row]
 
 
-def check_answer(answer: Allocation, robot: Robot, word: str) -> None:
-    """Commands are within limits, those that are lost get none, and their wrench is that of the
-    laws."""
+def check_answer(answer: Allocation, robot: Robot, damage_kind: str) -> None:
+    """Commands are within limits, lost actuators get none, and the wrench is that of the laws."""
     layout = answer.layout
     lost = np.array([name in answer.damage.lost for name in layout.names])
-    assert np.isnan(answer.command[lost]).all() and np.isfinite(answer.command[~lost]).all()
+    assert np.isnan(answer.command[lost]).all()
+    assert np.isfinite(answer.command[~lost]).all()
     outside = (answer.command < layout.lower) | (answer.command > layout.upper)
     assert not outside.any(), f"commands outside of limits: {answer.command[outside]}"
-    for part, is_lost, force in zip(layout.actuators, lost, answer.forces, strict=True):
-        command = answer.commands[part.name]
-        assert (command is None) == is_lost and (not is_lost or not force.any())
-    if word in ("whole", "lost"):
+    for actuator, is_lost, force in zip(layout.actuators, lost, answer.forces, strict=True):
+        assert (answer.commands[actuator.name] is None) == is_lost
+        if is_lost:
+            assert not force.any()
+    if damage_kind in ("whole", "lost"):
         command = robot.plant.commands_of(answer)
         size = np.abs(answer.forces).sum()
         np.testing.assert_allclose(
             answer.wrench, robot.plant.wrench(command), rtol=1e-9, atol=1e-9 * size
         )
         assert answer.power == pytest.approx(robot.plant.power(command), rel=1e-9, abs=1e-12)
-    for place, part in enumerate(layout.actuators):
-        if part.type != "thruster":
+    for i, actuator in enumerate(layout.actuators):
+        if actuator.type != "thruster":
             continue
-        force = answer.command[place, 0]
-        if abs(force) < part.dead_band and answer.previous is None:
-            assert not answer.forces[place].any() and force == np.clip(
-                0.0, part.lower[0], part.upper[0]
-            )
+        force = answer.command[i, 0]
+        if abs(force) < actuator.dead_band and answer.previous is None:
+            # Within its dead band a thruster gives nothing, and is asked for nothing.
+            assert not answer.forces[i].any()
+            assert force == np.clip(0.0, actuator.lower[0], actuator.upper[0])
 
 
 def check_figures(answer: Allocation, wrench: Array, free: tuple[str, ...]) -> None:
@@ -277,32 +299,33 @@ def check_figures(answer: Allocation, wrench: Array, free: tuple[str, ...]) -> N
     )
     error = np.linalg.norm(missing / answer.scale)
     assert answer.err_norm == pytest.approx(error, rel=1e-9, abs=1e-12)
-    assert answer.reachable == (answer.err_norm <= 1e-3)
-    assert answer.power >= 0.0 and np.isfinite(answer.power)
+    assert answer.reachable == (answer.err_norm <= 1e-3)  # what `Allocation.reachable` promises
+    assert np.isfinite(answer.power)
+    assert answer.power >= 0.0
     if answer.bound is not None:
         assert 0.0 <= answer.bound <= answer.power, f"bound {answer.bound}, power {answer.power}"
 
 
-def check_default(answer: Allocation, question: Question, robot: Robot, word: str) -> None:
+def check_default(answer: Allocation, question: Question, robot: Robot, damage_kind: str) -> None:
     """The default method delivers what can be, at no more power than a command that is known to,
     and no command of a tick has changed faster than its drive can, angles the shorter way round."""
-    if question.known is not None:
+    if question.delivering is not None:
         assert answer.err_norm <= 1e-5
-        if word in ("whole", "lost"):
-            assert answer.power <= robot.plant.power(question.known) * (1.0 + 1e-6) + 1e-9
-    previous = question.asked.get("previous")
+        if damage_kind in ("whole", "lost"):
+            assert answer.power <= robot.plant.power(question.delivering) * (1.0 + 1e-6) + 1e-9
+    previous = question.arguments.get("previous")
     if previous is None:
         return
-    period_s = 0.1
+    period_s = 0.1  # `USUAL_PERIOD_S`, which no question here changes
     for part, old, new in zip(answer.layout.actuators, previous, answer.command, strict=True):
         if np.isnan(new).any():
             continue
         change = np.abs(new - old)
         turns = np.isclose(np.array(part.upper) - np.array(part.lower), 2.0 * math.pi)
         change[turns] = np.minimum(change, np.abs(2.0 * math.pi - change))[turns]
-        most = np.array(part.rates) * period_s
-        assert (change <= most * (1.0 + 1e-9) + 1e-9).all(), (
-            f"{part.name}: {old} to {new} in {most}"
+        max_change = np.array(part.rates) * period_s
+        assert (change <= max_change * (1.0 + 1e-9) + 1e-9).all(), (
+            f"{part.name}: {old} to {new}, more than {max_change}"
         )
 
 

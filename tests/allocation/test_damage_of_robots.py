@@ -13,42 +13,46 @@ from finlab.cli import main
 from finlab.errors import AllocationError, FinlabError, LayoutError
 from finlab.layout import Damage, Layout, Limits, load_layout
 from finlab.physics import Plant
-from tests.any_robot import AnyRobot
+from tests.allocator_cache import AllocatorCache
 from tests.terminal import refused
 
 TARGET = [1.0, 0.3, 1.0, 0.0, 0.05, 0.1]
+"""A wrench within reach of five fins that are whole [N, N m]."""
 
 
 @pytest.fixture(scope="module")
 def penta() -> Layout:
+    """Five fins."""
     return load_layout(shipped_layouts()["penta"])
 
 
-def test_a_weak_fin_keeps_to_what_is_left(search: AnyRobot, penta: Layout) -> None:
+def test_a_weak_fin_keeps_to_what_is_left(search: AllocatorCache, penta: Layout) -> None:
     health = Damage(weak={"bow": 0.4})
     result = search.allocate(penta, TARGET, damage=health)
     assert result.err_norm < 1e-5
     whole = penta.fins[penta.index("bow")].limits
     amplitude, frequency, _ = result.command[penta.index("bow")]
     assert amplitude <= 0.4 * whole.amplitude[1] and frequency <= 0.4 * whole.frequency[1]
-    far = search.allocate(penta, [20.0, 0, 0, 0, 0, 0], damage=health)
-    assert np.linalg.norm(far.forces[penta.index("bow")]) < 0.05 * np.linalg.norm(far.forces)
+    result_out_of_reach = search.allocate(penta, [20.0, 0, 0, 0, 0, 0], damage=health)
+    assert np.linalg.norm(result_out_of_reach.forces[penta.index("bow")]) < 0.05 * np.linalg.norm(
+        result_out_of_reach.forces
+    )
 
 
 @pytest.mark.parametrize("kind", SCALES_THRUST)
 def test_a_torn_fin_gives_its_share_at_every_command(
-    search: AnyRobot, penta: Layout, kind: str
+    search: AllocatorCache, penta: Layout, kind: str
 ) -> None:
     fins = tuple(replace(fin, model=FinModelSpec(kind)) for fin in penta.fins)
     layout = replace(penta, actuators=fins)
     bow = penta.index("bow")
     result = search.allocate(layout, TARGET, damage=Damage(torn={"bow": 0.4}))
     assert result.err_norm < 1e-5
-    told = result.forces
+    forces = result.forces
     law = Plant(layout).body_forces(result.command)
     assert np.linalg.norm(law[bow]) > 0.01, "the fin is in use"
-    np.testing.assert_allclose(told[bow], 0.4 * law[bow], rtol=1e-9)
-    np.testing.assert_allclose(np.delete(told, bow, 0), np.delete(law, bow, 0), rtol=1e-9)
+    np.testing.assert_allclose(forces[bow], 0.4 * law[bow], rtol=1e-9)
+    np.testing.assert_allclose(np.delete(forces, bow, 0), np.delete(law, bow, 0), rtol=1e-9)
 
 
 def test_the_thrust_of_a_table_cannot_be_scaled() -> None:
@@ -60,7 +64,7 @@ def test_the_thrust_of_a_table_cannot_be_scaled() -> None:
         Damage(torn={"bow": 1.5})
 
 
-def test_a_stuck_fin_points_where_it_stays(search: AnyRobot, penta: Layout) -> None:
+def test_a_stuck_fin_points_where_it_stays(search: AllocatorCache, penta: Layout) -> None:
     for angle in (0.7, -2.0, 0.7 + 2 * math.pi):
         result = search.allocate(penta, TARGET, damage=Damage(stuck={"bow": angle}))
         assert result.err_norm < 1e-5
@@ -69,14 +73,16 @@ def test_a_stuck_fin_points_where_it_stays(search: AnyRobot, penta: Layout) -> N
 
 @pytest.mark.parametrize("method", ["dual", "sqp"])
 def test_the_force_of_a_running_fin_is_made_up_for(method: str, penta: Layout) -> None:
-    kept = (0.4, 1.2, 1.0)
-    result = Allocator(penta, method).allocate(TARGET, damage=Damage(running={"bow": kept}))
-    np.testing.assert_allclose(result.command[penta.index("bow")], kept)
+    running_command = (0.4, 1.2, 1.0)
+    result = Allocator(penta, method).allocate(
+        TARGET, damage=Damage(running={"bow": running_command})
+    )
+    np.testing.assert_allclose(result.command[penta.index("bow")], running_command)
     assert result.err_norm < (1e-5 if method == "dual" else 0.02)
     np.testing.assert_allclose(result.wrench, Plant(penta).wrench(result.command), atol=1e-12)
 
 
-def test_damage_and_failures_go_together(search: AnyRobot, penta: Layout) -> None:
+def test_damage_and_failures_go_together(search: AllocatorCache, penta: Layout) -> None:
     name = penta.names[1]
     result = search.allocate(penta, TARGET, lost=[name], damage=Damage(stuck={"bow": 0.2}))
     assert np.isnan(result.command[1]).all() and result.command[
@@ -95,7 +101,7 @@ def test_whole_fins_are_left_alone(penta: Layout) -> None:
     assert same.count(False) == 1
 
 
-def test_nonsense_is_refused(search: AnyRobot, penta: Layout) -> None:
+def test_nonsense_is_refused(search: AllocatorCache, penta: Layout) -> None:
     for bad in (
         {"weak": {"bow": 0.0}},
         {"weak": {"bow": 1.5}},
@@ -169,8 +175,10 @@ def test_what_is_left_of_a_weak_fins_limits(
     """The upper limits shrink; a lower one only where it would lie above."""
     whole = penta.replace_actuator("bow", limits=Limits((0.1, 0.5), (1.0, 2.0), (0.0, 1.0)))
     layout = Damage(weak={"bow": share}).applied_to(whole)
-    left = layout.fins[layout.index("bow")].limits
-    assert left.amplitude == pytest.approx(amplitude) and left.frequency == pytest.approx(frequency)
-    assert left.zero_direction == (0.0, 1.0)
+    limits = layout.fins[layout.index("bow")].limits
+    assert limits.amplitude == pytest.approx(amplitude) and limits.frequency == pytest.approx(
+        frequency
+    )
+    assert limits.zero_direction == (0.0, 1.0)
     others = [i for i, name in enumerate(penta.names) if name != "bow"]
     assert [layout.fins[i] for i in others] == [whole.fins[i] for i in others]

@@ -10,6 +10,7 @@ CITED = re.compile(r"\bEqs?\. (?P<first>\d+)(?: (?P<word>to|and) (?P<last>\d+))?
 
 
 def numbers_of_page() -> list[int]:
+    """Numbers of the equations of docs/theory/method.md, in the order in which they stand there."""
     page = (ROOT / "docs" / "theory" / "method.md").read_text()
     return [int(number) for number in re.findall(r"\\tag\{(\d+)\}", page)]
 
@@ -46,8 +47,8 @@ def citations() -> dict[str, set[int]]:
 
 
 def test_cited_equations_exist() -> None:
-    known = set(numbers_of_page())
-    wrong = [place for place, numbers in citations().items() if not numbers <= known]
+    numbers_on_page = set(numbers_of_page())
+    wrong = [place for place, numbers in citations().items() if not numbers <= numbers_on_page]
     assert wrong == []
 
 

@@ -12,94 +12,103 @@ from finlab.allocation import Allocator, Policy
 from finlab.errors import LayoutError
 from finlab.layout import Damage, Layout
 from finlab.physics import plant_of
-from tests.any_robot import AnyRobot
-from tests.exhaustive import sampled
+from tests.allocator_cache import AllocatorCache
 from tests.hostile_robots import hostile_robot
+from tests.sampled_cases import sampled
 
 N_CASES = 400
+"""How many random robots there are; each day a share of them is asked."""
 METHODS = ("dual", "dual", "mdn", "analytic", "qp", "sqp", "paper")
+"""Methods to draw from; the default one twice as often."""
 
 
 @cache
-def method(name: str) -> Allocator:
+def quick_method(name: str) -> Allocator:
+    """A method by its name, or `sqp-power` with its objective, with settings that answer
+    quickly."""
     kind, _, objective = name.partition("-")
     options: dict[str, Any] = {"objective": objective} if objective else {}
     if kind == "paper":
         options = {"n_candidates": 4, "n_steps": 2}
     if kind == "sqp":
         options |= {"n_starts": 1, "n_steps": 4}
-    return AnyRobot(kind, **options)
+    return AllocatorCache(kind, **options)
 
 
-def pick(rng: np.random.Generator, values: Any) -> Any:
+def choose(rng: np.random.Generator, values: Any) -> Any:
+    """One of some values."""
     return values[int(rng.integers(len(values)))]
 
 
-def policy(rng: np.random.Generator) -> Policy:
-    kind = pick(rng, ("closest", "closest", "direction", "priority"))
-    weights = pick(
+def random_policy(rng: np.random.Generator) -> Policy:
+    """A policy with weights that differ by many orders of magnitude, or of another kind."""
+    kind = choose(rng, ("closest", "closest", "direction", "priority"))
+    weights = choose(
         rng, ((1.0,) * 6, (1.0, 0.0, 1e-6, 1.0, 1e6, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 1.0))
     )
     return Policy(kind, axis_weights=weights if kind == "closest" else (1.0,) * 6)
 
 
-def damage(rng: np.random.Generator, robot: Layout) -> dict[str, Any]:
+def random_damage(rng: np.random.Generator, robot: Layout) -> dict[str, Any]:
+    """Arguments `lost` and `damage` of a question, each of them in three of ten."""
     names = [str(name) for name in rng.permutation(robot.names)]
-    asked: dict[str, Any] = {}
+    arguments: dict[str, Any] = {}
     if len(names) > 1 and rng.random() < 0.3:
-        asked["lost"] = names[: int(rng.integers(1, len(names)))]
+        arguments["lost"] = names[: int(rng.integers(1, len(names)))]
     if rng.random() < 0.3:
-        kind = pick(rng, ("weak", "stuck", "running", "torn"))
+        kind = choose(rng, ("weak", "stuck", "running", "torn"))
         value = {"weak": 1e-3, "stuck": 0.7, "running": (0.3, 1.0, 0.5), "torn": 1e-3}[kind]
-        asked["damage"] = Damage(**{kind: {names[-1]: value}})
-    return asked
+        arguments["damage"] = Damage(**{kind: {names[-1]: value}})
+    return arguments
 
 
 def question(rng: np.random.Generator, robot: Layout) -> dict[str, Any]:
     """What is asked of a robot, other than the wrench."""
     plant = plant_of(robot)
-    asked = damage(rng, robot)
-    way = rng.integers(6)
-    if way == 0:
-        asked["previous"] = plant.sample(rng, (1,))[0]
-    elif way == 1:
-        asked["previous"] = np.where(rng.random((robot.n_fins, 1)) < 0.5, np.nan, plant.upper)
-    elif way == 2:
-        asked["previous"] = rng.normal(size=(robot.n_fins, 3)) * 1e6
+    arguments = random_damage(rng, robot)
+    choice = rng.integers(6)
+    if choice == 0:
+        arguments["previous"] = plant.sample(rng, (1,))[0]
+    elif choice == 1:
+        arguments["previous"] = np.where(rng.random((robot.n_fins, 1)) < 0.5, np.nan, plant.upper)
+    elif choice == 2:
+        arguments["previous"] = rng.normal(size=(robot.n_fins, 3)) * 1e6
     if rng.random() < 0.1:
-        asked["reference"] = rng.normal(size=(4, 6))
-    return asked
+        arguments["reference"] = rng.normal(size=(4, 6))
+    return arguments
 
 
 def ask(seed: int) -> None:
     """Ask a drawn robot, and look at what it answers."""
     rng = np.random.default_rng([2026, seed])
-    name = pick(rng, METHODS)
+    name = choose(rng, METHODS)
     robot = hostile_robot(seed, 2026)
-    allocator = method(name)
-    how = policy(rng)
+    allocator = quick_method(name)
+    how = random_policy(rng)
     if name not in ("dual", "mdn") and not how.is_plain:
         how = Policy()
     plant = plant_of(robot)
-    asked = question(rng, robot)
+    arguments = question(rng, robot)
     reached = plant.wrench(plant.sample(rng, (1,)))[0]
     anywhere = rng.normal(size=6) * 10.0 ** rng.uniform(-12, 6)
     target = np.clip(
-        pick(rng, (reached, 0.5 * reached, 2.0 * reached, anywhere, np.zeros(6), 1e-12 * reached)),
+        choose(
+            rng, (reached, 0.5 * reached, 2.0 * reached, anywhere, np.zeros(6), 1e-12 * reached)
+        ),
         -1e6,
         1e6,
     )
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
-            result = allocator.allocate(robot, target, policy=how, **asked)
+            result = allocator.allocate(robot, target, policy=how, **arguments)
         except LayoutError as error:  # what damage leaves of a fin may be below all bounds
-            assert "must be at least" in str(error) and "damage" in asked
+            assert "must be at least" in str(error) and "damage" in arguments
             return
         if result.bound is not None and result.reachable:
             assert 0.0 <= result.bound <= result.power * (1 + 1e-6) + 1e-12
         batch = allocator.allocate_batch(
-            robot, [target, 0.3 * target], policy=how, lost=asked.get("lost", ())
+            robot, [target, 0.3 * target], policy=how, lost=arguments.get("lost", ())
         )
     for found, limited in (
         (result.command, result.layout),

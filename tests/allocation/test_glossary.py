@@ -24,7 +24,9 @@ ROOMS = (
 )
 """Where the glossary's names are looked for."""
 QUOTED = re.compile(r"`([^`]+)`")
+"""Code in a cell of a table."""
 NAME_COLUMN = "name in code"
+"""Head of the column that is checked."""
 NO_CODE_IN_C = re.compile(r'/\*.*?\*/|//[^\n]*|"(?:\\.|[^"\\])*"', re.DOTALL)
 """Comments and strings of C."""
 FORBIDDEN = {
@@ -79,7 +81,7 @@ def defined_in_python(source: str) -> set[str]:
 @cache
 def definitions(room: str) -> dict[str, frozenset[str]]:
     """The names that each file of a room defines, by its path; that of the file itself, too."""
-    found: dict[str, frozenset[str]] = {}
+    names_of_files: dict[str, frozenset[str]] = {}
     for path in sorted((ROOT / room).rglob("*")):
         if path.suffix == ".py":
             names = defined_in_python(path.read_text(encoding="utf-8"))
@@ -88,14 +90,17 @@ def definitions(room: str) -> dict[str, frozenset[str]]:
             names = set(re.findall(r"[A-Za-z_]\w*", code))
         else:
             continue
-        found[path.relative_to(ROOT).as_posix()] = frozenset({path.stem, *names})
-    return found
+        names_of_files[path.relative_to(ROOT).as_posix()] = frozenset({path.stem, *names})
+    return names_of_files
 
 
 @cache
 def all_defined() -> frozenset[str]:
     """What the files of all rooms define."""
-    return frozenset().union(*(names for room in ROOMS for names in definitions(room).values()))
+    names = set[str]()
+    for room in ROOMS:
+        names.update(*definitions(room).values())
+    return frozenset(names)
 
 
 def test_the_tables_are_read() -> None:
@@ -117,13 +122,10 @@ def test_a_word_in_a_comment_is_no_definition() -> None:
 @pytest.mark.parametrize("word", FORBIDDEN)
 def test_a_word_with_one_meaning_names_nothing_else(word: str) -> None:
     pattern, rooms = FORBIDDEN[word]
-    wrong = [
-        f"{path}: {name}"
-        for room in rooms
-        for path, names in definitions(room).items()
-        for name in sorted(names)
-        if re.fullmatch(pattern, name)
-    ]
+    wrong = []
+    for room in rooms:
+        for path, names in definitions(room).items():
+            wrong += [f"{path}: {name}" for name in sorted(names) if re.fullmatch(pattern, name)]
     assert not wrong, f"{word} means something else, see docs/theory/glossary.md: {wrong}"
 
 

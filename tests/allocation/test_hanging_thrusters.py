@@ -19,7 +19,7 @@ from finlab.layout.save import layout_to_dict
 from finlab.physics import plant_of
 from tests.terminal import refused
 
-TABLE = PowerTable(
+MEASURED_TABLE = PowerTable(
     (
         (1100.0, -40.0, 300.0),
         (1300.0, -10.0, 50.0),
@@ -28,25 +28,33 @@ TABLE = PowerTable(
         (1900.0, 50.0, 400.0),
     )
 )
+"""A measured thruster, by rows of width of pulse [us], force [N] and power [W]."""
 MET = 1e-6
 """Error over the wrench scale, of a target that is met."""
 
 
-def unit(rng: np.random.Generator) -> Array:
+def random_direction(rng: np.random.Generator) -> Array:
+    """A random direction (3,)."""
     vector = rng.normal(size=3)
     return np.asarray(vector / np.linalg.norm(vector))
 
 
-def thruster(rng: np.random.Generator, name: str, dead_band: float) -> Thruster:
-    model = TABLE if rng.random() < 0.3 else PowerLaw(rng.uniform(0.5, 2.0), rng.uniform(0.5, 2.0))
+def random_thruster(rng: np.random.Generator, name: str, dead_band: float) -> Thruster:
+    """A random thruster with a dead band [N]."""
+    model = (
+        MEASURED_TABLE
+        if rng.random() < 0.3
+        else PowerLaw(rng.uniform(0.5, 2.0), rng.uniform(0.5, 2.0))
+    )
     position = tuple(rng.uniform(-0.4, 0.4, 3).tolist())
     force = -float(rng.uniform(10.0, 40.0)), float(rng.uniform(10.0, 50.0))
-    return Thruster(name, position, tuple(unit(rng).tolist()), force, model, dead_band)
+    return Thruster(name, position, tuple(random_direction(rng).tolist()), force, model, dead_band)
 
 
-def pod(rng: np.random.Generator, name: str, dead_band: float) -> Azimuth:
-    axis = unit(rng)
-    zero = np.cross(axis, unit(rng))
+def random_pod(rng: np.random.Generator, name: str, dead_band: float) -> Azimuth:
+    """A random pod with a dead band [N], three of five of which push either way."""
+    axis = random_direction(rng)
+    zero = np.cross(axis, random_direction(rng))
     zero /= np.linalg.norm(zero)
     position = tuple(rng.uniform(-0.4, 0.4, 3).tolist())
     least = -float(rng.uniform(5.0, 20.0)) if rng.random() < 0.6 else 0.0
@@ -62,7 +70,7 @@ def robot(rng: np.random.Generator) -> Layout:
     """Eight thrusters and pods; the first one may have a dead band."""
     parts: list[Actuator] = []
     for i in range(8):
-        make = thruster if rng.random() < 0.6 else pod
+        make = random_thruster if rng.random() < 0.6 else random_pod
         parts.append(make(rng, f"a{i}", 2.0 if i == 0 and rng.random() < 0.5 else 0.0))
     return Layout("random", tuple(parts))
 
@@ -118,8 +126,8 @@ def test_the_others_make_up_for_what_hangs(seed: int) -> None:
     many = allocator.allocate_batch(targets, damage=damage)
     assert many.err_norm.max() < MET
     np.testing.assert_allclose(many.command[:, index], np.tile(kept, (4, 1)), rtol=0.0, atol=1e-12)
-    far = allocator.allocate(1e3 * targets[0], damage=damage, policy="direction")
-    np.testing.assert_allclose(far.command[index], kept, rtol=0.0, atol=1e-12)
+    result_out_of_reach = allocator.allocate(1e3 * targets[0], damage=damage, policy="direction")
+    np.testing.assert_allclose(result_out_of_reach.command[index], kept, rtol=0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize("method", ["dual", "px4", "analytic", "ardusub", "ipopt"])
@@ -144,11 +152,15 @@ def test_power_of_what_hangs_counts_as_it_is() -> None:
     layout = load_layout("bluerov2_heavy")
     name = layout.names[0]
     result = Allocator(layout).allocate([0.0] * 6, damage=Damage(stuck={name: 20.0}))
-    own = float(plant_of(layout).power(result.command)[0])
-    assert own == pytest.approx(0.997 * 20.0**1.5, rel=0.2) and result.power > own
+    power = float(plant_of(layout).power(result.command)[0])
+    assert power == pytest.approx(0.997 * 20.0**1.5, rel=0.2) and result.power > power
     in_band = layout.replace_actuator(name, dead_band=3.0)
-    still = Allocator(in_band).allocate([0.0] * 6, damage=Damage(stuck={name: 2.0}))
-    assert still.command[0, 0] == 2.0 and not still.forces.any() and still.err_norm < MET
+    result_of_stuck = Allocator(in_band).allocate([0.0] * 6, damage=Damage(stuck={name: 2.0}))
+    assert (
+        result_of_stuck.command[0, 0] == 2.0
+        and not result_of_stuck.forces.any()
+        and result_of_stuck.err_norm < MET
+    )
 
 
 def test_jets_of_one_that_hangs_count() -> None:
@@ -197,7 +209,12 @@ def test_damage_known_of_a_thruster_that_sticks() -> None:
 def test_texts_give_degrees_and_newtons_by_what_they_are_of() -> None:
     rng = np.random.default_rng(3)
     layout = Layout(
-        "mixed", (thruster(rng, "screw", 0.0), pod(rng, "pod", 0.0), thruster(rng, "other", 0.0))
+        "mixed",
+        (
+            random_thruster(rng, "screw", 0.0),
+            random_pod(rng, "pod", 0.0),
+            random_thruster(rng, "other", 0.0),
+        ),
     )
     damage = Damage.parse(layout, stuck=["screw=-5", "pod=20"], running=["other=7"])
     assert damage == Damage(

@@ -12,30 +12,37 @@ from finlab.allocation.rates import Rates
 from finlab.layout import Fin, FinModelSpec, Layout, Limits
 from finlab.physics import plant_of
 from finlab.research.random_layouts import random_layout
-from tests.any_robot import AnyRobot
+from tests.allocator_cache import AllocatorCache
 
 
-def problem_of(search: AnyRobot, layout: Layout) -> CommandProblem:
+def problem_of(search: AllocatorCache, layout: Layout) -> CommandProblem:
+    """The problem that Levenberg-Marquardt solves for a robot."""
     return CommandProblem.of(plant_of(layout), search.normalization.std)
 
 
-def draw(problem: CommandProblem, rows: int, seed: int) -> np.ndarray:
-    share = np.random.default_rng(seed).uniform(size=(rows, *problem.lower.shape))
-    return np.asarray(problem.lower + share * (problem.upper - problem.lower))
+def random_commands(problem: CommandProblem, rows: int, seed: int) -> np.ndarray:
+    """Commands (rows, n, 3) within the limits."""
+    fraction = np.random.default_rng(seed).uniform(size=(rows, *problem.lower.shape))
+    return np.asarray(problem.lower + fraction * (problem.upper - problem.lower))
 
 
-def error(problem: CommandProblem, target: np.ndarray, command: np.ndarray) -> np.ndarray:
+def wrench_error(problem: CommandProblem, target: np.ndarray, command: np.ndarray) -> np.ndarray:
+    """Length (rows,) of what commands leave of the targets, in units of the wrench scale."""
     return np.asarray(np.linalg.norm(target - problem.wrench(command), axis=-1))
 
 
-def keeps_limits(problem: CommandProblem, command: np.ndarray) -> bool:
+def is_within_limits(problem: CommandProblem, command: np.ndarray) -> bool:
+    """Whether commands are within the limits."""
     return bool((command >= problem.lower).all() and (command <= problem.upper).all())
 
 
-SHARED = (0.1, 0.05, 0.0)
-HOSTILE = {
+SHARED_POSITION = (0.1, 0.05, 0.0)
+"""Position of two fins that stand at one place [m]."""
+HOSTILE_LAYOUTS = {
     "one fin": Layout("one", (Fin("a", (0.0, 0.0, 0.0), 0.0),)),
-    "two at one place": Layout("twins", (Fin("a", SHARED, 0.3), Fin("b", SHARED, 0.3))),
+    "two at one place": Layout(
+        "twins", (Fin("a", SHARED_POSITION, 0.3), Fin("b", SHARED_POSITION, 0.3))
+    ),
     "all parallel": Layout("rake", tuple(Fin(f"f{i}", (0.1 * i, 0.0, 0.0), 0.5) for i in range(3))),
     "no width": Layout(
         "stiff",
@@ -45,24 +52,26 @@ HOSTILE = {
         ),
     ),
     "may rest": Layout(
-        "rest", (Fin("a", SHARED, 0.0, Limits((0.0, 0.6), (0.0, 2.1))), Fin("b", (0, 0, 0), 2.0))
+        "rest",
+        (Fin("a", SHARED_POSITION, 0.0, Limits((0.0, 0.6), (0.0, 2.1))), Fin("b", (0, 0, 0), 2.0)),
     ),
 }
+"""Robots whose Jacobian is singular somewhere, or whose ranges have no width."""
 
 
 @pytest.mark.parametrize("limits", ["nominal", "varied"])
-def test_never_makes_it_worse_and_mostly_much_better(limits: str, search: AnyRobot) -> None:
+def test_never_makes_it_worse_and_mostly_much_better(limits: str, search: AllocatorCache) -> None:
     before = []
     after = []
     for seed in range(5000, 5010):
         layout = random_layout(np.random.default_rng(seed), limits=limits)  # type: ignore[arg-type]
         problem = problem_of(search, layout)
-        target = problem.wrench(draw(problem, 20, 1))
-        start = draw(problem, 20, 2)
+        target = problem.wrench(random_commands(problem, 20, 1))
+        start = random_commands(problem, 20, 2)
         refined = refine(problem, target, start, 30)
-        assert keeps_limits(problem, refined.command)
-        before.append(error(problem, target, start))
-        after.append(error(problem, target, refined.command))
+        assert is_within_limits(problem, refined.command)
+        before.append(wrench_error(problem, target, start))
+        after.append(wrench_error(problem, target, refined.command))
         np.testing.assert_allclose(refined.error, after[-1], atol=1e-9)
         np.testing.assert_allclose(refined.wrench, problem.wrench(refined.command), atol=1e-9)
     first = np.concatenate(before)
@@ -71,27 +80,28 @@ def test_never_makes_it_worse_and_mostly_much_better(limits: str, search: AnyRob
     assert np.median(first) > 0.5 and (last < 0.05 * first).mean() > 0.7
 
 
-def test_finds_the_way_back_from_nearby(search: AnyRobot) -> None:
+def test_finds_the_way_back_from_nearby(search: AllocatorCache) -> None:
     problem = problem_of(search, random_layout(np.random.default_rng(5003), n_fins=5))
     middle = problem.lower + (0.3 + 0.4 * np.random.default_rng(0).uniform(size=(30, 5, 3))) * (
         problem.upper - problem.lower
     )
     start = problem.feasible(middle + 0.02 * np.random.default_rng(1).normal(size=middle.shape))
     target = problem.wrench(middle)
-    assert error(problem, target, start).min() > 1e-3
+    assert wrench_error(problem, target, start).min() > 1e-3
     refined = refine(problem, target, start, 12)
     assert np.quantile(refined.error, 0.9) < 1e-7
 
 
-STRONG = {
+STRONG_FINS = {
     "drag": (FinModelSpec(), Limits((0.0, 1.5), (0.0, 20.0))),
     "soft": (FinModelSpec("soft", (("k", 20.0),)), Limits((1.5, 1.5), (0.1, 20.0), (0.3, 0.3))),
 }
+"""Models of fins with limits at which forces grow large."""
 
 
-@pytest.mark.parametrize(("model", "limits"), STRONG.values(), ids=list(STRONG))
+@pytest.mark.parametrize(("model", "limits"), STRONG_FINS.values(), ids=list(STRONG_FINS))
 def test_strong_fins_on_long_levers_give_numbers(
-    model: FinModelSpec, limits: Limits, search: AnyRobot
+    model: FinModelSpec, limits: Limits, search: AllocatorCache
 ) -> None:
     """Their derivatives are large and of too low a rank: without a relative ridge a step is no
     number.
@@ -105,11 +115,11 @@ def test_strong_fins_on_long_levers_give_numbers(
     target = 1e3 * np.random.default_rng(0).normal(size=(200, 6))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        refined = refine(problem, target, draw(problem, 200, 1), 40)
+        refined = refine(problem, target, random_commands(problem, 200, 1), 40)
     assert np.isfinite(refined.command).all() and np.isfinite(refined.error).all()
 
 
-def test_a_start_a_whole_turn_off_is_the_same_start(search: AnyRobot) -> None:
+def test_a_start_a_whole_turn_off_is_the_same_start(search: AllocatorCache) -> None:
     limits = Limits(zero_direction=(0.0, 2.0 * math.pi))
     problem = problem_of(search, Layout("one", (Fin("a", (0.0, 0.0, 0.0), 0.0, limits),)))
     start = np.array([[[0.4, 1.5, -1.0]]])
@@ -118,27 +128,27 @@ def test_a_start_a_whole_turn_off_is_the_same_start(search: AnyRobot) -> None:
     assert refined.error[0] < 1e-9
 
 
-def test_commands_without_room_stay_bit_for_bit(search: AnyRobot) -> None:
-    problem = problem_of(search, HOSTILE["no width"])
+def test_commands_without_room_stay_bit_for_bit(search: AllocatorCache) -> None:
+    problem = problem_of(search, HOSTILE_LAYOUTS["no width"])
     refined = refine(
-        problem, np.random.default_rng(0).normal(size=(10, 6)), draw(problem, 10, 1), 10
+        problem, np.random.default_rng(0).normal(size=(10, 6)), random_commands(problem, 10, 1), 10
     )
     assert (refined.command[:, 0] == [0.3, 1.0, 0.5]).all()
     assert (refined.command[:, 1, 1] == 2.0).all()
     assert np.ptp(refined.command[:, 1, 0]) > 0.01  # what has room moves
 
 
-def test_rows_do_not_see_each_other(search: AnyRobot) -> None:
+def test_rows_do_not_see_each_other(search: AllocatorCache) -> None:
     problem = problem_of(search, random_layout(np.random.default_rng(5004), n_fins=4))
-    target = problem.wrench(draw(problem, 6, 1))
-    start = draw(problem, 6, 2)
+    target = problem.wrench(random_commands(problem, 6, 1))
+    start = random_commands(problem, 6, 2)
     together = refine(problem, target, start, 8)
     for row in range(6):
         alone = refine(problem, target[row : row + 1], start[row : row + 1], 8)
         np.testing.assert_allclose(together.error[row], alone.error[0], rtol=1e-3, atol=1e-6)
 
 
-def test_a_direction_may_cross_the_seam(search: AnyRobot) -> None:
+def test_a_direction_may_cross_the_seam(search: AllocatorCache) -> None:
     # The answer lies just across +-pi from the start, and nearly a full turn away the other way
     # round.
     problem = problem_of(search, Layout("one", (Fin("a", (0.0, 0.0, 0.0), 0.0),)))
@@ -157,6 +167,7 @@ POD = Azimuth(
     force=(0.0, 40.0),
     model=PowerLaw(1.0),
 )
+"""A pod, whose command is an angle and a force."""
 
 
 @pytest.mark.parametrize(
@@ -186,12 +197,14 @@ def test_a_pod_follows_its_angle_across_the_seam_in_a_tick() -> None:
     assert held.command[0, 0, 0] == pytest.approx(math.pi + 0.1, abs=1e-9)  # the end of the rate
 
 
-ARCS = (
+FINS_WITH_ARCS = (
     Fin("full", (0.1, 0.0, 0.0), 0.0, Limits((0.05, 0.6), (0.1, 2.1))),
     Fin("arc", (0.0, 0.1, 0.0), 0.0, Limits((0.1, 0.5), (0.2, 1.0), (0.5, 2.0))),
     Fin("narrow", (0.0, 0.0, 0.1), 0.0, Limits((0.3, 0.3), (0.7, 0.7), (-2.5, -2.0))),
 )
-LIMITS = CommandProblem.of(plant_of(Layout("arcs", ARCS)), np.ones(6))
+"""Fins of which one beats in any direction, one in an arc and one at a single command."""
+PROBLEM_OF_ARCS = CommandProblem.of(plant_of(Layout("arcs", FINS_WITH_ARCS)), np.ones(6))
+"""The problem of a robot of these fins, asked for its limits alone."""
 
 
 @pytest.mark.parametrize(
@@ -211,18 +224,18 @@ LIMITS = CommandProblem.of(plant_of(Layout("arcs", ARCS)), np.ones(6))
     ],
 )
 def test_directions_are_clamped_as_angles(fin: int, direction: float, expected: float) -> None:
-    clamped = LIMITS.feasible(np.array([[0.3, 0.7, direction]] * 3))
+    clamped = PROBLEM_OF_ARCS.feasible(np.array([[0.3, 0.7, direction]] * 3))
     assert clamped[fin, 2] == pytest.approx(expected)
 
 
 def test_clamped_commands_keep_their_limits_and_inner_ones_stay() -> None:
     rng = np.random.default_rng(0)
-    lower = LIMITS.lower
-    upper = LIMITS.upper
-    clamped = LIMITS.feasible(5.0 * rng.standard_normal((500, 3, 3)))
+    lower = PROBLEM_OF_ARCS.lower
+    upper = PROBLEM_OF_ARCS.upper
+    clamped = PROBLEM_OF_ARCS.feasible(5.0 * rng.standard_normal((500, 3, 3)))
     assert (clamped >= lower).all() and (clamped <= upper).all()
     inner = lower + rng.random((500, 3, 3)) * (upper - lower)
-    np.testing.assert_allclose(LIMITS.feasible(inner), inner, atol=1e-12)
+    np.testing.assert_allclose(PROBLEM_OF_ARCS.feasible(inner), inner, atol=1e-12)
 
 
 def _singular_weak() -> np.ndarray:

@@ -19,8 +19,8 @@ from finlab.assets import shipped_checkpoints
 from finlab.errors import DataError
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout
 from finlab.physics import make_law, write_table
-from tests.allocation.quick import OF_FINS, quick_allocator
-from tests.any_robot import FIN_ROBOTS
+from tests.allocation.quick_allocator import OF_FINS, quick_allocator
+from tests.allocator_cache import FIN_ROBOTS
 
 pytestmark = pytest.mark.skipif(
     not {"default", "paper"} <= set(shipped_checkpoints()),
@@ -29,10 +29,13 @@ pytestmark = pytest.mark.skipif(
 
 
 DRAG = make_law(FinModelSpec("drag"))
+"""The law of a fin that is written as a table."""
 CIRCLE = np.linspace(-np.pi, np.pi, 25)
+"""Zero directions of tables [rad], the whole circle."""
 
 
 def robot(limits: Limits, path: Path | None = None) -> Layout:
+    """Two fins, the first with limits and, by a path, with a table of forces."""
     model = FinModelSpec("drag") if path is None else FinModelSpec("table", (("path", str(path)),))
     return Layout(
         "two", (Fin("a", (0.2, 0.1, 0.0), 0.7, limits, model), Fin("b", (-0.2, 0.1, 0.0), 2.0))
@@ -150,10 +153,12 @@ def test_tables_hold_forces_at_rest() -> None:
     )
 
 
-SURGE = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
+WRENCH = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
+"""A wrench within reach of robot A: surge, heave and yaw [N, N m]."""
 
 
 def with_models(**models: FinModelSpec) -> Layout:
+    """Robot A, with other models of some fins by their names."""
     layout = load_layout("A")
     return replace(
         layout, actuators=tuple(replace(f, model=models.get(f.name, f.model)) for f in layout.fins)
@@ -174,7 +179,7 @@ def test_fins_that_no_network_learned_are_named(method: str) -> None:
 def test_the_note_names_the_fins_that_work(method: str) -> None:
     layout = with_models(front_left=FinModelSpec("lighthill"))
     allocator = quick_allocator(method)
-    notes = allocator.allocate(layout, SURGE).notes
+    notes = allocator.allocate(layout, WRENCH).notes
     assert len(notes) == (method == "paper")
     assert all("front_left" in note and "drag" in note for note in notes)
-    assert allocator.allocate(layout, SURGE, lost=["front_left"]).notes == ()
+    assert allocator.allocate(layout, WRENCH, lost=["front_left"]).notes == ()

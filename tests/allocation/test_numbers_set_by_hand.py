@@ -9,7 +9,8 @@ ROOT = Path(__file__).resolve().parents[2]
 ROW = re.compile(r"^\| `(\w+)` \| ([^|]+) \| `([^`|]+)` \| ([^|]+) \|$", re.MULTILINE)
 """A row of the page's table: name, value, file, reason."""
 PAGE = ROOT / "docs/theory/numbers.md"
-PYTHON = [
+"""The page of numbers."""
+PYTHON_FILES = [
     ROOT / "finlab/arrays.py",
     ROOT / "finlab/allocation/levenberg_marquardt.py",
     *sorted((ROOT / "finlab/allocation/dual").glob("*.py")),
@@ -20,9 +21,11 @@ PYTHON = [
     ROOT / "finlab/actuators/thrust_power.py",
     ROOT / "finlab/actuators/thruster.py",
 ]
-"""Files in Python whose constants the page has."""
-CORE = sorted((ROOT / "finlab/core").rglob("*.[ch]"))
-"""Files in C whose constants the page has."""
+"""Files of the default method in Python whose constants the page has to have."""
+
+
+C_FILES = sorted((ROOT / "finlab/core").rglob("*.[ch]"))
+"""Files of the core whose constants the page has to have."""
 DEFINED = re.compile(r"^#define (\w+) (?:R\()?([\d.]+(?:e-?\d+)?)\b", re.MULTILINE)
 """A constant in C: name, value."""
 SINGLE = re.compile(r"^#ifdef FL_SINGLE\n.*?^#else\n", re.MULTILINE | re.DOTALL)
@@ -76,10 +79,10 @@ def test_the_page_has_every_number_with_a_reason() -> None:
     rows = rows_of_page()
     on_page = {(row.file, row.name): ast.literal_eval(row.value) for row in rows}
     in_code: dict[tuple[str, str], object] = {}
-    for path in PYTHON:
+    for path in PYTHON_FILES:
         for name, value in numbers(path).items():
             in_code[str(path.relative_to(ROOT)), name] = value
-    for path in CORE:
+    for path in C_FILES:
         for name, text in DEFINED.findall(SINGLE.sub("", path.read_text())):
             same = [value for (_, other), value in in_code.items() if other == name]
             if same:  # said in both languages

@@ -20,21 +20,23 @@ from finlab.allocation.method import Method
 from finlab.errors import AllocationError
 from finlab.layout import Damage, Fin, FinModelSpec, Layout, load_layout
 from finlab.physics.objective import wrench_scale_of
-from tests.allocation.quick import QUICK
+from tests.allocation.quick_allocator import QUICK_SETTINGS
 
-SURGE = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
+WRENCH = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
+"""A wrench within reach of robot A: surge, heave and yaw [N, N m]."""
 
 
-def wrenches(n: int) -> np.ndarray:
+def random_wrenches(n: int) -> np.ndarray:
+    """Wrenches (n, 6) [N, N m] of the size that fins give."""
     return np.random.default_rng(0).normal(size=(n, 6)) * [1.0, 0.3, 1.0, 0.05, 0.05, 0.1]
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_copies_answer_the_same(method: str) -> None:
     layout = load_layout("bluerov2_heavy" if method in ("px4", "ardusub") else "A")
-    allocator = Allocator(layout, method, **QUICK.get(method, {}))
+    allocator = Allocator(layout, method, **QUICK_SETTINGS.get(method, {}))
     lost = layout.names[:1]
-    answer = allocator.allocate(SURGE, lost=lost)
+    answer = allocator.allocate(WRENCH, lost=lost)
     for twin in (
         copy.copy(allocator),
         copy.deepcopy(allocator),
@@ -45,12 +47,12 @@ def test_copies_answer_the_same(method: str) -> None:
             allocator.method,
             allocator.settings,
         )
-        assert twin.allocate(SURGE, lost=lost) == answer
+        assert twin.allocate(WRENCH, lost=lost) == answer
 
 
 def test_another_process_answers_the_same(tmp_path: Path) -> None:
     allocator = Allocator(load_layout("mixed"), period_s=0.2)
-    answer = allocator.allocate(SURGE)
+    answer = allocator.allocate(WRENCH)
     (tmp_path / "both").write_bytes(pickle.dumps((allocator, answer)))
     code = (
         "import pickle, sys\n"
@@ -62,7 +64,7 @@ def test_another_process_answers_the_same(tmp_path: Path) -> None:
 
 
 def test_an_answer_needs_no_allocator(tmp_path: Path) -> None:
-    answer = Allocator(load_layout("A")).allocate(SURGE)
+    answer = Allocator(load_layout("A")).allocate(WRENCH)
     (tmp_path / "answer").write_bytes(pickle.dumps(answer))
     code = (
         "import pickle, sys\n"
@@ -89,12 +91,12 @@ def test_damaged_robots_are_prepared_when_first_asked_about(
     monkeypatch.setattr(Method, "__init__", counted)
     assert issubclass(kind, Method)
     for _ in range(3):
-        allocator.allocate(SURGE)
-        allocator.allocate(SURGE, lost=["front_left"])
-        allocator.allocate(SURGE, damage=Damage(weak={"back_left": 0.5}))
+        allocator.allocate(WRENCH)
+        allocator.allocate(WRENCH, lost=["front_left"])
+        allocator.allocate(WRENCH, damage=Damage(weak={"back_left": 0.5}))
     assert len(made) == 1  # a loss prepares nothing
     for k in range(MAX_STATES + 3):
-        allocator.allocate(SURGE, damage=Damage(weak={"back_left": 0.5 + 0.01 * k}))
+        allocator.allocate(WRENCH, damage=Damage(weak={"back_left": 0.5 + 0.01 * k}))
     assert len(allocator._states) == MAX_STATES
 
 
@@ -109,10 +111,12 @@ def test_errors_are_shares_of_what_the_robot_can_push() -> None:
         < allocator.scale[3]
         <= 2.0 * strongest * lever.max() * 1.0001
     )
-    far = allocator.allocate([100.0, 0, 0, 0, 0, 0])
-    assert far.err_norm == pytest.approx((100.0 - far.wrench[0]) / allocator.scale[0], rel=1e-6)
-    assert far.expected_error == 0.0 and not far.expected_miss.any()
-    lost = allocator.allocate(SURGE, lost=["front_left"])
+    result_out_of_reach = allocator.allocate([100.0, 0, 0, 0, 0, 0])
+    assert result_out_of_reach.err_norm == pytest.approx(
+        (100.0 - result_out_of_reach.wrench[0]) / allocator.scale[0], rel=1e-6
+    )
+    assert result_out_of_reach.expected_error == 0.0 and not result_out_of_reach.expected_miss.any()
+    lost = allocator.allocate(WRENCH, lost=["front_left"])
     np.testing.assert_array_equal(lost.scale, allocator.scale)
 
 
@@ -136,7 +140,7 @@ def test_the_wrench_scale_grows_with_the_robot(size: float) -> None:
 
 def test_many_targets_take_flat_memory() -> None:
     allocator = Allocator(load_layout("A"))
-    targets = wrenches(12 * CHUNK)
+    targets = random_wrenches(12 * CHUNK)
     allocator.allocate_batch(targets[: CHUNK + 1])
     tracemalloc.start()
     batch = allocator.allocate_batch(targets)
@@ -154,7 +158,7 @@ def test_many_targets_take_flat_memory() -> None:
 @pytest.mark.parametrize("name", ["bluerov2_heavy", "turtle_hybrid"])
 def test_robots_with_other_actuators_are_told_as_well(name: str) -> None:
     allocator = Allocator(load_layout(name))
-    for wrench in (SURGE, [1e4, 0.0, 0.0, 0.0, 0.0, 0.0]):
+    for wrench in (WRENCH, [1e4, 0.0, 0.0, 0.0, 0.0, 0.0]):
         answer = allocator.allocate(wrench)
         assert pickle.loads(pickle.dumps(answer)) == answer and answer.effort is None
         assert answer.reachable or any("at full thrust" in words for words in answer.binding)
@@ -162,7 +166,7 @@ def test_robots_with_other_actuators_are_told_as_well(name: str) -> None:
 
 
 def test_an_answer_of_another_robot_is_not_refined() -> None:
-    answer = Allocator(load_layout("A"), "mdn").allocate(SURGE)
+    answer = Allocator(load_layout("A"), "mdn").allocate(WRENCH)
     with pytest.raises(
         AllocationError, match="this answer is of layout 'A', and this allocator is for 'B'"
     ):

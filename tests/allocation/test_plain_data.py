@@ -12,6 +12,7 @@ import finlab
 from finlab.allocation import Allocator
 
 ROOMS = ("allocation", "forces", "deploy")
+"""Folders of `finlab` whose classes are tested."""
 
 
 def classes(room: str) -> dict[str, Any]:

@@ -16,12 +16,13 @@ from finlab.errors import AllocationError, CommandError
 from finlab.layout import Fin, Layout, Limits, load_layout
 from finlab.layout.effectiveness import layout_effectiveness
 from finlab.physics import Plant
-from tests.allocation.quick import OF_FINS
-from tests.any_robot import AnyRobot, normalized_error
+from tests.allocation.quick_allocator import OF_FINS
+from tests.allocator_cache import AllocatorCache, normalized_error
 
 FAR = (30.0, 5.0, 20.0, 1.0, 1.0, 1.0)
 """A wrench that robots of up to six such fins do not deliver."""
-HEAVY = (0.0, 0.0, 20.0, 3.0, 0.0, 0.0)
+HEAVE_AND_ROLL = (0.0, 0.0, 20.0, 3.0, 0.0, 0.0)
+"""A wrench out of reach of fins, in heave and roll alone [N, N m]."""
 SHALLOW = (30.0, 0.0, 6.0, 0.0, 0.0, 0.0)
 """Its heave alone can be delivered, the whole cannot."""
 PATIENT = ("trf", "slsqp", "ipopt", "sqp")
@@ -29,6 +30,7 @@ PATIENT = ("trf", "slsqp", "ipopt", "sqp")
 
 
 def shipped(name: str) -> Layout:
+    """A shipped robot by its name."""
     return load_layout(shipped_layouts()[name])
 
 
@@ -73,15 +75,16 @@ def proven_error(layout: Layout, result: Allocation, target: np.ndarray) -> floa
 def cosine(result: Allocation) -> float:
     """Between what was asked and what is given, both normalized."""
     asked = result.target / result.scale
-    given = result.wrench / result.scale
-    return float(asked @ given / (np.linalg.norm(asked) * np.linalg.norm(given)))
+    wrench = result.wrench / result.scale
+    return float(asked @ wrench / (np.linalg.norm(asked) * np.linalg.norm(wrench)))
 
 
 @pytest.mark.parametrize(
-    ("name", "target"), [("A", FAR), ("pair", FAR), ("restricted", HEAVY), ("restricted", FAR)]
+    ("name", "target"),
+    [("A", FAR), ("pair", FAR), ("restricted", HEAVE_AND_ROLL), ("restricted", FAR)],
 )
 def test_closest_is_no_worse_than_least_squares_on_the_plant(
-    name: str, target: tuple[float, ...], search: AnyRobot
+    name: str, target: tuple[float, ...], search: AllocatorCache
 ) -> None:
     layout = shipped(name)
     result = search.allocate(layout, target)
@@ -91,7 +94,9 @@ def test_closest_is_no_worse_than_least_squares_on_the_plant(
 
 @pytest.mark.parametrize("name", ["A", "B", "penta", "pair", "hexa"])
 @pytest.mark.parametrize("target", [FAR, (0.0, 60.0, 0.0, 0.0, 0.0, -6.0)])
-def test_closest_is_proven_closest(name: str, target: tuple[float, ...], search: AnyRobot) -> None:
+def test_closest_is_proven_closest(
+    name: str, target: tuple[float, ...], search: AllocatorCache
+) -> None:
     layout = shipped(name)
     result = search.allocate(layout, target)
     assert not result.reachable
@@ -99,7 +104,7 @@ def test_closest_is_proven_closest(name: str, target: tuple[float, ...], search:
 
 
 @pytest.mark.parametrize("axis", range(6))
-def test_weights_move_the_error_away_from_an_axis(axis: int, search: AnyRobot) -> None:
+def test_weights_move_the_error_away_from_an_axis(axis: int, search: AllocatorCache) -> None:
     layout = shipped("penta")
     plain = search.allocate(layout, FAR)
     weights = np.where(np.arange(6) == axis, 10.0, 1.0)
@@ -112,7 +117,7 @@ def test_weights_move_the_error_away_from_an_axis(axis: int, search: AnyRobot) -
     assert plain.err_norm <= result.err_norm * (1.0 + 1e-6)
 
 
-def test_weights_are_answered_as_well_as_by_least_squares(search: AnyRobot) -> None:
+def test_weights_are_answered_as_well_as_by_least_squares(search: AllocatorCache) -> None:
     layout = shipped("restricted")
     weights = np.array([1.0, 1.0, 10.0, 1.0, 1.0, 1.0])
     result = search.allocate(layout, FAR, policy=Policy(axis_weights=tuple(weights)))
@@ -120,16 +125,18 @@ def test_weights_are_answered_as_well_as_by_least_squares(search: AnyRobot) -> N
     assert error < 1.001 * least_error(layout, np.array(FAR), weights / result.scale, 2)
 
 
-def test_equal_weights_change_nothing(search: AnyRobot) -> None:
+def test_equal_weights_change_nothing(search: AllocatorCache) -> None:
     layout = shipped("A")
     plain = search.allocate(layout, FAR)
     weighted = search.allocate(layout, FAR, policy=Policy(axis_weights=(3.0,) * 6))
     np.testing.assert_array_equal(weighted.command, plain.command)
 
 
-@pytest.mark.parametrize(("name", "target"), [("A", HEAVY), ("pair", SHALLOW), ("penta", FAR)])
+@pytest.mark.parametrize(
+    ("name", "target"), [("A", HEAVE_AND_ROLL), ("pair", SHALLOW), ("penta", FAR)]
+)
 def test_direction_is_kept_at_the_largest_scale(
-    name: str, target: tuple[float, ...], search: AnyRobot
+    name: str, target: tuple[float, ...], search: AllocatorCache
 ) -> None:
     layout = replace(shipped(name), axes=AXES)
     result = search.allocate(layout, target, policy="direction")
@@ -144,7 +151,7 @@ def test_direction_is_kept_at_the_largest_scale(
         assert more < 1.005 or proven_error(layout, tried, beyond) > 0.0
 
 
-def test_direction_within_arcs(search: AnyRobot) -> None:
+def test_direction_within_arcs(search: AllocatorCache) -> None:
     layout = shipped("restricted")
     result = search.allocate(layout, FAR, policy="direction")
     assert cosine(result) > 1.0 - 1e-9
@@ -153,7 +160,7 @@ def test_direction_within_arcs(search: AnyRobot) -> None:
 
 
 @pytest.mark.parametrize("policy", ["closest", "direction", "priority"])
-def test_what_is_reachable_is_delivered_whole_by_all(policy: str, search: AnyRobot) -> None:
+def test_what_is_reachable_is_delivered_whole_by_all(policy: str, search: AllocatorCache) -> None:
     layout = shipped("A")
     target = [1.0, 0.5, 2.0, 0.0, 0.1, 0.1]
     result = search.allocate(layout, target, policy=policy)
@@ -163,7 +170,7 @@ def test_what_is_reachable_is_delivered_whole_by_all(policy: str, search: AnyRob
 
 
 @pytest.mark.parametrize("name", ["A", "penta", "restricted"])
-def test_priority_serves_the_first_group_whole(name: str, search: AnyRobot) -> None:
+def test_priority_serves_the_first_group_whole(name: str, search: AllocatorCache) -> None:
     layout = shipped(name)
     assert search.allocate(layout, [0.0, 0.0, SHALLOW[2], 0.0, 0.0, 0.0]).reachable
     plain = search.allocate(layout, SHALLOW)
@@ -172,7 +179,7 @@ def test_priority_serves_the_first_group_whole(name: str, search: AnyRobot) -> N
     assert not result.reachable
 
 
-def test_priority_serves_groups_in_the_order_asked(search: AnyRobot) -> None:
+def test_priority_serves_groups_in_the_order_asked(search: AllocatorCache) -> None:
     layout = shipped("pair")
     heave = search.allocate(layout, FAR, policy=Policy("priority", order=(("Fz",), ("Fx",))))
     surge = search.allocate(layout, FAR, policy=Policy("priority", order=(("Fx",), ("Fz",))))
@@ -180,18 +187,18 @@ def test_priority_serves_groups_in_the_order_asked(search: AnyRobot) -> None:
     assert abs(surge.unallocated[0]) < abs(heave.unallocated[0])
 
 
-def test_scale_of_nothing_is_one(search: AnyRobot) -> None:
+def test_scale_of_nothing_is_one(search: AllocatorCache) -> None:
     assert search.allocate(shipped("A"), np.zeros(6)).share == 1.0
 
 
-def test_binding_limits_are_named(search: AnyRobot) -> None:
+def test_binding_limits_are_named(search: AllocatorCache) -> None:
     strong = search.allocate(shipped("A"), (60.0, 0.0, 0.0, 0.0, 0.0, 0.0))
     assert set(strong.binding) == {f"{name} at full thrust" for name in strong.names}
     stopped = search.allocate(shipped("restricted"), (-40.0, 0.0, 0.0, 0.0, 0.0, 0.0))
     assert {f"{name} at the end of its arc" for name in stopped.names} <= set(stopped.binding)
 
 
-def test_nothing_binds_where_the_target_is_delivered(search: AnyRobot) -> None:
+def test_nothing_binds_where_the_target_is_delivered(search: AllocatorCache) -> None:
     for lost in ([], ["back_left"]):
         assert search.allocate(shipped("A"), np.zeros(6), lost=lost).binding == ()
 
@@ -201,7 +208,7 @@ def test_methods_without_weights_say_so() -> None:
     for name in OF_FINS:
         if name in ("dual", "mdn", "paper") or name in PATIENT:
             continue
-        method = AnyRobot(name)
+        method = AllocatorCache(name)
         for policy in (
             Policy("priority"),
             Policy("direction"),
@@ -243,7 +250,7 @@ def test_bad_policies_are_refused(options: dict[str, object], sentence: str) -> 
     assert str(caught.value).startswith(sentence) and "\n" not in str(caught.value)
 
 
-def test_a_name_that_is_no_policy_is_refused(search: AnyRobot) -> None:
+def test_a_name_that_is_no_policy_is_refused(search: AllocatorCache) -> None:
     with pytest.raises(CommandError, match="policy: expected one of"):
         search.allocate(shipped("A"), FAR, policy="nearest")
 

@@ -13,9 +13,11 @@ from finlab.errors import AllocationError, CommandError
 from finlab.layout import Damage, Fin, Layout, Limits
 
 ROBOT = Layout("robot", tuple(Fin(name, (0.1 * i, 0.0, 0.0), 0.0) for i, name in enumerate("abc")))
+"""Three fins in a row."""
 
 
 def state_of(damage: Damage) -> question.RobotState:
+    """What an allocator prepares for a robot with damage."""
     return Allocator(ROBOT)._state(damage)
 
 

@@ -9,10 +9,11 @@ from finlab.allocation import METHODS, Allocator
 from finlab.assets import shipped_checkpoints
 from finlab.errors import AllocationError
 from finlab.layout import load_layout
-from tests.any_robot import AnyRobot
+from tests.allocator_cache import AllocatorCache
 
-SURGE = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
-OTHER: dict[str, dict[str, Any]] = {
+WRENCH = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
+"""A wrench within reach of robot A: surge, heave and yaw [N, N m]."""
+CHANGED_SETTINGS: dict[str, dict[str, Any]] = {
     "dual": {"robust": 2.0},
     "mdn": {"n_candidates": 8, "n_refined": 2},
     "paper": {"n_candidates": 4, "n_steps": 3},
@@ -25,6 +26,7 @@ OTHER: dict[str, dict[str, Any]] = {
     "px4": {"desaturation": "none"},
     "ardusub": {},
 }
+"""Method -> settings with which it answers otherwise than by its defaults."""
 ROBOT = {"px4": "bluerov2_heavy", "ardusub": "bluerov2_heavy"}
 """Those that do not take layout A."""
 SAME_ANSWER = ("dual", "analytic", "qp", "ipopt", "px4", "ardusub")
@@ -37,20 +39,20 @@ pytestmark = pytest.mark.skipif(
 
 
 def test_every_method_is_here() -> None:
-    assert set(OTHER) == set(METHODS)
+    assert set(CHANGED_SETTINGS) == set(METHODS)
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_other_settings_answer_otherwise(method: str) -> None:
     layout = load_layout(ROBOT.get(method, "A"))
     allocator = Allocator(layout, method)
-    before = allocator.allocate(SURGE).command
-    other = Allocator(layout, method, **OTHER[method])
-    command = other.allocate(SURGE).command
+    before = allocator.allocate(WRENCH).command
+    other = Allocator(layout, method, **CHANGED_SETTINGS[method])
+    command = other.allocate(WRENCH).command
     assert other.method == allocator.method
-    assert (other.settings != allocator.settings) == bool(OTHER[method])
+    assert (other.settings != allocator.settings) == bool(CHANGED_SETTINGS[method])
     assert method in SAME_ANSWER or not np.array_equal(command, before)
-    np.testing.assert_array_equal(allocator.allocate(SURGE).command, before)
+    np.testing.assert_array_equal(allocator.allocate(WRENCH).command, before)
 
 
 def test_networks_are_shared() -> None:
@@ -66,7 +68,7 @@ def test_networks_are_shared() -> None:
 @pytest.mark.parametrize("method", METHODS)
 def test_unknown_settings_are_refused(method: str) -> None:
     with pytest.raises(AllocationError, match="knows the settings .*, got 'shoe_size'"):
-        AnyRobot(method).with_settings(shoe_size=43)
+        AllocatorCache(method).with_settings(shoe_size=43)
 
 
 @pytest.mark.parametrize(
@@ -90,6 +92,6 @@ def test_unknown_settings_are_refused(method: str) -> None:
 )
 def test_impossible_settings_are_refused(method: str, wrong: dict[str, Any], message: str) -> None:
     with pytest.raises(AllocationError, match=message):
-        AnyRobot(method, **wrong)
+        AllocatorCache(method, **wrong)
     with pytest.raises(AllocationError, match=message):
-        AnyRobot(method).with_settings(**wrong)
+        AllocatorCache(method).with_settings(**wrong)

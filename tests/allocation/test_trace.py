@@ -14,6 +14,7 @@ import finlab
 
 ROOT = Path(__file__).resolve().parents[2]
 ROW = re.compile(r"^\| `(finlab/[\w/]+\.(?:py|c))` \| `([\w.]+)` \|", re.MULTILINE)
+"""A row of the tables: a file and its function."""
 Step = tuple[str, str]
 """A file and a function."""
 
@@ -48,10 +49,10 @@ def called(run: Callable[[], Any]) -> list[Step]:
 
 def assert_in_order(steps: list[Step], profile: list[Step]) -> None:
     """Each step is in what is left of a profile after the step before it."""
-    at = 0
+    next_step = 0
     for step in steps:
-        assert step in profile[at:], step
-        at = profile.index(step, at) + 1
+        assert step in profile[next_step:], step
+        next_step = profile.index(step, next_step) + 1
 
 
 def test_an_allocator_is_made_as_traced() -> None:

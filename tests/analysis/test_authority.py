@@ -14,6 +14,7 @@ from finlab.layout import Layout
 from tests.forces.conftest import THRUST
 
 Layouts = Callable[[str], Layout]
+"""The type of the fixture `shipped`: a shipped robot by its name."""
 
 
 def test_layout_a_in_closed_form(shipped: Layouts) -> None:

@@ -24,6 +24,7 @@ from finlab.arrays import Array
 from finlab.layout import Layout
 
 Layouts = Callable[[str], Layout]
+"""The type of the fixture `shipped`: a shipped robot by its name."""
 
 
 @dataclass

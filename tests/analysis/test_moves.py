@@ -12,6 +12,7 @@ from finlab.errors import LayoutError
 from finlab.layout import Layout
 
 Layouts = Callable[[str], Layout]
+"""The type of the fixture `shipped`: a shipped robot by its name."""
 
 
 def test_layout_a_is_two_pairs(shipped: Layouts) -> None:

@@ -9,7 +9,7 @@ from finlab.analysis.null_space import NullSpace
 from finlab.layout import load_layout
 from finlab.layout.effectiveness import layout_effectiveness
 from finlab.physics.objective import REACHED
-from tests.mixed_robots import KINDS, load, random_flow, random_plant, random_robot, within
+from tests.random_robots import KINDS, load, random_flow, random_plant, random_robot, within
 
 SAME = 1e-6
 """Normalized error that counts as none, and share of power."""

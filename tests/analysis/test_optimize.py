@@ -19,9 +19,10 @@ from finlab.arrays import Array
 from finlab.axes import AXES as WRENCH
 from finlab.errors import FinlabError, LayoutError
 from finlab.layout import Layout
-from tests.exhaustive import sampled
+from tests.sampled_cases import sampled
 
 Layouts = Callable[[str], Layout]
+"""The type of the fixture `shipped`: a shipped robot by its name."""
 
 
 @pytest.mark.parametrize("goal", GOALS)
@@ -126,7 +127,7 @@ def test_wrong_goals(shipped: Layouts, name: str, goal: str, mission: object, me
         optimize_layout(layout, layout.names[:1], goal=goal, mission=mission)
 
 
-SHIPPED = {
+SEARCHES = {
     "bluerov2_heavy": (["lift_rear_right"], {}),
     "bluerov2": (["lift_left", "front_left"], {}),
     "torpedo": (
@@ -137,12 +138,13 @@ SHIPPED = {
     "fish": (["tail"], {}),
     "turtle_hybrid": (["lift_left", "front_left"], {}),
 }
+"""Shipped robot -> which of its actuators may move, and settings of the search."""
 
 
-@pytest.mark.parametrize("name", sampled(SHIPPED, every=2))
+@pytest.mark.parametrize("name", sampled(SEARCHES, every=2))
 def test_any_actuator_moves_within_bounds_and_keeps_the_mirror(shipped: Layouts, name: str) -> None:
     layout = shipped(name)
-    names, settings = SHIPPED[name]
+    names, settings = SEARCHES[name]
     actuators = [layout.actuators[layout.index(actuator)] for actuator in names]
     bounds = {actuator.name: Bounds.around(actuator, 0.04, 0.3) for actuator in actuators}
     improvement = optimize_layout(layout, names, bounds, rounds=4, seed=1, **settings)

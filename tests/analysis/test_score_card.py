@@ -15,6 +15,7 @@ from finlab.errors import LayoutError
 from finlab.layout import FinModelSpec, Layout, load_layout
 
 Layouts = Callable[[str], Layout]
+"""The type of the fixture `shipped`: a shipped robot by its name."""
 
 
 def test_a_card_is_json(shipped: Layouts) -> None:
@@ -59,6 +60,7 @@ def test_quick_check_agrees_with_the_whole_analysis(shipped: Layouts, name: str)
 
 
 WRENCHES = np.concatenate([np.diag([1, 1, 1, 0.1, 0.1, 0.1]), [[1.2, 0, 0.5, 0, 0, 0.15]]])
+"""A wrench along each axis, and one of surge, heave and yaw: (7, 6) [N, N m]."""
 
 
 def least_for(force: float, blade: Blade) -> float:

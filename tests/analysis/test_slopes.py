@@ -11,6 +11,7 @@ from finlab.analysis.slopes import MissionPower, SlopedGoal, WeakestDirection
 from finlab.layout import Layout
 
 Layouts = Callable[[str], Layout]
+"""The type of the fixture `shipped`: a shipped robot by its name."""
 
 
 def slopes_are_differences(goal: SlopedGoal, moves: Moves, rel: float) -> None:

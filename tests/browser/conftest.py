@@ -15,11 +15,13 @@ import pytest
 CHROMIUM = next(
     (p for p in map(shutil.which, ("chromium", "chromium-browser", "google-chrome")) if p), None
 )
-MISSING = (
+"""Path of the browser; None where there is none."""
+CHROMIUM_MISSING = (
     "NO CHROMIUM: the browser tests were skipped, so nothing checked the app's pages. Install one "
     "with `apt-get install chromium` and run them again."
 )
-FLAGS = [
+"""Why the tests are skipped."""
+CHROMIUM_FLAGS = [
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
     "--ignore-gpu-blocklist",
@@ -31,6 +33,7 @@ FLAGS = [
     "--disable-sync",
     "--disable-dev-shm-usage",
 ]
+"""Options of Chromium for WebGL by software, without a graphics card."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -41,9 +44,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     if os.environ.get("CI", "").lower() in ("1", "true"):
         return  # the fixture fails
     if here:
-        warnings.warn(MISSING, stacklevel=1)
+        warnings.warn(CHROMIUM_MISSING, stacklevel=1)
     for item in here:
-        item.add_marker(pytest.mark.skip(reason=MISSING))
+        item.add_marker(pytest.mark.skip(reason=CHROMIUM_MISSING))
 
 
 @dataclass
@@ -85,7 +88,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
 def browser() -> Iterator[Any]:
     """One Chromium for all flows."""
     if CHROMIUM is None:
-        pytest.fail(MISSING)
+        pytest.fail(CHROMIUM_MISSING)
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright, tempfile.TemporaryDirectory() as home:
@@ -93,7 +96,7 @@ def browser() -> Iterator[Any]:
             executable_path=CHROMIUM,
             headless=True,
             chromium_sandbox=False,
-            args=FLAGS,
+            args=CHROMIUM_FLAGS,
             downloads_path=home,
         )
         yield chromium

@@ -8,7 +8,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from webapp.session.looking import DRAWERS, TASKS
+from webapp.session.looking import DRAWERS, TASKS, Desk, SearchRequest
+from webapp.session.swim_plan import SwimSettings
 from webapp.viser_internals import run_script
 
 WAIT_MS = 120_000
@@ -19,18 +20,20 @@ last."""
 
 ROW = "xpath=ancestor::div[contains(@class,'Flex-root')][1]"
 """From a label to the row it stands in."""
-VERTICES = """name => {
+VERTICES_SCRIPT = """name => {
   let geometry = null;
   window.__viserMutable.nodeRefFromName[name].traverse(o => { geometry = geometry ?? o.geometry ?? null; });
   return Array.from(geometry.attributes.position.array.slice(0, 6000));
 }"""
-INSTANCES = """name => {
+"""Script: the first 2000 vertices of a node's mesh, as a flat list."""
+INSTANCES_SCRIPT = """name => {
   let mesh = null;
   const find = o => { mesh = mesh ?? (o.matricesTexture ? o : null); };
   window.__viserMutable.nodeRefFromName[name].traverse(find);
   return Array.from(mesh?.matricesTexture.image.data.slice(0, 16 * mesh.instancesCount) ?? []);
 }"""
-PROJECT = """([name, point]) => {
+"""Script: the matrices (4, 4) of a node's instances, as a flat list."""
+PROJECT_SCRIPT = """([name, point]) => {
   const node = window.__viserMutable.nodeRefFromName[name];
   node.updateWorldMatrix(true, false);
   const place = node.localToWorld(node.position.clone().set(...point));
@@ -38,6 +41,7 @@ PROJECT = """([name, point]) => {
   const canvas = document.querySelector('canvas').getBoundingClientRect();
   return [canvas.left + (seen.x + 1) / 2 * canvas.width, canvas.top + (1 - seen.y) / 2 * canvas.height];
 }"""
+"""Script: where a point of a node is on the page [px]."""
 
 
 class Page:
@@ -80,8 +84,13 @@ class Page:
         done = threading.Event()
 
         def restart() -> None:
-            self.session.start_over()
-            self.session.forget_view(self._display)
+            session = self.session
+            session.start_over()
+            # What `start_over` keeps for a user, so that no test sees what another one looked at.
+            session.display = self._display
+            session.desk = Desk()
+            session.draft = SearchRequest()
+            session.swim = SwimSettings()
             self.view.jobs.improver.forget()
             self.view.scenery.end_swim()
             self.view.scenery.robot.look_from("3D")
@@ -267,7 +276,7 @@ class Page:
         self, node: str, point: tuple[float, float, float] = (0.0, 0.0, 0.0)
     ) -> tuple[float, float]:
         """Where a point of a node is on the screen."""
-        x, y = self.page.evaluate(PROJECT, [node, list(point)])
+        x, y = self.page.evaluate(PROJECT_SCRIPT, [node, list(point)])
         return x, y
 
     def text(self, selector: str) -> str:
@@ -283,12 +292,13 @@ class Page:
 
     def vertices(self, node: str) -> list[float]:
         """First coordinates of a mesh as the browser holds it."""
-        return [float(v) for v in self.page.evaluate(VERTICES, node)]
+        return [float(v) for v in self.page.evaluate(VERTICES_SCRIPT, node)]
 
     def instances(self, node: str) -> list[list[float]]:
         """Matrices of the arrows, or other instances, of a node as the browser holds them."""
-        numbers = [float(v) for v in self.page.evaluate(INSTANCES, node)]
+        numbers = [float(v) for v in self.page.evaluate(INSTANCES_SCRIPT, node)]
         return [numbers[k : k + 16] for k in range(0, len(numbers), 16)]
 
     def _pause(self) -> None:
+        """Wait until the page has sent the last input."""
         self.page.wait_for_timeout(1000 * PAUSE_S)

@@ -13,15 +13,17 @@ from finlab.cli import main
 from finlab.files import yaml_text
 from finlab.layout import FinModelSpec, layout_to_dict, load_layout
 from finlab.physics import make_law
-from tests.fit.cell import columns_of, commands, measured, soft, write
+from tests.fit.load_cell import columns_of, commands, measured, soft, write
 
-CARRIED = """files => {
+DROPPED_FILES_SCRIPT = """files => {
   const carried = new DataTransfer();
   for (const [name, content] of files)
     carried.items.add(new File([Uint8Array.from(atob(content), (c) => c.charCodeAt(0))], name));
   return carried;
 }"""
-EVIL = "<img src=x onerror=window.pwned=1><script>window.pwned=2"
+"""Script: files as a drag from the desktop carries them."""
+HOSTILE_TEXT = "<img src=x onerror=window.pwned=1><script>window.pwned=2"
+"""A name that would run as a script where it is not escaped."""
 
 
 def measured_robot(folder: Path) -> tuple[dict[str, Any], bytes]:
@@ -37,7 +39,7 @@ def drop(page: Any, place: str, files: dict[str, bytes]) -> None:
     """Drag files over an element of the page, see what the page says to that, and let them go
     there."""
     coded = [[name, base64.b64encode(content).decode()] for name, content in files.items()]
-    carried = page.page.evaluate_handle(CARRIED, coded)
+    carried = page.page.evaluate_handle(DROPPED_FILES_SCRIPT, coded)
     target = page.page.locator(place).first
     said = page.page.locator("html.fl-dropping")
     target.dispatch_event("dragover", {"dataTransfer": carried})
@@ -90,8 +92,14 @@ def test_files_are_saved_and_opened_or_refused(page: Any, tmp_path: Path) -> Non
 
 def test_a_strangers_layout_opens_no_file_and_runs_nothing(page: Any, tmp_path: Path) -> None:
     before = page.session.state
-    values = layout_to_dict(load_layout("ucat")) | {"name": EVIL, "description": EVIL}
-    values["actuators"][0] |= {"name": EVIL[:60], "model": {"type": "table", "path": "/etc/passwd"}}
+    values = layout_to_dict(load_layout("ucat")) | {
+        "name": HOSTILE_TEXT,
+        "description": HOSTILE_TEXT,
+    }
+    values["actuators"][0] |= {
+        "name": HOSTILE_TEXT[:60],
+        "model": {"type": "table", "path": "/etc/passwd"},
+    }
     (tmp_path / "robot.yaml").write_text(yaml_text(values))
     page.upload("Open", tmp_path / "robot.yaml")
     page.until(lambda: any("'passwd', which did not come along" in note for note in page.notes()))
@@ -99,8 +107,8 @@ def test_a_strangers_layout_opens_no_file_and_runs_nothing(page: Any, tmp_path: 
     values["actuators"][0]["model"] = {"type": "drag"}
     (tmp_path / "robot.yaml").write_text(yaml_text(values))
     page.upload("Open", tmp_path / "robot.yaml")
-    page.until(lambda: page.session.state.layout.name == EVIL and not page.view.busy)
-    page.until(lambda: EVIL[:20] in page.text(".fl-robot"))
+    page.until(lambda: page.session.state.layout.name == HOSTILE_TEXT and not page.view.busy)
+    page.until(lambda: HOSTILE_TEXT[:20] in page.text(".fl-robot"))
     page.key("n")
     for tab in ("Design", "Simulate", "Export", "Allocate"):
         page.tab(tab)

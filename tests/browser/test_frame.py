@@ -12,11 +12,13 @@ import pytest
 from finlab.layout import load_layout
 from webapp.session.looking import DRAWERS, TASKS
 
-SIZES = ((1400, 860), (900, 700))
+WINDOW_SIZES = ((1400, 860), (900, 700))
+"""Widths and heights of the window [px]: a laptop, and a small one."""
 NAMING_MS = 120
 """Until new parts have their names."""
-SETTLED = "() => !document.getAnimations().some((one) => one instanceof CSSTransition)"
-REGIONS = """() => {
+NO_TRANSITION_SCRIPT = "() => !document.getAnimations().some((one) => one instanceof CSSTransition)"
+"""Script: whether no transition runs."""
+REGIONS_SCRIPT = """() => {
   const shown = (e) => e && getComputedStyle(e).visibility === 'visible' && e.getClientRects().length > 0;
   const found = {};
   for (const name of ['top', 'left', 'right', 'drawer']) {
@@ -26,9 +28,11 @@ REGIONS = """() => {
   found.canvas = document.querySelector('canvas[data-engine]').getBoundingClientRect().toJSON();
   return found;
 }"""
-WORDS = """() => Object.fromEntries(['canvas[data-engine]', '.fl-camera', '.fl-corner'].map((name) =>
+"""Script: name of a region that is shown -> its box."""
+OVERLAYS_SCRIPT = """() => Object.fromEntries(['canvas[data-engine]', '.fl-camera', '.fl-corner'].map((name) =>
   [name, document.querySelector(name).getBoundingClientRect().toJSON()]))"""
-SMALL = """() => {
+"""Script: boxes of the view, of the buttons of its camera and of its corner."""
+SMALL_TYPE_SCRIPT = """() => {
   const found = new Set(), walk = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
   for (let text; (text = walk.nextNode()); ) {
     const box = text.parentElement, style = getComputedStyle(box);
@@ -38,7 +42,8 @@ SMALL = """() => {
   }
   return [...found];
 }"""
-WIDE = """() => {
+"""Script: texts that are shown smaller than they should be."""
+WIDE_CONTENT_SCRIPT = """() => {
   const found = [];
   for (const name of ['top', 'left', 'right', 'drawer']) {
     const box = document.querySelector(`.fl-${name}`).closest('.mantine-Paper-root');
@@ -47,7 +52,9 @@ WIDE = """() => {
   }
   return found;
 }"""
-CAMERA = "() => window.__viserMutable.camera.position.toArray()"
+"""Script: what is wider than the region in which it is."""
+CAMERA_SCRIPT = "() => window.__viserMutable.camera.position.toArray()"
+"""Script: where the camera is."""
 
 
 @pytest.fixture
@@ -62,7 +69,7 @@ def settle(page: Any) -> None:
     """Wait until the page has laid itself out, new parts have their names, and colors have faded
     in."""
     page.rest(NAMING_MS)
-    page.page.wait_for_function(SETTLED)
+    page.page.wait_for_function(NO_TRANSITION_SCRIPT)
 
 
 def overlaps(boxes: dict[str, dict[str, float]]) -> list[str]:
@@ -76,7 +83,7 @@ def overlaps(boxes: dict[str, dict[str, float]]) -> list[str]:
     return found
 
 
-@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
+@pytest.mark.parametrize("size", WINDOW_SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
 def test_nothing_lies_over_anything_else(resized: Any, size: tuple[int, int]) -> None:
     page = resized
     width, height = size
@@ -86,19 +93,19 @@ def test_nothing_lies_over_anything_else(resized: Any, size: tuple[int, int]) ->
         for name in DRAWERS[task] or (task,):
             page.tab(name)
             settle(page)
-            boxes = page.page.evaluate(REGIONS)
+            boxes = page.page.evaluate(REGIONS_SCRIPT)
             assert overlaps(boxes) == [], f"{name} at {width} x {height}"
             assert {"top", "right", "canvas"} <= set(boxes), name
             canvas = boxes["canvas"]
             assert canvas["width"] >= 480 and canvas["height"] >= 240, "the robot can be seen"
             for box in boxes.values():
                 assert box["left"] >= 0 and box["right"] <= width and box["bottom"] <= height
-            assert page.page.evaluate(SMALL) == [], f"type of 13 px at least, in {name}"
-            assert page.page.evaluate(WIDE) == [], (
+            assert page.page.evaluate(SMALL_TYPE_SCRIPT) == [], f"type of 13 px at least, in {name}"
+            assert page.page.evaluate(WIDE_CONTENT_SCRIPT) == [], (
                 f"nothing is cut off in {name} at {width} x {height}"
             )
             if size == (900, 700):  # a small view has its words beside it
-                assert overlaps(page.page.evaluate(WORDS)) == [], name
+                assert overlaps(page.page.evaluate(OVERLAYS_SCRIPT)) == [], name
     assert page.problems == []
 
 
@@ -112,7 +119,9 @@ def test_a_phone_watches(resized: Any) -> None:
         page.tab(task)
         settle(page)
         boxes = {
-            name: box for name, box in page.page.evaluate(REGIONS).items() if box["height"] > 0.0
+            name: box
+            for name, box in page.page.evaluate(REGIONS_SCRIPT).items()
+            if box["height"] > 0.0
         }
         assert overlaps(boxes) == [] and boxes["canvas"]["height"] > 200, task
         assert ("left" in boxes) == (task == "Log"), "what is said of a log is read there"
@@ -128,7 +137,7 @@ def test_a_phone_watches(resized: Any) -> None:
     page.type("Fx [N]", "1.2")
     page.until(lambda: page.text(".fl-status .pill") == "Exact")
     page.page.get_by_role("button", name="Fold the drawer").click()
-    page.until(lambda: page.page.evaluate(REGIONS)["canvas"]["height"] > 500)
+    page.until(lambda: page.page.evaluate(REGIONS_SCRIPT)["canvas"]["height"] > 500)
     page.page.get_by_role("button", name="Open the drawer").click()
 
 
@@ -136,14 +145,14 @@ def test_the_view_is_saved_as_it_is_seen(page: Any, tmp_path: Path) -> None:
     page.page.locator(".fl-camera button", has_text="3D").click()
     with PIL.Image.open(page.download("Picture", tmp_path / "view.png")) as picture:
         seen = picture.convert("RGB")
-    assert seen.width == 2 * round(page.page.evaluate(REGIONS)["canvas"]["width"])
+    assert seen.width == 2 * round(page.page.evaluate(REGIONS_SCRIPT)["canvas"]["width"])
     colors = {color for _, color in seen.getcolors(seen.width * seen.height)}
     assert len(colors) > 500, "water, hull and fins, not an empty canvas"
 
 
 def test_the_drawer_is_folded(page: Any) -> None:
     def height() -> float:
-        return float(page.page.evaluate(REGIONS)["drawer"]["height"])
+        return float(page.page.evaluate(REGIONS_SCRIPT)["drawer"]["height"])
 
     before = height()
     page.page.get_by_role("button", name="Fold the drawer").click()
@@ -187,7 +196,7 @@ def test_keys_do_what_the_list_of_commands_says(page: Any) -> None:
 
 def test_the_camera_frames_turns_and_leaves_ctrl_alone(page: Any) -> None:
     def off() -> float:
-        canvas = page.page.evaluate(REGIONS)["canvas"]
+        canvas = page.page.evaluate(REGIONS_SCRIPT)["canvas"]
         x, y = page.pixel("/robot/fins/2")
         return float(
             abs(x - canvas["x"] - canvas["width"] / 2) + abs(y - canvas["y"] - canvas["height"] / 2)
@@ -198,21 +207,21 @@ def test_the_camera_frames_turns_and_leaves_ctrl_alone(page: Any) -> None:
     page.until(lambda: off() < 6.0)
     page.page.get_by_role("button", name="Side").click()
     page.until(lambda: off() > 30.0)
-    before = page.page.evaluate(CAMERA)
+    before = page.page.evaluate(CAMERA_SCRIPT)
     page.page.keyboard.down("Control")
     page.page.keyboard.down("d")
     page.rest(400)
     page.page.keyboard.up("d")
     page.page.keyboard.up("Control")
-    assert page.page.evaluate(CAMERA) == before
+    assert page.page.evaluate(CAMERA_SCRIPT) == before
     page.page.locator("[role=slider]:visible").first.focus()
     asked = page.session.state.target
     page.page.keyboard.press("ArrowRight", delay=300)
     page.until(lambda: page.session.state.target != asked)
-    assert page.page.evaluate(CAMERA) == before, "an arrow key on a slider is the slider's"
+    assert page.page.evaluate(CAMERA_SCRIPT) == before, "an arrow key on a slider is the slider's"
     page.page.evaluate("document.activeElement.blur()")
     page.page.keyboard.down("d")
-    page.until(lambda: page.page.evaluate(CAMERA) != before)
+    page.until(lambda: page.page.evaluate(CAMERA_SCRIPT) != before)
     page.page.keyboard.up("d")
 
 
@@ -252,9 +261,11 @@ def test_what_is_typed_counts_with_enter(page: Any) -> None:
 
 AXE = files("axe_playwright_python").joinpath("axe.min.js").read_text("utf-8")
 """axe-core itself, as its wrapper for Python ships it."""
-RUN = """rules => axe.run(
+AXE_SCRIPT = """rules => axe.run(
   document, { resultTypes: ['violations'], preload: false, ...(rules && { runOnly: rules }) })"""
-SCHEME = "scheme => document.documentElement.dataset.mantineColorScheme === scheme"
+"""Script: what axe-core finds against accessibility, by some of its rules or by all."""
+SCHEME_SCRIPT = "scheme => document.documentElement.dataset.mantineColorScheme === scheme"
+"""Script: whether the page has a colour scheme, light or dark."""
 GRAVE = ("moderate", "serious", "critical")
 """Impacts that are mended before anything lands."""
 
@@ -267,7 +278,7 @@ def findings(page: Any, rules: list[str] | None = None) -> list[str]:
     if not tab.evaluate("() => typeof axe === 'object'"):
         tab.evaluate(AXE)
     found = []
-    for violation in tab.evaluate(RUN, rules)["violations"]:
+    for violation in tab.evaluate(AXE_SCRIPT, rules)["violations"]:
         if violation["impact"] in GRAVE:
             nodes = violation["nodes"]
             first = nodes[0]["html"][:160].replace("\n", " ")
@@ -291,7 +302,7 @@ def test_no_serious_finding_light_or_dark(page: Any) -> None:
     page.page.keyboard.press("Escape")
     page.session.set_display("dark", True)  # where nothing but colours is another
     page.key("Alt+1")
-    page.page.wait_for_function(SCHEME, arg="dark")
+    page.page.wait_for_function(SCHEME_SCRIPT, arg="dark")
     for task in TASKS:
         for name in DRAWERS[task] or (task,):
             page.tab(name)

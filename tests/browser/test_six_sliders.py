@@ -17,13 +17,15 @@ import finlab
 ROOT = Path(__file__).resolve().parents[2]
 pytest.importorskip("mkdocs")
 ROBOTS = "A", "catamaran"
-ASKS = """async ([name, lost, wrenches, policy]) => {
+"""Robots of the page that are asked."""
+ANSWERS_SCRIPT = """async ([name, lost, wrenches, policy]) => {
   const { loadCore, prepare } = await import("./core.js");
   const robot = (await (await fetch("robots.json")).json()).find((each) => each.name === name);
   const block = new Float64Array(await (await fetch(`${name}.bin`)).arrayBuffer());
   const ask = prepare(await loadCore("finlab.wasm"), block, robot.actuators.length);
   return wrenches.map((wrench) => ask(wrench, policy, robot.groups, lost));
 }"""
+"""Script: answers of the page's core to wrenches, for a robot with losses and by a policy."""
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +67,7 @@ def test_the_browser_answers_as_the_library_does(six_sliders: Any, name: str, lo
         * layout.commanded
     )
     for policy in ("closest", "direction", "priority"):
-        answers = six_sliders.evaluate(ASKS, [name, lost, wrenches.tolist(), policy])
+        answers = six_sliders.evaluate(ANSWERS_SCRIPT, [name, lost, wrenches.tolist(), policy])
         for wrench, answer in zip(wrenches, answers, strict=True):
             own = allocator.allocate(wrench, lost=names, policy=policy)
             missing = (own.wrench - answer["wrench"]) * layout.commanded / allocator.scale

@@ -163,7 +163,8 @@ def test_a_number_counts_when_it_is_typed_whole(page: Any) -> None:
     asked("3", "ArrowUp", 3.01)
 
 
-BOTTOMS = "all => all.map(one => one.getBoundingClientRect().bottom)"
+BOTTOMS_SCRIPT = "all => all.map(one => one.getBoundingClientRect().bottom)"
+"""Script: lower ends of elements [px]."""
 
 
 def test_a_robot_swims_and_one_fin_breaks(page: Any) -> None:
@@ -181,7 +182,7 @@ def test_a_robot_swims_and_one_fin_breaks(page: Any) -> None:
     start = page.pixel("/robot")
     page.until(lambda: page.pixel("/robot") != start)  # it moves on the screen
     page.until(lambda: page.page.locator(".fl-timeline .plot").count() == 6)
-    ends = page.page.locator(".fl-timeline .plot").evaluate_all(BOTTOMS)
+    ends = page.page.locator(".fl-timeline .plot").evaluate_all(BOTTOMS_SCRIPT)
     assert max(ends) <= page.page.viewport_size["height"], f"the last plots end at {ends}"
     page.page.get_by_role("button", name="2", exact=True).locator("visible=true").first.click()
     page.until(lambda: swimming.swimmer.visible_moment.believed_lost == ("front_left",))

@@ -13,10 +13,11 @@ import pytest
 
 from finlab.cli import main
 from finlab.layout import Uncertainty, load_layout, save_layout
-from tests.layout.test_file import HOSTILE
+from tests.layout.test_file import HOSTILE_FILES
 from tests.terminal import refused
 
 WRENCH = ["--wrench", "1", "0", "-0.5", "0", "0", "1e-1"]
+"""Options of a wrench within reach of robot A."""
 KEYS = [
     *("actuators", "fins", "command", "lost", "target", "flow", "wrench_expected"),
     *("wrench_plant", "unallocated", "err_norm", "expected_error", "expected_miss", "effort"),
@@ -33,9 +34,11 @@ KEYS = [
     ),
     *("binding", "unknown_fins", "notes"),
 ]
+"""Keys of the JSON, in order."""
 
 
 def refuse_constant(name: str) -> float:
+    """`parse_constant` of `json.loads`: NaN and Infinity are not JSON."""
     raise AssertionError(f"{name} is not JSON")
 
 
@@ -52,6 +55,7 @@ def allocate(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str
 
 
 def answer(run: tuple[int, str, str]) -> dict[str, Any]:
+    """The JSON that a run of the verb, which must have succeeded, has printed."""
     code, out, err = run
     assert code == 0, err
     result: dict[str, Any] = json.loads(out, parse_constant=refuse_constant)
@@ -157,7 +161,7 @@ def test_hostile_files_end_in_one_sentence(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    content, _ = HOSTILE[name]
+    content, _ = HOSTILE_FILES[name]
     monkeypatch.chdir(tmp_path)
     path = tmp_path / "hostile.yaml"
     path.write_bytes(content if isinstance(content, bytes) else content.encode())

@@ -20,11 +20,13 @@ from finlab import cli
 from finlab.cli import EXAMPLES, _command_line, _verb, examples, main
 from finlab.cli.shared_options import with_json_file
 from finlab.files.guarded import read_file
-from tests.fit.cell import columns_of, commands, measured, soft, write
+from tests.fit.load_cell import columns_of, commands, measured, soft, write
 from tests.terminal import refused
 
 FINLAB = [sys.executable, "-m", "finlab"]
+"""The command line, as a process of its own."""
 WRENCH = ["--wrench", "1", "0", "0.5", "0", "0", "0.1"]
+"""Options of a wrench within reach of robot A."""
 
 
 def verbs(app: SubcommandApp, *words: str) -> Iterator[str]:
@@ -72,9 +74,10 @@ def still(app: SubcommandApp, seen: list[str]) -> None:
             command.target = without_work(command.target, seen)
 
 
-ALL_EXAMPLES = [
-    line for verb in verbs(_command_line(["eval", "--help"])) for line in examples(verb.split())
-]
+ALL_EXAMPLES = list[str]()
+for _words in verbs(_command_line(["eval", "--help"])):
+    ALL_EXAMPLES += examples(_words.split())
+"""Lines of the examples that the help pages show."""
 
 
 @pytest.mark.parametrize("line", list(dict.fromkeys(ALL_EXAMPLES)))
@@ -93,7 +96,7 @@ def test_the_options_of_every_example_are_understood(
 
 
 @pytest.mark.parametrize(
-    "line", [line for verb in ("allocate", "layout show", "export") for line in EXAMPLES[verb]]
+    "line", [*EXAMPLES["allocate"], *EXAMPLES["layout show"], *EXAMPLES["export"]]
 )
 def test_quick_examples_run(line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
@@ -139,10 +142,11 @@ def test_interrupt_exits_with_130(monkeypatch: pytest.MonkeyPatch) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr("finlab.analysis.score_card", interrupted)
-    assert main(["layout", "show", "A"]) == 130
+    assert main(["layout", "show", "A"]) == 130  # as shells say: 128 + SIGINT
 
 
 RUNTIME = [sys.executable, "-m", "finlab.deploy.command"]
+"""The command of the robot, `finlab-runtime`, as a process of its own."""
 
 
 @pytest.mark.parametrize(
@@ -183,7 +187,7 @@ def test_files_are_written_before_anything_is_printed(tmp_path: Path) -> None:
         command, stdout=write_end, stderr=subprocess.PIPE, text=True, timeout=60, env=unbuffered
     )
     os.close(write_end)
-    assert done.returncode == 141
+    assert done.returncode == 141  # as shells say: 128 + SIGPIPE
     assert (tmp_path / "fin.csv").exists()
 
 

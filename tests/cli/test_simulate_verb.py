@@ -13,6 +13,7 @@ from finlab.swim.simulation import load_log
 from tests.terminal import first_shown, refused
 
 FILES = {"log.npz"}
+"""What a swim without pictures writes."""
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from finlab.cli import main
-from tests.fit.cell import columns_of, commands, measured, soft, write
+from tests.fit.load_cell import columns_of, commands, measured, soft, write
 from tests.terminal import refused
 
 WITHOUT_TORCH = """
@@ -28,6 +28,7 @@ sys.exit(main(sys.argv[1:]))
 """
 """A command line on a machine where PyTorch is not installed."""
 SMOKE = ["--preset", "smoke", "--steps", "3"]
+"""Options of a training of three steps."""
 
 
 def test_trains_the_network_over_forces_and_allocates_with_it(

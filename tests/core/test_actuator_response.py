@@ -8,9 +8,20 @@ import numpy as np
 import pytest
 
 from finlab.arrays import Array
-from tests.core.parts import POD, ROBOTS, LineResponse, Robot, Set, Tangent, at, functions, robot_of
+from tests.core.internal_functions import (
+    POD,
+    ROBOTS,
+    LineResponse,
+    Robot,
+    Set,
+    Tangent,
+    at,
+    functions,
+    robot_of,
+)
 
-ANGLES = 361
+N_ANGLES = 361
+"""How many angles of a sector are scanned."""
 SIZES = 121
 """Denser towards both ends, where prices rise most."""
 BLEND = 1e-5
@@ -19,12 +30,12 @@ BLEND = 1e-5
 
 def forces_of(robot: Robot, i: int, limits: Set) -> tuple[Array, Array]:
     """Forces (N, 2) along the rows of an actuator that its set has, and their power (N,) [W]."""
-    ways = [(limits.force_min, limits.force_max, 0.0, -1.0 if limits.is_flipped else 1.0)]
+    branches = [(limits.force_min, limits.force_max, 0.0, -1.0 if limits.is_flipped else 1.0)]
     if limits.force_max_reverse > 0.0:
-        ways.append((0.0, limits.force_max_reverse, math.pi, -1.0))
+        branches.append((0.0, limits.force_max_reverse, math.pi, -1.0))
     force = list[Array]()
     power = list[Array]()
-    for low, high, turned, sign in ways:
+    for low, high, rotation, sign in branches:
         share = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, SIZES if robot.is_plane(i) else 1201))
         size = low + share * (high - low)
         cost = np.array([robot.power(i, sign * one) for one in size])
@@ -35,21 +46,21 @@ def forces_of(robot: Robot, i: int, limits: Set) -> tuple[Array, Array]:
             continue
         angle = (
             limits.sector_center
-            + turned
-            + limits.sector_half_angle * np.linspace(-1.0, 1.0, ANGLES)
+            + rotation
+            + limits.sector_half_angle * np.linspace(-1.0, 1.0, N_ANGLES)
         )
         radius = np.array([robot.radius(i, one) for one in angle])
         direction = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
         force.append((size[:, None, None] * direction).reshape(-1, 2))
-        power.append(np.repeat(cost, ANGLES))
+        power.append(np.repeat(cost, N_ANGLES))
     return np.concatenate(force), np.concatenate(power)
 
 
 def sets_of(robot: Robot, i: int, rng: np.random.Generator) -> list[Set]:
     """All that an actuator may give, and parts of it: some sizes, some directions, one way."""
-    own = robot.actuators[i]
+    actuator = robot.actuators[i]
     low, high, middle, half = (
-        float(own[name])
+        float(actuator[name])
         for name in ("force_min", "force_max", "sector_center", "sector_half_angle")
     )
     ends = np.sort(low + rng.random((2, 2)) * (high - low), axis=1)
@@ -57,9 +68,9 @@ def sets_of(robot: Robot, i: int, rng: np.random.Generator) -> list[Set]:
     if robot.is_plane(i):
         for share in (0.02, 0.3, 0.7):
             narrow = share * half
-            turned = middle + (rng.uniform(-1.0, 1.0) * (half - narrow))
-            sets.append(robot.set_of(i, *ends[1], turned, narrow))
-        if own["command_kind"] == POD and low < 0.0:
+            center = middle + (rng.uniform(-1.0, 1.0) * (half - narrow))
+            sets.append(robot.set_of(i, *ends[1], center, narrow))
+        if actuator["command_kind"] == POD and low < 0.0:
             sets.append(robot.set_of(i, low, 0.3 * low, middle, half))
     return sets
 
@@ -67,15 +78,17 @@ def sets_of(robot: Robot, i: int, rng: np.random.Generator) -> list[Set]:
 def prices_of(robot: Robot, i: int, rng: np.random.Generator, count: int) -> Array:
     """Prices (count, 2) along the rows of an actuator: of small forces, up to more than the largest
     one's."""
-    own = robot.actuators[i]
-    top = robot.table(own["force_table"])[0] * own["power_scale"] / own["force_scale"]
+    actuator = robot.actuators[i]
+    top = (
+        robot.table(actuator["force_table"])[0] * actuator["power_scale"] / actuator["force_scale"]
+    )
     size = top * 10.0 ** rng.uniform(-1.5, 0.3, count)
     angle = rng.uniform(-np.pi, np.pi, count)
     price = np.stack([size * np.cos(angle), size * np.sin(angle)], axis=-1)
-    if own["rows"] == 1.0:
+    if actuator["rows"] == 1.0:
         return np.asarray(price * [1.0, 0.0])
-    if own["flow_speed"] > 0.0:  # drag is paid, a little or much, or welcome
-        price[:, 1] = own["flow_speed"] * rng.uniform(-3.0, 0.75, count)
+    if actuator["flow_speed"] > 0.0:  # drag is paid, a little or much, or welcome
+        price[:, 1] = actuator["flow_speed"] * rng.uniform(-3.0, 0.75, count)
     return price
 
 
@@ -93,11 +106,11 @@ def test_a_response_is_worth_as_much_as_the_best_force_of_its_set(name: str) -> 
             force, power = forces_of(robot, i, limits)
             for price in prices_of(robot, i, rng, 12):
                 best = worth(force, power, price)
-                told = robot.response(i, limits, price).conjugate
+                conjugate = robot.response(i, limits, price).conjugate
                 # Between points of the scan there may be more; blends and soft turns add a little.
                 scale = np.abs(price).max() * np.abs(force).max() + power.max()
                 soft = math.sqrt(limits.price_floor_squared) * np.abs(force).max()
-                assert -1e-6 * scale <= told - best <= 5e-4 * scale + soft, (i, price)
+                assert -1e-6 * scale <= conjugate - best <= 5e-4 * scale + soft, (i, price)
 
 
 def differences(
@@ -110,10 +123,8 @@ def differences(
     slope = np.zeros((2, 2))
     for q in range(rows):
         change = step * np.eye(2)[q]
-        ahead, back = (
-            robot.response(i, limits, price + change),
-            robot.response(i, limits, price - change),
-        )
+        ahead = robot.response(i, limits, price + change)
+        back = robot.response(i, limits, price - change)
         gradient[q] = (ahead.conjugate - back.conjugate) / (2.0 * step)
         slope[q] = (np.array(ahead.force) - np.array(back.force)) / (2.0 * step)
     return gradient, slope
@@ -125,12 +136,12 @@ def check_derivatives(robot: Robot, i: int, limits: Set, price: Array) -> bool:
     size = float(np.abs(price).max())
     fine = differences(robot, i, limits, price, 1e-6 * size)
     rough = differences(robot, i, limits, price, 3e-6 * size)
-    told = robot.response(i, limits, price)
+    response = robot.response(i, limits, price)
     most = robot.actuators[i]["row_force_max"].max()
     if np.abs(fine[1] - rough[1]).max() * size > 1e-3 * most:
         return False
-    np.testing.assert_allclose(told.force, fine[0], atol=1e-4 * most)
-    slope = np.array([[told.xx, told.xy], [told.xy, told.yy]])
+    np.testing.assert_allclose(response.force, fine[0], atol=1e-4 * most)
+    slope = np.array([[response.xx, response.xy], [response.xy, response.yy]])
     np.testing.assert_allclose(slope * size, fine[1] * size, atol=2e-3 * most)
     return True
 
@@ -139,13 +150,13 @@ def check_derivatives(robot: Robot, i: int, limits: Set, price: Array) -> bool:
 def test_forces_and_slopes_are_derivatives_of_the_conjugate(name: str) -> None:
     rng = np.random.default_rng(2)
     robot = robot_of(name, 1)
-    judged = list[bool]()
+    is_met = list[bool]()
     for i in range(robot.n):
         for limits in sets_of(robot, i, rng):
-            judged += [
+            is_met += [
                 check_derivatives(robot, i, limits, price) for price in prices_of(robot, i, rng, 12)
             ]
-    assert np.mean(judged) > 0.8
+    assert np.mean(is_met) > 0.8
 
 
 def test_slopes_between_two_answers_are_those_of_their_blend() -> None:
@@ -161,12 +172,14 @@ def test_slopes_between_two_answers_are_those_of_their_blend() -> None:
                 robot.table(robot.actuators[i]["force_table"])[0]
                 * robot.actuators[i]["power_scale"]
             )
-            found = crossing(robot, i, limits, top / robot.actuators[i]["force_scale"])
-            if found is None:
+            crossing_price = crossing(robot, i, limits, top / robot.actuators[i]["force_scale"])
+            if crossing_price is None:
                 continue
             for aside in (-3e-6, 0.0, 1e-5):
-                turn = np.array([math.cos(found[1] + aside), math.sin(found[1] + aside)])
-                blended += check_blend(robot, i, limits, found[0] * turn)
+                turn = np.array(
+                    [math.cos(crossing_price[1] + aside), math.sin(crossing_price[1] + aside)]
+                )
+                blended += check_blend(robot, i, limits, crossing_price[0] * turn)
     assert blended >= 6
 
 
@@ -181,7 +194,8 @@ def crossing(robot: Robot, i: int, limits: Set, top: float) -> tuple[float, floa
     ]
     apart = [np.linalg.norm(b - a) for a, b in zip(force, force[1:], strict=False)]
     k = int(np.argmax(apart))
-    low, high = angle[k], angle[k + 1]
+    low = angle[k]
+    high = angle[k + 1]
     if apart[k] < 0.3 * robot.actuators[i]["row_force_max"][0]:
         return None
     for _ in range(50):
@@ -200,10 +214,10 @@ def check_blend(robot: Robot, i: int, limits: Set, price: Array) -> bool:
     step = 1e-9 * float(np.abs(price).max())
     gradient, slope = differences(robot, i, limits, price, 100.0 * step)
     _, rough = differences(robot, i, limits, price, 200.0 * step)
-    told = robot.response(i, limits, price)
-    own = np.array([[told.xx, told.xy], [told.xy, told.yy]])
+    response = robot.response(i, limits, price)
+    own = np.array([[response.xx, response.xy], [response.xy, response.yy]])
     most = robot.actuators[i]["row_force_max"][0]
-    np.testing.assert_allclose(told.force, gradient, atol=2e-3 * most)
+    np.testing.assert_allclose(response.force, gradient, atol=2e-3 * most)
     np.testing.assert_allclose(
         own, slope, atol=0.02 * np.abs(own).max() + np.abs(slope - rough).max()
     )
@@ -232,9 +246,9 @@ def test_turning_costs_what_it_costs_and_is_weighed_against_the_force(number: in
                 )
                 limits.slope_max = functions().fl_largest_slope(at(robot.block), i)
                 best = max(turned_worth(robot, i, limits, force, power, price))
-                told = robot.response(i, limits, price)
+                response = robot.response(i, limits, price)
                 scale = np.abs(price).max() * np.abs(force).max() + power.max() + limits.turn_cost
-                assert -1e-6 * scale <= told.conjugate - best <= 1e-3 * scale
+                assert -1e-6 * scale <= response.conjugate - best <= 1e-3 * scale
                 check_derivatives(robot, i, limits, price)
 
 
@@ -243,26 +257,25 @@ def turned_worth(
 ) -> list[float]:
     """What forces of both ways are worth at angles around the one before, less the cost of turning
     there."""
-    low, high = (
-        limits.sector_center - limits.sector_half_angle,
-        limits.sector_center + limits.sector_half_angle,
-    )
+    low = limits.sector_center - limits.sector_half_angle
+    high = limits.sector_center + limits.sector_half_angle
     if limits.sector_half_angle >= np.pi:
-        low, high = limits.turn_origin - np.pi, limits.turn_origin + np.pi
-    found = list[float]()
-    ways = [(limits.force_min, limits.force_max, -1.0 if limits.is_flipped else 1.0, 1.0)]
+        low = limits.turn_origin - np.pi
+        high = limits.turn_origin + np.pi
+    worth_of_angles = list[float]()
+    branches = [(limits.force_min, limits.force_max, -1.0 if limits.is_flipped else 1.0, 1.0)]
     if limits.force_max_reverse > 0.0:
-        ways.append((0.0, limits.force_max_reverse, -1.0, -1.0))
-    for least, most, sign, way in ways:
+        branches.append((0.0, limits.force_max_reverse, -1.0, -1.0))
+    for least, most, sign, direction in branches:
         size = np.linspace(least, most, 121)
         cost = np.array([robot.power(i, sign * one) for one in size])
-        for angle in np.linspace(low, high, ANGLES):
-            along = way * (price[0] * math.cos(angle) + price[1] * math.sin(angle))
-            found.append(
+        for angle in np.linspace(low, high, N_ANGLES):
+            along = direction * (price[0] * math.cos(angle) + price[1] * math.sin(angle))
+            worth_of_angles.append(
                 float((along * size - cost).max())
                 - limits.turn_cost / 2.0 * (angle - limits.turn_origin) ** 2
             )
-    return found
+    return worth_of_angles
 
 
 @pytest.mark.parametrize("name", ROBOTS)
@@ -287,26 +300,28 @@ def test_a_foil_on_its_tangent_answers_with_the_best_step() -> None:
     robot = robot_of("rudders")
     for _ in range(40):
         tangent = Tangent()
-        tangent.force[:], tangent.force_slope[:] = rng.normal(size=2), rng.normal(size=2)
-        tangent.cost, tangent.cost_slope, tangent.curvature = (
-            rng.random(),
-            rng.normal(),
-            rng.uniform(0.5, 4.0),
-        )
+        tangent.force[:] = rng.normal(size=2)
+        tangent.force_slope[:] = rng.normal(size=2)
+        tangent.cost = rng.random()
+        tangent.cost_slope = rng.normal()
+        tangent.curvature = rng.uniform(0.5, 4.0)
         limits = robot.whole_set(0)
-        limits.force_min, limits.force_max = -rng.uniform(0.1, 1.0), rng.uniform(0.1, 1.0)
+        limits.force_min = -rng.uniform(0.1, 1.0)
+        limits.force_max = rng.uniform(0.1, 1.0)
         limits.tangent = ctypes.addressof(tangent)
         price = rng.normal(size=2)
         step = np.linspace(limits.force_min, limits.force_max, 20_001)
         force = np.array(tangent.force) + step[:, None] * np.array(tangent.force_slope)
         cost = tangent.cost + tangent.cost_slope * step + 0.5 * tangent.curvature * step**2
         value = force @ price - cost
-        told = robot.response(0, limits, price)
-        assert told.conjugate == pytest.approx(value.max(), abs=1e-7)
-        np.testing.assert_allclose(told.force, force[value.argmax()], atol=1e-3)
+        response = robot.response(0, limits, price)
+        assert response.conjugate == pytest.approx(value.max(), abs=1e-7)
+        np.testing.assert_allclose(response.force, force[value.argmax()], atol=1e-3)
         gradient, slope = differences(robot, 0, limits, price, 1e-6)
-        np.testing.assert_allclose(told.force, gradient, atol=1e-6)
-        np.testing.assert_allclose([[told.xx, told.xy], [told.xy, told.yy]], slope, atol=1e-6)
+        np.testing.assert_allclose(response.force, gradient, atol=1e-6)
+        np.testing.assert_allclose(
+            [[response.xx, response.xy], [response.xy, response.yy]], slope, atol=1e-6
+        )
 
 
 @pytest.mark.parametrize("name", ROBOTS)
@@ -315,32 +330,35 @@ def test_a_table_s_force_power_and_price_belong_together(name: str) -> None:
     rng = np.random.default_rng(6)
     robot = robot_of(name, 1)
     for i in range(robot.n):
-        own = robot.actuators[i]
-        for place in {own["force_table"], own["force_table_reverse"] or own["force_table"]}:
-            table = robot.table(place).copy()
-            top, largest = table[0], table[3 + 3 * int(table[1])]
+        actuator = robot.actuators[i]
+        for offset in {
+            actuator["force_table"],
+            actuator["force_table_reverse"] or actuator["force_table"],
+        }:
+            table = robot.table(offset).copy()
+            top = table[0]
+            largest = table[3 + 3 * int(table[1])]
             for price in top * rng.random(20) ** 3:
-                told = force_of_price(table, price)
+                response = force_of_price(table, price)
                 step = 1e-6 * price  # cells are narrower the lower the price
-                ahead, back = (
-                    force_of_price(table, price + step),
-                    force_of_price(table, price - step),
-                )
+                ahead = force_of_price(table, price + step)
+                back = force_of_price(table, price - step)
                 force = (ahead.conjugate - back.conjugate) / (2.0 * step)
                 slope = (ahead.force - back.force) / (2.0 * step)
-                assert told.force == pytest.approx(force, abs=1e-5 * largest)
-                assert told.slope * price == pytest.approx(slope * price, abs=1e-4 * largest)
+                assert response.force == pytest.approx(force, abs=1e-5 * largest)
+                assert response.slope * price == pytest.approx(slope * price, abs=1e-4 * largest)
                 paid = np.zeros(1)
                 power = functions().fl_marginal_cost(
-                    at(table), ctypes.c_double(told.force), at(paid)
+                    at(table), ctypes.c_double(response.force), at(paid)
                 )
-                assert price * told.force - power == pytest.approx(
-                    told.conjugate, abs=1e-7 * top * largest
+                assert price * response.force - power == pytest.approx(
+                    response.conjugate, abs=1e-7 * top * largest
                 )
-                if table[3] < told.force < largest * (1.0 - 1e-6):
-                    again = force_of_price(table, float(paid[0]))
-                    assert again.force == pytest.approx(told.force, abs=1e-6 * largest)
-            beyond, at_top = force_of_price(table, 1.5 * top), force_of_price(table, top)
+                if table[3] < response.force < largest * (1.0 - 1e-6):
+                    response_again = force_of_price(table, float(paid[0]))
+                    assert response_again.force == pytest.approx(response.force, abs=1e-6 * largest)
+            beyond = force_of_price(table, 1.5 * top)
+            at_top = force_of_price(table, top)
             assert beyond.force == largest
             assert beyond.conjugate - at_top.conjugate == pytest.approx(
                 0.5 * top * largest, rel=1e-9
@@ -349,5 +367,5 @@ def test_a_table_s_force_power_and_price_belong_together(name: str) -> None:
 
 def force_of_price(table: Array, price: float) -> LineResponse:
     """Force, slope and conjugate of a table at a price."""
-    told: LineResponse = functions().fl_force_of_price(at(table), ctypes.c_double(price))
-    return told
+    response: LineResponse = functions().fl_force_of_price(at(table), ctypes.c_double(price))
+    return response

@@ -1,4 +1,5 @@
-"""What `fl_check` of the core refuses: each number of a block that makes no sense, with its code."""
+"""What `fl_check` of the core refuses: each number of a block that makes no sense, with its
+code."""
 
 import numpy as np
 import pytest
@@ -6,10 +7,10 @@ import pytest
 from finlab.arrays import Array
 from finlab.core.fields import actuators_of, constant, head_of, tables_begin
 from finlab.core.library import library
-from tests.core.parts import FIN, POD, Robot, robot_of
+from tests.core.internal_functions import FIN, POD, Robot, robot_of
 
 FOIL = constant("FL_FOIL")
-"""FL_FOIL, the kind of a rudder's command."""
+"""The kind of a rudder's command."""
 
 
 def code_of(block: Array, length: int | None = None) -> str:
@@ -44,6 +45,7 @@ def test_robots_of_every_kind_pass() -> None:
         ("rank", -1.0, "FL_BAD_BLOCK"),
         ("rank", 1.5, "FL_BAD_BLOCK"),
         ("rank", 7.0, "FL_BAD_BLOCK"),
+        ("length", 1e6, "FL_BAD_BLOCK"),
     ],
 )
 def test_a_head_with_a_wrong_number_is_refused(field: str, value: float, refused: str) -> None:
@@ -83,6 +85,19 @@ def test_a_block_of_another_length_is_refused() -> None:
     assert code_of(short) == "FL_BAD_BLOCK"
 
 
+@pytest.mark.parametrize("name", ["azimuths", "fins uneven", "rudders"])
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_every_number_of_a_block_is_finite(name: str, bad: float) -> None:
+    """Every field of the head and of every actuator, and fifty numbers of the tables."""
+    block = robot_of(name).block
+    first_of_tables = tables_begin(robot_of(name).n)
+    in_tables = np.random.default_rng(0).integers(first_of_tables, len(block), 50)
+    for index in [*range(first_of_tables), *in_tables.tolist()]:
+        damaged = block.copy()
+        damaged[index] = bad
+        assert code_of(damaged) != "FL_OK", f"number {index} is {bad}"
+
+
 @pytest.mark.parametrize("i", [0, -1])
 @pytest.mark.parametrize(
     ("field", "value", "refused"),
@@ -109,6 +124,7 @@ def test_a_block_of_another_length_is_refused() -> None:
         ("row_force_max", 0.0, "FL_BAD_NUMBER"),
         ("max_change", -0.1, "FL_BAD_NUMBER"),
         ("command_min", 1e6, "FL_BAD_NUMBER"),
+        ("effectiveness_normalized", np.nan, "FL_BAD_NUMBER"),
     ],
 )
 def test_a_thruster_with_a_wrong_number_is_refused(
@@ -141,11 +157,11 @@ def test_numbers_of_a_command_that_its_kind_does_not_use_are_zero() -> None:
         i = first_of(robot, kind)
         for k in range(3):
             block = robot.block.copy()
-            own = actuators_of(block)
+            actuators = actuators_of(block)
             if k < used:  # an empty range
-                own["command_min"][i, k] = own["command_max"][i, k] + 1.0
+                actuators["command_min"][i, k] = actuators["command_max"][i, k] + 1.0
             else:
-                own["command_max"][i, k] = 1.0
+                actuators["command_max"][i, k] = 1.0
             assert code_of(block) == "FL_BAD_NUMBER", (name, k)
 
 

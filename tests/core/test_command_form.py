@@ -6,7 +6,7 @@ import ctypes
 import pytest
 
 from finlab.core.fields import struct
-from tests.core.parts import FIN, ROBOTS, CommandForm, functions, robot_of
+from tests.core.internal_functions import FIN, ROBOTS, CommandForm, functions, robot_of
 
 NO_NUMBER = -1
 """NO_NUMBER: no number of the command is one."""

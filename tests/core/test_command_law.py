@@ -11,7 +11,17 @@ from scipy.interpolate import CubicHermiteSpline
 from finlab.actuators.hermite_grid import grid_numbers
 from finlab.arrays import Array
 from finlab.core.fields import actuators_of, numbers_of, struct, tables_begin
-from tests.core.parts import EITHER_WAY, FIN, POD, ROBOTS, Box, Robot, at, functions, robot_of
+from tests.core.internal_functions import (
+    EITHER_WAY,
+    FIN,
+    POD,
+    ROBOTS,
+    Box,
+    Robot,
+    at,
+    functions,
+    robot_of,
+)
 
 STEP = 1e-6
 """Of differences."""
@@ -19,17 +29,17 @@ STEP = 1e-6
 
 def commands_of(robot: Robot, i: int, rng: np.random.Generator, count: int) -> Array:
     """Commands (count, 3) of an actuator within its limits."""
-    own = robot.actuators[i]
-    lower: Array = own["command_min"]
-    return np.asarray(lower + rng.random((count, 3)) * (own["command_max"] - lower))
+    actuator = robot.actuators[i]
+    lower: Array = actuator["command_min"]
+    return np.asarray(lower + rng.random((count, 3)) * (actuator["command_max"] - lower))
 
 
 def own_axes(robot: Robot, i: int, force: Array) -> Array:
     """A force (3,) of the core in the actuator's own axes, with what a foil drags at rest."""
-    own = robot.actuators[i]
+    actuator = robot.actuators[i]
     told = force.copy()
-    if own["flow_speed"] > 0.0:
-        told[1] += own["pressure_area"] * own["zero_lift_drag"]
+    if actuator["flow_speed"] > 0.0:
+        told[1] += actuator["pressure_area"] * actuator["zero_lift_drag"]
     return np.asarray(told @ robot.axes[i])
 
 
@@ -40,14 +50,14 @@ def test_forces_are_those_of_the_plant(name: str) -> None:
         rng = np.random.default_rng(number)
         for _ in range(20):
             command = np.stack([commands_of(robot, i, rng, 1)[0] for i in range(robot.n)])
-            told = np.stack(
+            force_of_core = np.stack(
                 [own_axes(robot, i, robot.force(i, command[i])[0]) for i in range(robot.n)]
             )
             # Where the law is below a dead band it gives nothing; the core asks for that elsewhere.
             held = np.abs(robot.plant.force(command)).max(axis=1) > 0.0
             most = robot.actuators["row_force_max"].max(axis=1)[:, None]
-            off = np.abs(told - robot.plant.force(command)) / most
-            assert off[held].max(initial=0.0) <= 1e-4
+            error = np.abs(force_of_core - robot.plant.force(command)) / most
+            assert error[held].max(initial=0.0) <= 1e-4
 
 
 @pytest.mark.parametrize("name", ROBOTS)
@@ -60,10 +70,8 @@ def test_slopes_of_forces_are_those_of_differences(name: str) -> None:
             _, slope = robot.force(i, command)
             for c in range(3):
                 change = STEP * np.eye(3)[c]
-                ahead, back = (
-                    robot.force(i, command + change)[0],
-                    robot.force(i, command - change)[0],
-                )
+                ahead = robot.force(i, command + change)[0]
+                back = robot.force(i, command - change)[0]
                 np.testing.assert_allclose(
                     slope[c] / most, (ahead - back) / (2 * STEP * most), atol=1e-4
                 )
@@ -76,25 +84,26 @@ def test_slopes_of_uneven_fins_that_are_commanded_by_force() -> None:
     step = 1e-3  # over which the core takes the derivative of a gauge
     rng = np.random.default_rng(2)
     for i in range(robot.n):
-        own = robot.actuators[i]
-        assert own["gauge_table"] > 0.0
-        own["command_kind"] = POD
+        actuator = robot.actuators[i]
+        assert actuator["gauge_table"] > 0.0
+        actuator["command_kind"] = POD
         for _ in range(20):
             command = np.array(
-                [rng.uniform(-3.0, 3.0), own["row_force_max"][0] * rng.random(), 0.0]
+                [rng.uniform(-3.0, 3.0), actuator["row_force_max"][0] * rng.random(), 0.0]
             )
             force, slope = robot.force(i, command)
             radius = robot.radius(i, command[0])
             direction = np.array([0.0, math.cos(command[0]), math.sin(command[0])])
             np.testing.assert_allclose(force, command[1] * radius * direction, rtol=1e-12)
-            for c, change in enumerate((step, 1e-6 * own["row_force_max"][0])):
+            for c, change in enumerate((step, 1e-6 * actuator["row_force_max"][0])):
                 near = change * np.eye(3)[c]
-                ahead, back = robot.force(i, command + near)[0], robot.force(i, command - near)[0]
-                atol = 1e-5 * own["row_force_max"][0]
+                ahead = robot.force(i, command + near)[0]
+                back = robot.force(i, command - near)[0]
+                atol = 1e-5 * actuator["row_force_max"][0]
                 np.testing.assert_allclose(
                     slope[c] * change, (ahead - back) / 2.0, atol=atol * change
                 )
-        own["command_kind"] = FIN
+        actuator["command_kind"] = FIN
 
 
 @pytest.mark.parametrize("period", [0.0, 5.0])
@@ -132,14 +141,14 @@ def test_a_grid_of_uneven_knots_is_a_cubic_of_each_axis(
         return np.asarray(spline(np.clip(x, axis[0], axis[-1])))
 
     def expected(command: Array) -> Array:
-        place = command.copy()
+        knot_position = command.copy()
         if is_product:
-            place[0] = command[0] * command[1]
-        left = values.reshape(4, -1)
-        left = along(knots[0], left, place[0], 0.0).reshape(5, -1)
-        left = along(knots[1], left, place[1], 0.0).reshape(6, -1)
-        found = along(knots[2], left, place[2], period)
-        return found**2 if is_root else found
+            knot_position[0] = command[0] * command[1]
+        values_left = values.reshape(4, -1)
+        values_left = along(knots[0], values_left, knot_position[0], 0.0).reshape(5, -1)
+        values_left = along(knots[1], values_left, knot_position[1], 0.0).reshape(6, -1)
+        value = along(knots[2], values_left, knot_position[2], period)
+        return value**2 if is_root else value
 
     for _ in range(60):
         command = np.array([rng.uniform(0.1, 1.8), rng.uniform(0.1, 3.5), rng.uniform(-6.0, 8.0)])
@@ -160,26 +169,29 @@ def test_a_command_gives_back_the_force_that_it_is_for(name: str) -> None:
         robot = robot_of(name, number)
         box = robot.whole_box()
         for i in range(robot.n):
-            own = robot.actuators[i]
+            actuator = robot.actuators[i]
             rows = slice(1, 3) if robot.is_plane(i) else slice(0, 1)
             for asked in commands_of(robot, i, rng, 12):
                 wanted = np.zeros(2)
-                given = robot.force(i, asked)[0][rows]
-                wanted[: len(given)] = given * (
-                    own["command_sign"] if own["command_kind"] == 0.0 else 1.0
+                force = robot.force(i, asked)[0][rows]
+                wanted[: len(force)] = force * (
+                    actuator["command_sign"] if actuator["command_kind"] == 0.0 else 1.0
                 )
-                if own["flow_speed"] > 0.0 and not own["force_min"] < wanted[0] < own["force_max"]:
+                if (
+                    actuator["flow_speed"] > 0.0
+                    and not actuator["force_min"] < wanted[0] < actuator["force_max"]
+                ):
                     continue  # stalled: others give as much lift, by less drag
                 command = np.zeros(3)
                 places = ctypes.byref(box), at(wanted), None, at(command)
                 functions().fl_command_for_force(at(robot.block), i, *places)
-                assert (command >= own["command_min"]).all() and (
-                    command <= own["command_max"]
+                assert (command >= actuator["command_min"]).all() and (
+                    command <= actuator["command_max"]
                 ).all()
                 back = robot.force(i, command)[0][rows]
-                np.testing.assert_allclose(back, given, atol=2e-3 * own["row_force_max"][0])
+                np.testing.assert_allclose(back, force, atol=2e-3 * actuator["row_force_max"][0])
                 if (
-                    own["command_kind"] == POD and np.hypot(*given) > 1e-3
+                    actuator["command_kind"] == POD and np.hypot(*force) > 1e-3
                 ):  # the cheaper way of both
                     assert (
                         robot.power(i, command[1]) <= robot.power(i, asked[1]) * (1.0 + 1e-6) + 1e-9
@@ -189,13 +201,13 @@ def test_a_command_gives_back_the_force_that_it_is_for(name: str) -> None:
 def boxes_of(robot: Robot, rng: np.random.Generator) -> Box:
     """A random part of all limits."""
     box = robot.whole_box()
-    for i, own in enumerate(robot.actuators):
+    for i, actuator in enumerate(robot.actuators):
         ends = np.sort(rng.random((2, 3)), axis=0)
-        box.command_min[i][:] = own["command_min"] + ends[0] * (
-            own["command_max"] - own["command_min"]
+        box.command_min[i][:] = actuator["command_min"] + ends[0] * (
+            actuator["command_max"] - actuator["command_min"]
         )
-        box.command_max[i][:] = own["command_min"] + ends[1] * (
-            own["command_max"] - own["command_min"]
+        box.command_max[i][:] = actuator["command_min"] + ends[1] * (
+            actuator["command_max"] - actuator["command_min"]
         )
     return box
 
@@ -203,13 +215,13 @@ def boxes_of(robot: Robot, rng: np.random.Generator) -> Box:
 def sizes_and_angles(robot: Robot, i: int, commands: Array) -> tuple[Array, Array | None]:
     """Forces (N,) [N] of commands (N, 3) along their directions, and of planes these directions
     [rad]."""
-    own = robot.actuators[i]
-    if own["command_kind"] == POD:
+    actuator = robot.actuators[i]
+    if actuator["command_kind"] == POD:
         return np.asarray(commands[:, 1]), np.asarray(commands[:, 0])
     force = np.array([robot.force(i, command)[0] for command in commands])
     if robot.is_plane(i):
         return np.hypot(force[:, 1], force[:, 2]), np.arctan2(force[:, 2], force[:, 1])
-    sign = own["command_sign"] if own["command_kind"] == 0.0 else 1.0
+    sign = actuator["command_sign"] if actuator["command_kind"] == 0.0 else 1.0
     return np.asarray(sign * force[:, 0]), None
 
 
@@ -220,25 +232,26 @@ def test_a_range_of_forces_holds_what_commands_of_a_box_give_and_no_more(name: s
         robot = robot_of(name, number)
         box = boxes_of(robot, rng)
         for i in range(robot.n):
-            own = robot.actuators[i]
-            if own["unevenness"] != 0.0 or own["gauge_table"] != 0.0:
+            actuator = robot.actuators[i]
+            if actuator["unevenness"] != 0.0 or actuator["gauge_table"] != 0.0:
                 continue  # the largest force is not the same in all directions
-            low, high = np.array(box.command_min[i]), np.array(box.command_max[i])
+            low = np.array(box.command_min[i])
+            high = np.array(box.command_max[i])
             share = np.stack(np.meshgrid(*3 * [np.linspace(0.0, 1.0, 6)]), axis=-1).reshape(-1, 3)
             size, angle = sizes_and_angles(robot, i, low + share * (high - low))
-            told = functions().fl_force_range(at(robot.block), i, ctypes.byref(box))
-            slack = 0.02 * own["row_force_max"][0]
-            assert size.min() == pytest.approx(told.low, abs=slack)
-            assert size.max() == pytest.approx(told.high, abs=slack)
+            force_range = functions().fl_force_range(at(robot.block), i, ctypes.byref(box))
+            slack = 0.02 * actuator["row_force_max"][0]
+            assert size.min() == pytest.approx(force_range.low, abs=slack)
+            assert size.max() == pytest.approx(force_range.high, abs=slack)
             if angle is None:
                 continue
             pushes = np.abs(size) > slack
-            off = np.abs(
-                [math.remainder(one - told.middle, 2.0 * math.pi) for one in angle[pushes]]
+            error = np.abs(
+                [math.remainder(one - force_range.middle, 2.0 * math.pi) for one in angle[pushes]]
             )
-            assert off.max(initial=0.0) <= told.half + 1e-3
-            if pushes.any() and told.half < 3.0:
-                assert off.max() >= told.half - 1e-3
+            assert error.max(initial=0.0) <= force_range.half + 1e-3
+            if pushes.any() and force_range.half < 3.0:
+                assert error.max() >= force_range.half - 1e-3
 
 
 def test_pods_either_way_are_among_the_robots() -> None:
@@ -257,9 +270,9 @@ def test_an_arc_that_lacks_a_rounding_of_a_turn_is_all_round(name: str) -> None:
             half = math.pi - lack
             box.command_min[i][0] = 0.4 - half
             box.command_max[i][0] = 0.4 + half
-            told = functions().fl_force_range(at(robot.block), i, ctypes.byref(box))
-            assert (told.half == math.pi) == is_whole
-            assert told.half == pytest.approx(half, abs=1e-9)
-            assert told.middle == pytest.approx(0.4, abs=1e-12)
-            assert told.low == box.command_min[i][1]
-            assert told.high == box.command_max[i][1]
+            force_range = functions().fl_force_range(at(robot.block), i, ctypes.byref(box))
+            assert (force_range.half == math.pi) == is_whole
+            assert force_range.half == pytest.approx(half, abs=1e-9)
+            assert force_range.middle == pytest.approx(0.4, abs=1e-12)
+            assert force_range.low == box.command_min[i][1]
+            assert force_range.high == box.command_max[i][1]

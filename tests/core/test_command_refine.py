@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from finlab.arrays import Array
-from tests.core.parts import EITHER_WAY, MOST, Robot, at, functions, robot_of
+from tests.core.internal_functions import EITHER_WAY, MOST, Robot, at, functions, robot_of
 
 # Their commands have no dead bands, and none of their foils stalls.
 SMOOTH = ("azimuths", "fins", "fins any shaft", "fins uneven", "wide arcs", "holes")
@@ -18,8 +18,8 @@ EXACT = 1.1e-8
 def wrench_of(robot: Robot, command: Array) -> Array:
     """The wrench (6,) of commands (n, 3) by the core's own laws."""
     force = np.stack([robot.force(i, np.ascontiguousarray(command[i]))[0] for i in range(robot.n)])
-    own = np.einsum("na,nak->k", force, robot.actuators["effectiveness_normalized"])
-    return np.asarray(own * robot.head["wrench_scale"] + robot.head["wrench_offset"])
+    force_wrench = np.einsum("na,nak->k", force, robot.actuators["effectiveness_normalized"])
+    return np.asarray(force_wrench * robot.head["wrench_scale"] + robot.head["wrench_offset"])
 
 
 def refined(robot: Robot, wrench: Array, start: Array, steps: int) -> tuple[float, Array]:
@@ -38,12 +38,15 @@ def test_near_commands_that_give_a_wrench_a_few_steps_come_to_some(name: str) ->
     for number in range(3):
         robot = robot_of(name, number)
         rng = np.random.default_rng([8, number])
-        lower, upper = robot.actuators["command_min"], robot.actuators["command_max"]
+        lower = robot.actuators["command_min"]
+        upper = robot.actuators["command_max"]
         width = upper - lower
         for _ in range(8):
-            known = lower + (0.2 + 0.6 * rng.random((robot.n, 3))) * width
-            wrench = wrench_of(robot, known)
-            start = np.clip(known + 0.02 * rng.normal(size=known.shape) * width, lower, upper)
+            delivering = lower + (0.2 + 0.6 * rng.random((robot.n, 3))) * width
+            wrench = wrench_of(robot, delivering)
+            start = np.clip(
+                delivering + 0.02 * rng.normal(size=delivering.shape) * width, lower, upper
+            )
             errors = list[float]()
             for steps in (0, 1, 2, 3, 6):
                 error, command = refined(robot, wrench, start, steps)
@@ -66,11 +69,12 @@ def test_near_commands_that_give_a_wrench_a_few_steps_come_to_some(name: str) ->
 def test_commands_at_their_limits_are_held_where_steps_would_leave(name: str) -> None:
     """A wrench that is given with some commands at their limits is found from commands at these
     limits."""
-    left = list[float]()
+    errors = list[float]()
     for number in range(3):
         robot = robot_of(name, number)
         rng = np.random.default_rng([9, number])
-        lower, upper = robot.actuators["command_min"], robot.actuators["command_max"]
+        lower = robot.actuators["command_min"]
+        upper = robot.actuators["command_max"]
         width = upper - lower
         for _ in range(6):
             share = 0.25 + 0.5 * rng.random((robot.n, 3))
@@ -82,5 +86,5 @@ def test_commands_at_their_limits_are_held_where_steps_would_leave(name: str) ->
             )
             error, command = refined(robot, wrench, np.minimum(lower + near * width, upper), 12)
             assert (command >= lower).all() and (command <= upper).all()
-            left.append(error)
-    assert np.median(left) <= EXACT
+            errors.append(error)
+    assert np.median(errors) <= EXACT

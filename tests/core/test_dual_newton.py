@@ -2,35 +2,57 @@
 the robot, beyond reach and from tick to tick."""
 
 import ctypes
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 
 from finlab.allocation import Policy
 from finlab.arrays import Array
-from finlab.core.calls import _policy_record
-from tests.core.parts import ROBOTS, Robot, Set, Work, at, functions, question_of, robot_of
+from finlab.core.calls import policy_record
+from tests.core.internal_functions import (
+    ROBOTS,
+    Robot,
+    Set,
+    Work,
+    at,
+    dual_function,
+    functions,
+    question_of,
+    robot_of,
+)
 from tests.core.test_feasible_set import commands_before
 
-NUMBERS = range(2)
-"""Of each kind of robot."""
-STEPS = {
-    "thrusters": (191, 877, 76),
-    "azimuths": (86, 588, 38),
-    "fins": (100, 909, 95),
-    "fins any shaft": (70, 971, 66),
-    "fins uneven": (81, 1092, 30),
-    "wide arcs": (258, 2067, 69),
-    "holes": (508, 2549, 38),
-    "rudders": (1744, 4872, 722),
-    "mixed": (132, 2227, 77),
-    "all": (134, 1905, 122),
-    "pods either way": (465, 3741, 333),
+ROBOT_NUMBERS = range(2)
+"""Numbers of the random robots of each kind."""
+
+
+class NewtonSteps(NamedTuple):
+    """Steps of Newton's method that all questions of one kind of robot take together."""
+
+    within_reach: int
+    """Eight wrenches that commands give."""
+    beyond_reach: int
+    """Four wrenches three times as large, by each policy."""
+    in_ticks: int
+    """Eight wrenches in ticks that follow on each other."""
+
+
+MOST_STEPS = {
+    "thrusters": NewtonSteps(191, 877, 76),
+    "azimuths": NewtonSteps(86, 588, 38),
+    "fins": NewtonSteps(100, 909, 95),
+    "fins any shaft": NewtonSteps(70, 971, 66),
+    "fins uneven": NewtonSteps(81, 1092, 30),
+    "wide arcs": NewtonSteps(258, 2067, 69),
+    "holes": NewtonSteps(508, 2549, 38),
+    "rudders": NewtonSteps(1744, 4872, 722),
+    "mixed": NewtonSteps(132, 2227, 77),
+    "all": NewtonSteps(134, 1905, 122),
+    "pods either way": NewtonSteps(465, 3741, 333),
 }
-"""Steps of all questions of a kind within reach, beyond it by the three policies, and in ticks:
-what they took when this was written, and a tenth more. A fault of a slope costs steps, where it
-costs nothing else."""
+"""Most steps of each kind of robot: those that it took when this was written, and a tenth more. A
+wrong slope costs steps, where it costs nothing else."""
 
 
 def wrenches(robot: Robot, number: int, times: float, count: int) -> Array:
@@ -39,70 +61,65 @@ def wrenches(robot: Robot, number: int, times: float, count: int) -> Array:
     return np.asarray(times * robot.plant.wrench(robot.plant.sample(rng, (count,))))
 
 
-def looked_at(robot: Robot, wrench: Array, inner: Array) -> tuple[float, Array]:
-    """The dual value [W] at multipliers (6,), and the forces (n, 2)."""
-    force = np.zeros((robot.n, 2))
-    value = functions().fl_dual_value(
-        at(robot.block), robot.work(), at(wrench), at(inner), at(force)
-    )
-    return float(value), force
-
-
 @pytest.mark.parametrize("name", ROBOTS)
 def test_the_gradient_of_the_dual_is_what_is_left_of_the_wrench(name: str) -> None:
-    for number in NUMBERS:
+    for number in ROBOT_NUMBERS:
         robot = robot_of(name, number)
         rng = np.random.default_rng([3, number])
         rank = int(robot.head["rank"])
         for wrench in wrenches(robot, number, 1.0, 4):
-            found = robot.answer(wrench)
-            inner: Array = found["lambda_reduced"].copy()
-            size = np.abs(inner).max()
-            inner[:rank] += 0.3 * size * rng.normal(size=rank)
-            _, force = looked_at(robot, wrench, inner)
+            answer = robot.answer(wrench)
+            lambda_reduced: Array = answer["lambda_reduced"].copy()
+            size = np.abs(lambda_reduced).max()
+            lambda_reduced[:rank] += 0.3 * size * rng.normal(size=rank)
+            force, _ = dual_function(robot.block, wrench, lambda_reduced)
             target = robot.head["basis"].T @ (wrench / robot.head["axis_scale"])
             residual = target - np.einsum(
                 "nr,nrj->j", force, robot.actuators["effectiveness_reduced"]
             )
             for j in range(rank):
-                change = 1e-5 * size * np.eye(6)[j]
-                ahead, back = (
-                    looked_at(robot, wrench, inner + one)[0] for one in (change, -change)
-                )
-                slope = (ahead - back) / (2e-5 * size)
+                step = 1e-5 * size
+                change = step * np.eye(6)[j]
+                _, value_above = dual_function(robot.block, wrench, lambda_reduced + change)
+                _, value_below = dual_function(robot.block, wrench, lambda_reduced - change)
+                slope = (value_above - value_below) / (2.0 * step)
                 assert slope == pytest.approx(residual[j], abs=2e-3 * np.linalg.norm(target))
 
 
-def steps_of(name: str) -> tuple[int, int, int]:
-    """Steps within reach, beyond it by each policy, and in ticks, of all robots of a kind."""
-    within = beyond = ticks = 0
-    for number in NUMBERS:
+def newton_steps(name: str) -> NewtonSteps:
+    """Steps that all robots of a kind take."""
+    within_reach = 0
+    beyond_reach = 0
+    in_ticks = 0
+    for number in ROBOT_NUMBERS:
         robot = robot_of(name, number)
-        within += sum(
-            int(robot.answer(wrench)["newton_steps"]) for wrench in wrenches(robot, number, 1.0, 8)
-        )
-        for policy in ("closest", "direction", "priority"):
-            record = _policy_record(Policy(policy))
-            for wrench in wrenches(robot, number, 3.0, 4):
-                beyond += int(robot.answer(wrench, policy=record.ctypes.data)["newton_steps"])
-        previous = None
         for wrench in wrenches(robot, number, 1.0, 8):
-            asked = {} if previous is None else {"previous": previous, "calm": 2.0}
-            answer = robot.answer(wrench, **asked)
-            previous = answer["command"][: robot.n].copy()
-            ticks += int(answer["newton_steps"])
-    return within, beyond, ticks
+            within_reach += int(robot.answer(wrench)["newton_steps"])
+        for kind in ("closest", "direction", "priority"):
+            record = policy_record(Policy(kind))
+            for wrench in wrenches(robot, number, 3.0, 4):
+                answer = robot.answer(wrench, policy=record.ctypes.data)
+                beyond_reach += int(answer["newton_steps"])
+        fields_of_tick: dict[str, Any] = {}
+        for wrench in wrenches(robot, number, 1.0, 8):
+            answer = robot.answer(wrench, **fields_of_tick)
+            in_ticks += int(answer["newton_steps"])
+            fields_of_tick = {"previous": answer["command"][: robot.n].copy(), "calm": 2.0}
+    return NewtonSteps(within_reach, beyond_reach, in_ticks)
 
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_answers_take_few_steps(name: str) -> None:
-    for took, most in zip(steps_of(name), STEPS[name], strict=True):
-        assert took <= most
+    steps = newton_steps(name)
+    most = MOST_STEPS[name]
+    assert steps.within_reach <= most.within_reach
+    assert steps.beyond_reach <= most.beyond_reach
+    assert steps.in_ticks <= most.in_ticks
 
 
 @pytest.mark.parametrize("name", ["azimuths", "fins", "fins any shaft", "fins uneven"])
 def test_from_the_multipliers_of_an_answer_nothing_is_left_to_do(name: str) -> None:
-    for number in NUMBERS:
+    for number in ROBOT_NUMBERS:
         robot = robot_of(name, number)
         for wrench in wrenches(robot, number, 1.0, 6):
             first = robot.answer(wrench)
@@ -112,7 +129,7 @@ def test_from_the_multipliers_of_an_answer_nothing_is_left_to_do(name: str) -> N
             assert near["newton_steps"] <= max(4, first["newton_steps"])
 
 
-def asked(robot: Robot, **question: Any) -> tuple[list[Set], Any]:
+def prepared_question(robot: Robot, **question: Any) -> tuple[list[Set], Any]:
     """Sets of a question, and the work area `fl_work` that it prepares."""
     record, _arrays = question_of(np.zeros(6), question)
     work = robot.work()
@@ -143,7 +160,7 @@ def largest_turn_cost(limits: Set) -> float:
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_the_largest_cost_is_that_of_the_dearest_forces_and_angles(name: str) -> None:
-    for number in NUMBERS:
+    for number in ROBOT_NUMBERS:
         robot = robot_of(name, number)
         rng = np.random.default_rng([4, number])
         lost = np.arange(robot.n) == rng.integers(robot.n)
@@ -163,7 +180,7 @@ def test_the_largest_cost_is_that_of_the_dearest_forces_and_angles(name: str) ->
         ]
         foils = robot.actuators["flow_speed"] > 0.0
         for question in questions:
-            sets, work = asked(robot, **question)
+            sets, work = prepared_question(robot, **question)
             works = question.get("lost", np.zeros(robot.n)) == 0
             dearest = 0.0
             for i in np.flatnonzero(works).tolist():

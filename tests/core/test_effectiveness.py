@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from finlab.arrays import Array
-from tests.core.parts import ROBOTS, Robot, Span, at, functions, robot_of
+from tests.core.internal_functions import ROBOTS, Robot, Span, at, functions, robot_of
 
 
 def span_of(robot: Robot, work: ctypes.Array[ctypes.c_char], lost: Array, free: Array) -> Span:
     """What is spanned with some actuators (n,) lost and some axes (6,) free."""
-    gone, open_axes = lost.astype(np.uint8), free.astype(np.uint8)
-    places = ctypes.c_void_p(gone.ctypes.data), ctypes.c_void_p(open_axes.ctypes.data)
+    lost_bytes = lost.astype(np.uint8)
+    open_axes = free.astype(np.uint8)
+    places = ctypes.c_void_p(lost_bytes.ctypes.data), ctypes.c_void_p(open_axes.ctypes.data)
     assert functions().fl_span_of_question(at(robot.block), work, *places)
     return Span.from_buffer(work)
 
@@ -20,17 +21,17 @@ def span_of(robot: Robot, work: ctypes.Array[ctypes.c_char], lost: Array, free: 
 def columns_of(robot: Robot, lost: Array, free: Array) -> Array:
     """Wrenches (n, 2, 6) [N, N m] per newton of each row, by the laws' own axes."""
     columns = np.zeros((robot.n, 2, 6))
-    for i, own in enumerate(robot.actuators):
+    for i, actuator in enumerate(robot.actuators):
         if lost[i]:
             continue
-        for row in range(int(own["rows"])):
+        for row in range(int(actuator["rows"])):
             axis = (
-                own["effectiveness_normalized"][1 + row]
+                actuator["effectiveness_normalized"][1 + row]
                 if robot.is_plane(i)
-                else own["effectiveness_normalized"][row]
+                else actuator["effectiveness_normalized"][row]
             )
             columns[i, row] = (
-                (own["command_sign"] if own["command_kind"] == 0.0 else 1.0)
+                (actuator["command_sign"] if actuator["command_kind"] == 0.0 else 1.0)
                 * axis
                 * robot.head["wrench_scale"]
             )
@@ -54,18 +55,18 @@ def check_span(robot: Robot, span: Span, lost: Array, free: Array) -> None:
     np.testing.assert_allclose(matrix @ basis.T * scale, columns, atol=1e-7 * np.abs(columns).max())
     assert not matrix[lost].any()
 
-    beside = robot.head["wrench_offset"].copy()
+    expected_offset = robot.head["wrench_offset"].copy()
     for i in np.flatnonzero(lost):
-        own = robot.actuators[i]
-        if own["flow_speed"] > 0.0:
-            beside -= (
-                own["pressure_area"]
-                * own["zero_lift_drag"]
-                * own["effectiveness_normalized"][1]
+        actuator = robot.actuators[i]
+        if actuator["flow_speed"] > 0.0:
+            expected_offset -= (
+                actuator["pressure_area"]
+                * actuator["zero_lift_drag"]
+                * actuator["effectiveness_normalized"][1]
                 * robot.head["wrench_scale"]
             )
     counts = ~free & (robot.head["is_commanded"] != 0.0)
-    np.testing.assert_allclose(span.wrench_offset, beside * counts, atol=1e-12)
+    np.testing.assert_allclose(span.wrench_offset, expected_offset * counts, atol=1e-12)
 
 
 @pytest.mark.parametrize("name", ROBOTS)
@@ -91,7 +92,8 @@ def test_the_span_is_that_of_the_columns_of_what_works(name: str) -> None:
 def test_a_state_that_was_asked_for_before_is_the_same_again(name: str) -> None:
     robot = robot_of(name)
     work = robot.work()
-    whole, none = np.zeros(robot.n, bool), np.zeros(6, bool)
+    whole = np.zeros(robot.n, bool)
+    none = np.zeros(6, bool)
     first = bytes(span_of(robot, work, whole, none))
     lost = np.arange(robot.n) == 1
     assert bytes(span_of(robot, work, lost, none)) != first

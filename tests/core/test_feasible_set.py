@@ -8,16 +8,18 @@ import pytest
 
 from finlab.allocation.rates import Rates
 from finlab.arrays import Array
-from tests.core.parts import FIN, POD, ROBOTS, Robot, Set, robot_of
+from tests.core.internal_functions import FIN, POD, ROBOTS, Robot, Set, robot_of
 
 PERIOD_S = 0.1
+"""Length of a tick [s]."""
 LEAST_POWER = 1e-3
 """Share of full power that counts as mean power at least."""
 
 
 def commands_before(robot: Robot, rng: np.random.Generator) -> Array:
     """Commands (n, 3) of a tick before, some of them at a limit."""
-    lower, upper = robot.actuators["command_min"], robot.actuators["command_max"]
+    lower = robot.actuators["command_min"]
+    upper = robot.actuators["command_max"]
     share = rng.random(lower.shape)
     share = np.where(rng.random(share.shape) < 0.15, np.round(share), share)
     return np.ascontiguousarray(np.minimum(lower + share * (upper - lower), upper))
@@ -26,42 +28,42 @@ def commands_before(robot: Robot, rng: np.random.Generator) -> Array:
 def given_in_box(robot: Robot, i: int, low: Array, high: Array) -> tuple[Array, Array]:
     """Forces (N,) [N] of commands within a box along their directions, and these directions
     [rad]."""
-    own = robot.actuators[i]
+    actuator = robot.actuators[i]
     share = np.stack(np.meshgrid(*3 * [[0.0, 0.25, 0.5, 0.75, 1.0]]), axis=-1).reshape(-1, 3)
     commands = low + share * (high - low)
     force = np.array([robot.force(i, command)[0] for command in commands])
-    if own["command_kind"] == POD:
+    if actuator["command_kind"] == POD:
         return commands[:, 1], commands[:, 0]
-    if own["command_kind"] == FIN:
+    if actuator["command_kind"] == FIN:
         return np.hypot(force[:, 1], force[:, 2]), np.arctan2(force[:, 2], force[:, 1])
-    return (own["command_sign"] if own["command_kind"] == 0.0 else 1.0) * force[:, 0], 0.0 * force[
+    return (actuator["command_sign"] if actuator["command_kind"] == 0.0 else 1.0) * force[
         :, 0
-    ]
+    ], 0.0 * force[:, 0]
 
 
-def check_set(robot: Robot, i: int, told: Set, low: Array, high: Array) -> None:
+def check_set(robot: Robot, i: int, limits: Set, low: Array, high: Array) -> None:
     """A set has the forces of the commands between two ends, and none else but for a little."""
-    own = robot.actuators[i]
+    actuator = robot.actuators[i]
     size, angle = given_in_box(robot, i, low, high)
-    slack = 0.02 * own["row_force_max"][0]
-    ways = [(told.force_min, told.force_max, 0.0)]
-    if told.is_flipped:
-        ways = [(-told.force_max, -told.force_min, math.pi)]
-    elif told.force_max_reverse > 0.0:
-        ways = [(-told.force_max_reverse, told.force_max, 0.0)]
-    ((least, most, turned),) = ways
-    band = own["dead_band"]
-    if band > 0.0 and least < band and most > -band:
+    slack = 0.02 * actuator["row_force_max"][0]
+    branches = [(limits.force_min, limits.force_max, 0.0)]
+    if limits.is_flipped:
+        branches = [(-limits.force_max, -limits.force_min, math.pi)]
+    elif limits.force_max_reverse > 0.0:
+        branches = [(-limits.force_max_reverse, limits.force_max, 0.0)]
+    ((force_min, force_max, rotation),) = branches
+    band = actuator["dead_band"]
+    if band > 0.0 and force_min < band and force_max > -band:
         return  # the band takes some of it: tests of sets have that
-    assert size.min() == pytest.approx(least, abs=slack)
-    assert size.max() == pytest.approx(most, abs=slack)
-    if robot.is_plane(i) and told.sector_half_angle < 3.0:
-        off = [
-            math.remainder(one - told.sector_center - turned, 2.0 * math.pi)
+    assert size.min() == pytest.approx(force_min, abs=slack)
+    assert size.max() == pytest.approx(force_max, abs=slack)
+    if robot.is_plane(i) and limits.sector_half_angle < 3.0:
+        angle_errors = [
+            math.remainder(one - limits.sector_center - rotation, 2.0 * math.pi)
             for one in angle[np.abs(size) > slack]
         ]
-        if off:
-            assert np.abs(off).max() == pytest.approx(told.sector_half_angle, abs=1e-3)
+        if angle_errors:
+            assert np.abs(angle_errors).max() == pytest.approx(limits.sector_half_angle, abs=1e-3)
 
 
 @pytest.mark.parametrize("name", ROBOTS)
@@ -75,15 +77,15 @@ def test_a_set_in_a_tick_is_what_commands_near_the_last_ones_give(name: str, tic
             previous = commands_before(robot, rng)
             box = Rates(robot.plant, step).box(previous)
             sets = robot.sets_now(previous=previous, ticks=ticks)
-            for i, told in enumerate(sets):
-                assert told.turn_cost == 0.0
-                own = robot.actuators[i]
-                whole = (box.lower[i] <= own["command_min"]).all() and (
-                    box.upper[i] >= own["command_max"]
+            for i, limits in enumerate(sets):
+                assert limits.turn_cost == 0.0
+                actuator = robot.actuators[i]
+                whole = (box.lower[i] <= actuator["command_min"]).all() and (
+                    box.upper[i] >= actuator["command_max"]
                 ).all()
-                if whole or own["gauge_table"] != 0.0 or own["unevenness"] != 0.0:
+                if whole or actuator["gauge_table"] != 0.0 or actuator["unevenness"] != 0.0:
                     continue  # all that it may give, or another force in each direction
-                check_set(robot, i, told, box.lower[i], box.upper[i])
+                check_set(robot, i, limits, box.lower[i], box.upper[i])
 
 
 @pytest.mark.parametrize("name", ["azimuths", "mixed", "pods either way"])
@@ -93,8 +95,8 @@ def test_turning_costs_by_the_mean_power_of_the_commands_before(name: str) -> No
         rng = np.random.default_rng([2, number])
         full = np.array(
             [
-                max(robot.power(i, own["force_max"]), robot.power(i, own["force_min"]))
-                for i, own in enumerate(robot.actuators)
+                max(robot.power(i, actuator["force_max"]), robot.power(i, actuator["force_min"]))
+                for i, actuator in enumerate(robot.actuators)
             ]
         )
         for scale in (1.0, 0.0):
@@ -112,31 +114,33 @@ def test_turning_costs_by_the_mean_power_of_the_commands_before(name: str) -> No
                 angles_wanted=toward,
                 lost=lost.astype(np.uint8),
             )
-            for i, told in enumerate(sets):
+            for i, limits in enumerate(sets):
                 if not pods[i] or lost[i]:
-                    assert told.turn_cost == 0.0
+                    assert limits.turn_cost == 0.0
                     continue
                 step = robot.layout.rates[i, 0] * PERIOD_S
-                assert told.turn_cost == pytest.approx(2.0 * mean / (3.0 * step), rel=1e-3)
+                assert limits.turn_cost == pytest.approx(2.0 * mean / (3.0 * step), rel=1e-3)
                 angle = previous[i, 0] if math.isnan(toward[i]) else toward[i]
-                off = math.remainder(
-                    told.turn_origin - angle - math.pi * told.is_flipped, 2.0 * math.pi
+                angle_error = math.remainder(
+                    limits.turn_origin - angle - math.pi * limits.is_flipped, 2.0 * math.pi
                 )
-                assert off == pytest.approx(0.0, abs=1e-9)
-                assert abs(told.turn_origin - told.sector_center) <= math.pi + 1e-9
+                assert angle_error == pytest.approx(0.0, abs=1e-9)
+                assert abs(limits.turn_origin - limits.sector_center) <= math.pi + 1e-9
 
 
 def power_of(robot: Robot, i: int, command: Array) -> float:
     """Power [W] of a command by the core's tables."""
-    own = robot.actuators[i]
+    actuator = robot.actuators[i]
     force, _ = robot.force(i, command)
-    if own["command_kind"] == POD:
+    if actuator["command_kind"] == POD:
         size = command[1]
     elif robot.is_plane(i):
         size = math.hypot(force[1], force[2]) / robot.radius(i, math.atan2(force[2], force[1]))
     else:
-        size = own["command_sign"] * force[0]
-    return robot.power(i, min(max(float(size), float(own["force_min"])), float(own["force_max"])))
+        size = actuator["command_sign"] * force[0]
+    return robot.power(
+        i, min(max(float(size), float(actuator["force_min"])), float(actuator["force_max"]))
+    )
 
 
 @pytest.mark.parametrize("name", ["azimuths", "fins", "thrusters"])
@@ -169,10 +173,10 @@ def test_a_number_on_a_free_axis_changes_no_command(name: str) -> None:
         rng = np.random.default_rng([5, number])
         free = (np.arange(6) == rng.integers(6)).astype(np.uint8)
         previous = robot.plant.sample(rng, (1,))[0]
-        given = robot.plant.wrench(robot.plant.sample(rng, (1,))[0])
-        wrench = np.where(free, 0.0, rng.uniform(0.0, 1.0) * given)
+        wrench_of_command = robot.plant.wrench(robot.plant.sample(rng, (1,))[0])
+        wrench = np.where(free, 0.0, rng.uniform(0.0, 1.0) * wrench_of_command)
         loud = np.where(free, 1e5, wrench)
-        for asked in ({}, {"previous": previous}):
-            quiet_answer = robot.answer(wrench, free=free, **asked)
-            loud_answer = robot.answer(loud, free=free, **asked)
+        for tick in ({}, {"previous": previous}):
+            quiet_answer = robot.answer(wrench, free=free, **tick)
+            loud_answer = robot.answer(loud, free=free, **tick)
             np.testing.assert_array_equal(loud_answer["command"], quiet_answer["command"])

@@ -11,7 +11,7 @@ import numpy as np
 
 import finlab
 
-ASK = """
+ANSWERS_SCRIPT = """
 import sys
 import numpy as np
 from pathlib import Path
@@ -33,8 +33,16 @@ for name in ("A", "bluerov2_heavy", "catamaran"):
     write_c(c_sources(layout, samples=4), folder / name)
 np.savez(folder / "commands.npz", fields=struct("fl_actuator").names, **commands)
 """
+<<<<<<< HEAD
 LAYOUTS = Path(finlab.__file__).parents[1] / "layouts"
-FLAGS = ["-std=c99", "-O1", "-ffp-contract=off", "-Wall", "-Wextra", "-Wno-cpp", "-Werror"]
+FLAGS = ["-std=c99", "-O0", "-ffp-contract=off", "-Wall", "-Wextra", "-Wno-cpp", "-Werror"]
+=======
+"""A program that loads the changed core, and writes what it answers for three robots."""
+LAYOUT_FOLDER = Path(finlab.__file__).parents[1] / "layouts"
+"""The shipped layouts."""
+C_FLAGS = ["-std=c99", "-O1", "-ffp-contract=off", "-Wall", "-Wextra", "-Wno-cpp", "-Werror"]
+"""Options of the C compiler; warnings are errors."""
+>>>>>>> main
 
 
 def copied(folder: Path) -> Path:
@@ -57,7 +65,7 @@ def test_a_field_more_in_the_middle_changes_no_answer(tmp_path: Path) -> None:
     sources = sorted(map(str, (copy / "core" / "src").glob("*.c")))
     library = str(copy / "core" / "libfinlab.so")
     subprocess.run(
-        ["gcc", *FLAGS, f"-I{copy / 'core'}", "-fPIC", "-shared", *sources, "-o", library, "-lm"],
+        ["gcc", *C_FLAGS, f"-I{copy / 'core'}", "-fPIC", "-shared", *sources, "-o", library, "-lm"],
         check=True,
     )
     said = {}
@@ -66,7 +74,10 @@ def test_a_field_more_in_the_middle_changes_no_answer(tmp_path: Path) -> None:
         out.mkdir()
         words = {**os.environ, "PYTHONPATH": str(place)}
         subprocess.run(
-            [sys.executable, "-c", ASK, str(out), str(LAYOUTS)], env=words, cwd=out, check=True
+            [sys.executable, "-c", ANSWERS_SCRIPT, str(out), str(LAYOUT_FOLDER)],
+            env=words,
+            cwd=out,
+            check=True,
         )
         said[name] = dict(np.load(out / "commands.npz"))
     assert "spare" in said["more"].pop("fields") and "spare" not in said["now"].pop("fields")
@@ -75,5 +86,5 @@ def test_a_field_more_in_the_middle_changes_no_answer(tmp_path: Path) -> None:
     for name in said["now"]:
         folder = tmp_path / "more" / name
         files = sorted(map(str, folder.glob("*.c")))
-        subprocess.run(["gcc", *FLAGS, *files, "-o", str(folder / "selftest"), "-lm"], check=True)
+        subprocess.run(["gcc", *C_FLAGS, *files, "-o", str(folder / "selftest"), "-lm"], check=True)
         subprocess.run([str(folder / "selftest")], check=True, stdout=subprocess.DEVNULL)

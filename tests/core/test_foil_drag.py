@@ -1,4 +1,5 @@
-"""Power and forces of commands, on which the search of robots whose foils drag steps from one to the next."""
+"""Power and forces of commands, on which the search of robots whose foils drag steps from one to
+the next."""
 
 import ctypes
 
@@ -6,7 +7,7 @@ import numpy as np
 import pytest
 
 from finlab.arrays import Array
-from tests.core.parts import FIN, MOST, ROBOTS, Robot, at, functions, robot_of
+from tests.core.internal_functions import FIN, MOST, ROBOTS, Robot, at, functions, robot_of
 
 
 def told(robot: Robot, command: Array, lost: Array) -> tuple[float, Array]:
@@ -32,12 +33,12 @@ def test_power_and_forces_of_commands_are_those_of_the_plant(name: str) -> None:
         for command in robot.plant.sample(rng, (6,)):
             lost = np.arange(robot.n) == rng.integers(2 * robot.n)
             power, force = told(robot, command, lost)
-            own = robot.plant.power(command)
+            plant_power = robot.plant.power(command)
             # A law has no power in its dead band, where the core has that of the force.
-            given = np.abs(robot.plant.force(command)).max(axis=1) > 0.0
-            if given[~lost].all():
+            gives_force = np.abs(robot.plant.force(command)).max(axis=1) > 0.0
+            if gives_force[~lost].all():
                 # A fin has many beats for one force, of which the core knows the cheapest.
-                most = own[~lost].sum()
+                most = plant_power[~lost].sum()
                 assert power <= most * (1.0 + 2e-3) + 1e-6
                 if not (robot.actuators["command_kind"] == FIN).any():
                     assert power == pytest.approx(most, rel=2e-3, abs=1e-6)

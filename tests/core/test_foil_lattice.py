@@ -1,4 +1,5 @@
-"""The lattice of foils' angles at which searches for commands begin, against the plant and numpy."""
+"""The lattice of foils' angles at which searches for commands begin, against the plant and
+numpy."""
 
 import ctypes
 from dataclasses import dataclass
@@ -11,7 +12,7 @@ import pytest
 
 from finlab.arrays import Array
 from finlab.layout.load import parse_layout
-from tests.core.parts import (
+from tests.core.internal_functions import (
     MOST,
     REAL,
     Box,
@@ -23,7 +24,7 @@ from tests.core.parts import (
     in_the_core,
     question_of,
 )
-from tests.mixed_robots import layout_of, random_flow, random_robot
+from tests.random_robots import layout_of, random_flow, random_robot
 
 FOILS = 6
 """Foils on the lattice at most: LATTICE_FOILS."""

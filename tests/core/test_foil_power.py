@@ -8,8 +8,8 @@ from scipy.optimize import minimize
 
 from finlab.arrays import Array
 from finlab.layout.load import parse_layout
-from tests.core.parts import Robot, in_the_core
-from tests.mixed_robots import random_flow, random_robot
+from tests.core.internal_functions import Robot, in_the_core
+from tests.random_robots import random_flow, random_robot
 
 STARTS = 20
 """Random commands at which SLSQP begins."""
@@ -56,7 +56,7 @@ def least_power(robot: Robot, wrench: Array, starts: list[Array]) -> float:
     least = np.inf
     for start in starts:
         share = (start[used] - plant.lower[used]) / plant.width[used]
-        found = minimize(
+        optimum = minimize(
             power,
             share,
             jac=True,
@@ -65,7 +65,7 @@ def least_power(robot: Robot, wrench: Array, starts: list[Array]) -> float:
             constraints={"type": "eq", "fun": miss, "jac": slope},
             options={"maxiter": 60, "ftol": 1e-8},
         )
-        within = np.clip(found.x, 0.0, 1.0)
+        within = np.clip(optimum.x, 0.0, 1.0)
         if np.linalg.norm(miss(within)) <= MISS:
             least = min(least, power(within)[0])
     return least
@@ -79,8 +79,8 @@ def test_robots_with_stalled_foils_take_no_more_than_slsqp_finds(number: int) ->
     wrench = robot.plant.wrench(command)
     answer = robot.answer(wrench)
     found = np.ascontiguousarray(answer["command"][: robot.n])
-    given = robot.plant.wrench(found)
-    assert np.linalg.norm((given - wrench) / robot.head["wrench_scale"]) <= 3e-5
+    wrench_of_command = robot.plant.wrench(found)
+    assert np.linalg.norm((wrench_of_command - wrench) / robot.head["wrench_scale"]) <= 3e-5
     starts = [found, command, *robot.plant.sample(rng, (STARTS,))]
     least = least_power(robot, wrench, starts)
     assert np.isfinite(least)

@@ -13,8 +13,9 @@ from finlab.core.library import PATH, SIGNATURES
 from finlab.deploy.c_sources import c_sources, write_c
 from finlab.layout import load_layout
 
-CORE = Path(core.__path__[0])
-STRICT = [
+CORE_FOLDER = Path(core.__path__[0])
+"""The core's headers and sources."""
+STRICT_FLAGS = [
     "-std=c99",
     "-Wall",
     "-Wextra",
@@ -24,7 +25,8 @@ STRICT = [
     "-Wmissing-prototypes",
     "-Werror",
 ]
-MAIN = """
+"""Options of the C compiler: warnings that users of a library may have on."""
+TWO_ROBOTS_PROGRAM = """
 #include "A/fl_a.h"
 #include "catamaran/fl_catamaran.h"
 #include <cmath>
@@ -42,17 +44,19 @@ int main() {
   return fl_a_selftest() + fl_catamaran_selftest();
 }
 """
+"""A program in C++ that links the exports of two robots and asks each."""
 
 
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
 @pytest.mark.parametrize("single", [[], ["-DFL_SINGLE"]], ids=["double", "single"])
 def test_no_compiler_warns(compiler: str, single: list[str]) -> None:
-    for source in sorted((CORE / "src").glob("*.c")):
-        words = [compiler, *STRICT, *single, "-fsyntax-only", f"-I{CORE}", str(source)]
+    for source in sorted((CORE_FOLDER / "src").glob("*.c")):
+        words = [compiler, *STRICT_FLAGS, *single, "-fsyntax-only", f"-I{CORE_FOLDER}", str(source)]
         subprocess.run(words, check=True)
 
 
 def _global_names(binary: Path) -> set[str]:
+    """Names that an object file or a library defines for the linker."""
     words = ["nm", "-g", "--defined-only", str(binary)]
     text = subprocess.run(words, check=True, capture_output=True, text=True).stdout
     return {line.split()[-1] for line in text.splitlines() if len(line.split()) == 3}
@@ -70,14 +74,22 @@ def test_two_robots_link_into_a_program_in_cpp(tmp_path: Path) -> None:
         folder = tmp_path / name
         write_c(c_sources(load_layout(name)), folder)
         for source in sorted(folder.glob("*.c")):
-            made = folder / f"{source.stem}.o"
-            words = ["gcc", *STRICT, "-DFL_NO_MAIN", "-c", str(source), "-o", str(made)]
+            object_file = folder / f"{source.stem}.o"
+            words = [
+                "gcc",
+                *STRICT_FLAGS,
+                "-DFL_NO_MAIN",
+                "-c",
+                str(source),
+                "-o",
+                str(object_file),
+            ]
             subprocess.run(words, check=True, cwd=folder)
-            objects.append(made)
+            objects.append(object_file)
     names = set(itertools.chain.from_iterable(map(_global_names, objects)))
     assert {"fl_a_answer_one", "fl_catamaran_answer_one"} < names
     assert not {name for name in names if not name.startswith("fl_")}
-    (tmp_path / "main.cpp").write_text(MAIN)
+    (tmp_path / "main.cpp").write_text(TWO_ROBOTS_PROGRAM)
     program = tmp_path / "main"
     words = ["g++", "-std=c++17", "-Wall", "-Wextra", "-pedantic", "-Werror", "main.cpp"]
     subprocess.run(
@@ -87,6 +99,7 @@ def test_two_robots_link_into_a_program_in_cpp(tmp_path: Path) -> None:
 
 
 _COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
+"""A comment of C."""
 _PROTOTYPE = re.compile(r"^(int|void|fl_real|const char \*)\s*(fl_\w+)\(([^()]*)\);", re.MULTILINE)
 """A function of `finlab.h`: what it returns, its name, its arguments."""
 
@@ -103,7 +116,7 @@ def _letter(declaration: str) -> str:
 
 def _declared_signatures() -> dict[str, str]:
     """The signatures of all functions of `finlab.h`, in the letters of `SIGNATURES`."""
-    header = _COMMENT.sub("", (CORE / "finlab.h").read_text(encoding="utf-8"))
+    header = _COMMENT.sub("", (CORE_FOLDER / "finlab.h").read_text(encoding="utf-8"))
     signatures = {}
     for returned, name, arguments in _PROTOTYPE.findall(header):
         letters = [_letter(returned)]
@@ -121,7 +134,10 @@ def test_python_calls_each_function_by_the_signature_of_the_header() -> None:
 
 def test_every_header_compiles_alone_in_c_and_cpp() -> None:
     for header in ("finlab.h", "fl_work.h"):
-        for words in (["gcc", *STRICT], ["g++", "-std=c++17", "-Wall", "-pedantic", "-Werror"]):
+        for words in (
+            ["gcc", *STRICT_FLAGS],
+            ["g++", "-std=c++17", "-Wall", "-pedantic", "-Werror"],
+        ):
             language = "c" if words[0] == "gcc" else "c++"
-            command = [*words, "-x", language, "-fsyntax-only", str(CORE / header)]
+            command = [*words, "-x", language, "-fsyntax-only", str(CORE_FOLDER / header)]
             subprocess.run(command, check=True)

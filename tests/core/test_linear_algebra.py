@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from finlab.arrays import Array
-from tests.core.parts import at, functions
+from tests.core.internal_functions import at, functions
 
 
 def factor_of(matrix: Array) -> tuple[int, Array]:
@@ -23,10 +23,10 @@ def test_equations_are_solved(seed: int) -> None:
     matrix = root @ root.T + 0.1 * np.eye(6)
     right = rng.normal(size=6)
     code, factor = factor_of(matrix)
-    found = np.zeros(6)
-    functions().fl_solve(at(factor), at(right), at(found))
+    solution = np.zeros(6)
+    functions().fl_solve(at(factor), at(right), at(solution))
     assert code == 1
-    np.testing.assert_allclose(found, np.linalg.solve(matrix, right), rtol=1e-9)
+    np.testing.assert_allclose(solution, np.linalg.solve(matrix, right), rtol=1e-9)
 
 
 @pytest.mark.parametrize("negative", range(6))
@@ -41,7 +41,8 @@ def test_a_matrix_with_a_direction_that_falls_is_singular(negative: int) -> None
 
 def test_squares_are_added_to_the_lower_triangle() -> None:
     rng = np.random.default_rng(1)
-    matrix, row = np.zeros((6, 6)), rng.normal(size=6)
+    matrix = np.zeros((6, 6))
+    row = rng.normal(size=6)
     functions().fl_add_square(at(matrix), at(row), ctypes.c_double(2.5))
     np.testing.assert_allclose(matrix, np.tril(2.5 * np.outer(row, row)), rtol=1e-12)
     trace = functions().fl_trace

@@ -10,7 +10,7 @@ import pytest
 from scipy.optimize import linprog, lsq_linear
 
 from finlab.arrays import Array
-from tests.core.parts import POINTS, REAL, Mixture, Robot, at, functions, robot_of
+from tests.core.internal_functions import POINTS, REAL, Mixture, Robot, at, functions, robot_of
 from tests.core.test_actuator_response import forces_of
 
 CLOSE = 1e-9

@@ -9,11 +9,11 @@ from scipy.optimize import linprog, lsq_linear
 
 from finlab.allocation import Policy
 from finlab.arrays import Array
-from finlab.core.calls import _policy_record
+from finlab.core.calls import policy_record
 from finlab.layout.load import parse_layout
-from tests.core.parts import Robot, in_the_core
+from tests.core.internal_functions import Robot, in_the_core
 from tests.core.test_actuator_response import forces_of
-from tests.mixed_robots import random_robot
+from tests.random_robots import random_robot
 
 NUMBERS = range(4)
 """Of each kind of robot."""
@@ -33,7 +33,7 @@ def targets(robot: Robot, number: int) -> Array:
 
 def served(robot: Robot, wrench: Array, policy: str) -> Array:
     """Wrench (6,) that a policy serves."""
-    record = _policy_record(Policy(policy))
+    record = policy_record(Policy(policy))
     return np.asarray(robot.answer(wrench, policy=record.ctypes.data)["wrench_served"])
 
 
@@ -62,14 +62,14 @@ def largest_share(robot: Robot, wrench: Array) -> float:
     rank = int(robot.head["rank"])
     met = np.column_stack([wrenches.T[:rank], -target[:rank]])
     sums = np.column_stack([weights_of_one, np.zeros(robot.n)])
-    found = linprog(
+    optimum = linprog(
         np.append(np.zeros(len(wrenches)), -1.0),
         A_eq=np.vstack([met, sums]),
         b_eq=np.append(np.zeros(rank), np.ones(robot.n)),
         bounds=[(0.0, 1.0)] * (len(wrenches) + 1),
     )
-    assert found.success
-    return float(found.x[-1])
+    assert optimum.success
+    return float(optimum.x[-1])
 
 
 @pytest.mark.parametrize("name", ["thrusters", "azimuths"])
@@ -77,10 +77,10 @@ def largest_share(robot: Robot, wrench: Array) -> float:
 def test_direction_serves_the_largest_share_of_a_wrench(name: str, number: int) -> None:
     robot = convex_robot(name, number)
     for wrench in targets(robot, number):
-        given = served(robot, wrench, "direction")
-        share = float(given @ wrench / (wrench @ wrench))
+        wrench_served = served(robot, wrench, "direction")
+        share = float(wrench_served @ wrench / (wrench @ wrench))
         size = np.linalg.norm(wrench)
-        np.testing.assert_allclose(given, share * wrench, atol=1e-6 * size)
+        np.testing.assert_allclose(wrench_served, share * wrench, atol=1e-6 * size)
         largest = largest_share(robot, wrench)
         # Samples of a disc lie within it, and leave out a little.
         assert largest - 1e-6 <= share <= largest * (1.0 + 2e-3) + 1e-6
@@ -89,31 +89,31 @@ def test_direction_serves_the_largest_share_of_a_wrench(name: str, number: int) 
 @pytest.mark.parametrize("number", NUMBERS)
 def test_closest_serves_the_nearest_wrench_of_bounded_forces(number: int) -> None:
     robot = convex_robot("thrusters", number)
-    own = robot.actuators
+    actuators = robot.actuators
     scale = robot.head["wrench_scale"]
     B = (scaled_effectiveness(robot)[:, 0] @ robot.head["basis"].T) * robot.head["axis_scale"]
     for wrench in targets(robot, number):
-        given = served(robot, wrench, "closest")
-        bounds = (own["force_min"], own["force_max"])
+        wrench_served = served(robot, wrench, "closest")
+        bounds = (actuators["force_min"], actuators["force_max"])
         nearest = lsq_linear((B / scale).T, wrench / scale, bounds, tol=1e-12)
         least = np.linalg.norm((B / scale).T @ nearest.x - wrench / scale)
-        error = np.linalg.norm((given - wrench) / scale)
+        error = np.linalg.norm((wrench_served - wrench) / scale)
         assert error == pytest.approx(least, rel=1e-5, abs=1e-7)
 
 
 @pytest.mark.parametrize("number", NUMBERS)
 def test_priority_serves_the_first_group_with_the_least_error(number: int) -> None:
     robot = convex_robot("thrusters", number)
-    own = robot.actuators
+    actuators = robot.actuators
     scale = robot.head["wrench_scale"]
     B = (scaled_effectiveness(robot)[:, 0] @ robot.head["basis"].T) * robot.head["axis_scale"]
     first = np.array(Policy("priority").groups)[0].astype(bool)
-    bounds = (own["force_min"], own["force_max"])
+    bounds = (actuators["force_min"], actuators["force_max"])
     for wrench in targets(robot, number):
-        given = served(robot, wrench, "priority")
+        wrench_served = served(robot, wrench, "priority")
         by_force = (B / scale)[:, first].T
-        wanted = (wrench / scale)[first]
-        nearest = lsq_linear(by_force, wanted, bounds, tol=1e-12)
-        least = np.linalg.norm(by_force @ nearest.x - wanted)
-        error = np.linalg.norm(((given - wrench) / scale)[first])
+        target = (wrench / scale)[first]
+        nearest = lsq_linear(by_force, target, bounds, tol=1e-12)
+        least = np.linalg.norm(by_force @ nearest.x - target)
+        error = np.linalg.norm(((wrench_served - wrench) / scale)[first])
         assert error == pytest.approx(least, rel=1e-4, abs=1e-6)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from finlab.arrays import Array
-from tests.core.parts import (
+from tests.core.internal_functions import (
     EITHER_WAY,
     Robot,
     Set,
@@ -27,25 +27,25 @@ SLACK = 1e-6
 def has(robot: Robot, i: int, limits: Set, force: Array) -> bool:
     """Whether a set has a force (2,) by its definition: sizes in an arc, some in reverse, none in a
     band."""
-    own = robot.actuators[i]
-    slack = SLACK * float(own["row_force_max"][0])
+    actuator = robot.actuators[i]
+    slack = SLACK * float(actuator["row_force_max"][0])
     if not robot.is_plane(i):
         return bool(limits.force_min - slack <= force[0] <= limits.force_max + slack)
     size = math.hypot(*force)
     if size <= slack:
         return bool(limits.force_min <= slack)
-    for low, high, turned in (
+    for low, high, rotation in (
         (limits.force_min, limits.force_max, 0.0),
         (0.0, limits.force_max_reverse, math.pi),
     ):
-        off = math.remainder(
-            math.atan2(force[1], force[0]) - limits.sector_center - turned, 2.0 * math.pi
+        angle_error = math.remainder(
+            math.atan2(force[1], force[0]) - limits.sector_center - rotation, 2.0 * math.pi
         )
         radius = size / robot.radius(i, math.atan2(force[1], force[0]))
         if (
             high > 0.0
             and low - slack <= radius <= high + slack
-            and abs(off) <= limits.sector_half_angle + 1e-6
+            and abs(angle_error) <= limits.sector_half_angle + 1e-6
         ):
             return True
     return False
@@ -60,9 +60,11 @@ def narrowed(robot: Robot, i: int, limits: Set, force: Array, side: int) -> Set:
 
 def in_a_band(robot: Robot, i: int, force: Array) -> bool:
     """Whether a force lies in the dead band of its actuator, and is not rest."""
-    own = robot.actuators[i]
+    actuator = robot.actuators[i]
     return bool(
-        1e-6 * own["row_force_max"][0] < math.hypot(*force) < own["dead_band"] * (1.0 - 1e-6)
+        1e-6 * actuator["row_force_max"][0]
+        < math.hypot(*force)
+        < actuator["dead_band"] * (1.0 - 1e-6)
     )
 
 
@@ -137,7 +139,7 @@ def check_other_way(robot: Robot, i: int, limits: Set, parts: list[Set], cut: Ar
 @pytest.mark.parametrize("name", ["thrusters", "wide arcs", EITHER_WAY])
 def test_the_nearer_side_of_a_gap_is_the_one_whose_forces_are_nearer(name: str) -> None:
     rng = np.random.default_rng(2)
-    judged = 0
+    n_compared = 0
     for number in range(2):
         robot = robot_of(name, number)
         for i in range(robot.n):
@@ -161,14 +163,14 @@ def test_the_nearer_side_of_a_gap_is_the_one_whose_forces_are_nearer(name: str) 
                     assert (
                         apart[side] <= apart[-side] + 0.02 * robot.actuators[i]["row_force_max"][0]
                     )
-                judged += 1
-    assert judged > 2
+                n_compared += 1
+    assert n_compared > 2
 
 
 def nearest(robot: Robot, i: int, limits: Set, force: Array) -> float:
     """Distance [N] of a force from those of a set."""
-    known, _ = forces_of(robot, i, limits)
-    return float(np.hypot(*(known - force).T).min())
+    forces, _ = forces_of(robot, i, limits)
+    return float(np.hypot(*(forces - force).T).min())
 
 
 def test_a_pod_is_cut_where_its_answer_jumps() -> None:
@@ -176,20 +178,20 @@ def test_a_pod_is_cut_where_its_answer_jumps() -> None:
     rng = np.random.default_rng(3)
     robot = in_the_core(pods_either_way(5))
     for i in range(robot.n):
-        own = robot.actuators[i]
+        actuator = robot.actuators[i]
         limits = robot.set_of(
-            i, 0.0, own["force_max"], own["sector_center"], own["sector_half_angle"]
+            i, 0.0, actuator["force_max"], actuator["sector_center"], actuator["sector_half_angle"]
         )
-        limits.turn_cost, limits.has_jumped = 1.0, 1
+        limits.turn_cost = 1.0
+        limits.has_jumped = 1
         limits.turn_origin = limits.sector_center + 0.3 * min(limits.sector_half_angle, 1.0)
-        low, high = (
-            limits.sector_center - limits.sector_half_angle,
-            limits.sector_center + limits.sector_half_angle,
-        )
+        low = limits.sector_center - limits.sector_half_angle
+        high = limits.sector_center + limits.sector_half_angle
         if limits.sector_half_angle >= math.pi:
-            low, high = limits.turn_origin - math.pi, limits.turn_origin + math.pi
+            low = limits.turn_origin - math.pi
+            high = limits.turn_origin + math.pi
         limits.jump_angle = rng.uniform(low, high)
-        cut = np.array([own["force_max"], 0.0])
+        cut = np.array([actuator["force_max"], 0.0])
         below, above = (narrowed(robot, i, limits, cut, side) for side in (-1, 1))
         ends = [
             below.sector_center - below.sector_half_angle,
@@ -200,9 +202,11 @@ def test_a_pod_is_cut_where_its_answer_jumps() -> None:
         assert above.sector_center + above.sector_half_angle == pytest.approx(high)
         assert not below.has_jumped and not above.has_jumped
         for angle in (low + 0.01, limits.jump_angle - 0.01, limits.jump_angle + 0.01, high - 0.01):
-            one = own["force_max"] * np.array([math.cos(angle), math.sin(angle)])
-            known = Set.from_buffer_copy(limits)
-            side = functions().fl_nearer_side(at(robot.block), i, ctypes.byref(known), at(one))
+            one = actuator["force_max"] * np.array([math.cos(angle), math.sin(angle)])
+            whole_limits = Set.from_buffer_copy(limits)
+            side = functions().fl_nearer_side(
+                at(robot.block), i, ctypes.byref(whole_limits), at(one)
+            )
             if -math.pi < angle < math.pi:
                 assert side == (1 if angle >= limits.jump_angle else -1)
 
@@ -224,15 +228,15 @@ def test_what_is_fixed_at_its_least_force_stands_next_to_where_it_was(name: str)
             )
             assert fixed.cost_at_min == pytest.approx(limits.cost_at_min)
             assert fixed.cost_at_max == fixed.cost_at_min and fixed.force_max_reverse == 0.0
-            off = math.remainder(
+            angle_error = math.remainder(
                 math.atan2(force[1], force[0]) - limits.sector_center, 2.0 * math.pi
             )
-            wanted = limits.sector_center + min(
-                max(off, -limits.sector_half_angle), limits.sector_half_angle
+            expected_center = limits.sector_center + min(
+                max(angle_error, -limits.sector_half_angle), limits.sector_half_angle
             )
-            assert math.remainder(fixed.sector_center - wanted, 2.0 * math.pi) == pytest.approx(
-                0.0, abs=1e-9
-            )
+            assert math.remainder(
+                fixed.sector_center - expected_center, 2.0 * math.pi
+            ) == pytest.approx(0.0, abs=1e-9)
 
 
 @pytest.mark.parametrize("name", ["thrusters", "mixed", "rudders"])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from finlab.arrays import Array
-from tests.core.parts import (
+from tests.core.internal_functions import (
     REAL,
     Response,
     Robot,
@@ -40,10 +40,14 @@ def robot() -> Robot:
 
 def turning_set(robot: Robot, i: int, origin: float, turn_cost: float, reverse: bool) -> Set:
     """The set of a pod that turns from an angle [rad], at a cost [W/rad^2]."""
-    own = robot.actuators[i]
-    force_min = own["force_min"] if reverse else 0.0
+    actuator = robot.actuators[i]
+    force_min = actuator["force_min"] if reverse else 0.0
     limits = robot.set_of(
-        i, force_min, own["force_max"], own["sector_center"], own["sector_half_angle"]
+        i,
+        force_min,
+        actuator["force_max"],
+        actuator["sector_center"],
+        actuator["sector_half_angle"],
     )
     limits.turn_cost = turn_cost
     limits.turn_origin = origin
@@ -76,28 +80,28 @@ def best_of_scan(robot: Robot, i: int, limits: Set, price: Array) -> float:
     angle = np.linspace(*window_of(limits), ANGLES)
     along = price[0] * np.cos(angle) + price[1] * np.sin(angle)
     best = np.array([(v * size - cost).max() for v in along])
-    turned = angle - limits.turn_origin
-    return float((best - limits.turn_cost / 2.0 * turned**2).max())
+    turn = angle - limits.turn_origin
+    return float((best - limits.turn_cost / 2.0 * turn**2).max())
 
 
 def top_price(robot: Robot, i: int) -> float:
     """About the price [W/N] of a pod's largest force."""
-    own = robot.actuators[i]
-    return float(2.0 * robot.power(i, own["force_max"]) / own["force_max"])
+    actuator = robot.actuators[i]
+    return float(2.0 * robot.power(i, actuator["force_max"]) / actuator["force_max"])
 
 
 def cases_of(robot: Robot, i: int, rng: np.random.Generator) -> list[tuple[Set, Array]]:
     """Sets of a pod and prices (2,), where turning costs little and where it costs much."""
-    own = robot.actuators[i]
+    actuator = robot.actuators[i]
     cases = []
     for share in (0.03, 0.3, 3.0):
         for reverse in (False, True):
             size = top_price(robot, i) * rng.uniform(0.2, 1.2)
             towards = rng.uniform(-math.pi, math.pi)
             price = size * np.array([math.cos(towards), math.sin(towards)])
-            half = min(own["sector_half_angle"], math.pi)
-            origin = own["sector_center"] + half * rng.uniform(-1.0, 1.0)
-            turn_cost = share * size * own["force_max"]
+            half = min(actuator["sector_half_angle"], math.pi)
+            origin = actuator["sector_center"] + half * rng.uniform(-1.0, 1.0)
+            turn_cost = share * size * actuator["force_max"]
             cases.append((turning_set(robot, i, origin, turn_cost, reverse), price))
     return cases
 
@@ -116,8 +120,8 @@ def test_a_response_is_worth_as_much_as_the_best_of_all_angles(robot: Robot, i: 
         force = np.array(response.force)
         size = force @ [math.cos(response.angle), math.sin(response.angle)]
         assert math.hypot(*force) == pytest.approx(abs(size), abs=1e-9 * limits.force_max)
-        turned = response.angle - limits.turn_origin
-        value = force @ price - robot.power(i, size) - limits.turn_cost / 2.0 * turned**2
+        turn = response.angle - limits.turn_origin
+        value = force @ price - robot.power(i, size) - limits.turn_cost / 2.0 * turn**2
         assert value == pytest.approx(response.conjugate, abs=1e-5 * scale)
 
 
@@ -157,12 +161,12 @@ def test_a_free_pod_answers_alike_on_both_sides_of_half_a_turn(robot: Robot, rev
         price = 0.6 * top_price(robot, FREE) * np.array([math.cos(towards), math.sin(towards)])
         first = respond(robot, FREE, limits, price)
         for turn in (math.pi - origin - 0.05, math.pi - origin + 0.05, -2.0, 2.0 * math.pi):
-            turned = Set.from_buffer_copy(limits)
-            turned.turn_origin = origin + turn
+            turned_limits = Set.from_buffer_copy(limits)
+            turned_limits.turn_origin = origin + turn
             rotation = np.array(
                 [[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]]
             )
-            second = respond(robot, FREE, turned, rotation @ price)
+            second = respond(robot, FREE, turned_limits, rotation @ price)
             np.testing.assert_allclose(
                 second.force, rotation @ first.force, atol=1e-6 * limits.force_max
             )
@@ -283,8 +287,8 @@ def test_the_response_itself_jumps_where_two_angles_are_worth_the_same(robot: Ro
     size = top_price(robot, FREE)
     answers = []
     prices = []
-    for off in (-2e-6, -1e-6, 1e-6, 2e-6):
-        towards = 0.3 + math.pi + off
+    for angle_step in (-2e-6, -1e-6, 1e-6, 2e-6):
+        towards = 0.3 + math.pi + angle_step
         prices.append(size * np.array([math.cos(towards), math.sin(towards)]))
         answers.append(respond(robot, FREE, limits, prices[-1]))
     for k, is_jump in ((0, False), (1, True), (2, False)):
@@ -295,7 +299,7 @@ def test_the_response_itself_jumps_where_two_angles_are_worth_the_same(robot: Ro
             state.dy_ds[FREE][:] = (answer.xx, answer.xy, answer.yy)
             state.push_angle[FREE] = answer.angle
         step = prices[k + 1] - prices[k]
-        found = functions().fl_has_jumped(
+        has_jumped = functions().fl_has_jumped(
             at(robot.block),
             FREE,
             ctypes.byref(limits),
@@ -304,7 +308,7 @@ def test_the_response_itself_jumps_where_two_angles_are_worth_the_same(robot: Ro
             at(step),
             1,
         )
-        assert bool(found) == is_jump
+        assert bool(has_jumped) == is_jump
     assert abs(answers[1].angle - answers[2].angle) > 0.5
 
 

@@ -10,17 +10,17 @@ import finlab
 from finlab.deploy.bundle import Bundle, make_bundle
 from finlab.layout import FinModelSpec, Layout
 from finlab.physics import make_law, write_table
-from tests.any_robot import AnyRobot
+from tests.allocator_cache import AllocatorCache
 
 
 @pytest.fixture(scope="session")
-def shipped_allocator() -> AnyRobot:
+def shipped_allocator() -> AllocatorCache:
     """The product's default."""
-    return AnyRobot()
+    return AllocatorCache()
 
 
 @pytest.fixture(scope="session")
-def bundle(shipped_allocator: AnyRobot) -> Bundle:
+def bundle(shipped_allocator: AllocatorCache) -> Bundle:
     """Layout A for the product's default."""
     return make_bundle(shipped_allocator.on(finlab.load_layout("A")))
 
@@ -45,6 +45,6 @@ def measured(force_table: Path) -> Layout:
 
 
 @pytest.fixture(scope="session")
-def measured_bundle(measured: Layout, shipped_allocator: AnyRobot) -> Bundle:
+def measured_bundle(measured: Layout, shipped_allocator: AllocatorCache) -> Bundle:
     """That robot for the product's default."""
     return make_bundle(shipped_allocator.on(measured))

@@ -31,9 +31,10 @@ from finlab.deploy.command import main as runtime
 from finlab.deploy.deployed_robot import load_robot, parse_robot
 from finlab.errors import AllocationError, CheckpointError, DataError, FinlabError
 from finlab.layout import Layout
-from tests.any_robot import AnyRobot
+from tests.allocator_cache import AllocatorCache
 
 WRENCH = [1, 0, 0.5, 0, 0, 0.1]
+"""A wrench within reach of robot A: surge, heave and yaw [N, N m]."""
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +57,7 @@ def edited(bundle: Bundle, name: str, change: Callable[[dict[str, Any]], Any]) -
 
 
 def test_folder_and_archive_hold_the_same_and_come_back(
-    bundle: Bundle, shipped_allocator: AnyRobot, tmp_path: Path
+    bundle: Bundle, shipped_allocator: AllocatorCache, tmp_path: Path
 ) -> None:
     truth = shipped_allocator.allocate(finlab.load_layout("A"), WRENCH)
     bundle.write(tmp_path / "A")
@@ -118,7 +119,7 @@ def test_networks_of_ones_own_travel(
 
 
 def test_the_command_line_takes_a_bundle_with_its_lost_fins(
-    shipped_allocator: AnyRobot, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    shipped_allocator: AllocatorCache, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     make_bundle(shipped_allocator.on(finlab.load_layout("A")), ("back_left",)).write_zip(
         tmp_path / "A.zip"
@@ -202,7 +203,7 @@ def test_other_networks_than_those_of_the_desk_are_refused(of_mdn: Bundle) -> No
 def test_force_tables_travel_and_answer_from_folder_and_archive(
     measured: Layout,
     measured_bundle: Bundle,
-    shipped_allocator: AnyRobot,
+    shipped_allocator: AllocatorCache,
     force_table: Path,
     tmp_path: Path,
 ) -> None:
@@ -250,6 +251,7 @@ def test_a_force_table_outside_the_bundle_is_refused(
 
 
 def archive_of(path: Path, **files: bytes) -> Path:
+    """Write files by their names into a zip archive."""
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in files.items():
             archive.writestr(name, content)

@@ -25,16 +25,29 @@ from finlab.deploy.deployed_robot import (
 from finlab.errors import FinlabError
 from finlab.layout import Layout, save_layout
 from finlab.physics import plant_of
-from tests.any_robot import FIN_ROBOTS, AnyRobot
-from tests.exhaustive import sampled
+from tests.allocator_cache import FIN_ROBOTS, AllocatorCache
+from tests.sampled_cases import sampled
 
 TARGET = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
-WRENCH = ["--wrench", *map(str, TARGET)]
-HEAVY = ("torch", "scipy", "viser", "matplotlib", "yaml", "tyro", "tqdm", "threadpoolctl")
+"""A wrench within reach of robot A: surge, heave and yaw [N, N m]."""
+WRENCH_OPTIONS = ["--wrench", *map(str, TARGET)]
+"""The same as options of the command."""
+PACKAGES_NOT_ON_ROBOTS = (
+    "torch",
+    "scipy",
+    "viser",
+    "matplotlib",
+    "yaml",
+    "tyro",
+    "tqdm",
+    "threadpoolctl",
+)
+"""Packages that the robot's computer need not have."""
 
 
 @pytest.fixture(scope="module")
 def folder(bundle: Bundle, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The bundle of robot A, unpacked."""
     path = tmp_path_factory.mktemp("bundle") / "A"
     bundle.write(path)
     return path
@@ -43,10 +56,10 @@ def folder(bundle: Bundle, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_nothing_heavy_is_loaded(folder: Path) -> None:
     code = (
         "import sys\n"
-        f"for name in {HEAVY!r}: sys.modules[name] = None\n"
+        f"for name in {PACKAGES_NOT_ON_ROBOTS!r}: sys.modules[name] = None\n"
         "from finlab.deploy.command import main\n"
         f"assert main(['check', {str(folder)!r}]) == 0\n"
-        f"assert main(['allocate', {str(folder)!r}, *{WRENCH!r}]) == 0\n"
+        f"assert main(['allocate', {str(folder)!r}, *{WRENCH_OPTIONS!r}]) == 0\n"
         "import os; assert os.environ['OPENBLAS_NUM_THREADS'] == '1'\n"
     )
     environment = {
@@ -60,7 +73,7 @@ def test_nothing_heavy_is_loaded(folder: Path) -> None:
 
 
 def test_allocate_prints_a_table_or_one_object(folder: Path, capsys: Any) -> None:
-    question = ["allocate", str(folder), *WRENCH, "--lost", "back_left"]
+    question = ["allocate", str(folder), *WRENCH_OPTIONS, "--lost", "back_left"]
     truth = finlab.Allocator(finlab.load_layout("A")).allocate(TARGET, lost=["back_left"])
     assert main([*question, "--json"]) == 0
     shown = json.loads(capsys.readouterr().out)
@@ -140,6 +153,7 @@ def test_every_page_of_help_has_an_example(capsys: Any, monkeypatch: pytest.Monk
 
 @pytest.fixture(scope="module")
 def robot(bundle: Bundle) -> DeployedRobot:
+    """The robot of the bundle."""
     return parse_robot(bundle.files)
 
 
@@ -161,7 +175,7 @@ def test_answer_says_what_is_missing(robot: DeployedRobot) -> None:
         robot.allocate([0] * 6, lost=["nobody"])
 
 
-def test_lost_fins_of_the_bundle_stay_lost(shipped_allocator: AnyRobot) -> None:
+def test_lost_fins_of_the_bundle_stay_lost(shipped_allocator: AllocatorCache) -> None:
     layout = finlab.load_layout("A")
     robot = parse_robot(make_bundle(shipped_allocator.on(layout), ("back_left",)).files)
     lost = layout.index("back_left")
@@ -177,7 +191,7 @@ def test_every_shipped_layout_answers_as_the_library_to_the_last_bit(
 ) -> None:
     """By its own physics, tables included; single, batched and from tick to tick."""
     layout = measured if name == "measured" else finlab.load_layout(name)
-    desk = AnyRobot()
+    desk = AllocatorCache()
     make_bundle(desk.on(layout)).write_zip(tmp_path / "x.zip")
     robot = load_robot(tmp_path / "x.zip")
     assert not bad(robot)

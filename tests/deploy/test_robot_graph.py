@@ -19,6 +19,7 @@ from finlab.research.paper.network import raw_features
 from tests.terminal import refused
 
 SCHEMA = Path(__file__).parents[2] / "finlab" / "layout" / "graph.schema.json"
+"""The published schema of the format."""
 
 
 @pytest.mark.parametrize("name", sorted(shipped_layouts()))

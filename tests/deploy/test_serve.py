@@ -23,17 +23,21 @@ from finlab.deploy.transport import MAX_LINE, SIGNALS, Line, StandardStreams, Un
 from finlab.errors import DataError, FinlabError
 from finlab.layout import load_layout
 
-GOOD: dict[str, Any] = {"wrench": [1, 0, 0.5, 0, 0, 0.1]}
-LINE = json.dumps(GOOD).encode() + b"\n"
+GOOD_REQUEST: dict[str, Any] = {"wrench": [1, 0, 0.5, 0, 0, 0.1]}
+"""A request that is answered."""
+GOOD_LINE = json.dumps(GOOD_REQUEST).encode() + b"\n"
+"""The same as a line of the protocol."""
 
 
 @pytest.fixture(scope="module")
 def robot(bundle: Bundle) -> DeployedRobot:
+    """The robot of a bundle."""
     return parse_robot(bundle.files)
 
 
 @pytest.fixture(scope="module")
 def folder(bundle: Bundle, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The bundle of robot A, unpacked."""
     path = tmp_path_factory.mktemp("robots") / "A"
     bundle.write(path)
     return path
@@ -51,6 +55,7 @@ class Script:
         self.waits: list[float | None] = []
 
     def newest(self, timeout: float | None) -> Line | None:
+        """The next of the requests, which costs 0.3 s; an exception in their place is raised."""
         self.waits.append(timeout)
         self.now += 0.3
         if not self.requests:
@@ -64,6 +69,7 @@ class Script:
         return Line(text, max(self.now, time.monotonic()))
 
     def send(self, line: bytes) -> None:
+        """Keep a reply, which must be one line of JSON."""
         assert line.endswith(b"}\n")
         self.sent.append(json.loads(line, parse_constant=pytest.fail))
 
@@ -71,19 +77,20 @@ class Script:
 def served(
     robot: DeployedRobot, *requests: Any, watchdog: float | None = 1.0
 ) -> list[dict[str, Any]]:
+    """Replies of a server to requests, until they end."""
     script = Script(*requests)
     Server(robot, watchdog).run(script)
     return script.sent
 
 
 def test_answers_like_the_library(robot: DeployedRobot) -> None:
-    first, end = served(robot, {**GOOD, "id": 7, "lost": ["back_left"]})
-    truth = robot.allocate(GOOD["wrench"], lost=["back_left"])
+    first, end = served(robot, {**GOOD_REQUEST, "id": 7, "lost": ["back_left"]})
+    truth = robot.allocate(GOOD_REQUEST["wrench"], lost=["back_left"])
     assert (first["id"], first["status"]) == (7, "ok") and first["fins"] == list(truth.names)
     assert first["command"][2] is None
     np.testing.assert_array_equal(first["command"][0], truth.command[0])
     assert [first[key] for key in ("err_norm", "power")] == [truth.err_norm, truth.power]
-    ahead = served(robot, {**GOOD, "reference": [[2, 0, 0.5, 0, 0, 0.1]] * 9})[0]
+    ahead = served(robot, {**GOOD_REQUEST, "reference": [[2, 0, 0.5, 0, 0, 0.1]] * 9})[0]
     assert ahead["wrench"][0] == pytest.approx(2.0, abs=1e-3), "fins will have followed by then"
     assert end["status"] == "neutral" and end["command"][2] is None, (
         "a lost fin gets no command at the end"
@@ -92,7 +99,7 @@ def test_answers_like_the_library(robot: DeployedRobot) -> None:
 
 @pytest.mark.parametrize("id_", [None, 0, -1.5, "a", [1, "x"], {"of": [None, True]}])
 def test_an_id_of_any_kind_comes_back(id_: Any, robot: DeployedRobot) -> None:
-    assert served(robot, {**GOOD, "id": id_})[0]["id"] == id_
+    assert served(robot, {**GOOD_REQUEST, "id": id_})[0]["id"] == id_
 
 
 @pytest.mark.parametrize(
@@ -101,28 +108,28 @@ def test_an_id_of_any_kind_comes_back(id_: Any, robot: DeployedRobot) -> None:
         (b"nonsense", "request: is not valid JSON"),
         (b"[" * 60_000, "request: is nested too deeply"),
         (b"x" * 70_000, "longer than 65536 bytes"),
-        (LINE.strip().ljust(MAX_LINE + 1), "longer than 65536 bytes"),
+        (GOOD_LINE.strip().ljust(MAX_LINE + 1), "longer than 65536 bytes"),
         ({"wrench": [1, 2]}, "expected six numbers"),
         ({"wrench": [True, 0, 0, 0, 0, 0]}, "wrench: expected six numbers"),
         ({"wrench": [1, 0, "1", 0, 0, 0]}, "wrench: expected six numbers"),
         ({"wrench": "1"}, "wrench: expected six numbers"),
-        ({**GOOD, "flow": [1, 0, 0, 0, 0, False]}, "flow: expected six numbers"),
-        ({**GOOD, "reference": [["1", 0, 0, 0, 0, 0]]}, "reference: expected an array"),
+        ({**GOOD_REQUEST, "flow": [1, 0, 0, 0, 0, False]}, "flow: expected six numbers"),
+        ({**GOOD_REQUEST, "reference": [["1", 0, 0, 0, 0, 0]]}, "reference: expected an array"),
         ({"force": [1, 2]}, "force: unknown key, expected one of wrench, id"),
-        ({**GOOD, "speed": 3}, "request: speed: unknown key"),
-        ({**GOOD, "lost": "back_left"}, "lost: expected a list, got 'back_left'"),
-        ({**GOOD, "lost": ["nobody"]}, "no fin 'nobody'"),
-        ({**GOOD, "policy": "hope"}, "policy: expected one of"),
-        ({**GOOD, "policy": 3}, "policy: expected text, got 3"),
-        ({**GOOD, "flow": [1, 0, 0]}, "flow: expected six numbers"),
+        ({**GOOD_REQUEST, "speed": 3}, "request: speed: unknown key"),
+        ({**GOOD_REQUEST, "lost": "back_left"}, "lost: expected a list, got 'back_left'"),
+        ({**GOOD_REQUEST, "lost": ["nobody"]}, "no fin 'nobody'"),
+        ({**GOOD_REQUEST, "policy": "hope"}, "policy: expected one of"),
+        ({**GOOD_REQUEST, "policy": 3}, "policy: expected text, got 3"),
+        ({**GOOD_REQUEST, "flow": [1, 0, 0]}, "flow: expected six numbers"),
         (
-            {**GOOD, "reference": [1, 0, 0, 0, 0, 0]},
+            {**GOOD_REQUEST, "reference": [1, 0, 0, 0, 0, 0]},
             r"reference: expected an array of shape \(N, 6\)",
         ),
-        ({**GOOD, "id": "x" * 1000}, "id: longer than 1000 characters"),
-        ({**GOOD, "id": float("nan")}, "holds NaN, expected a finite number"),
-        ({**GOOD, "id": [float("-inf")]}, "holds -Infinity, expected a finite"),
-        (LINE.replace(b"}", b', "id": 1e999}'), "holds 1e999, expected a finite"),
+        ({**GOOD_REQUEST, "id": "x" * 1000}, "id: longer than 1000 characters"),
+        ({**GOOD_REQUEST, "id": float("nan")}, "holds NaN, expected a finite number"),
+        ({**GOOD_REQUEST, "id": [float("-inf")]}, "holds -Infinity, expected a finite"),
+        (GOOD_LINE.replace(b"}", b', "id": 1e999}'), "holds 1e999, expected a finite"),
         ({"wrench": [float("nan")] * 6}, "holds NaN, expected a finite number"),
         ({"wrench": [10**400, 0, 0, 0, 0, 0]}, "a number of 401 digits"),
     ],
@@ -142,9 +149,9 @@ def test_bad_requests_get_one_sentence_and_no_commands(
         ({"wrench": [1, 2], "id": 7}, 7),
         ({"wrench": [1, 0, 0, 0, 0, 0], "id": "a", "speed": 3}, "a"),
         ({"id": [1, {"k": None}]}, [1, {"k": None}]),
-        ({**GOOD, "id": 8, "lost": "back_left"}, 8),
-        ({**GOOD, "id": 9, "policy": 3}, 9),
-        ({**GOOD, "id": "x" * 1000}, None),
+        ({**GOOD_REQUEST, "id": 8, "lost": "back_left"}, 8),
+        ({**GOOD_REQUEST, "id": 9, "policy": 3}, 9),
+        ({**GOOD_REQUEST, "id": "x" * 1000}, None),
         (b'{"id": 7, "wrench": ', None),
         (b"[7]", None),
     ],
@@ -158,7 +165,7 @@ def test_a_refused_request_gets_its_id_back(request_: Any, name: Any, robot: Dep
 def test_only_good_targets_and_rest_wind_up_the_watchdog(
     robot: DeployedRobot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    script = Script(GOOD, b"nonsense", b"nonsense", GOOD, *[b"nonsense"] * 4, None)
+    script = Script(GOOD_REQUEST, b"nonsense", b"nonsense", GOOD_REQUEST, *[b"nonsense"] * 4, None)
     monkeypatch.setattr("finlab.deploy.serve.time.monotonic", lambda: script.now)
     Server(robot, 1.0).run(script)
     status = [reply["status"] for reply in script.sent]
@@ -173,13 +180,13 @@ def test_only_good_targets_and_rest_wind_up_the_watchdog(
     ]
     assert script.waits == pytest.approx([1.0, 1.0, 0.7, 0.4, 1.0, 0.7, 0.4, 0.1, 1.0, 1.0])
     np.testing.assert_array_equal(np.array(script.sent[-1]["command"]), robot.neutral())
-    script = Script(GOOD, b"nonsense")
+    script = Script(GOOD_REQUEST, b"nonsense")
     Server(robot, None).run(script)
     assert script.waits == [None] * 3
 
 
 def test_the_fins_rest_before_an_error_that_nobody_foresaw_is_told(robot: DeployedRobot) -> None:
-    script = Script(GOOD, ZeroDivisionError("a fault of ours"))
+    script = Script(GOOD_REQUEST, ZeroDivisionError("a fault of ours"))
     with pytest.raises(ZeroDivisionError, match="a fault of ours"):
         Server(robot).run(script)
     assert [reply["status"] for reply in script.sent] == ["ok", "neutral"]
@@ -228,7 +235,7 @@ def test_an_answer_that_is_no_number_is_an_error(
         return answer.with_command(answer.command * np.nan)
 
     monkeypatch.setattr(type(robot.allocator), "allocate", broken)
-    rest, reply = served(robot, GOOD)[:2]
+    rest, reply = served(robot, GOOD_REQUEST)[:2]
     assert rest["status"] == "neutral" and "command" not in reply
     assert reply["status"] == "error" and "answers with NaN" in reply["error"]
 
@@ -248,7 +255,9 @@ def test_after_a_fault_in_a_solve_the_robot_rests_and_the_next_request_is_answer
 
     monkeypatch.setattr(type(robot.allocator), "allocate", broken)
     lost = {"lost": ["back_left"]}
-    sent = served(robot, GOOD | lost, {"wrench": [9, 0, 0, 0, 0, 0], "id": 3}, GOOD | lost)
+    sent = served(
+        robot, GOOD_REQUEST | lost, {"wrench": [9, 0, 0, 0, 0, 0], "id": 3}, GOOD_REQUEST | lost
+    )
     assert [reply["status"] for reply in sent] == ["ok", "neutral", "error", "ok", "neutral"]
     assert sent[2]["id"] == 3 and type(fault).__name__ in sent[2]["error"]
     assert sent[1]["command"][2] is None and sent[3]["command"][2] is None
@@ -261,7 +270,10 @@ def test_a_refused_request_does_not_decide_which_fins_beat(
     refused: dict[str, Any], robot: DeployedRobot
 ) -> None:
     lost = {"lost": ["back_left"]}
-    for first, second in ((GOOD | lost, GOOD | refused), (GOOD, GOOD | lost | refused)):
+    for first, second in (
+        (GOOD_REQUEST | lost, GOOD_REQUEST | refused),
+        (GOOD_REQUEST, GOOD_REQUEST | lost | refused),
+    ):
         good, error, end = served(robot, first, second)
         assert error["status"] == "error" and end["status"] == "neutral"
         assert [row is None for row in end["command"]] == [row is None for row in good["command"]]
@@ -292,12 +304,14 @@ def test_what_waited_longer_than_the_watchdog_allows_is_dropped(
     monkeypatch.setattr(Server, "answers", paused)
 
     class Late(Script):
+        """Requests that have waited for some time, each after a silence."""
+
         def newest(self, timeout: float | None) -> Line | None:
             if not self.requests:
                 raise EOFError
             age, silence, name = self.requests.pop(0)
             now[0] += silence
-            return Line(json.dumps(GOOD | {"id": name}).encode(), now[0] - age)
+            return Line(json.dumps(GOOD_REQUEST | {"id": name}).encode(), now[0] - age)
 
     script = Late(
         (0.0, 0.1, "a"), (3.9, 4.0, "old"), (0.0, 0.1, "b"), (0.0, 0.1, "slow"), (0.0, 0.1, "c")
@@ -310,6 +324,7 @@ def test_what_waited_longer_than_the_watchdog_allows_is_dropped(
 
 @pytest.fixture
 def streams() -> Iterator[StandardStreams]:
+    """Standard streams with their signal handlers; those of before come back at the end."""
     before = {number: signal.getsignal(number) for number in (*SIGNALS, signal.SIGALRM)}
     yield StandardStreams()
     for number, handler in before.items():
@@ -326,6 +341,7 @@ def requests(streams: StandardStreams) -> Iterator[int]:
 
 
 def text(line: Line | None) -> bytes:
+    """The text of a line; empty where there is none."""
     return b"" if line is None else line.text
 
 
@@ -392,7 +408,7 @@ def test_a_signal_ends_waiting_and_sending(
     monkeypatch.setattr("finlab.deploy.transport.SEND_TIMEOUT_S", 0.05)
     source, requests = os.pipe()
     _, sink = os.pipe()
-    os.write(requests, LINE)
+    os.write(requests, GOOD_LINE)
     streams.open(source, sink)
     signal.raise_signal(signal.SIGTERM)
     with pytest.raises(EOFError):
@@ -402,6 +418,7 @@ def test_a_signal_ends_waiting_and_sending(
 
 
 def started(folder: Path, *options: str, **streams: Any) -> subprocess.Popen[bytes]:
+    """A server as a process of its own."""
     command = [sys.executable, "-m", "finlab.deploy.command", "serve", str(folder), *options]
     return subprocess.Popen(
         command, **{"stdin": subprocess.PIPE, "stderr": subprocess.PIPE, **streams}
@@ -409,6 +426,7 @@ def started(folder: Path, *options: str, **streams: Any) -> subprocess.Popen[byt
 
 
 def pipe(end: IO[bytes] | None) -> IO[bytes]:
+    """A stream of a process that was asked for."""
     assert end is not None
     return end
 
@@ -416,7 +434,7 @@ def pipe(end: IO[bytes] | None) -> IO[bytes]:
 def answering(folder: Path, *options: str) -> subprocess.Popen[bytes]:
     """A service that has answered a request."""
     service = started(folder, *options, stdout=subprocess.PIPE)
-    pipe(service.stdin).write(LINE)
+    pipe(service.stdin).write(GOOD_LINE)
     pipe(service.stdin).flush()
     assert json.loads(pipe(service.stdout).readline())["status"] == "ok"
     return service
@@ -435,17 +453,21 @@ def test_after_a_pause_of_the_process_the_first_line_is_rest(folder: Path) -> No
     out = pipe(service.stdout)
     for paused in (False, True):
         for i in range(15):
-            feed.write(json.dumps(GOOD | {"id": [paused, i]}).encode() + b"\n")
+            feed.write(json.dumps(GOOD_REQUEST | {"id": [paused, i]}).encode() + b"\n")
             feed.flush()
-            while not paused and (reply := json.loads(out.readline()))["id"] != [False, i]:
+            while not paused:
+                reply = json.loads(out.readline())
+                if reply["id"] == [False, i]:
+                    break
                 assert reply["status"] == "neutral"
             time.sleep(0.07 * paused)
         service.send_signal(signal.SIGCONT if paused else signal.SIGSTOP)
     assert json.loads(out.readline())["status"] == "neutral"
-    feed.write(json.dumps(GOOD | {"id": "new"}).encode() + b"\n")
+    feed.write(json.dumps(GOOD_REQUEST | {"id": "new"}).encode() + b"\n")
     feed.flush()
-    while (reply := json.loads(out.readline()))["status"] == "neutral":
-        pass
+    reply = json.loads(out.readline())
+    while reply["status"] == "neutral":
+        reply = json.loads(out.readline())
     assert reply["id"] == "new"
     feed.close()
     service.wait(60)
@@ -494,7 +516,7 @@ def test_a_reader_that_ends_is_noticed_at_the_next_answer(folder: Path) -> None:
 @pytest.mark.parametrize(("closed", "full"), [("0<&-", ""), ("1>&-", ""), ("", "1>/dev/full")])
 def test_without_streams_it_ends_with_a_sentence(closed: str, full: str, folder: Path) -> None:
     command = f"exec {sys.executable} -m finlab.deploy.command serve {folder} {closed} {full}"
-    done = subprocess.run(["sh", "-c", command], input=LINE, capture_output=True, timeout=60)
+    done = subprocess.run(["sh", "-c", command], input=GOOD_LINE, capture_output=True, timeout=60)
     told = done.stderr.decode()
     assert done.returncode == 2 and told.count("\n") == 1
     assert told.startswith("finlab-runtime: error: ") and "standard " in told
@@ -509,5 +531,6 @@ def test_times_are_finite_and_above_zero(option: str, capsys: pytest.CaptureFixt
 
     assert main(["serve", "bundle", option]) == 2
     name, text = option.split("=")
-    assert f"argument {name}: expected a number from" in (told := capsys.readouterr().err)
-    assert told.endswith(f"got {text!r}\n")
+    error = capsys.readouterr().err
+    assert f"argument {name}: expected a number from" in error
+    assert error.endswith(f"got {text!r}\n")

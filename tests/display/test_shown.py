@@ -18,33 +18,38 @@ from finlab.analysis import attainable_set, score_card
 from finlab.forces.reach import axis_ranges
 from finlab.swim.simulation import ClosedLoop, make_trajectory
 
-HOSTILE = "<img src=x onerror=alert(1)> & $\\frac{'\""
-TARGET = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
+HOSTILE_NAME = "<img src=x onerror=alert(1)> & $\\frac{'\""
+"""A name that HTML, TeX and quotes would break, where it is not escaped."""
+WRENCH = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
+"""A wrench within reach of robot A: surge, heave and yaw [N, N m]."""
 
 
 @cache
 def robot() -> finlab.Layout:
+    """Robot A, with hostile names."""
     layout = finlab.load_layout("A")
-    parts = (replace(layout.fins[0], name=HOSTILE), *layout.actuators[1:])
-    return replace(layout, name=HOSTILE, description=HOSTILE, actuators=parts)
+    parts = (replace(layout.fins[0], name=HOSTILE_NAME), *layout.actuators[1:])
+    return replace(layout, name=HOSTILE_NAME, description=HOSTILE_NAME, actuators=parts)
 
 
 def result(**asked: Any) -> finlab.Allocation:
-    return finlab.Allocator(robot()).allocate(TARGET, **asked)
+    """An answer of this robot."""
+    return finlab.Allocator(robot()).allocate(WRENCH, **asked)
 
 
 @cache
 def swim() -> Any:
+    """A swim of this robot, one fin of which is lost after a second."""
     loop = ClosedLoop(
         robot(),
         finlab.Allocator(robot()),
         make_trajectory("station", 12.0),
-        failures=[(HOSTILE, 1.0)],
+        failures=[(HOSTILE_NAME, 1.0)],
     )
     return loop.run()
 
 
-VALUES: dict[str, Callable[[], Any]] = {
+MAKERS: dict[str, Callable[[], Any]] = {
     "layout": robot,
     "result": result,
     "card": lambda: score_card(robot()),
@@ -55,6 +60,7 @@ VALUES: dict[str, Callable[[], Any]] = {
     "ranges": lambda: axis_ranges(finlab.load_layout("pair"), np.zeros(6)),
     "nothing works": lambda: finlab.Allocator(robot()).allocate(np.zeros(6)),
 }
+"""Name of a value that notebooks show -> what makes it."""
 
 
 class Page(HTMLParser):
@@ -78,9 +84,9 @@ class Page(HTMLParser):
             self.rows[-1].append(data)
 
 
-@pytest.mark.parametrize("name", VALUES)
+@pytest.mark.parametrize("name", MAKERS)
 def test_a_table_and_a_picture_are_shown_and_no_name_becomes_a_tag(name: str) -> None:
-    shown = VALUES[name]()._repr_html_()
+    shown = MAKERS[name]()._repr_html_()
     page = Page(shown)
     assert set(page.tags) <= {"table", "caption", "tr", "th", "td", "p", "br", "img"}
     assert page.tags.count("img") == 1 and "table" in page.tags
@@ -90,7 +96,7 @@ def test_a_table_and_a_picture_are_shown_and_no_name_becomes_a_tag(name: str) ->
 
 @pytest.mark.parametrize("name", ["layout", "result", "card", "swim"])
 def test_hostile_names_are_read_as_written(name: str) -> None:
-    assert HOSTILE in Page(VALUES[name]()._repr_html_()).text
+    assert HOSTILE_NAME in Page(MAKERS[name]()._repr_html_()).text
 
 
 def test_figures_are_those_of_the_object() -> None:
@@ -112,7 +118,7 @@ def test_figures_are_those_of_the_object() -> None:
     rows = {row[0]: row[1:] for row in Page(log._repr_html_()).rows}
     off = np.linalg.norm(log.position - log.reference, axis=1)
     assert float(rows["off the reference, largest [m]"][0]) == pytest.approx(off.max(), abs=6e-4)
-    ranges = axis_ranges(robot(), TARGET)
+    ranges = axis_ranges(robot(), WRENCH)
     rows = {row[0]: row[1:] for row in Page(ranges._repr_html_()).rows}
     np.testing.assert_allclose(
         [float(rows["Fz"][k]) for k in (0, 1)], [ranges.low[2], ranges.high[2]], atol=6e-4

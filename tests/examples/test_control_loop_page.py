@@ -11,13 +11,14 @@ import finlab
 from finlab.allocation import Allocator
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "howto" / "control-loop.md"
+"""The page whose blocks are run."""
 
 
 def test_the_page_runs_and_its_thousand_ticks_stay_within_the_drives(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     text = PAGE.read_text()
-    assert len(text.splitlines()) <= 100
+    assert len(text.splitlines()) <= 100, "the page is read in a sitting"
     blocks = re.findall(r"^```python[^\n]*\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
     answers: list[Any] = []
     plain = Allocator.allocate

@@ -6,6 +6,7 @@ import runpy
 import shutil
 import time
 from collections.abc import Iterator
+from itertools import chain
 from operator import attrgetter
 from pathlib import Path
 from typing import Any
@@ -15,12 +16,14 @@ import pytest
 from nbclient import NotebookClient
 from nbformat.v4 import new_code_cell
 
-from tests.exhaustive import sampled
+from tests.sampled_cases import sampled
 
 EXAMPLES = sorted((Path(__file__).resolve().parents[2] / "examples").glob("[0-9]*.py"))
+"""Files of the examples, by their numbers."""
 NOTEBOOKS = [path for path in EXAMPLES if "# %%" in path.read_text()]
 """`make docs` runs all of them."""
 stem = attrgetter("stem")
+"""Name of a test's case: that of the file without its ending."""
 PATIENCE_S = 20.0
 """What a notebook may take."""
 
@@ -50,7 +53,7 @@ def test_notebook_runs(path: Path, kernel: NotebookClient, tmp_path: Path) -> No
     for number, cell in enumerate(notebook.cells):
         kernel.execute_cell(cell, number)
     assert time.monotonic() - started < PATIENCE_S
-    outputs = [output for cell in notebook.cells for output in cell.get("outputs", ())]
+    outputs = list(chain.from_iterable(cell.get("outputs", ()) for cell in notebook.cells))
     assert any(output.get("name") == "stdout" and output.text.strip() for output in outputs)
     assert not [output for output in outputs if output.get("name") == "stderr"]
     (*_, last) = [output for output in outputs if "data" in output]
@@ -70,7 +73,7 @@ def test_the_script_says_how_it_is_called(
 @pytest.mark.parametrize("path", EXAMPLES, ids=stem)
 def test_example_is_short_and_says_what_you_will_see(path: Path) -> None:
     text = path.read_text()
-    assert len(text.splitlines()) < 100
+    assert len(text.splitlines()) < 100, "an example is read in a sitting"
     assert text.startswith(('"""', "# %% [markdown]\n# # ")) and "You will see" in text.replace(
         "\n#", ""
     )

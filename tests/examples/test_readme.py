@@ -7,8 +7,11 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 BLOCKS = re.findall(r"```(\w*)\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
+"""Blocks of code of the README: language and text."""
 NUMBER = re.compile(r"-?\d+\.?\d*(?:e-?\d+)?")
+"""A number in printed text, which need not be the same."""
 PAGES = [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("checkpoints/**/*.md")]
+"""All pages of the tree."""
 
 
 def test_python_gives_output_of_the_printed_form(
@@ -54,11 +57,9 @@ def test_links_and_files_of_all_pages_exist() -> None:
 
 
 def test_make_targets_of_all_pages_exist() -> None:
-    targets = {
-        name
-        for page in PAGES
-        for name in re.findall(r"(?:^|`)make ([a-z-]+)", page.read_text(), re.MULTILINE)
-    }
+    targets = set[str]()
+    for page in PAGES:
+        targets.update(re.findall(r"(?:^|`)make ([a-z-]+)", page.read_text(), re.MULTILINE))
     makefile = (ROOT / "Makefile").read_text()
     gone = {"mutate", "bench", "bench-runtime"}  # which the changelog says
     assert {
@@ -71,11 +72,9 @@ def test_make_targets_of_all_pages_exist() -> None:
 def test_figures_of_pages_are_columns_of_experiments() -> None:
     from finlab.research.evaluation.experiment import load_experiment
 
-    marks = [
-        mark
-        for page in PAGES
-        for mark in re.findall(r"<!-- figures: (\w+) ?([^>]*) -->", page.read_text())
-    ]
+    marks = list[tuple[str, str]]()
+    for page in PAGES:
+        marks += re.findall(r"<!-- figures: (\w+) ?([^>]*) -->", page.read_text())
     assert marks
     for name, keys in marks:
         keys = {key for key in keys.split() if "=" not in key}

@@ -14,6 +14,7 @@ pytest.importorskip("mkdocs")
 
 @pytest.fixture
 def site(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Any:
+    """The module that runs the blocks of pages, with a cache of its own."""
     monkeypatch.syspath_prepend(str(ROOT / "tools" / "site"))
     import blocks
 

@@ -18,7 +18,9 @@ from finlab.swim.identification.swim import STEP_S, read_swim, replay
 from tests.swim.identification.swims import swim
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "10_swim_from_rosbag.py"
-SECONDS = 32.0
+"""The example under test."""
+SWIM_S = 32.0
+"""Length of the swim that is recorded [s]."""
 BEGUN = 1_790_000_000_123_456_789
 """Time of the first message [ns]."""
 
@@ -26,11 +28,12 @@ BEGUN = 1_790_000_000_123_456_789
 @pytest.fixture(scope="module")
 def swum() -> tuple[np.ndarray, np.ndarray]:
     """Commands (N, 4, 3) and measurements (N, 12)."""
-    return swim(load_layout("A"), SECONDS, 5)
+    return swim(load_layout("A"), SWIM_S, 5)
 
 
 @pytest.fixture
 def convert() -> Callable[[Path, Path], int]:
+    """The example's function from a bag to a file of a swim."""
     made: Callable[[Path, Path], int] = runpy.run_path(str(EXAMPLE))["convert"]
     return made
 
@@ -66,6 +69,7 @@ def messages(
 
 
 def _fields(message: Any) -> set[str]:
+    """Names of the fields of a message."""
     return set(message.__dataclass_fields__)
 
 

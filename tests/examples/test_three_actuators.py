@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 import finlab
-from tests.least_power import lower_bound
-from tests.mixed_robots import T200, T200_FORCE, layout_of, load
-from tests.own_plant import OwnPlant
+from tests.oracle_optima import lower_bound
+from tests.oracle_plant import OraclePlant
+from tests.random_robots import T200, T200_FORCE, layout_of, load
 
 PATH = Path(__file__).resolve().parents[2] / "examples" / "12_three_actuators.py"
+"""The example under test."""
 ROBOT = layout_of(
     "three",
     [
@@ -38,11 +39,12 @@ ROBOT = layout_of(
         | {"zero": [1.0, 0.0, 0.0], "force_n": [0.0, T200_FORCE[1]], "model": T200},
     ],
 )
+"""The three actuators of the example, as a layout file says them."""
 
 
 @pytest.mark.parametrize("seed", range(10))
 def test_least_watts_of_three_actuators(seed: int) -> None:
-    plant = OwnPlant(ROBOT)
+    plant = OraclePlant(ROBOT)
     rng = np.random.default_rng(seed)
     wrench = plant.wrench(plant.draw(rng, float(rng.uniform(0.2, 1.0))))
     force, watts, bound = runpy.run_path(str(PATH))["solve"](wrench[[0, 1, 5]])

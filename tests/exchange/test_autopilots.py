@@ -1,6 +1,7 @@
 """Layouts from and to the parameters of PX4, the factors of ArduSub, and allocation matrices."""
 
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -13,13 +14,20 @@ from finlab.errors import LayoutError
 from finlab.exchange import Exchange, convert, read_any
 from finlab.exchange.motor_factors import FRAMES, factors_of
 from finlab.layout import Layout, Thruster, own_effectiveness, save_layout
-from tests.mixed_robots import load, random_robot
+from tests.random_robots import load, random_robot
 
-D = np.sqrt(0.5)
-DIRECTIONS = [(-D, -D, 0), (-D, D, 0), (D, -D, 0), (D, D, 0), *[(0, 0, -1)] * 4]
+DIAGONAL = np.sqrt(0.5)
+"""Part of a unit vector along each of two axes, between which it lies."""
+DIRECTIONS = [
+    (-DIAGONAL, -DIAGONAL, 0),
+    (-DIAGONAL, DIAGONAL, 0),
+    (DIAGONAL, -DIAGONAL, 0),
+    (DIAGONAL, DIAGONAL, 0),
+    *[(0, 0, -1)] * 4,
+]
 """Force of each thruster of a BlueROV2 Heavy for a positive output of ArduSub, x forward, y left, z
 up."""
-SCRIPT = """#!/bin/sh
+AIRFRAME_SCRIPT = """#!/bin/sh
 # @name Some robot, with motors in x forward, y right, z down
 . ${R}etc/init.d/rc.uuv_defaults
 param set-default CA_AIRFRAME 7
@@ -37,9 +45,11 @@ param set CA_ROTOR1_AZ 1.0
 param set CA_ROTOR1_PY -.5
 param set-default CA_ROTOR2_KM -0.02
 """
+"""A start script of PX4, with parameters and with lines that are none."""
 
 
 def thrusters(number: int) -> Layout:
+    """A random robot of thrusters."""
     return load(random_robot("thrusters", number, 7))
 
 
@@ -60,18 +70,18 @@ def wrenches(layout: Layout) -> Array:
 
 def test_px4_rotors_push_and_turn_as_its_formula_says(tmp_path: Path) -> None:
     path = tmp_path / "60999_some_robot"
-    path.write_text(SCRIPT)
+    path.write_text(AIRFRAME_SCRIPT)
     layout = read_any(str(path), Exchange())
     first, second, third = layout.actuators
     assert isinstance(third, Thruster)
     np.testing.assert_allclose(
-        (first.position, first.frame[0]), [(0.5, -0.3, -0.2), (D, D, 0)], atol=1e-15
+        (first.position, first.frame[0]), [(0.5, -0.3, -0.2), (DIAGONAL, DIAGONAL, 0)], atol=1e-15
     )
     np.testing.assert_allclose([part.lower[0] for part in layout.actuators], [-40.0, -6.5, 0.0])
     np.testing.assert_allclose([part.upper[0] for part in layout.actuators], [40.0, 6.5, 6.5])
     # CT (p x a - KM a) in x forward, y right, z down; the usual axis is -z, the usual KM 0.05.
     for part, place, axis, km in (
-        (first, (0.5, 0.3, 0.2), (D, -D, 0.0), 0.0),
+        (first, (0.5, 0.3, 0.2), (DIAGONAL, -DIAGONAL, 0.0), 0.0),
         (second, (0.0, -0.5, 0.0), (0.0, 0.0, 1.0), 0.05),
         (third, (0.0, 0.0, 0.0), (0.0, 0.0, -1.0), -0.02),
     ):
@@ -190,7 +200,7 @@ def test_a_published_matrix_of_the_bluerov2(tmp_path: Path) -> None:
     layout = read_any(str(tmp_path / "tam.csv"), Exchange())
     np.testing.assert_allclose(wrenches(layout), matrix, atol=1e-15)
     np.testing.assert_allclose(np.linalg.norm(layout.position[:4], axis=1), 0.1888)
-    places = [[x, y, 0.0] for x in (0.12, -0.12) for y in (-0.21805, 0.21805)]
+    places = list(product((0.12, -0.12), (-0.21805, 0.21805), (0.0,)))
     np.testing.assert_allclose(layout.position[4:], places, atol=1e-15)
     assert (layout.lower[0, 0], layout.upper[0, 0]) == (-39.91, 51.44)
     convert(str(tmp_path / "tam.csv"), tmp_path / "rov.cpp", None, Exchange())

@@ -10,15 +10,17 @@ from finlab.cli import main
 from finlab.deploy.command import main as runtime
 from tests.terminal import refused
 
-HEAVY = str(Path(__file__).parent / "bluerov2_heavy.urdf")
+HEAVY_URDF = str(Path(__file__).parent / "bluerov2_heavy.urdf")
+"""Description of a BlueROV2 Heavy."""
 WRENCH = [20.0, 0.0, 10.0, 0.0, 0.0, 2.0]
+"""A wrench within its reach [N, N m]."""
 
 
 def test_from_a_description_to_the_robot(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert main(["layout", "convert", HEAVY, "rov.yaml"]) == 0
+    assert main(["layout", "convert", HEAVY_URDF, "rov.yaml"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "rov.yaml: bluerov2_heavy with 8 thrusters"
     assert (
@@ -39,9 +41,9 @@ def test_from_a_description_to_the_robot(
 
 
 def test_the_form_of_the_output_must_be_clear(tmp_path: Path) -> None:
-    error = refused(["layout", "convert", HEAVY, str(tmp_path / "60999_rov")])
+    error = refused(["layout", "convert", HEAVY_URDF, str(tmp_path / "60999_rov")])
     assert "its end says no form; say --to layout, urdf, sdf, px4, ardusub, matrix" in error
-    assert main(["layout", "convert", HEAVY, str(tmp_path / "60999_rov"), "--to", "px4"]) == 0
+    assert main(["layout", "convert", HEAVY_URDF, str(tmp_path / "60999_rov"), "--to", "px4"]) == 0
     error = refused(["layout", "convert", "nowhere.urdf", str(tmp_path / "x.yaml")])
     assert "'nowhere.urdf' is neither a file nor a shipped layout" in error
     assert "param set-default CA_ROTOR_COUNT 8" in (tmp_path / "60999_rov").read_text()

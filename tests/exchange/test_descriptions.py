@@ -12,16 +12,21 @@ import finlab
 from finlab.errors import LayoutError
 from finlab.exchange import Exchange, convert, read_any
 from finlab.layout import Azimuth, Body, Layout, Thruster, own_effectiveness
-from tests.any_robot import FIN_ROBOTS
-from tests.mixed_robots import load, random_robot
+from tests.allocator_cache import FIN_ROBOTS
+from tests.random_robots import load, random_robot
 
 HERE = Path(__file__).parent
-TURTLE = HERE / "turtle.urdf"
-HEAVY = HERE / "bluerov2_heavy.urdf"
-FINS = ("front_right_fin", "front_left_fin", "tail_fin")
+"""Folder of the descriptions."""
+TURTLE_URDF = HERE / "turtle.urdf"
+"""A robot of three fins and a rudder."""
+HEAVY_URDF = HERE / "bluerov2_heavy.urdf"
+"""A BlueROV2 Heavy, eight thrusters."""
+TURTLE_FINS = ("front_right_fin", "front_left_fin", "tail_fin")
+"""Names of the turtle's links that are fins."""
 
 
 def read(path: Path, **unsaid: Any) -> Layout:
+    """The layout of a description; `unsaid` is what the description does not say."""
     return read_any(str(path), Exchange(**unsaid))
 
 
@@ -32,6 +37,7 @@ def written(layout: Layout, path: Path, **unsaid: Any) -> Layout:
 
 
 def convert_layout(layout: Layout, path: Path) -> list[str]:
+    """Write a layout as a description; what could not be written is returned."""
     finlab.layout.save_layout(layout, path.with_name("before.yaml"))
     exchange = Exchange()
     convert(str(path.with_name("before.yaml")), path, None, exchange)
@@ -39,7 +45,7 @@ def convert_layout(layout: Layout, path: Path) -> list[str]:
 
 
 def test_a_bluerov2_comes_out_as_shipped() -> None:
-    layout = read(HEAVY)
+    layout = read(HEAVY_URDF)
     shipped = finlab.load_layout("bluerov2_heavy")
     assert layout.names == tuple(f"thruster{i}" for i in range(1, 9))
     np.testing.assert_allclose(
@@ -57,7 +63,7 @@ def test_a_bluerov2_comes_out_as_shipped() -> None:
 def test_golden_forces_of_a_bluerov2() -> None:
     """Pseudo-inverse of places that were taken from the robot's public description, by other
     means."""
-    inverse = np.linalg.pinv(own_effectiveness(read(HEAVY))[:, 0].T)
+    inverse = np.linalg.pinv(own_effectiveness(read(HEAVY_URDF))[:, 0].T)
     for wrench, forces in (
         ((20, 0, 0, 0, 0, 0), (-7.0711, -7.0711, 7.0711, 7.0711, 0.4661, 0.4661, -0.4661, -0.4661)),
         ((0, 20, 0, 0, 0, 0), (-7.2202, 7.2202, -6.9219, 6.9219, -0.2558, 0.2558, -0.2558, 0.2558)),
@@ -70,7 +76,7 @@ def test_golden_forces_of_a_bluerov2() -> None:
         np.testing.assert_allclose(inverse @ wrench, forces, atol=2e-4)
 
 
-SDF = """<sdf version="1.9"><world name="sea"><model name="rov"><pose>9 9 9 0 0 1</pose>
+SDF_ROBOT = """<sdf version="1.9"><world name="sea"><model name="rov"><pose>9 9 9 0 0 1</pose>
   <link name="hull"><inertial><pose>0.1 0 0 0 0 0</pose><mass>10</mass>
     <inertia><ixx>1</ixx><iyy>2</iyy><izz>3</izz></inertia><fluid_added_mass><xx>4</xx><rr>0.5</rr></fluid_added_mass></inertial></link>
   <frame name="stern" attached_to="hull"><pose degrees="true">-0.5 0 0 0 0 180</pose></frame>
@@ -87,11 +93,12 @@ SDF = """<sdf version="1.9"><world name="sea"><model name="rov"><pose>9 9 9 0 0 
   <plugin filename="ignition-gazebo-thruster-system" name="ignition::gazebo::systems::Thruster">
     <joint_name>b_joint</joint_name></plugin>
 </model></world></sdf>"""
+"""A robot in SDF with poses of frames, a hull and added mass."""
 
 
 def test_frames_of_sdf(tmp_path: Path) -> None:
     path = tmp_path / "model.sdf"
-    path.write_text(SDF)
+    path.write_text(SDF_ROBOT)
     exchange = Exchange()
     layout = read_any(str(path), exchange)
     a, b = layout.actuators
@@ -116,7 +123,7 @@ def test_frames_of_sdf(tmp_path: Path) -> None:
 
 def test_an_axis_may_be_expressed_in_any_frame(tmp_path: Path) -> None:
     path = tmp_path / "model.sdf"
-    turned = SDF.replace(
+    turned = SDF_ROBOT.replace(
         '<pose rotation_format="quat_xyzw">0 0 0.3 0 1 0 1', '<pose degrees="true">0 0 0.3 0 0 90'
     )
     for frame, axis in (
@@ -127,7 +134,7 @@ def test_an_axis_may_be_expressed_in_any_frame(tmp_path: Path) -> None:
     ):
         path.write_text(turned.replace('expressed_in="__model__"', f'expressed_in="{frame}"'))
         np.testing.assert_allclose(read(path).actuators[1].frame[0], axis, atol=1e-12)
-    path.write_text(SDF.replace("__model__", "nowhere"))
+    path.write_text(SDF_ROBOT.replace("__model__", "nowhere"))
     with pytest.raises(
         LayoutError, match="no frame 'nowhere', in which the axis of joint 'b_joint'"
     ):
@@ -207,7 +214,7 @@ def test_an_azimuth_that_turns_about_a_line_beside_its_thrust(tmp_path: Path) ->
 
 
 def test_rotated_links_and_axes_of_fins_come_out_in_the_body_frame() -> None:
-    layout = read(TURTLE, fins=(*FINS, "rudder"), origin="base")
+    layout = read(TURTLE_URDF, fins=(*TURTLE_FINS, "rudder"), origin="base")
     right, left, tail, upright = layout.fins
     c = math.cos(math.pi / 3)
     s = math.sin(math.pi / 3)
@@ -222,8 +229,8 @@ def test_rotated_links_and_axes_of_fins_come_out_in_the_body_frame() -> None:
 
 
 def test_origin_moves_to_the_centre_of_gravity() -> None:
-    base = read(TURTLE, fins=FINS, origin="base")
-    gravity = read(TURTLE, fins=FINS)
+    base = read(TURTLE_URDF, fins=TURTLE_FINS, origin="base")
+    gravity = read(TURTLE_URDF, fins=TURTLE_FINS)
     for a, b in zip(base.fins, gravity.fins, strict=True):
         np.testing.assert_allclose(
             np.subtract(a.position, b.position), [0.02, 0.0, -0.01], atol=1e-12
@@ -234,7 +241,7 @@ def test_origin_moves_to_the_centre_of_gravity() -> None:
 
 
 def test_links_may_be_named_as_thrusters() -> None:
-    layout = read(TURTLE, thrusters=["tail_fin", "mount"], force=(-5.0, 5.0))
+    layout = read(TURTLE_URDF, thrusters=["tail_fin", "mount"], force=(-5.0, 5.0))
     tail, mount = layout.actuators
     assert isinstance(tail, Thruster) and isinstance(mount, Thruster) and tail.force == (-5.0, 5.0)
     np.testing.assert_allclose(tail.axis, [-1.0, 0.0, 0.0], atol=1e-12)
@@ -256,6 +263,7 @@ def test_robots_of_fins_survive_the_way_there_and_back(
 
 
 PLUGIN = '<gazebo><plugin name="gz::sim::systems::Thruster"><joint_name>x</joint_name></plugin></gazebo></robot>'
+"""A plugin of a thruster whose joint is not there."""
 
 
 @pytest.mark.parametrize(
@@ -266,14 +274,14 @@ PLUGIN = '<gazebo><plugin name="gz::sim::systems::Thruster"><joint_name>x</joint
         ('<robot><link name="${prefix}a"/></robot>', (), "names .prefix., which is not defined"),
         ("<robot>", ("x",), "is not readable XML"),
         ("<svg/>", (), "expected a <robot> of URDF or a <model> of SDF, got <svg>"),
-        (TURTLE.read_text(), ("nobody",), "has no link 'nobody' that a joint moves; such links: front"),
-        (TURTLE.read_text(), ("mount",), "joint 'mount_joint' is fixed; a fin's joint is revolute or"),
-        (TURTLE.read_text(), (), "has no thruster's plugin of gz-sim or uuv; name the links that are fins"),
-        (TURTLE.read_text().replace('mass value="10"', 'mass value="0"'), FINS, "has no masses"),
-        (TURTLE.read_text().replace('xyz="0.2 ', 'xyz="20e3 '), FINS, r"position\[0\] of fin .*: must lie"),
-        (TURTLE.read_text().replace('xyz="0.2 ', 'xyz="west '), FINS, "pose of joint .* is not 6 numbers"),
-        (TURTLE.read_text().replace("</robot>", PLUGIN), (), "joint 'x', which moves no link in it"),
-        (TURTLE.read_text().replace('"base_link"/><child', '"tail_fin"/><child'), FINS, "itself in a circle"),
+        (TURTLE_URDF.read_text(), ("nobody",), "has no link 'nobody' that a joint moves; such links: front"),
+        (TURTLE_URDF.read_text(), ("mount",), "joint 'mount_joint' is fixed; a fin's joint is revolute or"),
+        (TURTLE_URDF.read_text(), (), "has no thruster's plugin of gz-sim or uuv; name the links that are fins"),
+        (TURTLE_URDF.read_text().replace('mass value="10"', 'mass value="0"'), TURTLE_FINS, "has no masses"),
+        (TURTLE_URDF.read_text().replace('xyz="0.2 ', 'xyz="20e3 '), TURTLE_FINS, r"position\[0\] of fin .*: must lie"),
+        (TURTLE_URDF.read_text().replace('xyz="0.2 ', 'xyz="west '), TURTLE_FINS, "pose of joint .* is not 6 numbers"),
+        (TURTLE_URDF.read_text().replace("</robot>", PLUGIN), (), "joint 'x', which moves no link in it"),
+        (TURTLE_URDF.read_text().replace('"base_link"/><child', '"tail_fin"/><child'), TURTLE_FINS, "itself in a circle"),
     ],
 )  # fmt: skip
 def test_refusals_say_what_is_wrong(

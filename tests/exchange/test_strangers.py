@@ -16,21 +16,26 @@ SCREW = (
     '</link><link name="screw"><pose>-0.4 0 0 0 0 0</pose></link><joint name="sj" type="revolute"><parent>hull</parent>'
     "<child>screw</child><axis><xyz>1 0 0</xyz></axis></joint>"
 )
+"""A hull and a propeller that turns, in SDF."""
 THRUSTER = '<plugin filename="gz-sim-thruster-system" name="gz::sim::systems::Thruster"><joint_name>sj</joint_name></plugin>'
+"""The plugin that makes a thruster of this propeller."""
 COLUMNS = np.array([[1, 0, 0, 0, 0, 0.3], [1, 0, 0, 0, 0, -0.3], [0, 0, 1, 0.1, -0.2, 0]])
 """Wrenches per newton of a robot's port, starboard and lift, x forward, y left, z up."""
 
 
 def read(file: str, text: str, **said: object) -> tuple[Layout, str]:
+    """The layout of a text under a file name, and the notes about what was not said."""
     exchange = Exchange(**said)  # type: ignore[arg-type]
     return read_robot(text, file, exchange), " ".join(exchange.notes)
 
 
-def columns(layout: Layout) -> np.ndarray:
+def effectiveness_of(layout: Layout) -> np.ndarray:
+    """Effectiveness (n, 6) of each actuator along its first axis."""
     return own_effectiveness(layout)[:, 0]
 
 
 def sdf(inside: str, version: str = "1.9") -> str:
+    """A robot in SDF."""
     return f'<sdf version="{version}"><model name="rov">{inside}</model></sdf>'
 
 
@@ -54,7 +59,7 @@ def sdf(inside: str, version: str = "1.9") -> str:
 )  # fmt: skip
 def test_matrices_of_every_shape(file: str, text: str, read_as: str) -> None:
     layout, notes = read(file, text)
-    np.testing.assert_allclose(columns(layout), COLUMNS, atol=1e-12)
+    np.testing.assert_allclose(effectiveness_of(layout), COLUMNS, atol=1e-12)
     assert read_as in notes
 
 
@@ -120,18 +125,18 @@ def test_rows_and_frames_may_be_said() -> None:
     for rows, expected in (("axes", matrix.T), ("thrusters", matrix)):
         layout, _ = read("a.csv", text, rows=rows, force=(-1.0, 1.0))
         size = np.linalg.norm(expected[:, :3], axis=1, keepdims=True)
-        np.testing.assert_allclose(columns(layout), expected / size, atol=1e-12)
+        np.testing.assert_allclose(effectiveness_of(layout), expected / size, atol=1e-12)
     layout, notes = read(
         "a.yaml", "frame: FLU\ntam: {fx: [1], fy: [0], fz: [0], tz: [1]}", frame="FRD"
     )
-    assert columns(layout)[0, 5] == -1.0 and "--frame FRD was taken" in notes
+    assert effectiveness_of(layout)[0, 5] == -1.0 and "--frame FRD was taken" in notes
 
 
 def test_a_boat_commands_the_axes_of_its_rows() -> None:
     layout, notes = read("a.csv", "axis,l,r\nFx,1,1\nTz,-0.4,0.4\n")
     assert layout.axes == ("Fx", "Tz") and "no row Fy, Fz, Tx, Ty" in notes
     np.testing.assert_allclose(
-        columns(layout), [[1, 0, 0, 0, 0, -0.4], [1, 0, 0, 0, 0, 0.4]], atol=1e-12
+        effectiveness_of(layout), [[1, 0, 0, 0, 0, -0.4], [1, 0, 0, 0, 0, 0.4]], atol=1e-12
     )
 
 
@@ -191,8 +196,8 @@ def test_motors_of_programs_and_lists_are_the_same() -> None:
     two, _ = read("a.lua", lua)
     three, _ = read("a.csv", csv)
     assert one.names == two.names == three.names == ("motor1", "motor2", "motor3", "motor4")
-    np.testing.assert_allclose(columns(one), columns(two), atol=1e-12)
-    np.testing.assert_allclose(columns(one), columns(three), atol=1e-12)
+    np.testing.assert_allclose(effectiveness_of(one), effectiveness_of(two), atol=1e-12)
+    np.testing.assert_allclose(effectiveness_of(one), effectiveness_of(three), atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -251,6 +256,7 @@ def test_axes_in_the_frame_of_the_model(version: str, told: str, axis: tuple[flo
 
 
 WATER = '<plugin filename="gz-sim-hydrodynamics-system" name="gz::sim::systems::Hydrodynamics">{}</plugin>'
+"""The plugin of a body in water, in which a test writes its coefficients."""
 
 
 def test_derivatives_that_are_not_said_stay_unknown() -> None:

@@ -27,6 +27,7 @@ HULL = (
     '<link name="hull"><inertial><mass value="12"/>'
     '<inertia ixx="0.2" iyy="0.3" izz="0.3" ixy="0" ixz="0" iyz="0"/></inertial></link>'
 )
+"""A link with a mass and an inertia."""
 
 
 def screw(name: str, place: str) -> str:
@@ -45,7 +46,8 @@ def robot(*parts: str) -> str:
     return f"{start}{HULL}{''.join(parts)}</robot>"
 
 
-def written(folder: Path, text: str, name: str = "a.urdf") -> str:
+def write(folder: Path, text: str, name: str = "a.urdf") -> str:
+    """Write a description, and return its path."""
     path = folder / name
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text)
@@ -73,12 +75,13 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     assert not list(tmp_path.rglob(MARK))
 
 
-WALK = "().__class__.__base__.__subclasses__()"
-HOSTILE = [
-    f"(lambda: [c for c in {WALK} if c.__name__ == '_wrap_close'][0]"
+ALL_CLASSES = "().__class__.__base__.__subclasses__()"
+"""An expression that reaches all classes of Python, by which sandboxes are left."""
+HOSTILE_EXPRESSIONS = [
+    f"(lambda: [c for c in {ALL_CLASSES} if c.__name__ == '_wrap_close'][0]"
     f".__init__.__globals__['system']('touch {MARK}'))() or 10",
     f"__import__('os').system('touch {MARK}')",
-    WALK,
+    ALL_CLASSES,
     "''.__class__",
     "pi.__class__.__mro__[1]",
     "(1).real",
@@ -146,18 +149,21 @@ HOSTILE = [
     "-" * 1999 + "1",
     "1+" * 1200 + "1",
 ]
+"""Expressions that leave what xacro may evaluate; some would create the file `MARK`."""
 
 
-@pytest.mark.parametrize("expression", HOSTILE)
+@pytest.mark.parametrize("expression", HOSTILE_EXPRESSIONS)
 def test_a_hostile_expression_is_a_sentence(folder: Path, expression: str) -> None:
     part = f"<link name={quoteattr('a${' + expression + '}')}/>"
-    sentence = sentence_of(written(folder, robot(screw("s", "-1 0 0"), part)))
+    sentence = sentence_of(write(folder, robot(screw("s", "-1 0 0"), part)))
     assert "${" in sentence
 
 
-CODE = f"${{(lambda: [c for c in {WALK}][0])()}}"
+CODE = f"${{(lambda: [c for c in {ALL_CLASSES}][0])()}}"
+"""One of them, as xacro writes an expression."""
 EVAL = "$(eval [].__class__)"
-PLACES = {
+"""The same in the older form of `$(eval ...)`."""
+DESCRIPTIONS_WITH_CODE = {
     "text": "<gazebo><a>CODE</a></gazebo>",
     "property": '<xacro:property name="p" value="CODE"/><link name="a${p}"/>',
     "property of a property": '<xacro:property name="p" value="CODE"/><xacro:property name="q" '
@@ -186,24 +192,25 @@ PLACES = {
     "eval in an expression": f"<link name=\"${{'{EVAL}'}}\"/>",
     "eval that calls": "<link name=\"$(eval env('HOME')\"/>",
 }
+"""Where in a description an expression may stand -> that description."""
 
 
-@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.parametrize("place", DESCRIPTIONS_WITH_CODE)
 def test_expressions_are_judged_wherever_they_stand(folder: Path, place: str) -> None:
-    text = PLACES[place].replace("CODE", CODE)
-    sentence = sentence_of(written(folder, robot(screw("s", "-1 0 0"), text)))
+    text = DESCRIPTIONS_WITH_CODE[place].replace("CODE", CODE)
+    sentence = sentence_of(write(folder, robot(screw("s", "-1 0 0"), text)))
     assert "expected" in sentence
 
 
 def test_an_expression_that_is_escaped_stays_text(folder: Path) -> None:
     text = f'<xacro:property name="p" value="${CODE}"/><link name="a${{p}}"/>'
-    assert read_any(written(folder, robot(screw("s", "-1 0 0"), text)), Exchange()).n == 1
+    assert read_any(write(folder, robot(screw("s", "-1 0 0"), text)), Exchange()).n == 1
 
 
 def test_an_expression_in_an_included_file_is_judged_there(folder: Path) -> None:
-    written(folder, f'<robot><link name="{CODE}"/></robot>', "parts/b.xacro")
+    write(folder, f'<robot><link name="{CODE}"/></robot>', "parts/b.xacro")
     text = robot('<xacro:include filename="parts/b.xacro"/>')
-    assert "in b.xacro: ${" in sentence_of(written(folder, text))
+    assert "in b.xacro: ${" in sentence_of(write(folder, text))
 
 
 @pytest.mark.parametrize(
@@ -245,30 +252,37 @@ def test_no_file_elsewhere_and_no_environment(folder: Path, part: str, said: str
     (folder / "entity.xacro").write_text("<!DOCTYPE a [<!ENTITY b 'c'>]><robot>&b;</robot>")
     os.mkfifo(folder / "pipe.xacro")
     part = part.replace("OUTSIDE", str(folder.parent))
-    file = written(folder, robot(screw("s", "-1 0 0"), part))
+    file = write(folder, robot(screw("s", "-1 0 0"), part))
     with pytest.raises(LayoutError, match=said):
         read_any(file, Exchange())
     sentence_of(file)
 
 
-MANY = '<link name="${1}"/>' * 2000
-TWICE = '<xacro:macro name="mNEXT" params=""><xacro:mTHIS/><xacro:mTHIS/></xacro:macro>'
-DOUBLED = "".join(TWICE.replace("NEXT", str(i + 1)).replace("THIS", str(i)) for i in range(40))
-LONGER = '<xacro:property name="pNEXT" value="${pTHIS}${pTHIS}"/>'
-LONG_PROPERTIES = "".join(
-    LONGER.replace("NEXT", str(i + 1)).replace("THIS", str(i)) for i in range(60)
+MANY_LINKS = '<link name="${1}"/>' * 2000
+"""Two thousand links."""
+DOUBLING_MACRO = '<xacro:macro name="mNEXT" params=""><xacro:mTHIS/><xacro:mTHIS/></xacro:macro>'
+"""A macro that expands another one twice."""
+DOUBLING_MACROS = "".join(
+    DOUBLING_MACRO.replace("NEXT", str(i + 1)).replace("THIS", str(i)) for i in range(40)
 )
+"""Forty of these: a description of 2^40 links."""
+DOUBLING_PROPERTY = '<xacro:property name="pNEXT" value="${pTHIS}${pTHIS}"/>'
+"""A property that holds another one twice."""
+DOUBLING_PROPERTIES = "".join(
+    DOUBLING_PROPERTY.replace("NEXT", str(i + 1)).replace("THIS", str(i)) for i in range(60)
+)
+"""Sixty of these: a text of 2^60 times its length."""
 
 
 @pytest.mark.parametrize(
     "part",
     [
         '<xacro:macro name="m" params=""><link name="${1}"/><xacro:m/></xacro:macro><xacro:m/>',
-        f'<xacro:macro name="m" params="">{MANY}<xacro:m/></xacro:macro><xacro:m/>',
-        f'{DOUBLED}<xacro:macro name="m0" params=""><link name="a"/></xacro:macro><xacro:m40/>',
-        f'<xacro:property name="p"><g>{MANY}<xacro:insert_block name="p"/>'
+        f'<xacro:macro name="m" params="">{MANY_LINKS}<xacro:m/></xacro:macro><xacro:m/>',
+        f'{DOUBLING_MACROS}<xacro:macro name="m0" params=""><link name="a"/></xacro:macro><xacro:m40/>',
+        f'<xacro:property name="p"><g>{MANY_LINKS}<xacro:insert_block name="p"/>'
         '<xacro:insert_block name="p"/></g></xacro:property><xacro:insert_block name="p"/>',
-        f'{LONG_PROPERTIES}<xacro:property name="p0" value="a b"/><link name="${{p60}}"/>',
+        f'{DOUBLING_PROPERTIES}<xacro:property name="p0" value="a b"/><link name="${{p60}}"/>',
         '<xacro:property name="p" value="${q}"/><xacro:property name="q" value="${p}"/><link name="${p}"/>',
         '<xacro:macro name="m" params="n"><link name="l${n}"/><xacro:if value="${n > 0}">'
         '<xacro:m n="${n - 1}"/></xacro:if></xacro:macro>' + '<xacro:m n="80"/>' * 200,
@@ -277,12 +291,12 @@ LONG_PROPERTIES = "".join(
         '<xacro:property name="' + "-" * 900_000 + '" value="1"/>',
         "<!--a-->" * 100_000 + '<xacro:property name="p" value="${1}"/>',
         "<?a?>" * 100_000 + '<xacro:property name="p" value="${1}"/>',
-        '<link name="${' + "sum(" + "+".join(["[1] * 9"] * 100) + ')}"/>' + MANY * 8,
+        '<link name="${' + "sum(" + "+".join(["[1] * 9"] * 100) + ')}"/>' + MANY_LINKS * 8,
     ],
     ids=range(13),
 )
 def test_what_grows_without_end_ends_soon(folder: Path, part: str) -> None:
-    file = written(folder, robot(screw("s", "-1 0 0"), part))
+    file = write(folder, robot(screw("s", "-1 0 0"), part))
     start = time.thread_time()
     with pytest.raises(LayoutError):
         read_any(file, Exchange())
@@ -295,7 +309,7 @@ def test_what_grows_without_end_ends_soon(folder: Path, part: str) -> None:
 def test_a_macro_with_a_quote_without_end_is_read_in_linear_time(folder: Path) -> None:
     macro = '<xacro:macro name="m" params="p:=' + "x" * 5000 + "'\"/>"
     start = time.thread_time()
-    assert read_any(written(folder, robot(screw("s", "${-1} 0 0"), macro)), Exchange()).n == 1
+    assert read_any(write(folder, robot(screw("s", "${-1} 0 0"), macro)), Exchange()).n == 1
     assert time.thread_time() - start < 1.0
 
 
@@ -309,7 +323,7 @@ def both(file: str) -> Layout:
     return layout
 
 
-ORDINARY = {
+ORDINARY_DESCRIPTIONS = {
     "property": (
         '<xacro:property name="half" value="0.3"/>'
         + screw("l", "-0.5 ${half} 0")
@@ -368,17 +382,18 @@ ORDINARY = {
         [(-0.7, 0, 0)],
     ),
 }  # fmt: skip
+"""Feature of xacro -> a description that uses it, and where its thrusters are."""
 
 
-@pytest.mark.parametrize("kind", ORDINARY)
+@pytest.mark.parametrize("kind", ORDINARY_DESCRIPTIONS)
 def test_ordinary_descriptions_work(folder: Path, kind: str) -> None:
-    text, places = ORDINARY[kind]
+    text, places = ORDINARY_DESCRIPTIONS[kind]
     inside = '<xacro:include filename="../parts/macro.xacro"/>'
     place = '<xacro:property name="place" value="-0.7"/>'
-    written(folder, f'<robot xmlns:xacro="x">{place}{inside}</robot>', "parts/screws.xacro")
+    write(folder, f'<robot xmlns:xacro="x">{place}{inside}</robot>', "parts/screws.xacro")
     macro = f'<xacro:macro name="screw" params="x">{screw("s", "${x} 0 0")}</xacro:macro>'
-    written(folder, f'<robot xmlns:xacro="x">{macro}</robot>', "parts/macro.xacro")
-    layout = both(written(folder, robot(text), "a.urdf.xacro"))
+    write(folder, f'<robot xmlns:xacro="x">{macro}</robot>', "parts/macro.xacro")
+    layout = both(write(folder, robot(text), "a.urdf.xacro"))
     assert layout.body is not None and layout.body.mass_kg == 12
     np.testing.assert_allclose([part.position for part in layout.actuators], places, atol=1e-9)
 
@@ -391,7 +406,7 @@ def test_a_description_without_a_path_is_not_expanded() -> None:
 def test_it_changes_nothing_for_others_who_use_xacro(folder: Path) -> None:
     import xacro
 
-    file = written(folder, robot(screw("s", "${-1} 0 0")))
+    file = write(folder, robot(screw("s", "${-1} 0 0")))
     evaluate = xacro.safe_eval
     symbols = dict(xacro._global_symbols)
     read_any(file, Exchange())
@@ -404,7 +419,7 @@ def test_another_xacro_is_not_trusted(folder: Path, monkeypatch: pytest.MonkeyPa
     (other / "xacro.py").write_text("def process_doc(document): pass")
     monkeypatch.syspath_prepend(str(other))
     monkeypatch.delitem(sys.modules, "xacro", raising=False)
-    file = written(folder, robot(screw("s", "${-1} 0 0")))
+    file = write(folder, robot(screw("s", "${-1} 0 0")))
     with pytest.raises(LayoutError, match=r"has no safe_eval: pip install xacro==2\.1\.1"):
         read_any(file, Exchange())
 

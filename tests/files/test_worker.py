@@ -27,15 +27,18 @@ def _started(request: pytest.FixtureRequest) -> Iterator[None]:
 
 
 def refuse(kind: type[FinlabError]) -> None:
+    """Raise an error of some kind, as a reader would."""
     raise kind("a.yaml: is wrong")
 
 
 def spin() -> None:
+    """Never end."""
     while True:
         pass
 
 
 def fill() -> int:
+    """Take 3 GB of memory."""
     return len([bytearray(1_000_000) for _ in range(3_000)])
 
 
@@ -84,7 +87,7 @@ def test_time_is_bounded() -> None:
 def test_memory_is_bounded() -> None:
     with pytest.raises(FinlabError, match="too much memory, over 150 MB"):
         in_worker(fill)
-    assert 100 < in_worker(grown) < 150 + 110, "and what was free before"
+    assert 100 < in_worker(grown) < 150 + 110, "MB, and what was free before"
 
 
 def test_limits_grow_with_the_file() -> None:
@@ -95,6 +98,7 @@ def test_limits_grow_with_the_file() -> None:
 
 
 def fill_with(content: bytes) -> int:
+    """Take 300 MB of memory."""
     return len([bytearray(1_000_000) for _ in range(300)])
 
 
@@ -107,7 +111,7 @@ def test_a_reader_that_only_waits_is_ended(monkeypatch: pytest.MonkeyPatch) -> N
 def test_a_process_ends_with_the_one_that_started_it(tmp_path: Path) -> None:
     """However that ended, and whatever it does meanwhile."""
     script = tmp_path / "parent.py"
-    script.write_text(PARENT)
+    script.write_text(PARENT_PROGRAM)
     parent = subprocess.Popen([sys.executable, str(script)], stdout=subprocess.PIPE, text=True)
     assert parent.stdout is not None
     workers = [int(number) for number in parent.stdout.readline().split()]
@@ -120,7 +124,7 @@ def test_a_process_ends_with_the_one_that_started_it(tmp_path: Path) -> None:
         time.sleep(0.05)
 
 
-PARENT = """
+PARENT_PROGRAM = """
 import multiprocessing, time
 from finlab.files.worker import end_with_parent
 
@@ -130,6 +134,7 @@ if __name__ == "__main__":
         print(*[process.pid for process in pool._pool], flush=True)
         busy.wait()
 """
+"""A program that starts a worker and is killed."""
 
 
 def runs(number: int) -> bool:

@@ -17,24 +17,30 @@ from finlab.fit.thruster_bench import read_bench
 from finlab.fit.thruster_fit import ThrusterFit, fit_thruster
 
 PWM = np.arange(1100.0, 1901.0, 50.0)
+"""Widths of pulse at which a thruster was measured [us]."""
 N_PER_KGF = 9.80665
+"""Newtons in a kilogram-force."""
 N_PER_LB = 4.44822
+"""Newtons in a pound-force."""
 ENDS = (-41.0, 52.0)
 """Forces [N] at the ends of the commands, at 16 V."""
 
 
-def force(volts: float = 16.0) -> Array:
+def true_force(volts: float = 16.0) -> Array:
+    """Force (17,) [N] of the thruster at a voltage [V]."""
     x = (PWM - 1500.0) / 400.0
     return np.asarray(
         np.where(x > 0.0, ENDS[1], -ENDS[0]) * np.sign(x) * np.abs(x) ** 1.6 * volts / 16.0
     )
 
 
-def power(volts: float = 16.0) -> Array:
+def true_power(volts: float = 16.0) -> Array:
+    """Power (17,) [W] of the thruster at a voltage [V]."""
     return np.asarray(390.0 * (np.abs(PWM - 1500.0) / 400.0) ** 2.5 * (volts / 16.0) ** 2 + 1.0)
 
 
-def written(path: Path, columns: dict[str, Array]) -> Path:
+def write_csv(path: Path, columns: dict[str, Array]) -> Path:
+    """Write columns by their names into a file of CSV."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(columns)
@@ -58,7 +64,7 @@ def workbook(path: Path, volts: tuple[float, ...], column: bool) -> Path:
         sheet = book.create_sheet(f"T300 at {v:g} V")
         sheet.append(["Performance"])
         sheet.append(header[: 5 + column])
-        for p, n, w in zip(PWM, force(v), power(v), strict=True):
+        for p, n, w in zip(PWM, true_force(v), true_power(v), strict=True):
             row = [p, 8.0 * abs(p - 1500.0), w, n / N_PER_KGF, None if n == 0.0 else abs(n) / w, v]
             sheet.append(row[: 5 + column])
     book.save(path)
@@ -66,6 +72,7 @@ def workbook(path: Path, volts: tuple[float, ...], column: bool) -> Path:
 
 
 def fitted(*paths: Path, volts: float | None = None) -> ThrusterFit:
+    """A thruster that is fitted to files, at a voltage [V]."""
     return fit_thruster(read_bench(paths, volts))
 
 
@@ -109,36 +116,38 @@ def test_one_sheet_needs_no_voltage_and_what_is_no_workbook_gets_a_sentence(
 @pytest.mark.parametrize("shift", [0.0, 10.0])
 def test_voltages_of_one_table_are_apart_but_a_supply_may_sag(tmp_path: Path, shift: float) -> None:
     both = {
-        "PWM (us)": np.append(PWM, PWM + shift), "Force (N)": np.append(force(12.0), force()),
-        "Power (W)": np.append(power(12.0), power()), "Voltage (V)": np.repeat([12.0, 16.0], len(PWM)),
+        "PWM (us)": np.append(PWM, PWM + shift), "Force (N)": np.append(true_force(12.0), true_force()),
+        "Power (W)": np.append(true_power(12.0), true_power()), "Voltage (V)": np.repeat([12.0, 16.0], len(PWM)),
     }  # fmt: skip
-    path = written(tmp_path / "both.csv", both)
+    path = write_csv(tmp_path / "both.csv", both)
     with pytest.raises(DataError, match="measured at 12, 16 V"):
         fitted(path)
     np.testing.assert_allclose(fitted(path, volts=12.0).force, np.array(ENDS) * 0.75, rtol=1e-3)
-    sagging = {"PWM (us)": PWM, "Force (N)": force()}
-    sagging |= {"Voltage (V)": 16.0 - power() / 130.0, "Current (A)": power() / 15.0}
+    sagging = {"PWM (us)": PWM, "Force (N)": true_force()}
+    sagging |= {"Voltage (V)": 16.0 - true_power() / 130.0, "Current (A)": true_power() / 15.0}
     np.testing.assert_allclose(
-        fitted(written(tmp_path / "sag.csv", sagging)).force, ENDS, rtol=1e-3
+        fitted(write_csv(tmp_path / "sag.csv", sagging)).force, ENDS, rtol=1e-3
     )
 
 
 @pytest.mark.parametrize(
     ("columns", "note"),
     [
-        ({"ESC signal (\u00b5s)": PWM, "Thrust (kgf)": force() / N_PER_KGF, "Speed (Hz)": PWM}, "rpm"),
-        ({"Throttle (\u00b5s)": PWM, "Thrust (lbf)": force() / N_PER_LB, "Thrust (N)": force()}, ""),
-        ({"PWM": PWM, "Thrust (lbs)": force() / N_PER_LB}, "no unit stands at PWM: taken for us"),
-        ({"PWM (us)": PWM, "Force": force()}, "no unit stands at Force: taken for N"),
-        ({"PWM (us)": PWM, "Force (N)": np.abs(force())}, "they are sizes alone: those below the neutral"),
-        ({"ESC (us)": PWM, "Force (N)": -np.abs(force())}, "no sign, they are negative alone"),
-        ({"Throttle (%)": (PWM - 1500.0) / 4.0, "Thrust [gf]": 1e3 * force() / N_PER_KGF}, ""),
+        ({"ESC signal (\u00b5s)": PWM, "Thrust (kgf)": true_force() / N_PER_KGF, "Speed (Hz)": PWM}, "rpm"),
+        ({"Throttle (\u00b5s)": PWM, "Thrust (lbf)": true_force() / N_PER_LB, "Thrust (N)": true_force()}, ""),
+        ({"PWM": PWM, "Thrust (lbs)": true_force() / N_PER_LB}, "no unit stands at PWM: taken for us"),
+        ({"PWM (us)": PWM, "Force": true_force()}, "no unit stands at Force: taken for N"),
+        ({"PWM (us)": PWM, "Force (N)": np.abs(true_force())}, "they are sizes alone: those below the neutral"),
+        ({"ESC (us)": PWM, "Force (N)": -np.abs(true_force())}, "no sign, they are negative alone"),
+        ({"Throttle (%)": (PWM - 1500.0) / 4.0, "Thrust [gf]": 1e3 * true_force() / N_PER_KGF}, ""),
     ],
 )  # fmt: skip
 def test_headers_units_and_signs_of_others(
     tmp_path: Path, columns: dict[str, Array], note: str
 ) -> None:
-    fit = fitted(written(tmp_path / "bench.csv", columns | {"Electrical Power (W)": power()}))
+    fit = fitted(
+        write_csv(tmp_path / "bench.csv", columns | {"Electrical Power (W)": true_power()})
+    )
     np.testing.assert_allclose(fit.force, ENDS, rtol=1e-3)
     assert note in " ".join(fit.notes) if note else not fit.notes
 
@@ -146,12 +155,21 @@ def test_headers_units_and_signs_of_others(
 def test_forces_that_contradict_each_other_are_named_and_one_way_is_no_missing_sign(
     tmp_path: Path,
 ) -> None:
-    two = {"PWM (us)": PWM, "Thrust (N)": force(), "Thrust (kgf)": force(), "Power (W)": power()}
+    two = {
+        "PWM (us)": PWM,
+        "Thrust (N)": true_force(),
+        "Thrust (kgf)": true_force(),
+        "Power (W)": true_power(),
+    }
     with pytest.raises(DataError, match=r"Thrust \(N\) and Thrust \(kgf\), and differ"):
-        fitted(written(tmp_path / "two.csv", two))
+        fitted(write_csv(tmp_path / "two.csv", two))
     ahead = PWM >= 1500.0
-    one = {"PWM (us)": PWM[ahead], "Force (N)": force()[ahead], "Power (W)": power()[ahead]}
-    assert fitted(written(tmp_path / "one.csv", one)).force == pytest.approx(
+    one = {
+        "PWM (us)": PWM[ahead],
+        "Force (N)": true_force()[ahead],
+        "Power (W)": true_power()[ahead],
+    }
+    assert fitted(write_csv(tmp_path / "one.csv", one)).force == pytest.approx(
         (0.0, ENDS[1]), rel=1e-3
     )
 
@@ -168,7 +186,9 @@ def test_the_command_line_takes_a_voltage(
 
 def test_blanks_take_no_time(tmp_path: Path) -> None:
     path = tmp_path / "blanks.csv"
-    rows = "\n".join(f"{p},{n},{w}" for p, n, w in zip(PWM, force(), power(), strict=True))
+    rows = "\n".join(
+        f"{p},{n},{w}" for p, n, w in zip(PWM, true_force(), true_power(), strict=True)
+    )
     path.write_text(
         f"PWM (us),Force{' ' * 9000}(N),Power{'(' * 9000} (W)\n" + f"{' ' * 9000},,\n" * 300 + rows
     )

@@ -13,12 +13,13 @@ from finlab.fit.fin_fit import fit_fin, write_fin
 from finlab.layout import FinModelSpec
 from finlab.physics import FinLaw, TableLaw, make_law, plant_of
 from finlab.research.random_layouts import random_fin_model, random_layout
-from tests.exhaustive import sampled
-from tests.fit.cell import commands, measured, samples
+from tests.fit.load_cell import commands, measured, samples
+from tests.sampled_cases import sampled
 
 LAWS = ("drag", "lighthill", "soft", "table")
 """The last one is a soft fin's grid with noise of 3 %."""
-TARGETS = 40
+N_TARGETS = 40
+"""How many wrenches each robot is asked for."""
 
 
 def random_law(kind: str, rng: np.random.Generator) -> FinLaw:
@@ -51,7 +52,9 @@ def miss_and_expected(kind: str, seed: int, folder: Path) -> tuple[Array, Array]
         layout = replace(layout, actuators=tuple(replace(fin, model=model) for fin in layout.fins))
         plant = plant_of(layout)
         allocator = Allocator(layout)
-        targets = rng.uniform(0.2, 0.9, (TARGETS, 1)) * plant.wrench(plant.sample(rng, (TARGETS,)))
+        targets = rng.uniform(0.2, 0.9, (N_TARGETS, 1)) * plant.wrench(
+            plant.sample(rng, (N_TARGETS,))
+        )
         answers = allocator.allocate_batch(targets)
         off = law.force(answers.command) - plant.force(answers.command)
         misses.append(np.einsum("kni,niw->kw", off, plant.effectiveness) / allocator.scale)
@@ -64,7 +67,7 @@ def ratio(miss: Array, expected: Array) -> float:
     return float(np.sqrt(np.mean((miss**2).sum(axis=1) / (expected**2).sum(axis=1))))
 
 
-@pytest.mark.parametrize("kind", sampled(LAWS, every=2))
+@pytest.mark.parametrize("kind", sampled(LAWS, every=4))
 def test_fitted_fins_miss_as_much_as_they_say(kind: str, tmp_path: Path) -> None:
     rows = [miss_and_expected(kind, seed, tmp_path) for seed in (21, 22)]
     miss, expected = (np.concatenate(part) for part in zip(*rows, strict=True))

@@ -17,11 +17,14 @@ from finlab.errors import DataError
 from finlab.fit.fin_fit import FinFit, fit_fin, summary, write_fin
 from finlab.layout import Fin, FinModelSpec, Layout
 from finlab.physics import TableLaw
-from tests.fit.cell import commands, measured, samples, soft
+from tests.fit.load_cell import commands, measured, samples, soft
 
 LAW = soft(k=4.0, p=1.4, x0=0.9, q=4.0, e=0.15, phi_e=1.0, d=0.12)
-TEST = commands(2000, seed=9)
+"""The law of the fin that is measured, uneven in its directions."""
+TEST_COMMANDS = commands(2000, seed=9)
+"""Commands (2000, 3) that the fits have not seen."""
 OUTLIERS = (17, 100)
+"""Which measurements are spoiled."""
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +39,8 @@ def fit() -> FinFit:
     return fit_fin(type(result)(command, force, power, result.sources, ()))
 
 
-def error_of(fit: FinFit, test: Array = TEST) -> Array:
+def error_of(fit: FinFit, test: Array = TEST_COMMANDS) -> Array:
+    """Errors of a fit at commands, as parts of the largest force."""
     truth = LAW.force(test)
     return np.asarray(
         np.linalg.norm(fit.predict(test)[0] - truth, axis=-1) / np.linalg.norm(truth, axis=-1).max()
@@ -45,8 +49,8 @@ def error_of(fit: FinFit, test: Array = TEST) -> Array:
 
 def test_forces_are_near_the_truth_and_the_band_holds_it(fit: FinFit) -> None:
     assert np.sqrt(np.mean(error_of(fit) ** 2)) < 0.03
-    force, deviation = fit.predict(TEST)
-    inside = np.abs(force - LAW.force(TEST))[:, 1:] <= 1.96 * deviation[:, 1:]
+    force, deviation = fit.predict(TEST_COMMANDS)
+    inside = np.abs(force - LAW.force(TEST_COMMANDS))[:, 1:] <= 1.96 * deviation[:, 1:]
     assert 0.85 < inside.mean() <= 1.0
     assert deviation[:, 1:].mean() < 0.03 * fit.largest, (
         "a band as wide as the water is no knowledge"
@@ -54,9 +58,9 @@ def test_forces_are_near_the_truth_and_the_band_holds_it(fit: FinFit) -> None:
 
 
 def test_power_and_lean(fit: FinFit) -> None:
-    power = fit.predict_power(TEST)
+    power = fit.predict_power(TEST_COMMANDS)
     assert power is not None
-    assert np.abs(power - LAW.power(TEST)).max() < 0.05 * LAW.power(TEST).max()
+    assert np.abs(power - LAW.power(TEST_COMMANDS)).max() < 0.05 * LAW.power(TEST_COMMANDS).max()
     assert fit.deflection == pytest.approx(0.12, abs=0.03)
     assert fit.predict(np.array([[0.0, 1.0, 0.3], [0.4, 0.0, 1.0]]))[0] == pytest.approx(0.0), (
         "at rest"
@@ -101,7 +105,9 @@ def test_the_file_of_a_fin_is_a_table_that_answers_as_the_fit(fit: FinFit, tmp_p
     law = read_table(tmp_path / "fin.csv")
     assert isinstance(law, TableLaw) and law.has_power and law.notes == summary(fit)
     # The grid's own error is small beside that of the fit.
-    assert np.abs(law.force(TEST) - fit.predict(TEST)[0]).max() < 0.02 * fit.largest
+    assert (
+        np.abs(law.force(TEST_COMMANDS) - fit.predict(TEST_COMMANDS)[0]).max() < 0.02 * fit.largest
+    )
     with pytest.raises(DataError, match=r"ends in \.csv"):
         write_fin(fit, tmp_path / "fin.yaml")
 
@@ -122,9 +128,9 @@ def test_one_zero_direction_speaks_for_all() -> None:
     result = fit_fin(
         type(single)(command, single.force, None, single.sources, (), has_directions=False)
     )
-    truth = law.force(TEST)
+    truth = law.force(TEST_COMMANDS)
     error = (
-        np.linalg.norm(result.predict(TEST)[0] - truth, axis=-1)
+        np.linalg.norm(result.predict(TEST_COMMANDS)[0] - truth, axis=-1)
         / np.linalg.norm(truth, axis=-1).max()
     )
     assert np.sqrt(np.mean(error**2)) < 0.02
@@ -175,8 +181,8 @@ def test_axes_without_force_or_noise_raise_no_warning(along_shaft: float, noise:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         result = fit_fin(samples(command, force))
-        assert np.isfinite(result.predict(TEST)).all()
-    assert np.sqrt(np.mean(error_of(result)[TEST[:, 0] > 0.1] ** 2)) < 0.2
+        assert np.isfinite(result.predict(TEST_COMMANDS)).all()
+    assert np.sqrt(np.mean(error_of(result)[TEST_COMMANDS[:, 0] > 0.1] ** 2)) < 0.2
 
 
 def test_few_forces_among_many_zeros_are_no_outliers() -> None:

@@ -6,14 +6,20 @@ import pytest
 from scipy.optimize import approx_fprime
 
 from finlab.fit.gaussian_process import GaussianProcess, ThrustKernel
-from tests.fit.cell import commands
+from tests.fit.load_cell import commands
 
 KERNEL = ThrustKernel(isotropic=0.7, directional=0.2, amplitude=0.5, frequency=0.8, turn=1.3)
-FEW = commands(12) / [0.6, 2.1, 1.0]
+"""The kernel, with another length in each direction."""
+FEW_INPUTS = commands(12) / [0.6, 2.1, 1.0]
+"""Inputs (12, 3), each of about unit size."""
 INPUTS = commands(30) / [0.6, 2.1, 1.0]
+"""Inputs (30, 3), each of about unit size."""
 RNG = np.random.default_rng(0)
+"""Of the values below."""
 VALUES = RNG.standard_normal(30)
+"""Observed values (30,)."""
 VARIANCE = RNG.uniform(0.01, 0.1, 30)
+"""Variances (30,) of their noise."""
 
 
 def test_predictions_are_those_of_a_conditioned_normal_distribution() -> None:
@@ -48,18 +54,20 @@ def test_repeated_commands_without_noise_are_bearable() -> None:
 
 def test_the_gradient_is_that_of_the_covariance() -> None:
     weights = np.random.default_rng(0).standard_normal((12, 12))
-    k, gradient = KERNEL.with_gradient(FEW, FEW)
-    np.testing.assert_allclose(np.diag(k), KERNEL.variance(FEW))
+    k, gradient = KERNEL.with_gradient(FEW_INPUTS, FEW_INPUTS)
+    np.testing.assert_allclose(np.diag(k), KERNEL.variance(FEW_INPUTS))
     differences = approx_fprime(
         np.log(KERNEL),
-        lambda logs: float(np.vdot(weights, ThrustKernel(*np.exp(logs)).covariance(FEW, FEW))),
+        lambda logs: float(
+            np.vdot(weights, ThrustKernel(*np.exp(logs)).covariance(FEW_INPUTS, FEW_INPUTS))
+        ),
     )
     np.testing.assert_allclose(gradient(weights), differences, atol=1e-6)
 
 
 def test_nothing_is_unknown_at_rest() -> None:
     rest = np.array([[0.0, 0.5, 0.3], [0.7, 0.0, 1.0]])
-    assert not KERNEL.covariance(rest, FEW).any()
+    assert not KERNEL.covariance(rest, FEW_INPUTS).any()
 
 
 def test_only_the_directional_part_fades_with_the_turn() -> None:

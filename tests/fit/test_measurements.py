@@ -9,18 +9,21 @@ import pytest
 from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.fit.measurements import Measurements, read_measurements
-from tests.fit.cell import columns_of, commands, measured, soft, write
+from tests.fit.load_cell import columns_of, commands, measured, soft, write
 
 Columns = dict[str, Array]
+"""Columns of a file by their names."""
 
 
 @pytest.fixture
 def columns() -> Columns:
+    """Columns of forty measurements of a soft fin."""
     command = commands(40)
     return columns_of(command, measured(soft(d=0.1), command))
 
 
 def read(tmp_path: Path, columns: Columns) -> Measurements:
+    """Measurements of a file with some columns."""
     return read_measurements([write(tmp_path / "cell.csv", columns)])
 
 
@@ -72,7 +75,8 @@ def test_one_zero_direction_is_filled_by_symmetry_and_said(
     assert not read(tmp_path, columns | {"phi": 0.0 * columns["phi"] + 0.3}).has_directions
 
 
-def emptied(columns: Columns, tmp_path: Path) -> Path:
+def with_empty_cell(columns: Columns, tmp_path: Path) -> Path:
+    """A file one cell of which is empty."""
     path = write(tmp_path / "bad.csv", columns)
     lines = path.read_text().splitlines()
     lines[4] = ",".join(["0.3", "", *lines[4].split(",")[2:]])
@@ -112,7 +116,7 @@ def test_bad_files_get_a_sentence(
 
 def test_a_gap_a_short_line_and_no_file(tmp_path: Path, columns: Columns) -> None:
     with pytest.raises(DataError, match="line 5, column f, is empty; leave no gaps"):
-        read_measurements([emptied(columns, tmp_path)])
+        read_measurements([with_empty_cell(columns, tmp_path)])
     path = write(tmp_path / "short.csv", columns)
     path.write_text(path.read_text() + "1,2\n")
     with pytest.raises(DataError, match="line 42 has 2 values, the header has 6"):

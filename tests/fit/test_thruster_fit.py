@@ -16,7 +16,7 @@ from finlab.errors import DataError
 from finlab.fit.thruster_bench import BenchData, read_bench
 from finlab.fit.thruster_fit import ThrusterFit, fit_thruster, layout_lines
 from finlab.physics.table_error import thrust_table_error
-from tests.fit.cell import write
+from tests.fit.load_cell import write
 
 T200 = Path(__file__).parent / "data" / "t200_16v.csv"
 """Force in kgf, voltage and current in place of power, rpm beside PWM."""
@@ -90,8 +90,15 @@ def test_power_at_rest_is_in_the_table() -> None:
 
 
 Columns = dict[str, Array]
+"""Columns of a file by their names."""
 PWM = np.linspace(1100.0, 1900.0, 17)
-GOOD = {"PWM": PWM, "force": true_force((PWM - 1500.0) / 400.0), "power": np.abs(PWM - 1500.0)}
+"""Widths of pulse at which a thruster was measured [us]."""
+GOOD_COLUMNS = {
+    "PWM": PWM,
+    "force": true_force((PWM - 1500.0) / 400.0),
+    "power": np.abs(PWM - 1500.0),
+}
+"""Columns that a fit takes."""
 
 
 @pytest.mark.parametrize(
@@ -114,7 +121,7 @@ def test_wrong_benches_get_a_sentence(
     tmp_path: Path, change: Callable[[Columns], Columns], sentence: str
 ) -> None:
     with pytest.raises(DataError, match=sentence) as raised:
-        fit_thruster(read_bench([write(tmp_path / "bench.csv", change(GOOD))]))
+        fit_thruster(read_bench([write(tmp_path / "bench.csv", change(GOOD_COLUMNS))]))
     assert "bench.csv" in str(raised.value)
 
 

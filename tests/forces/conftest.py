@@ -19,6 +19,7 @@ THRUST = 4.0 * 1000.0 * 0.15 * 0.02 * 0.1**2 * (2.0 * np.pi * 2.1) ** 2 * np.sin
 
 @pytest.fixture(scope="session")
 def shipped() -> Callable[[str], Layout]:
+    """A shipped robot by its name."""
     return lambda name: load_layout(shipped_layouts()[name])
 
 

@@ -17,13 +17,15 @@ from finlab.forces.reach import axis_ranges, max_wrench_along_exactly
 from finlab.layout import Azimuth, Layout, Thruster, load_layout
 from finlab.physics import Plant
 from tests.forces.conftest import THRUST
-from tests.least_power import farthest
-from tests.mixed_robots import load, random_flow, random_plant, random_robot
-from tests.own_plant import OwnPlant
+from tests.oracle_optima import farthest
+from tests.oracle_plant import OraclePlant
+from tests.random_robots import load, random_flow, random_plant, random_robot
 
 Array = NDArray[np.float64]
 Layouts = Callable[[str], Layout]
-OWN = {"force": slice(0, 3), "torque": slice(3, 6)}
+"""The type of the fixture `shipped`: a shipped robot by its name."""
+AXES_OF_KIND = {"force": slice(0, 3), "torque": slice(3, 6)}
+"""Axes of a wrench that belong to forces and to torques."""
 
 
 def outside(body: AttainableSet, points: Array) -> float:
@@ -42,8 +44,8 @@ def test_sets_with_all_else_zero_hold_what_was_found_otherwise(shipped: Layouts,
     # them.
     layout = shipped("mixed")
     sets = force_sets(layout)
-    own = OWN[kind]
-    other = OWN["torque" if kind == "force" else "force"]
+    own = AXES_OF_KIND[kind]
+    other = AXES_OF_KIND["torque" if kind == "force" else "force"]
     effectiveness = sets.effectiveness[0].reshape(-1, 6)
     _, _, directions = np.linalg.svd(effectiveness[:, other].T)
     kept = directions[3:]
@@ -109,8 +111,10 @@ def test_an_unknown_failed_fin_is_an_error(shipped: Layouts) -> None:
         attainable_set(shipped("A"), "force", lost=("nobody",))
 
 
-AXES = np.concatenate([np.eye(6), -np.eye(6)])
-AT_SPEED = (1.5, 0.0, 0.0, 0.0, 0.0, 0.0)
+AXIS_DIRECTIONS = np.concatenate([np.eye(6), -np.eye(6)])
+"""Directions (12, 6) either way along each axis."""
+FLOW_FROM_AHEAD = (1.5, 0.0, 0.0, 0.0, 0.0, 0.0)
+"""Flow of a robot that moves straight ahead: (6,) [m/s, rad/s]."""
 
 
 def test_bluerov2_heavy_reaches_what_its_sources_say() -> None:
@@ -143,7 +147,7 @@ def test_where_the_water_pushes_harder_than_all_can_hold() -> None:
         robot = random_robot("rudders", number, 21)
         flow = rng.normal(size=6) * [1.5, 1.5, 1.5, 0.3, 0.3, 0.3]
         sets = force_sets(load(robot), flow=flow)
-        plant = OwnPlant(robot, flow)
+        plant = OraclePlant(robot, flow)
         directions = rng.normal(size=(4, 6))
         directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
         found = max_wrench_along_exactly(sets, directions)[0][0]
@@ -154,7 +158,7 @@ def test_where_the_water_pushes_harder_than_all_can_hold() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "flow"), [("turtle_hybrid", None), ("catamaran", None), ("torpedo", AT_SPEED)]
+    ("name", "flow"), [("turtle_hybrid", None), ("catamaran", None), ("torpedo", FLOW_FROM_AHEAD)]
 )
 def test_no_command_goes_beyond_and_the_best_are_as_good(
     name: str, flow: tuple[float, ...] | None
@@ -163,7 +167,9 @@ def test_no_command_goes_beyond_and_the_best_are_as_good(
     plant = Plant(layout)
     sets = force_sets(layout, flow=flow)
     drawn = np.random.default_rng(2).standard_normal((30, 6))
-    directions = np.concatenate([AXES, drawn / np.linalg.norm(drawn, axis=1, keepdims=True)])
+    directions = np.concatenate(
+        [AXIS_DIRECTIONS, drawn / np.linalg.norm(drawn, axis=1, keepdims=True)]
+    )
     water = None if flow is None else np.array(flow)
     share = np.random.default_rng(3).uniform(-0.2, 1.2, (20_000, layout.n, 3)).clip(0.0, 1.0)
     command = layout.lower + share * (layout.upper - layout.lower)
@@ -195,7 +201,7 @@ def test_a_thruster_that_pulls_only_and_an_azimuth_that_cannot_stop() -> None:
 def test_a_torpedo_needs_speed() -> None:
     layout = replace(load_layout("torpedo"), axes=WRENCH)
     still = score_card(layout)
-    ahead = score_card(layout, flow=AT_SPEED)
+    ahead = score_card(layout, flow=FLOW_FROM_AHEAD)
     assert (still.authority.rank, ahead.authority.rank) == (1, 4)
     assert any("At rest rudder_top" in note for note in still.notes)
     assert not any("At rest" in note for note in ahead.notes)
@@ -207,6 +213,6 @@ def test_a_torpedo_needs_speed() -> None:
 
 def test_a_lost_actuator_takes_its_drag_along() -> None:
     layout = load_layout("torpedo")
-    sets = force_sets(layout, layout.names[1:], AT_SPEED)
+    sets = force_sets(layout, layout.names[1:], FLOW_FROM_AHEAD)
     assert sets.farthest(-np.eye(6)[:1])[0][0] == pytest.approx(104.7)
     assert score_card(layout, layout.names).authority.rank == 0

@@ -10,7 +10,8 @@ from finlab.layout import Fin, FinModelSpec, Layout, Limits
 from finlab.physics import Plant
 
 Array = NDArray[np.float64]
-HALVES = [0.4, np.pi / 2, 1.9, 2.9, np.pi]
+HALF_ANGLES = [0.4, np.pi / 2, 1.9, 2.9, np.pi]
+"""Half of the angle of a sector [rad]: narrow to a whole disc."""
 
 
 def sectors(effectiveness: Array, radius: Array, middle: Array, half: float) -> ForceSets:
@@ -31,7 +32,8 @@ def fins(half: float, rows: int = 200) -> ForceSets:
     )
 
 
-def pulls(rows: int = 200) -> Array:
+def random_prices(rows: int = 200) -> Array:
+    """Prices (rows, 1, 2) of forces."""
     return np.random.default_rng(1).standard_normal((rows, 1, 2)) * 2.0
 
 
@@ -44,10 +46,10 @@ def sector(sets: ForceSets, row: int) -> Array:
     return np.concatenate([boundary * share for share in np.linspace(0.0, 1.0, 60)])
 
 
-@pytest.mark.parametrize("half", HALVES)
+@pytest.mark.parametrize("half", HALF_ANGLES)
 def test_farthest_is_the_farthest_point_of_the_sector(half: float) -> None:
     sets = fins(half)
-    pull = pulls()
+    pull = random_prices()
     normal = np.pad(pull[:, 0], ((0, 0), (0, 4)))
     reach, force = sets.farthest(normal)
     assert np.allclose((force * pull).sum((-1, -2)), reach)
@@ -67,7 +69,7 @@ def test_a_polygon_reaches_to_its_best_corner(turn: float) -> None:
         sets = assembled(
             [[Shape(np.eye(2, 3), 1.0, 0.0, 0.0, (polygon,))]], np.eye(3, 6)[None, None]
         )
-        pull = pulls()[:, 0]
+        pull = random_prices()[:, 0]
         reach, force = sets.tile(200).farthest(np.pad(pull, ((0, 0), (0, 4))))
         np.testing.assert_allclose(reach, (polygon @ pull.T).max(axis=0), rtol=1e-12, atol=1e-12)
         np.testing.assert_allclose((force[:, 0] * pull).sum(-1), reach, rtol=1e-12, atol=1e-12)

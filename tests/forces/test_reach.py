@@ -16,12 +16,14 @@ from finlab.forces.reach import (
 )
 from finlab.layout import Layout
 from finlab.physics import Plant
-from tests.exhaustive import crossed
 from tests.forces.conftest import THRUST, largest_by_polygons
-from tests.forces.test_force_sets import HALVES, sectors
+from tests.forces.test_force_sets import HALF_ANGLES, sectors
+from tests.sampled_cases import crossed
 
 Layouts = Callable[[str], Layout]
-BOTH_WAYS = np.concatenate([np.eye(6), -np.eye(6)])
+"""The type of the fixture `shipped`: a shipped robot by its name."""
+AXIS_DIRECTIONS = np.concatenate([np.eye(6), -np.eye(6)])
+"""Directions (12, 6) either way along each axis."""
 
 
 def test_layout_b_in_closed_form(shipped: Layouts) -> None:
@@ -40,7 +42,7 @@ def test_bracketed_by_linear_programmes(shipped: Layouts, name: str) -> None:
     sets = force_sets(shipped(name))
     mixture = np.random.default_rng(0).standard_normal((3, 6))
     directions = np.concatenate(
-        [BOTH_WAYS[::3], mixture / np.linalg.norm(mixture, axis=1, keepdims=True)]
+        [AXIS_DIRECTIONS[::3], mixture / np.linalg.norm(mixture, axis=1, keepdims=True)]
     )
     found, gap = max_wrench_along_exactly(sets, directions)
     assert gap < 2e-5
@@ -52,17 +54,20 @@ def test_bracketed_by_linear_programmes(shipped: Layouts, name: str) -> None:
 
 def test_wide_arcs_count_piece_by_piece(wide: Layout) -> None:
     sets = force_sets(wide)
-    size = max_wrench_along_exactly(sets, BOTH_WAYS)[0][0]
+    size = max_wrench_along_exactly(sets, AXIS_DIRECTIONS)[0][0]
     parts = convex_parts(sets)
     assert len(parts.radius) == 4
     by_piece = np.array(
         [
-            [largest_by_polygons(part, direction, 180, outer=False) for direction in BOTH_WAYS]
+            [
+                largest_by_polygons(part, direction, 180, outer=False)
+                for direction in AXIS_DIRECTIONS
+            ]
             for part in (parts.take(np.array([k])) for k in range(4))
         ]
     )
     assert size == pytest.approx(by_piece.max(axis=0), rel=1e-3, abs=1e-4)
-    hull = max_wrench_along(sets.tile(12), BOTH_WAYS).size
+    hull = max_wrench_along(sets.tile(12), AXIS_DIRECTIONS).size
     assert (hull >= size - 1e-4).all()
     assert (hull > size + 1e-3).any()
 
@@ -70,7 +75,7 @@ def test_wide_arcs_count_piece_by_piece(wide: Layout) -> None:
 def test_the_plant_gives_the_largest_wrench(shipped: Layouts) -> None:
     layout = shipped("mixed")
     sets = force_sets(layout)
-    for direction in BOTH_WAYS:
+    for direction in AXIS_DIRECTIONS:
         found = max_wrench_along(sets, direction[None])
         force = found.force[0]
         thrust = np.hypot(*force.T)
@@ -96,8 +101,8 @@ def test_no_sampled_command_goes_beyond(shipped: Layouts, name: str) -> None:
     lower = layout.lower
     upper = layout.upper
     wrench = Plant(layout).wrench(rng.uniform(lower, upper, (4_000, layout.n_fins, 3))) / SCALE
-    size, _ = force_sets(layout).tile(12).farthest(BOTH_WAYS)
-    assert ((wrench @ BOTH_WAYS.T).max(axis=0) <= size + 1e-3).all()
+    size, _ = force_sets(layout).tile(12).farthest(AXIS_DIRECTIONS)
+    assert ((wrench @ AXIS_DIRECTIONS.T).max(axis=0) <= size + 1e-3).all()
 
 
 @pytest.mark.parametrize("name", ["A", "restricted", "mixed"])
@@ -107,7 +112,9 @@ def test_the_plant_reaches_as_far_as_it_is_said_to(shipped: Layouts, name: str) 
     layout = shipped(name)
     plant = Plant(layout)
     drawn = np.random.default_rng(3).standard_normal((30, 6))
-    directions = np.concatenate([BOTH_WAYS, drawn / np.linalg.norm(drawn, axis=1, keepdims=True)])
+    directions = np.concatenate(
+        [AXIS_DIRECTIONS, drawn / np.linalg.norm(drawn, axis=1, keepdims=True)]
+    )
     best = np.zeros(len(directions))
     for i, fin in enumerate(layout.fins):
         command = np.full((2_000, layout.n_fins, 3), np.nan)
@@ -118,7 +125,8 @@ def test_the_plant_reaches_as_far_as_it_is_said_to(shipped: Layouts, name: str) 
     assert size == pytest.approx(best, rel=1e-5, abs=1e-9)
 
 
-def robots(half: float, scale: float) -> ForceSets:
+def random_sectors(half: float, scale: float) -> ForceSets:
+    """Sets of 40 robots of five actuators, with sectors of one half angle [rad]."""
     rng = np.random.default_rng(5)
     effectiveness = scale * rng.standard_normal((40, 5, 2, 6))
     return sectors(
@@ -126,9 +134,9 @@ def robots(half: float, scale: float) -> ForceSets:
     )
 
 
-@pytest.mark.parametrize(("half", "scale"), crossed(HALVES, [1e-3, 1.0, 1e3], every=2))
+@pytest.mark.parametrize(("half", "scale"), crossed(HALF_ANGLES, [1e-3, 1.0, 1e3], every=2))
 def test_a_plane_and_forces_prove_each_size(half: float, scale: float) -> None:
-    sets = robots(half, scale)
+    sets = random_sectors(half, scale)
     rng = np.random.default_rng(6)
     ray = rng.standard_normal((40, 6))
     ray /= np.linalg.norm(ray, axis=-1, keepdims=True)
@@ -151,7 +159,7 @@ def test_a_plane_and_forces_prove_each_size(half: float, scale: float) -> None:
 
 @pytest.mark.filterwarnings("error")
 def test_robots_without_anything_to_push_with() -> None:
-    sets = robots(1.0, 1.0)
+    sets = random_sectors(1.0, 1.0)
     ray = np.tile(np.eye(6)[0], (40, 1))
     for dead in (
         sets._replace(radius=np.zeros((40, 5))),
@@ -168,7 +176,8 @@ def test_robots_without_anything_to_push_with() -> None:
         )
 
 
-CORNERS = 96
+N_CORNERS = 96
+"""Corners of the polygon by which a sector is bracketed."""
 
 
 def ranges_by_polygons(layout: Layout, wrench: list[float], lost: tuple[str, ...]) -> np.ndarray:
@@ -177,11 +186,11 @@ def ranges_by_polygons(layout: Layout, wrench: list[float], lost: tuple[str, ...
     sets = force_sets(layout, lost)
     n = sets.radius.shape[1]
     turn = sets.sector_center[0, :, None] + sets.sector_half_angle[0, :, None] * np.linspace(
-        -1, 1, CORNERS
+        -1, 1, N_CORNERS
     )
     force = sets.radius[0, :, None, None] * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
     corners = np.einsum("npc,nck->npk", force, sets.effectiveness[0]).reshape(-1, 6)
-    share = np.kron(np.eye(n), np.ones(CORNERS))
+    share = np.kron(np.eye(n), np.ones(N_CORNERS))
     found = np.full((6, 2), np.nan)
     for k in range(6):
         held = [j for j in range(6) if j != k]

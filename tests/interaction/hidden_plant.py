@@ -12,14 +12,20 @@ import numpy as np
 from finlab.layout import Layout
 from finlab.physics import Plant
 
-RHO = 1025.0
+WATER_DENSITY = 1025.0
+"""Density of sea water [kg/m3]."""
 
 
 def _jet(force: np.ndarray, diameter: float) -> tuple[float, np.ndarray, float]:
+    """Thrust [N], direction (3,) and speed [m/s] of the jet of a force (3,) [N]."""
     thrust = float(np.linalg.norm(force))
     if thrust < 1e-9 or diameter <= 0.0:
         return 0.0, np.zeros(3), 0.0
-    return thrust, -force / thrust, math.sqrt(2.0 * thrust / (RHO * math.pi * diameter**2 / 4.0))
+    return (
+        thrust,
+        -force / thrust,
+        math.sqrt(2.0 * thrust / (WATER_DENSITY * math.pi * diameter**2 / 4.0)),
+    )
 
 
 def _velocity(way: np.ndarray, course: np.ndarray, speed: float, diameter: float) -> np.ndarray:
@@ -48,6 +54,7 @@ def wrenches(layout: Layout, command: np.ndarray) -> np.ndarray:
 
 
 def _wrench(layout: Layout, plant: Plant, command: np.ndarray) -> np.ndarray:
+    """Wrench (6,) of a command (n, 3), jets included."""
     own = plant.force(command[None])[0]
     wrench = np.einsum("na,naw->w", own, plant.effectiveness)
     forces = np.einsum("na,nab->nb", own, layout.frames)
@@ -71,8 +78,8 @@ def _wrench(layout: Layout, plant: Plant, command: np.ndarray) -> np.ndarray:
         if speed > 0.0:
             push += forces[i] * (kept - 1.0)
             across = water - float(water @ course) * course
-            push += 0.22 * RHO * area * speed * across
-        push += 0.5 * RHO * 0.12 * area * float(np.linalg.norm(water)) * water
+            push += 0.22 * WATER_DENSITY * area * speed * across
+        push += 0.5 * WATER_DENSITY * 0.12 * area * float(np.linalg.norm(water)) * water
         if hull is not None and hull.size_m is not None and thrust > 0.0:
             push += _on_hull(place, course, thrust, 0.5 * np.array(hull.size_m))
         wrench[:3] += push

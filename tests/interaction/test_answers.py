@@ -26,9 +26,11 @@ KINDS = {
     "fins": [random_shaft_fin],
     "all": None,
 }
+"""Kind of robot -> makers of its actuators; None makes any."""
 
 
 def robot(seed: int, kinds: list | None) -> tuple[Allocator, Array]:
+    """A random robot with jets, and three wrenches within its reach."""
     rng = np.random.default_rng([41, seed])
     layout = replace(random_jet_robot(rng, "robot", (4, 8), kinds), interaction=Jets())
     plant = Plant(layout)
@@ -51,6 +53,7 @@ def test_answers_are_exact_by_the_plant(kind: str, seed: int) -> None:
 
 
 def pods(places: list[tuple[float, float]]) -> Layout:
+    """Pods with jets at places x, y [m]."""
     parts = [
         Azimuth(
             f"p{i}",
@@ -107,15 +110,17 @@ def test_jets_in_line_are_turned_aside(places: list[tuple[float, float]], surge:
 
 @pytest.fixture(scope="module")
 def heavy() -> Allocator:
+    """Eight thrusters with jets, whose effect is uncertain."""
     return Allocator(replace(finlab.load_layout("bluerov2_heavy"), interaction=Jets(uncertain=0.1)))
 
 
-FAR = [400.0, 0.0, 100.0, 0.0, 0.0, 5.0]
+WRENCH_OUT_OF_REACH = [400.0, 0.0, 100.0, 0.0, 0.0, 5.0]
+"""A wrench that these thrusters cannot give [N, N m]."""
 
 
 def test_direction_stays_on_the_ray(heavy: Allocator) -> None:
-    result = heavy.allocate(FAR, policy="direction")
-    along = FAR / heavy.scale
+    result = heavy.allocate(WRENCH_OUT_OF_REACH, policy="direction")
+    along = WRENCH_OUT_OF_REACH / heavy.scale
     wrench = result.wrench / heavy.scale
     share = float(along @ wrench / (along @ along))
     assert 0.15 < share < 1.0
@@ -123,14 +128,14 @@ def test_direction_stays_on_the_ray(heavy: Allocator) -> None:
 
 
 def test_priority_serves_its_first_group(heavy: Allocator) -> None:
-    result = heavy.allocate(FAR, policy="priority")
-    assert_allclose(result.wrench[2:], FAR[2:], atol=1e-3)
+    result = heavy.allocate(WRENCH_OUT_OF_REACH, policy="priority")
+    assert_allclose(result.wrench[2:], WRENCH_OUT_OF_REACH[2:], atol=1e-3)
 
 
 def test_closest_misses_no_more_than_the_others(heavy: Allocator) -> None:
-    closest = heavy.allocate(FAR).err_norm
+    closest = heavy.allocate(WRENCH_OUT_OF_REACH).err_norm
     for policy in ("direction", "priority"):
-        assert closest <= heavy.allocate(FAR, policy=policy).err_norm + 1e-6
+        assert closest <= heavy.allocate(WRENCH_OUT_OF_REACH, policy=policy).err_norm + 1e-6
 
 
 def test_ticks_stay_within_rates_and_arrive(heavy: Allocator) -> None:
@@ -145,7 +150,7 @@ def test_ticks_stay_within_rates_and_arrive(heavy: Allocator) -> None:
 
 
 def test_one_and_many_give_the_same(heavy: Allocator) -> None:
-    targets = np.array([[40.0, 0, 20, 0, 0, 1], [0, 30, 0, 0, 0, 0], FAR])
+    targets = np.array([[40.0, 0, 20, 0, 0, 1], [0, 30, 0, 0, 0, 0], WRENCH_OUT_OF_REACH])
     batch = heavy.allocate_batch(targets)
     for k, target in enumerate(targets):
         assert_allclose(batch.command[k], heavy.allocate(target).command, atol=1e-9)

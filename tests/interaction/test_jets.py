@@ -17,15 +17,25 @@ from finlab.physics import Plant
 from finlab.research.random_layouts import random_jet_robot
 from tests.interaction import oracle
 
-D = 0.1
+DIAMETER_M = 0.1
+"""Diameter of a jet [m]."""
 LAW = PowerLaw(1.0)
+"""Power over force of the actuators."""
 
 
 def tandem(apart: float, turned: float = 0.0, **constants: float) -> Layout:
     """Two pods in line, `apart` diameters; the front one turned by `turned` degrees."""
     front, back = (
-        Azimuth(name, (x, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 40.0), LAW, diameter=D)
-        for name, x in (("front", 0.0), ("back", -apart * D))
+        Azimuth(
+            name,
+            (x, 0.0, 0.0),
+            (0.0, 0.0, 1.0),
+            (1.0, 0.0, 0.0),
+            (0.0, 40.0),
+            LAW,
+            diameter=DIAMETER_M,
+        )
+        for name, x in (("front", 0.0), ("back", -apart * DIAMETER_M))
     )
     return Layout("tandem", (front, back), interaction=Jets(**constants))
 
@@ -86,7 +96,9 @@ def test_what_rests_takes_and_gives_nothing() -> None:
 
 
 def test_a_jet_on_the_hull_pushes_back() -> None:
-    thruster = Thruster("bow", (0.6, 0.0, 0.0), (1.0, 0.0, 0.0), (-30.0, 30.0), LAW, diameter=D)
+    thruster = Thruster(
+        "bow", (0.6, 0.0, 0.0), (1.0, 0.0, 0.0), (-30.0, 30.0), LAW, diameter=DIAMETER_M
+    )
     hull = Body(hull=Hull("ellipsoid", (0.6, 0.4, 0.3)))
     plant = Plant(Layout("one", (thruster,), body=hull, interaction=Jets(hull=0.5)))
     astern, ahead = (plant.wrench(np.array([[f, 0.0, 0.0]]))[0] for f in (-20.0, 20.0))
@@ -97,8 +109,8 @@ def test_a_jet_on_the_hull_pushes_back() -> None:
 def open_water(force: float, speed: float, kt: float, none_at: float) -> float:
     """Thrust at a speed of advance along Kt = Kt0 (1 - J / J0), at the rate that gives `force` at
     rest."""
-    rate = math.sqrt(force / (1000.0 * kt * D**4))
-    return 1000.0 * rate**2 * D**4 * kt * (1.0 - speed / (rate * D * none_at))
+    rate = math.sqrt(force / (1000.0 * kt * DIAMETER_M**4))
+    return 1000.0 * rate**2 * DIAMETER_M**4 * kt * (1.0 - speed / (rate * DIAMETER_M * none_at))
 
 
 @pytest.mark.parametrize("force", [10.0, 20.0, 40.0])
@@ -110,7 +122,7 @@ def test_speed_takes_what_the_open_water_line_says(force: float, kt: float, none
         (1.0, 0.0, 0.0),
         (-50.0, 50.0),
         LAW,
-        diameter=D,
+        diameter=DIAMETER_M,
         open_water=(kt, none_at),
     )
     plant = Plant(Layout("one", (one,), interaction=Jets()))

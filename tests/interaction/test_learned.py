@@ -23,6 +23,7 @@ from tests.interaction.test_jets import differs
 
 @pytest.fixture(scope="module")
 def network(tmp_path_factory: pytest.TempPathFactory) -> Learned:
+    """A network of a short training."""
     from finlab.fit.interaction.samples import read_samples, write_samples
     from finlab.research.interaction.random_samples import random_samples
     from finlab.research.interaction.train import WEIGHTS_FILE, recipe, train
@@ -34,6 +35,7 @@ def network(tmp_path_factory: pytest.TempPathFactory) -> Learned:
 
 
 def unseen(count: int) -> list[tuple[Layout, Array]]:
+    """Robots that it has not seen, with their true forward data."""
     robots = []
     for k in range(count):
         rng = np.random.default_rng([51, k])
@@ -46,7 +48,7 @@ def test_unseen_robots_are_missed_by_less_than_half(network: Learned) -> None:
     laws = []
     learned = []
     expected = []
-    for layout, targets in unseen(8):
+    for layout, targets in unseen(5):
         known = replace(layout, interaction=network)
         for robot, errors in ((layout, laws), (known, learned)):
             allocator = finlab.Allocator(robot)

@@ -23,29 +23,33 @@ from finlab.physics import Plant
 from finlab.physics.objective import wrench_scale_of
 from finlab.research.interaction.random_samples import random_samples
 
-OTHER = Jets(2.1, 2.4, 28.0, 0.8, 1.0, 0.2, 0.15, 0.45)
+TRUE_JETS = Jets(2.1, 2.4, 28.0, 0.8, 1.0, 0.2, 0.15, 0.45)
+"""Jets with other constants than the library's."""
 
 
-def other(layout: Layout, command: Array) -> Array:
-    return Plant(replace(layout, interaction=OTHER)).wrench(command)
+def true_wrench(layout: Layout, command: Array) -> Array:
+    """Wrench of commands by these jets."""
+    return Plant(replace(layout, interaction=TRUE_JETS)).wrench(command)
 
 
 def write_table(samples: Samples, path: Path) -> None:
+    """Write samples as the file of a test stand."""
     layout = samples.layout
     names = sum(command_columns(layout), [])
     with path.open("w", newline="") as file:
         writer = csv.writer(file)
         writer.writerow([*names, "Fx", "Fy", "Fz", "Tx", "Ty", "Tz"])
         for command, wrench in zip(samples.command, samples.wrench, strict=True):
-            parts = zip(layout.actuators, command, strict=True)
-            writer.writerow(
-                [*(v for part, row in parts for v in row[: len(part.KIND.numbers)]), *wrench]
-            )
+            cells = list[float]()
+            for actuator, row in zip(layout.actuators, command, strict=True):
+                cells += row[: len(actuator.KIND.numbers)].tolist()
+            writer.writerow([*cells, *wrench])
 
 
 @pytest.fixture(scope="module")
 def samples() -> list[Samples]:
-    return random_samples(other, 3, 60, 7, 0.02, (4, 8))
+    """Forward data of three robots, by these jets."""
+    return random_samples(true_wrench, 3, 60, 7, 0.02, (4, 8))
 
 
 def test_files_give_back_what_was_written(samples: list[Samples], tmp_path: Path) -> None:
@@ -90,7 +94,7 @@ def test_twenty_samples_fit_the_constants(samples: list[Samples]) -> None:
         command = one.command[20:]
         plant = Plant(robot)
         scale = wrench_scale_of(one.layout)
-        truth = other(one.layout, command)
+        truth = true_wrench(one.layout, command)
         error, laws = (
             (Plant(layout).wrench(command) - truth) / scale for layout in (robot, one.layout)
         )
@@ -115,13 +119,13 @@ def test_the_verbs_go_from_a_table_to_an_answer(samples: list[Samples], tmp_path
         check=True,
     )
     assert "laws alone miss" in done.stdout and "type: jets" in done.stdout
-    target = other(one.layout, one.command[-1:])[0]
+    target = true_wrench(one.layout, one.command[-1:])[0]
     errors = []
     for name in ("robot.yaml", "known.yaml"):
         allocator = finlab.Allocator(finlab.load_layout(tmp_path / name))
         command = allocator.allocate(target).command
         errors.append(
-            np.linalg.norm((other(one.layout, command[None])[0] - target) / allocator.scale)
+            np.linalg.norm((true_wrench(one.layout, command[None])[0] - target) / allocator.scale)
         )
     assert errors[1] < 0.5 * errors[0]
 

@@ -16,15 +16,25 @@ from finlab.actuators.thruster import Thruster, ThrusterCommand
 from finlab.layout import Fin
 
 AHEAD = (1.0, 0.0, 0.0)
+"""Unit vector forward."""
 UP = (0.0, 0.0, 1.0)
+"""Unit vector upward."""
 LAW = PowerLaw(2.0)
+"""Power over force of actuators that are not measured."""
 ROWS = ((1100, -40, 390), (1470, 0, 0), (1480, 0, 0), (1530, 0, 0), (1700, 10, 30), (1900, 50, 380))
+"""Width of pulse [us], force [N] and power [W]; of some widths the force is zero."""
 TABLE = PowerTable(tuple(tuple(map(float, row)) for row in ROWS), "us")
+"""A thruster by these rows."""
 FIN = Fin("fin", (0.1, 0.2, 0.3), 0.4)
+"""A fin."""
 THRUSTER = Thruster("thruster", (0.0, 0.1, 0.0), AHEAD, (-40.0, 50.0), TABLE)
+"""A measured thruster."""
 AZIMUTH = Azimuth("azimuth", (0.0, 0.0, 0.2), UP, AHEAD, (0.0, 20.0), LAW)
+"""A pod that turns all round."""
 TILT = Tilt("tilt", (0.0, 0.0, 0.2), UP, AHEAD, (3.0, 20.0), LAW, arc=(0.2, 0.7))
+"""A pod that turns within an arc and cannot rest."""
 RUDDER = Rudder("rudder", (-1.0, 0.0, 0.0), UP, AHEAD, 0.03, (-0.7, 0.5), 3.0)
+"""A rudder that turns farther to one side."""
 
 
 def test_each_type_has_a_command_of_its_own() -> None:

@@ -13,7 +13,7 @@ from finlab.actuators.fin.fin_model import FIN_MODELS
 from finlab.errors import LayoutError
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout, parse_layout, save_layout
 
-GOOD = {
+GOOD_LAYOUT = {
     "format": "finlab-layout",
     "version": 2,
     "name": "good",
@@ -36,11 +36,12 @@ GOOD = {
     ],
     "body": {"hull": {"shape": "box", "size_m": [0.4, 0.2, 0.2]}, "mass_kg": 4.5},
 }
+"""A layout file that is read."""
 
 
 def edited(*path, value):
     """A copy of GOOD with the value at a path replaced, or removed if the value is `...`."""
-    data = copy.deepcopy(GOOD)
+    data = copy.deepcopy(GOOD_LAYOUT)
     inner = data
     for key in path[:-1]:
         inner = inner.setdefault(key, {}) if isinstance(inner, dict) else inner[key]
@@ -58,7 +59,7 @@ def changed(key, value):
     )
 
 
-BAD = [
+BAD_VALUES = [
     ("actuators", [], "expected a list of 1 to 64 values, got 0"),
     ("actuators", "left", "expected a list, got 'left'"),
     ("actuators", ..., "required key is missing"),
@@ -115,10 +116,12 @@ BAD = [
     ("body.hull.size_m[1]", -1, "must lie within"),
     ("body.hull", {"scale": 2}, "either a shape"),
 ]
+"""Key, value, and what the refusal says."""
 
 
-CHANGED = [(key, changed(key, value), why) for key, value, why in BAD]
-CHANGED += [
+BAD_LAYOUTS = [(key, changed(key, value), why) for key, value, why in BAD_VALUES]
+"""Key, a layout file in which it is wrong, and what the refusal says."""
+BAD_LAYOUTS += [
     (
         "actuators[0].model.path",
         edited("actuators", 0, "model", value={"type": "table"}),
@@ -134,7 +137,7 @@ CHANGED += [
 ]
 
 
-@pytest.mark.parametrize(("key", "data", "why"), CHANGED)
+@pytest.mark.parametrize(("key", "data", "why"), BAD_LAYOUTS)
 def test_a_bad_value_is_refused_with_file_key_and_reason(key, data, why, tmp_path):
     path = tmp_path / "bad.yaml"
     path.write_text(yaml.safe_dump(data))
@@ -155,7 +158,8 @@ ALIAS_BOMB = "a: &a [x,x,x,x,x,x,x,x,x]\n" + "".join(
     f"{this}: &{this} [{','.join(['*' + last] * 9)}]\n"
     for last, this in zip("abcdefgh", "bcdefghi", strict=True)
 )
-HOSTILE = {
+"""A small file of YAML that grows to 9^9 values."""
+HOSTILE_FILES = {
     "bomb": (ALIAS_BOMB, "anchors and aliases"),
     "anchor": ("a: &x 1\n", "anchors and aliases"),
     "python": ('!!python/object/apply:os.system ["touch pwned"]\n', "tags (!) are not allowed"),
@@ -178,12 +182,13 @@ HOSTILE = {
     "scalar": ("just words", "finlab layout convert reads"),
     "date": ("2026-13-45", ""),
 }
+"""Name of a damaged or hostile file -> its text, and what the refusal says."""
 
 
-@pytest.mark.parametrize("name", HOSTILE)
+@pytest.mark.parametrize("name", HOSTILE_FILES)
 def test_a_hostile_file_is_refused_quickly_and_runs_nothing(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    content, why = HOSTILE[name]
+    content, why = HOSTILE_FILES[name]
     path = tmp_path / f"{name}.yaml"
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
     start = time.perf_counter()
@@ -198,8 +203,8 @@ def test_a_hostile_file_is_refused_quickly_and_runs_nothing(name, tmp_path, monk
 
 def test_json_is_accepted_and_its_errors_are_as_plain(tmp_path):
     path = tmp_path / "layout.json"
-    path.write_text(json.dumps(GOOD))
-    assert load_layout(path) == parse_layout(GOOD)
+    path.write_text(json.dumps(GOOD_LAYOUT))
+    assert load_layout(path) == parse_layout(GOOD_LAYOUT)
     for content, why in [
         ('{"name": "a", "name": "b"}', "key 'name' is given twice"),
         ('{"name": ', "is not valid JSON: line 1"),
@@ -230,7 +235,7 @@ def test_missing_file_folder_and_device_are_refused(tmp_path):
 
 
 def test_what_a_file_may_leave_out_has_the_nominal_value():
-    layout = parse_layout(GOOD)
+    layout = parse_layout(GOOD_LAYOUT)
     assert layout.fins[1].limits == Limits() == Limits((0.05, 0.6), (0.1, 2.1), (-math.pi, math.pi))
     assert layout.fins[1].model == FinModelSpec("drag")
     assert layout.fins[0].limits.zero_direction == (-1.0, 2.0)
@@ -240,7 +245,7 @@ def test_what_a_file_may_leave_out_has_the_nominal_value():
 
 def test_numbers_written_in_any_usual_way_are_numbers(tmp_path):
     path = tmp_path / "x.yaml"
-    text = yaml.safe_dump(GOOD).replace("mass_kg: 4.5", "mass_kg: 45e-1")
+    text = yaml.safe_dump(GOOD_LAYOUT).replace("mass_kg: 4.5", "mass_kg: 45e-1")
     path.write_text(text)
     assert load_layout(path).body.mass_kg == 4.5
 

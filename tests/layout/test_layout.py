@@ -1,6 +1,7 @@
 """Layouts as values: names, losses, changes; and as padded arrays."""
 
 import math
+from itertools import chain
 
 import numpy as np
 import pytest
@@ -10,37 +11,38 @@ from finlab.layout import Fin, Layout, Limits, layout_effectiveness
 from finlab.layout.effectiveness import force_effectiveness
 from finlab.research.random_layouts import TRAINING_BOX, random_layout
 
-THREE = Layout(
+THREE_FINS = Layout(
     "three",
     tuple(Fin(name, (0.1 * i, 0.2, -0.1), 0.5 * i) for i, name in enumerate(["a", "b", "c"])),
 )
+"""A robot of three fins."""
 
 
 def test_fins_are_found_by_name_and_an_unknown_name_lists_those_there_are():
-    assert THREE.names == ("a", "b", "c")
-    assert THREE.index("b") == 1
-    assert THREE.indices(["c", "a"]) == (2, 0)
+    assert THREE_FINS.names == ("a", "b", "c")
+    assert THREE_FINS.index("b") == 1
+    assert THREE_FINS.indices(["c", "a"]) == (2, 0)
     with pytest.raises(LayoutError, match="layout three has no fin 'nobody', it has a, b, c"):
-        THREE.index("nobody")
+        THREE_FINS.index("nobody")
 
 
 def test_without_leaves_the_rest_in_order_and_never_nothing():
-    assert THREE.without(["b"]).names == ("a", "c")
-    assert THREE.without([]) == THREE
-    assert THREE.n_fins == 3
+    assert THREE_FINS.without(["b"]).names == ("a", "c")
+    assert THREE_FINS.without([]) == THREE_FINS
+    assert THREE_FINS.n_fins == 3
     with pytest.raises(LayoutError, match="no fin left"):
-        THREE.without(["a", "b", "c"])
+        THREE_FINS.without(["a", "b", "c"])
     with pytest.raises(LayoutError, match="no fin 'x'"):
-        THREE.without(["x"])
+        THREE_FINS.without(["x"])
 
 
 def test_layouts_are_values():
-    moved = THREE.replace_actuator("b", position=(0.3, 0.0, 0.0))
+    moved = THREE_FINS.replace_actuator("b", position=(0.3, 0.0, 0.0))
     assert moved.fins[1].position == (0.3, 0.0, 0.0)
-    assert THREE.fins[1].position == (0.1, 0.2, -0.1)
-    assert hash(THREE) == hash(Layout("three", THREE.fins))
+    assert THREE_FINS.fins[1].position == (0.1, 0.2, -0.1)
+    assert hash(THREE_FINS) == hash(Layout("three", THREE_FINS.fins))
     with pytest.raises(LayoutError, match="already the name"):
-        THREE.replace_actuator("b", name="a")
+        THREE_FINS.replace_actuator("b", name="a")
 
 
 def test_numpy_numbers_become_plain_ones():
@@ -66,7 +68,7 @@ def test_force_columns_are_force_and_moment_of_a_newton():
 
 
 def test_layout_effectiveness_sets_the_blocks_side_by_side():
-    matrix = layout_effectiveness(THREE)
+    matrix = layout_effectiveness(THREE_FINS)
     assert matrix.shape == (6, 6)
     np.testing.assert_array_equal(matrix[:, 5], [0, 0, 1, 0.2, -0.2, 0])
 
@@ -75,7 +77,7 @@ def test_random_layouts_keep_to_box_counts_and_limits():
     rng = np.random.default_rng(0)
     layouts = [random_layout(rng, limits="varied") for _ in range(1200)]
     assert {layout.n for layout in layouts} == {2, 3, 4, 5}
-    fins = [fin for layout in layouts for fin in layout.fins]
+    fins = chain.from_iterable(layout.fins for layout in layouts)
     assert all((np.abs(fin.position) <= TRAINING_BOX).all() for fin in fins)
     upper, lower = (
         np.concatenate([getattr(layout, end) for layout in layouts]) for end in ("upper", "lower")

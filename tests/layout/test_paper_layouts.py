@@ -19,6 +19,7 @@ AS_PRINTED = {
     "D": [(0.150, 0.200, 0, 0), (-0.050, -0.200, 0, 0), (-0.150, 0.200, 0, 180)],
 }
 SURGE_HEAVE_YAW = [0, 2, 5]
+"""Indices of these axes in a wrench."""
 
 
 @pytest.mark.parametrize("name", AS_PRINTED)

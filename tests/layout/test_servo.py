@@ -11,12 +11,14 @@ from finlab.deploy.bundle import make_bundle
 from finlab.errors import LayoutError
 from finlab.layout import Layout, Servo, layout_to_dict, load_layout, parse_layout, save_layout
 
-SLOW = Servo(amplitude_pole=3.0, speed_limit=6.0)
+SLOW_SERVO = Servo(amplitude_pole=3.0, speed_limit=6.0)
+"""A drive that is slower than the default."""
 
 
 @pytest.fixture(scope="module")
 def slow() -> Layout:
-    return load_layout("A").replace_actuator("back_left", servo=SLOW)
+    """Robot A, one fin of which has this drive."""
+    return load_layout("A").replace_actuator("back_left", servo=SLOW_SERVO)
 
 
 def test_arrays_follow_the_order_of_commands(slow: Layout) -> None:

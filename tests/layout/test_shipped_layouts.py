@@ -9,7 +9,9 @@ from finlab.assets import shipped_layouts
 from finlab.layout import layout_to_dict, load_layout, own_effectiveness, parse_layout, save_layout
 
 SHIPPED = shipped_layouts()
+"""Name of a shipped robot -> its file."""
 AXES = ["Fx", "Fy", "Fz", "Tx", "Ty", "Tz"]
+"""Names of the axes of a wrench."""
 
 
 def columns(layout):
@@ -26,10 +28,12 @@ def columns(layout):
 
 
 def rank(layout):
+    """How many axes a robot drives independently."""
     return int(np.linalg.matrix_rank(columns(layout), tol=1e-6))
 
 
 def missing_axes(layout):
+    """Names of the axes that a robot cannot drive."""
     rows = columns(layout)
     return [axis for axis, row in zip(AXES, rows, strict=True) if np.abs(row).max() < 1e-9]
 

@@ -25,11 +25,12 @@ from finlab.layout import (
 from finlab.layout.damage import Damage
 from finlab.layout.layout import MAX_ACTUATORS
 from finlab.physics.plant import Plant
-from tests.layout.test_other_actuators import AZIMUTH, RUDDER, THRUSTER, TILT
+from tests.layout.test_other_actuators import AZIMUTH_DATA, RUDDER_DATA, THRUSTER_DATA, TILT_DATA
 from tools.schemas import PACKAGE
 
-LIFT = {**THRUSTER, "axis": [0, 0, 1], "torque_per_newton_m": 0.0}
-GOOD = {
+LIFT = {**THRUSTER_DATA, "axis": [0, 0, 1], "torque_per_newton_m": 0.0}
+"""A thruster that pushes upward."""
+GOOD_LAYOUT = {
     "format": "finlab-layout",
     "version": 2,
     "name": "all types",
@@ -43,11 +44,12 @@ GOOD = {
             "zero": [1, 0, 0],
         },
         LIFT,
-        {**AZIMUTH, "name": "pod"},
-        {**TILT, "name": "nose"},
-        RUDDER,
+        {**AZIMUTH_DATA, "name": "pod"},
+        {**TILT_DATA, "name": "nose"},
+        RUDDER_DATA,
     ],
 }
+"""A layout file with an actuator of each type."""
 
 
 def plain_yaml(data):
@@ -57,7 +59,7 @@ def plain_yaml(data):
 
 def edited(i, **changes):
     """A copy of GOOD with some keys of one actuator changed, or removed if the value is `...`."""
-    data = copy.deepcopy(GOOD)
+    data = copy.deepcopy(GOOD_LAYOUT)
     part = data["actuators"][i]
     part.update(changes)
     for key in [key for key, value in changes.items() if value is ...]:
@@ -67,7 +69,7 @@ def edited(i, **changes):
 
 def test_all_types_are_read_and_written(tmp_path):
     path = tmp_path / "robot.yaml"
-    path.write_text(plain_yaml(GOOD))
+    path.write_text(plain_yaml(GOOD_LAYOUT))
     layout = load_layout(path)
     assert [part.type for part in layout.actuators] == [
         "fin",
@@ -84,7 +86,9 @@ def test_all_types_are_read_and_written(tmp_path):
     assert layout.upper[4].tolist() == [math.radians(30), 20.0, 0.0]
     written = layout_to_dict(layout)
     assert written["version"] == 2 and parse_layout(json.loads(json.dumps(written))) == layout
-    jsonschema.validate(GOOD, json.loads((PACKAGE / "layout/layout.schema.json").read_text()))
+    jsonschema.validate(
+        GOOD_LAYOUT, json.loads((PACKAGE / "layout/layout.schema.json").read_text())
+    )
     np.testing.assert_allclose(
         layout.frames @ layout.frames.swapaxes(1, 2), [np.eye(3)] * 6, atol=1e-15
     )
@@ -162,31 +166,31 @@ def test_fins_with_any_shaft_push_as_a_formula_of_its_own_says():
 
 
 def test_the_effectiveness_is_force_and_lever():
-    layout = parse_layout(GOOD)
+    layout = parse_layout(GOOD_LAYOUT)
     columns = own_effectiveness(layout)
     np.testing.assert_allclose(columns[2, 0], [0, 0, 1, 0.2, 0, 0], atol=1e-15)
     np.testing.assert_allclose(columns[1, 1], [1, 0, 0, 0, 0, 0], atol=1e-15)
     np.testing.assert_allclose(columns[1, 2], [0, 1, 0, 0, 0, -0.4], atol=1e-15)
 
 
-BAD = [
+BAD_LAYOUTS = [
     ("actuators[2].name", edited(2, name="tail"), "'tail' is already the name of actuator 2"),
-    ("actuators", {**GOOD, "actuators": []}, "a list of 1 to 64 values, got 0"),
+    ("actuators", {**GOOD_LAYOUT, "actuators": []}, "a list of 1 to 64 values, got 0"),
     (
         "actuators",
-        {**GOOD, "actuators": [{**LIFT, "name": f"t{i}"} for i in range(65)]},
+        {**GOOD_LAYOUT, "actuators": [{**LIFT, "name": f"t{i}"} for i in range(65)]},
         "values, got 65",
     ),
-    ("fins", {**GOOD, "fins": []}, "unknown key"),
+    ("fins", {**GOOD_LAYOUT, "fins": []}, "unknown key"),
     (
         "version",
-        {**GOOD, "version": 1},
+        {**GOOD_LAYOUT, "version": 1},
         "version 1, with fins:, is no longer read; write version: 2",
     ),
-    ("version", {**GOOD, "version": 3}, "reads version 2, got 3"),
+    ("version", {**GOOD_LAYOUT, "version": 3}, "reads version 2, got 3"),
     (
         "version",
-        {key: value for key, value in GOOD.items() if key != "version"},
+        {key: value for key, value in GOOD_LAYOUT.items() if key != "version"},
         "required key is missing",
     ),
     (
@@ -220,10 +224,13 @@ BAD = [
     ("actuators[3].turn_axis", edited(3, turn_axis=[0, 0, 2]), ""),
     ("actuators[5].deflection_deg", edited(5, deflection_deg=[25, -25]), "25 and -25"),
 ]
+"""Key, a layout file in which it is wrong, and what the refusal says."""
 
 
 @pytest.mark.parametrize(
-    ("key", "data", "why"), BAD, ids=[f"{key}-{i}" for i, (key, *_) in enumerate(BAD)]
+    ("key", "data", "why"),
+    BAD_LAYOUTS,
+    ids=[f"{key}-{i}" for i, (key, *_) in enumerate(BAD_LAYOUTS)],
 )
 def test_a_bad_value_is_refused_with_file_key_and_reason(key, data, why, tmp_path):
     path = tmp_path / "bad.yaml"
@@ -245,7 +252,7 @@ def test_as_many_actuators_as_are_allowed():
 
 
 def test_what_works_for_fins_only_says_so():
-    layout = parse_layout(GOOD)
+    layout = parse_layout(GOOD_LAYOUT)
     with pytest.raises(LayoutError, match="simulate works for .* 'lift' of .* is of type thruster"):
         layout.require_kind("simulate")
     tail = layout.without(["side", "lift", "pod", "nose", "rudder"])
@@ -259,7 +266,7 @@ def test_what_works_for_fins_only_says_so():
 
 
 def test_damage_leaves_the_other_actuators_as_they_are():
-    layout = parse_layout(GOOD)
+    layout = parse_layout(GOOD_LAYOUT)
     health = Damage(weak={"side": 0.5, "lift": 0.5, "pod": 0.5}, stuck={"nose": 0.1})
     damaged = health.applied_to(layout)
     assert damaged.names == layout.names
@@ -297,20 +304,21 @@ def test_damage_leaves_the_other_actuators_as_they_are():
 )
 def test_damage_that_an_actuator_cannot_have_is_refused(damage, why):
     with pytest.raises((AllocationError, LayoutError), match=why):
-        Damage(**damage).applied_to(parse_layout(GOOD))
+        Damage(**damage).applied_to(parse_layout(GOOD_LAYOUT))
 
 
-UNCERTAIN = {"share": 0.05, "floor_n": 0.1, "common": "bench", "correlation": 0.4}
+UNCERTAINTY = {"share": 0.05, "floor_n": 0.1, "common": "bench", "correlation": 0.4}
+"""How uncertain an actuator's force is, as a layout file says it."""
 
 
 @pytest.mark.parametrize("i", range(6))
 def test_any_actuator_may_be_uncertain(i: int) -> None:
-    data = copy.deepcopy(GOOD)
-    data["actuators"][i]["uncertainty"] = UNCERTAIN
+    data = copy.deepcopy(GOOD_LAYOUT)
+    data["actuators"][i]["uncertainty"] = UNCERTAINTY
     layout = parse_layout(data)
     assert layout.actuators[i].uncertainty == Uncertainty(0.05, 0.1, "bench", 0.4)
     assert [part.uncertainty for k, part in enumerate(layout.actuators) if k != i] == [None] * 5
-    assert parse_layout(layout_to_dict(layout)) == layout != parse_layout(GOOD)
+    assert parse_layout(layout_to_dict(layout)) == layout != parse_layout(GOOD_LAYOUT)
 
 
 @pytest.mark.parametrize(
@@ -318,8 +326,8 @@ def test_any_actuator_may_be_uncertain(i: int) -> None:
     [("share", -0.1), ("floor_n", math.inf), ("common", ""), ("correlation", 1.1), ("x", 1)],
 )
 def test_uncertainty_that_cannot_be_is_refused_with_its_key(key: str, value: object) -> None:
-    data = copy.deepcopy(GOOD)
-    data["actuators"][2]["uncertainty"] = {**UNCERTAIN, key: value}
+    data = copy.deepcopy(GOOD_LAYOUT)
+    data["actuators"][2]["uncertainty"] = {**UNCERTAINTY, key: value}
     with pytest.raises(
         LayoutError, match=rf"actuators\[2\]\.uncertainty\.{key} of thruster 'lift': "
     ):

@@ -17,14 +17,20 @@ from tests.log.ulog_writer import write_ulog
 
 FULL = 40.0
 """Force of each thruster at full output, either way [N]."""
-FRD = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
-ROOT = np.sqrt(0.5)
-LEVER, ROLL, PITCH = 0.24 * ROOT, 0.22, 0.12
-"""Arms of yaw, roll and pitch [m]."""
+FLU_TO_FRD = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
+"""Signs by which wrenches go from x forward, y left, z up to y right, z down."""
+DIAGONAL = np.sqrt(0.5)
+"""Part of a unit vector along each of two axes, between which it lies."""
+LEVER = 0.24 * DIAGONAL
+"""Arm of yaw [m]."""
+ROLL = 0.22
+"""Arm of roll [m]."""
+PITCH = 0.12
+"""Arm of pitch [m]."""
 # PX4 divides columns of the pseudo-inverse: each of thrust by the mean of its entries, roll and
 # pitch by sqrt(2) times the larger entry, yaw by its own.
-PX4_UNIT = 4 * FULL * np.array([ROOT, ROOT, 1.0, PITCH * ROOT, PITCH * ROOT, LEVER])
-SUB_UNIT = 4 * FULL * np.array([ROOT, ROOT, 1.0, ROLL, PITCH, LEVER])
+PX4_UNIT = 4 * FULL * np.array([DIAGONAL, DIAGONAL, 1.0, PITCH * DIAGONAL, PITCH * DIAGONAL, LEVER])
+SUB_UNIT = 4 * FULL * np.array([DIAGONAL, DIAGONAL, 1.0, ROLL, PITCH, LEVER])
 """Wrench of a setpoint of 1 on each axis by the rules of both autopilots, worked out for this
 robot."""
 
@@ -96,7 +102,7 @@ def px4_dive(
     found = read_parameters(write_px4(robot, Exchange(), ""), "")
     whole = ("CA_ROTOR_COUNT", "CA_R_REV", "CA_AIRFRAME")
     parameters = {key: int(value) if key in whole else value for key, value in found.items()}
-    setpoint = demand / PX4_UNIT * FRD
+    setpoint = demand / PX4_UNIT * FLU_TO_FRD
     topics = {
         "vehicle_thrust_setpoint": (time, {"xyz": setpoint[:, :3]}),
         "vehicle_torque_setpoint": (time, {"xyz": setpoint[:, 3:]}),
@@ -116,7 +122,7 @@ def px4_dive(
         control = np.full((n, 12), np.nan)
         control[:, :8] = force / FULL
         topics["actuator_motors"] = (time + 0.001, {"control": control})
-    left = (demand - given) / PX4_UNIT * FRD
+    left = (demand - given) / PX4_UNIT * FLU_TO_FRD
     late = time > time[n // 3]
     topics["failure_detector_status"] = (
         time,
@@ -174,9 +180,11 @@ def sub_dive(path: Path, n: int = 3000, dt: float = 0.02, speed: np.ndarray | No
 
 @pytest.fixture(scope="session")
 def px4(tmp_path_factory: pytest.TempPathFactory) -> Dive:
+    """The dive as PX4 logs it."""
     return px4_dive(tmp_path_factory.mktemp("px4") / "dive.ulg")
 
 
 @pytest.fixture(scope="session")
 def sub(tmp_path_factory: pytest.TempPathFactory) -> Dive:
+    """The dive as ArduSub logs it."""
     return sub_dive(tmp_path_factory.mktemp("sub") / "dive.bin")

@@ -17,10 +17,12 @@ from finlab.physics.objective import wrench_scale_of
 from tests.log.conftest import SUB_UNIT, Dive, columns, px4_dive, sub_dive
 
 YAW = 5
+"""Index of yaw in a wrench."""
 
 
 @pytest.fixture(params=["px4", "sub"])
 def dive(request: pytest.FixtureRequest) -> Dive:
+    """The dive of a log, by the name of its fixture."""
     made: Dive = request.getfixturevalue(request.param)
     return made
 

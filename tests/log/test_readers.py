@@ -22,6 +22,7 @@ from tests.log.conftest import Dive
 from tests.log.test_judge import check
 
 TYPES = get_typestore(Stores.ROS2_HUMBLE)
+"""Types of the messages of ROS 2 Humble."""
 
 
 def write_bag(path: Path, dive: Dive, topics: tuple[str, ...] = ("/wrench",)) -> Path:

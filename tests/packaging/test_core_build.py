@@ -30,6 +30,7 @@ def project(tmp_path: Path) -> Path:
 
 
 def python(project: Path, *argv: str, **variables: str) -> subprocess.CompletedProcess[str]:
+    """Run Python in a project, without the settings of a compiler that this machine may have."""
     clean = {key: value for key, value in os.environ.items() if key not in ("CC", "FINLAB_TARGET")}
     words = [sys.executable, *argv]
     variables = clean | variables

@@ -20,7 +20,18 @@ from finlab.assets import DISTRIBUTION, EXTRA_OF_PACKAGE
 
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-CORE = {"msgspec", "numpy", "scipy", "pyyaml", "safetensors", "threadpoolctl", "tyro", "tqdm"}
+"""Table `project` of pyproject.toml."""
+CORE_REQUIREMENTS = {
+    "msgspec",
+    "numpy",
+    "scipy",
+    "pyyaml",
+    "safetensors",
+    "threadpoolctl",
+    "tyro",
+    "tqdm",
+}
+"""Packages that an installation without extras needs."""
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +55,7 @@ def bare(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         [sys.executable, "-m", "venv", "--without-pip", str(folder)], check=True, timeout=120
     )
     site = next(folder.glob("lib/python3*/site-packages"))
-    for name in with_requirements(CORE):
+    for name in with_requirements(CORE_REQUIREMENTS):
         found = metadata.distribution(name)
         for file in found.files or ():
             if file.parts[0] not in ("..", "__pycache__") and not (site / file.parts[0]).exists():
@@ -53,7 +64,8 @@ def bare(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "bin" / "python"
 
 
-def normal(name: str) -> str:
+def normal_name(name: str) -> str:
+    """The name of a package as indexes compare it."""
     return re.sub(r"[-_.]+", "-", name).lower()
 
 
@@ -62,10 +74,13 @@ def with_requirements(names: set[str]) -> set[str]:
     waiting = set(names)
     seen = set[str]()
     while waiting:
-        seen.add(name := waiting.pop())
+        name = waiting.pop()
+        seen.add(name)
         lines = map(Requirement, metadata.distribution(name).requires or ())
         needed = {
-            normal(line.name) for line in lines if line.marker is None or line.marker.evaluate()
+            normal_name(line.name)
+            for line in lines
+            if line.marker is None or line.marker.evaluate()
         }
         waiting |= needed - seen
     return seen
@@ -76,17 +91,17 @@ def declared(*extras: str) -> set[str]:
     lines = [Requirement(line) for line in PROJECT["dependencies"]]
     for extra in extras:
         lines += map(Requirement, PROJECT["optional-dependencies"][extra])
-    inside = {extra for line in lines if line.name == DISTRIBUTION for extra in line.extras} - set(
-        extras
-    )
-    return (
-        declared(*extras, *inside)
-        if inside
-        else {normal(line.name) for line in lines} - {DISTRIBUTION}
-    )
+    extras_of_extras = set[str]()
+    for line in lines:
+        if line.name == DISTRIBUTION:
+            extras_of_extras |= line.extras
+    if extras_of_extras - set(extras):
+        return declared(*extras, *(extras_of_extras - set(extras)))
+    return {normal_name(line.name) for line in lines} - {DISTRIBUTION}
 
 
 def bare_run(bare: Path, cwd: Path, *argv: str) -> subprocess.CompletedProcess[str]:
+    """Run a program of the fresh environment, which sees nothing of this tree."""
     environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
     return subprocess.run(
         [str(bare), *argv], cwd=cwd, env=environment, capture_output=True, text=True, timeout=300
@@ -117,7 +132,7 @@ def test_asks_for_the_core_and_offers_extras(wheel: Path) -> None:
     about = email.message_from_bytes(archive.read(name))
     assert about["Name"] == DISTRIBUTION == PROJECT["name"]
     required = [line for line in about.get_all("Requires-Dist", []) if "extra ==" not in line]
-    assert {normal(Requirement(line).name) for line in required} == CORE
+    assert {normal_name(Requirement(line).name) for line in required} == CORE_REQUIREMENTS
     extras = {
         "train",
         "plot",
@@ -150,7 +165,7 @@ def test_what_is_imported_is_required(package: str, extra: str) -> None:
     known = with_requirements(declared(extra))
     home = metadata.packages_distributions()
     foreign = set(imported(package)) - sys.stdlib_module_names - {"finlab", "webapp"}
-    missing = {name for name in foreign if not {normal(each) for each in home[name]} & known}
+    missing = {name for name in foreign if not {normal_name(each) for each in home[name]} & known}
     assert not missing, f"name them in the extra {extra} of pyproject.toml"
 
 
@@ -215,7 +230,7 @@ def test_the_lines_of_the_readme_run_from_any_folder(bare: Path, tmp_path: Path)
 
 def test_constraints_pin_everything_exactly() -> None:
     lines = (ROOT / "constraints.txt").read_text().splitlines()
-    pins = {normal(line.split("==")[0]) for line in lines if line and not line.startswith("#")}
+    pins = {normal_name(line.split("==")[0]) for line in lines if line and not line.startswith("#")}
     assert all("==" in line for line in lines if not line.startswith("#"))
     assert declared("dev") <= pins
 

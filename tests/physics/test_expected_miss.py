@@ -16,9 +16,10 @@ from finlab.layout import FinModelSpec, Layout, Uncertainty, load_layout
 from finlab.physics import make_law, plant_of, write_table
 from finlab.physics.expected_miss import expected_miss
 from finlab.physics.table_error import grid_uncertainty, thrust_table_error
-from tests.mixed_robots import load, random_flow, random_robot
+from tests.random_robots import load, random_flow, random_robot
 
-DRAWS = 20_000
+N_DRAWS = 20_000
+"""How many errors of the forces are sampled."""
 
 
 def with_uncertainty(layout: Layout, rng: np.random.Generator) -> Layout:
@@ -35,13 +36,13 @@ def sampled_miss(
     layout: Layout, force: Array, effectiveness: Array, rng: np.random.Generator
 ) -> Array:
     """Standard deviation (6,) of the wrench where forces (n, 3) err at random."""
-    shared = {name: rng.standard_normal((DRAWS, 2)) for name in ("bench", "tank")}
-    miss = np.zeros((DRAWS, 6))
+    shared = {name: rng.standard_normal((N_DRAWS, 2)) for name in ("bench", "tank")}
+    miss = np.zeros((N_DRAWS, 6))
     for i, part in enumerate(layout.actuators):
         told = part.uncertainty
         if told is None:
             continue
-        own = rng.standard_normal((DRAWS, 2))
+        own = rng.standard_normal((N_DRAWS, 2))
         if told.common:
             own = (
                 np.sqrt(1 - told.correlation) * own

@@ -16,8 +16,11 @@ from finlab.layout import FinModelSpec
 from finlab.physics import make_law
 
 DRAG = make_law(FinModelSpec("drag"))
+"""The law of drag with its default constants."""
 LIGHTHILL = make_law(FinModelSpec("lighthill"))
+"""Lighthill's law with its default constants."""
 SOFT = make_law(FinModelSpec("soft"))
+"""The law of a soft fin with its default constants."""
 UNEVEN = make_law(
     FinModelSpec(
         "soft", (("d", 0.1), ("e", 0.2), ("k", 2.0), ("p", 1.7), ("phi_e", 2.0), ("q", 3.0))
@@ -25,23 +28,26 @@ UNEVEN = make_law(
 )
 """A soft fin whose thrust depends on the zero direction and is turned from it."""
 LAWS = {name: make_law(FinModelSpec(name)) for name in PLANAR_LAWS} | {"uneven": UNEVEN}
+"""Name -> law, of all formulas and one that is uneven."""
 every_law = pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+"""Runs a test with each of these laws."""
 
 
-def commands(n, seed=0):
+def random_commands(n, seed=0):
+    """Commands (n, 3) of a fin."""
     unit = np.random.default_rng(seed).random((n, 3))
     return np.array([0.05, 0.1, -math.pi]) + unit * np.array([1.4, 3.0, 2 * math.pi])
 
 
 def test_drag_thrust_is_4_737_f2_sin2_a():
-    a, f, _ = commands(100).T
+    a, f, _ = random_commands(100).T
     np.testing.assert_allclose(DRAG.thrust(a, f), 4.737 * f**2 * np.sin(a) ** 2, rtol=1e-4)
     printed = 2 * 1000 * 0.15 * 0.02 * 0.1**2 * (2 * math.pi * f) ** 2 * (1 - np.cos(2 * a))
     np.testing.assert_allclose(DRAG.thrust(a, f), printed, rtol=1e-12)
 
 
 def test_lighthill_thrust_is_the_formula_with_the_bessel_function():
-    a, f, _ = commands(100).T
+    a, f, _ = random_commands(100).T
     mass = math.pi / 4 * 1000 * 0.10**2
     expected = 0.5 * mass * 0.20**2 * (2 * math.pi * f) ** 2 * a * j1(a)
     np.testing.assert_allclose(LIGHTHILL.thrust(a, f), expected, rtol=1e-13)
@@ -70,7 +76,7 @@ def test_soft_thrust_is_the_contract_by_hand():
 
 @every_law
 def test_force_points_where_the_law_says_and_never_along_the_shaft(law):
-    u = commands(200)
+    u = random_commands(200)
     force = law.force(u)
     assert not force[:, 0].any()
     turn = np.arctan2(force[:, 2], force[:, 1]) - u[:, 2] - law.offset
@@ -80,7 +86,7 @@ def test_force_points_where_the_law_says_and_never_along_the_shaft(law):
 
 @every_law
 def test_slopes_are_those_of_the_tensors_own_differentiation(law):
-    u = torch.from_numpy(commands(50)).requires_grad_()
+    u = torch.from_numpy(random_commands(50)).requires_grad_()
     force, jacobian = law.force_and_jacobian(u.detach().numpy())
     np.testing.assert_array_equal(force, law.force(u.detach().numpy()))
     tensor = law.force(u)
@@ -97,7 +103,7 @@ def test_symbols_give_the_same_thrust(law):
     f = casadi.SX.sym("f")
     d = casadi.SX.sym("d")
     formula = casadi.Function("thrust", [a, f, d], [law.thrust(a, f, d)])
-    for command in commands(10):
+    for command in random_commands(10):
         assert float(formula(*command)) == pytest.approx(float(law.thrust(*command)), rel=1e-12)
 
 
@@ -110,7 +116,7 @@ def test_a_fin_that_does_not_beat_gives_nothing_and_its_slopes_are_finite(law):
 
 @pytest.mark.parametrize("name", PLANAR_LAWS)
 def test_every_parameter_of_a_description_reaches_its_law(name):
-    u = commands(7)
+    u = random_commands(7)
     for key, rule in FIN_MODELS[name].items():
         other = make_law(FinModelSpec(name, ((key, rule.default + 0.1),)))
         changed = np.abs(other.force(u) - make_law(FinModelSpec(name)).force(u)).max() > 1e-6
@@ -129,7 +135,9 @@ BLADES = [
     Blade(0.05, 0.2),
     Blade(drag_coefficient=1e-6),
 ]
+"""Blades of several sizes, densities and coefficients of drag."""
 BEATS = [(0.01, 0.1), (0.05, 2.1), (0.3, 1.0), (0.6, 2.1), (1.2, 0.5), (1.5, 3.0)]
+"""Amplitudes [rad] and frequencies [Hz], from a tremble to a full beat."""
 
 
 def integrated(blade: Blade, amplitude: float, frequency: float) -> float:

@@ -7,7 +7,7 @@ import pytest
 
 from finlab.physics import Plant
 from finlab.physics.objective import EffortMeter, Name, command_effort, cost_meter, fin_effort
-from tests.random_fins import KINDS, random_robot_of_fins
+from tests.random_fin_robots import KINDS, random_robot_of_fins
 
 
 @pytest.mark.parametrize("objective", ["power", "effort"])
@@ -34,23 +34,25 @@ def test_what_each_objective_counts() -> None:
     np.testing.assert_allclose(cost_meter("effort", plant)(command), effort)
 
 
-UPPER = np.array([[0.6, 2.1, np.pi], [0.4, 3.0, -0.5], [0.5, 1.0, 0.0]])
+COMMAND_MAX = np.array([[0.6, 2.1, np.pi], [0.4, 3.0, -0.5], [0.5, 1.0, 0.0]])
+"""Upper limits (3, 3) of three fins."""
 
 
-def commands(rows: int) -> np.ndarray:
+def random_commands(rows: int) -> np.ndarray:
+    """Commands (rows, 3, 3) of these fins."""
     return np.random.default_rng(0).uniform(0.05, 0.9, (rows, 3, 3)) * [1.0, 2.0, 3.0]
 
 
 def test_each_term_by_hand() -> None:
     half = np.array([0.3, 0.7, np.pi / 4])  # 1/2, 1/3 and 1/4 of the first fin's limits
-    assert fin_effort(half, UPPER[0]) == pytest.approx(1 / 4 + 1 / 9 + 0.1 / 16 + 1 / 6)
+    assert fin_effort(half, COMMAND_MAX[0]) == pytest.approx(1 / 4 + 1 / 9 + 0.1 / 16 + 1 / 6)
 
 
 def test_a_robots_energy_is_the_sum_over_fins() -> None:
-    command = commands(5)
-    fins = np.stack([fin_effort(command[:, i], UPPER[i]) for i in range(3)], axis=1)
-    np.testing.assert_allclose(EffortMeter(UPPER)(command), fins.sum(1))
-    np.testing.assert_allclose(command_effort(command, UPPER), fins.sum(1))
+    command = random_commands(5)
+    fins = np.stack([fin_effort(command[:, i], COMMAND_MAX[i]) for i in range(3)], axis=1)
+    np.testing.assert_allclose(EffortMeter(COMMAND_MAX)(command), fins.sum(1))
+    np.testing.assert_allclose(command_effort(command, COMMAND_MAX), fins.sum(1))
     command[2, 1] = np.nan  # a lost fin costs nothing
     fins[2, 1] = 0.0
-    np.testing.assert_allclose(command_effort(command, UPPER), fins.sum(1))
+    np.testing.assert_allclose(command_effort(command, COMMAND_MAX), fins.sum(1))

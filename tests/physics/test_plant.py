@@ -11,9 +11,9 @@ from finlab.assets import shipped_layouts
 from finlab.errors import CommandError
 from finlab.layout import Fin, FinModelSpec, Layout, load_layout
 from finlab.physics import Plant, make_law, write_table
-from tests.any_robot import FIN_ROBOTS
-from tests.mixed_robots import KINDS, bluerov2_heavy, load, random_plant, with_dead_bands
-from tests.own_plant import OwnPlant
+from tests.allocator_cache import FIN_ROBOTS
+from tests.oracle_plant import OraclePlant
+from tests.random_robots import KINDS, bluerov2_heavy, load, random_plant, with_dead_bands
 
 
 def wrench_by_hand(layout, command):
@@ -37,6 +37,7 @@ def wrench_by_hand(layout, command):
 
 
 def random_commands(layout, n, seed=0):
+    """Commands (n, ...) within the limits of a robot."""
     lower = layout.lower
     upper = layout.upper
     return np.random.default_rng(seed).uniform(lower, upper, (n, *lower.shape))
@@ -144,7 +145,7 @@ def test_wrench_and_watts_of_random_robots(kind: str, number: int) -> None:
 def test_rudders_at_large_angles_and_astern() -> None:
     own = random_plant("rudders", 0, 5)
     for flow in np.random.default_rng(0).normal(size=(20, 6)):
-        turned = OwnPlant(own.layout, flow)
+        turned = OraclePlant(own.layout, flow)
         commands = turned.draw(np.random.default_rng(1))
         expected = turned.wrench(commands)
         given = Plant(load(own.layout)).wrench(commands, flow=flow)
@@ -153,7 +154,7 @@ def test_rudders_at_large_angles_and_astern() -> None:
 
 def test_dead_bands() -> None:
     rng = np.random.default_rng(0)
-    own = OwnPlant(with_dead_bands(bluerov2_heavy(), rng))
+    own = OraclePlant(with_dead_bands(bluerov2_heavy(), rng))
     commands = np.zeros((100, 8, 3))
     commands[:, :, 0] = rng.uniform(-1.5, 1.5, (100, 8))
     np.testing.assert_allclose(

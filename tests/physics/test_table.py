@@ -4,6 +4,7 @@ file."""
 import math
 import os
 import zipfile
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -15,19 +16,26 @@ from finlab.layout import Fin, FinModelSpec, Layout
 from finlab.physics import Plant, make_law, plant_of, read_table, write_table
 
 DRAG = make_law(FinModelSpec("drag"))
+"""The law of drag with its default constants."""
 LIGHTHILL = make_law(FinModelSpec("lighthill"))
+"""Lighthill's law with its default constants."""
 AMPLITUDE = np.linspace(0.0, 0.7, 9)
+"""Amplitudes of the tables [rad]."""
 FREQUENCY = np.linspace(0.0, 2.4, 9)
+"""Frequencies of the tables [Hz]."""
 CIRCLE = np.linspace(-math.pi, math.pi, 25)
+"""Zero directions of the tables [rad], the whole circle."""
 
 
-def commands(n, seed=0):
+def random_commands(n, seed=0):
+    """Commands (n, 3) within the tables."""
     unit = np.random.default_rng(seed).random((n, 3))
     return np.array([0.05, 0.1, -math.pi]) + unit * np.array([0.55, 2.0, 2 * math.pi])
 
 
 @pytest.fixture
 def table(tmp_path):
+    """The law of drag as a table."""
     write_table(tmp_path / "drag.csv", DRAG, AMPLITUDE, FREQUENCY, CIRCLE)
     return read_table(tmp_path / "drag.csv")
 
@@ -35,7 +43,7 @@ def table(tmp_path):
 def test_the_grid_points_come_back_exactly_and_the_rest_closely(table):
     points = np.array([[AMPLITUDE[3], FREQUENCY[5], CIRCLE[7]], [0.7, 2.4, math.pi]])
     np.testing.assert_allclose(table.force(points), DRAG.force(points), rtol=1e-8, atol=1e-8)
-    u = commands(2000)
+    u = random_commands(2000)
     largest = np.linalg.norm(DRAG.force(u), axis=-1).max()
     error = np.linalg.norm(table.force(u) - DRAG.force(u), axis=-1)
     assert error.mean() < 0.002 * largest
@@ -43,7 +51,7 @@ def test_the_grid_points_come_back_exactly_and_the_rest_closely(table):
 
 
 def test_slopes_agree_with_differences_and_with_the_original(table):
-    u = commands(200)
+    u = random_commands(200)
     force, jacobian = table.force_and_jacobian(u)
     np.testing.assert_allclose(force, table.force(u), rtol=1e-13, atol=1e-13)
     for k in range(3):
@@ -68,7 +76,7 @@ def test_full_circle_is_periodic_with_or_without_its_end_point(table, tmp_path):
     write_table(tmp_path / "open.csv", DRAG, AMPLITUDE, FREQUENCY, CIRCLE[:-1])
     without_end = read_table(tmp_path / "open.csv")
     assert table.periodic and without_end.periodic
-    u = commands(50)
+    u = random_commands(50)
     np.testing.assert_allclose(table.force(u), table.force(u + [0.0, 0.0, 2 * math.pi]), atol=1e-12)
     np.testing.assert_allclose(table.force(u), without_end.force(u), atol=1e-12)
 
@@ -106,6 +114,11 @@ def test_a_layout_may_use_a_table(tmp_path):
 
 
 HEADER = "A,f,phi,Fx,Fy,Fz"
+"""Columns of a file without power."""
+GOOD_COMMANDS = list(product((0.1, 0.2), (1, 2), (0, 1)))
+"""Amplitude [rad], frequency [Hz] and direction [rad] of a grid of 2 x 2 x 2 commands."""
+GOOD_ROWS = [f"{a},{f},{d},0,1,2" for a, f, d in GOOD_COMMANDS]
+"""Rows of a table on this grid."""
 
 
 def scaled(*, amplitude=1.0, frequency=1.0, direction=1.0, force=1.0, power=None):
@@ -120,14 +133,9 @@ def scaled(*, amplitude=1.0, frequency=1.0, direction=1.0, force=1.0, power=None
             2 * force,
             *([] if power is None else [f * f * power]),
         ]
-        for a in (0.1, 0.2)
-        for f in (1, 2)
-        for d in (0, 1)
+        for a, f, d in GOOD_COMMANDS
     ]
     return [HEADER + ("" if power is None else ",P"), *(",".join(map(str, row)) for row in rows)]
-
-
-BLOCK = [f"{a},{f},{d},0,1,2" for a in (0.1, 0.2) for f in (1, 2) for d in (0, 1)]
 
 
 @pytest.mark.parametrize(
@@ -140,16 +148,16 @@ BLOCK = [f"{a},{f},{d},0,1,2" for a in (0.1, 0.2) for f in (1, 2) for d in (0, 1
         ([HEADER, "1,2,3,4"], "line 2 has 4 values"),
         ([HEADER, "1,2,x,4,5,6"], "line 2, column phi, holds 'x', which is not a number"),
         (
-            [HEADER, *BLOCK[:-1], "0.2,2,1,nan,1,2"],
+            [HEADER, *GOOD_ROWS[:-1], "0.2,2,1,nan,1,2"],
             "line 9, column Fx, holds 'nan', which is not finite",
         ),
         (
-            [HEADER, *BLOCK[:-1]],
+            [HEADER, *GOOD_ROWS[:-1]],
             "do not fill the grid of 2 amplitudes, 2 frequencies and 2 zero directions",
         ),
-        ([HEADER, *BLOCK[:-1]], "the row A = 0.2, f = 2, phi = 1 is missing"),
-        ([HEADER, *BLOCK[:-1], "0.2,2,1,,1,2"], "line 9, column Fx, is empty; leave no gaps"),
-        ([HEADER, *BLOCK, BLOCK[0]], "appears in two rows, lines 2 and 10"),
+        ([HEADER, *GOOD_ROWS[:-1]], "the row A = 0.2, f = 2, phi = 1 is missing"),
+        ([HEADER, *GOOD_ROWS[:-1], "0.2,2,1,,1,2"], "line 9, column Fx, is empty; leave no gaps"),
+        ([HEADER, *GOOD_ROWS, GOOD_ROWS[0]], "appears in two rows, lines 2 and 10"),
         (
             scaled(amplitude=57.3),
             "column A has 11.46, expected half amplitudes in rad (not peak to peak), 0 to 1.571",
@@ -176,9 +184,9 @@ BLOCK = [f"{a},{f},{d},0,1,2" for a in (0.1, 0.2) for f in (1, 2) for d in (0, 1
             "column P has -1, expected the mean power in W that drives it, 0 to 1e+06",
         ),
         (scaled(power=0.0), "column P is 0 everywhere; leave it out"),
-        ([HEADER, *BLOCK[:4]], "column A has one value"),
+        ([HEADER, *GOOD_ROWS[:4]], "column A has one value"),
         (
-            [HEADER, *BLOCK, *(row.replace(",1,0,1,2", ",7,0,1,2") for row in BLOCK[1::2])],
+            [HEADER, *GOOD_ROWS, *(row.replace(",1,0,1,2", ",7,0,1,2") for row in GOOD_ROWS[1::2])],
             "span 7 rad",
         ),
     ],
@@ -196,13 +204,12 @@ def circle_with_power(path, force_at_end, extra):
     """A table around the circle, whose end has another force, and extra power, beside its
     beginning."""
     angles = np.linspace(-math.pi, math.pi, 9)
-    last = np.arange(9) == 8
-    rows = [
-        f"{a},{f},{d},0,{a * f * math.cos(d) + force_at_end * end},{a * f * math.sin(d)},{5 + extra * end}"
-        for a in (0.5, 1)
-        for f in (1, 2)
-        for d, end in zip(angles, last, strict=True)
-    ]
+    rows = []
+    for a, f, d in product((0.5, 1), (1, 2), angles):
+        is_end = d == angles[-1]
+        across = a * f * math.cos(d) + force_at_end * is_end
+        along = a * f * math.sin(d)
+        rows.append(f"{a},{f},{d},0,{across},{along},{5 + extra * is_end}")
     path.write_text("\n".join([HEADER + ",P", *rows]))
     return path
 
@@ -223,9 +230,7 @@ def test_a_circle_is_closed_by_its_forces_whatever_the_power(tmp_path):
 def test_power_never_falls_below_zero_between_points_near_zero(tmp_path):
     """A cubic through 0, 0, 1 dips; its slope is then told as that of zero."""
     power = [0.0, 0.0, 0.0, 1.0, 1.0]
-    rows = [
-        f"{a},{f},{d},0,1,2,{p}" for a in (0.1, 0.2) for f, p in enumerate(power) for d in (0, 1)
-    ]
+    rows = [f"{a},{f},{d},0,1,2,{power[f]}" for a, f, d in product((0.1, 0.2), range(5), (0, 1))]
     (tmp_path / "t.csv").write_text("\n".join([HEADER + ",P", *rows]))
     law = read_table(tmp_path / "t.csv")
     at = np.zeros((401, 3))
@@ -243,9 +248,7 @@ def test_one_turn_apart_noise_may_be_a_twentieth_of_the_largest_force(share, goo
     angles = np.linspace(-math.pi, math.pi, 9)
     rows = [
         f"{a},{f},{d},0,{a * f * math.cos(d) * (1.0 + share * (d > 3.0))},{a * f * math.sin(d)}"
-        for a in (0.5, 1)
-        for f in (1, 2)
-        for d in angles
+        for a, f, d in product((0.5, 1), (1, 2), angles)
     ]
     (tmp_path / "t.csv").write_text("\n".join([HEADER, *rows]))
     if good:
@@ -266,16 +269,19 @@ def test_a_missing_or_binary_file_is_refused(tmp_path):
 
 
 GRID = np.linspace(0.0, 0.6, 5), np.linspace(0.0, 2.1, 6), np.linspace(-np.pi, np.pi, 9)
+"""Amplitudes [rad], frequencies [Hz] and zero directions [rad] of a soft fin's table."""
 
 
 @pytest.fixture
 def soft_table(tmp_path: Path) -> Path:
+    """File of a soft fin's table."""
     path = tmp_path / "fin.csv"
     write_table(path, make_law(FinModelSpec("soft", (("e", 0.2),))), *GRID)
     return path
 
 
 def spec(path: Path) -> FinModelSpec:
+    """The model of a fin whose law is a table."""
     return FinModelSpec("table", (("path", str(path)),))
 
 

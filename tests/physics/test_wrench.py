@@ -11,10 +11,13 @@ from finlab.layout.effectiveness import body_force, force_effectiveness, wrench_
 from finlab.physics import make_law
 
 F64 = torch.float64
+"""Double precision of torch."""
 DRAG = make_law(FinModelSpec())
+"""The law of the fins."""
 
 
 def drag_wrench(command, position, angle):
+    """Wrenches of fins that obey this law."""
     return wrench_of_forces(DRAG.force(command), force_effectiveness(position, angle))
 
 

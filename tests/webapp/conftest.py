@@ -17,6 +17,7 @@ prepare(["webapp.session.files", "webapp.tasks.fitting"])
 
 @pytest.fixture
 def worker() -> Iterator[Pool]:
+    """The process that computes for a page."""
     worker = Pool()
     yield worker
     worker.stop()
@@ -24,11 +25,13 @@ def worker() -> Iterator[Pool]:
 
 @pytest.fixture
 def session() -> Session:
+    """A session of U-CAT."""
     return Session(load_layout("ucat"))
 
 
 @pytest.fixture
 def swimming(worker: Pool) -> Iterator[Swimming]:
+    """Swims of a page."""
     swim = Swimming(context_of(worker))
     yield swim
     swim.halt()

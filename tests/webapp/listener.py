@@ -72,6 +72,7 @@ class Listener:
 
 
 def _heard(message: dict[str, Any], arrays: list[int]) -> Heard:
+    """A message with what it is about and how many bytes it takes."""
     size = len(msgspec.msgpack.encode(message)) + sum(arrays[k] for k in _arrays(message))
     keys = [f"{k}" for k in message.get("updates", {})]
     about = message.get("name") or message.get("uuid") or str(message.get("source", ""))[:60]
@@ -84,4 +85,8 @@ def _arrays(value: Any) -> list[int]:
         if "__binary_index" in value:
             return [value["__binary_index"]]
         value = list(value.values())
-    return [index for part in value for index in _arrays(part)] if isinstance(value, list) else []
+    indices = list[int]()
+    if isinstance(value, list):
+        for part in value:
+            indices += _arrays(part)
+    return indices

@@ -29,6 +29,7 @@ from webapp.tasks.slot import Attended, Bell, Deferred, Pool, Pools, Slot
 from webapp.tasks.solver import Solver
 
 N_REFINED = 4
+"""Candidates that are refined."""
 Array = NDArray[np.float64]
 
 

@@ -30,6 +30,7 @@ from webapp.view import View
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[viser.ViserServer]:
+    """A real server without a page."""
     server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
     yield server
     server.stop()
@@ -37,6 +38,7 @@ def server() -> Iterator[viser.ViserServer]:
 
 @pytest.fixture(scope="module")
 def app(server: viser.ViserServer) -> Iterator[App]:
+    """The app on it."""
     app = App(server, Solver(load=load_stand_in), load_layout(shipped_layouts()["ucat"]))
     yield app
     app.stop()
@@ -44,6 +46,7 @@ def app(server: viser.ViserServer) -> Iterator[App]:
 
 @pytest.fixture
 def view(server: viser.ViserServer, app: App) -> Iterator[View]:
+    """A page of the app without a browser."""
     client: Any = SilentClient(server)
     loop = server.get_event_loop()
     session = Session(load_layout(shipped_layouts()["ucat"]))

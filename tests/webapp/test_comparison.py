@@ -26,6 +26,7 @@ from webapp.tasks.slot import Pool
 from webapp.tasks.solver import Solver
 
 UCAT = load_layout(shipped_layouts()["ucat"])
+"""Four fins."""
 
 
 def test_all_methods_answer_one_after_the_other(worker: Pool) -> None:
@@ -167,6 +168,7 @@ def test_every_answer_keeps_least_what_is_asked() -> None:
 
 
 TARGET = (1.0, 0.0, 0.5, 0.0, 0.0, 0.1)
+"""A wrench within reach of robot A: surge, heave and yaw [N, N m]."""
 
 
 @pytest.fixture

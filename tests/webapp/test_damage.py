@@ -26,6 +26,7 @@ from webapp.session.targets import axis_reach, full_thrust
 from webapp.tasks.solver import Solver
 
 UCAT = load_layout("ucat")
+"""Four fins."""
 
 
 def test_a_weak_and_a_stuck_fin_keep_to_what_is_left(session: Session) -> None:
@@ -67,7 +68,8 @@ def test_damage_is_mended_undone_and_goes_with_its_fin(session: Session) -> None
     assert session.state.damage == Damage()
 
 
-VALUES = {"weak": 0.5, "torn": 0.5, "stuck": 0.3, "running": (0.3, 1.0, 0.2)}
+DAMAGE_VALUES = {"weak": 0.5, "torn": 0.5, "stuck": 0.3, "running": (0.3, 1.0, 0.2)}
+"""Kind of damage -> a value that the page may send."""
 NO_FIN = {"thruster": (0.3,), "azimuth": (0.3, 1.0), "tilt": (0.3, 1.0)}
 """What those that are no fins keep."""
 
@@ -76,7 +78,10 @@ NO_FIN = {"thruster": (0.3,), "azimuth": (0.3, 1.0), "tilt": (0.3, 1.0)}
 def test_every_actuator_has_the_faults_of_its_type_and_no_others(robot: str) -> None:
     session = Session(load_layout(robot))
     for part in session.state.layout.actuators:
-        for kind, value in {**VALUES, "running": NO_FIN.get(part.type, VALUES["running"])}.items():
+        for kind, value in {
+            **DAMAGE_VALUES,
+            "running": NO_FIN.get(part.type, DAMAGE_VALUES["running"]),
+        }.items():
             if kind in part.KIND.faults:
                 session.damage(part.name, kind, value)
                 assert session.state.damage.faults_of(part.name)[kind] == value
@@ -163,6 +168,7 @@ def hulled() -> Session:
 
 
 def body(hulled: Session) -> Body:
+    """The body of a session's robot."""
     found = hulled.state.layout.body
     assert found is not None
     return found

@@ -28,11 +28,13 @@ from webapp.tasks.solver import Solver
 
 @pytest.fixture(autouse=True)
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder of caches for this test alone."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     return tmp_path / "cache"
 
 
 def link_of(text: str, kind: str = files.PLAIN) -> str:
+    """A text as the end of a link."""
     return kind + base64.urlsafe_b64encode(zlib.compress(text.encode())).decode().rstrip("=")
 
 
@@ -72,12 +74,22 @@ def test_a_small_hull_and_table_travel_and_large_ones_are_refused(tmp_path: Path
         files.packed(session.state.layout)
 
 
-WHOLE = files.packed(load_layout("ucat"))
+GOOD_LINK = files.packed(load_layout("ucat"))
+"""The end of a link that opens."""
 
 
 @pytest.mark.parametrize(
     "text",
-    ["", "y", "y!!!", "q" + "A" * 20, "yAAAA", files.ARCHIVE + "AAAA", "y" + "é" * 8, WHOLE[:-9]],
+    [
+        "",
+        "y",
+        "y!!!",
+        "q" + "A" * 20,
+        "yAAAA",
+        files.ARCHIVE + "AAAA",
+        "y" + "é" * 8,
+        GOOD_LINK[:-9],
+    ],
 )
 def test_what_is_no_design_is_refused_with_a_sentence(text: str) -> None:
     with pytest.raises(FinlabError) as told:
@@ -109,6 +121,8 @@ class Browser:
 
 
 def designs_of(session: Session, browser: Browser) -> Designs:
+    """The designs of a page, whose notes and downloads a stand-in keeps."""
+
     def notify(title: str, text: str, calm: bool = False) -> None:
         if title != "Saved":
             browser.notes.append(text)

@@ -15,10 +15,15 @@ from tests.webapp.test_other_robots import FISH
 from webapp.session import Session
 
 ROBOTS = ("ucat", "bluerov2", "torpedo", "catamaran", "fish", "turtle_hybrid")
+"""Shipped robots of all kinds of actuator."""
 FLOW = np.array([1.2, 0.1, -0.2, 0.0, 0.0, 0.0])
-POLAR = np.array([1.0, -1.0, 1.0])
-AXIAL = np.array([-1.0, 1.0, -1.0])
-MIRRORED = np.concatenate([POLAR, AXIAL])
+"""A flow that is not straight (6,) [m/s, rad/s]."""
+POLAR_MIRROR = np.array([1.0, -1.0, 1.0])
+"""Signs of forces and velocities in a mirror at the plane of x and z."""
+AXIAL_MIRROR = np.array([-1.0, 1.0, -1.0])
+"""The same of torques and angular velocities."""
+WRENCH_MIRROR = np.concatenate([POLAR_MIRROR, AXIAL_MIRROR])
+"""The same of wrenches and flows."""
 
 
 def wrenches(layout: Layout, names: tuple[str, ...], flow: Array) -> Array:
@@ -63,8 +68,8 @@ def test_copies_around_an_axis_do_what_the_first_does_turned(robot: str) -> None
 def test_the_image_does_the_mirrored_thing(layout: Layout) -> None:
     for part in layout.actuators:
         other = Layout("image", (part.image(),))
-        flow = FLOW * MIRRORED
-        first = wrenches(layout, (part.name,), FLOW) * MIRRORED
+        flow = FLOW * WRENCH_MIRROR
+        first = wrenches(layout, (part.name,), FLOW) * WRENCH_MIRROR
         assert same(first, wrenches(other, (part.name,), flow)), part.name
         again = part.image().image()
         np.testing.assert_allclose(again.frame, part.frame, atol=1e-9)

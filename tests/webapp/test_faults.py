@@ -18,7 +18,7 @@ import viser
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
-from tests.exhaustive import sampled
+from tests.sampled_cases import sampled
 from tests.webapp.stand_in import SilentClient, load_stand_in
 from webapp.session import Display, Session
 from webapp.session.looking import DRAWERS
@@ -30,7 +30,9 @@ from webapp.viser_internals import start_server, stop_server
 
 BEFORE, OPENED, AFTER = (load_layout(shipped_layouts()[name]) for name in ("A", "B", "ucat"))
 DISPLAY = Display(frozen=True, drawn="forces")
-WORDS = "out of order"
+"""Switches of a page that draws most."""
+FAULT_TEXT = "out of order"
+"""Text of the exception that is raised."""
 
 COMPUTED = (
     "webapp.tasks.solver.Solver.solve",
@@ -77,6 +79,8 @@ class Tab:
         self.settle()
 
     def on_loop(self, act: Callable[[], Any]) -> Any:
+        """Call something on the server's loop, and return its result."""
+
         async def run() -> Any:
             return act()
 
@@ -87,7 +91,8 @@ class Tab:
         """To all that can be seen: each task with each drawer, with a fin selected and without."""
         session = self.view.session
         acts: list[Callable[[], object]] = [lambda: session.select(session.state.layout.names[0])]
-        acts += [partial(session.show_drawer, name) for names in DRAWERS.values() for name in names]
+        for names in DRAWERS.values():
+            acts += [partial(session.show_drawer, name) for name in names]
         acts += [partial(session.show_task, task) for task in ("Export", "Design")]
         return [*acts, partial(session.select, None), partial(session.show_task, "Allocate")]
 
@@ -97,10 +102,12 @@ class Tab:
             self.on_loop(partial(self.view.do, act))
 
     def open(self, layout: Any) -> None:
+        """Open a layout, and wait for its answer."""
         self.on_loop(lambda: self.view.do(lambda: self.view.session.open_layout(layout)))
         self.settle()
 
     def settle(self) -> None:
+        """Wait until all is answered and drawn."""
         end = time.monotonic() + 60
         while not self.on_loop(lambda: self.view.is_settled):
             assert time.monotonic() < end
@@ -130,11 +137,13 @@ class Tab:
         }
 
     def close(self) -> None:
+        """Close the page and the server."""
         self.on_loop(self.view.close)
         stop_server(self.server)
 
 
 def _html(container: Any, hidden: list[Any]) -> Iterator[str]:
+    """Blocks of HTML that are shown."""
     for child in container._children.values():
         if getattr(child, "visible", True) and child not in hidden:
             if hasattr(child, "_children"):
@@ -145,6 +154,7 @@ def _html(container: Any, hidden: list[Any]) -> Iterator[str]:
 
 @pytest.fixture(scope="module")
 def workers() -> Iterator[Pools]:
+    """Pools for pages that answer at once."""
     workers = Pools()
     with (
         pytest.MonkeyPatch.context() as patch
@@ -167,12 +177,8 @@ def tab(workers: Pools) -> Iterator[Tab]:
     ("place", "fault"),
     sampled(
         [
-            pytest.param(place, kind(WORDS))
-            for kind, places in (
-                (RuntimeError, COMPUTED + DRAWN),
-                (FinlabError, (COMPUTED[0], DRAWN[2])),
-            )
-            for place in places
+            *(pytest.param(place, RuntimeError(FAULT_TEXT)) for place in COMPUTED + DRAWN),
+            *(pytest.param(place, FinlabError(FAULT_TEXT)) for place in (COMPUTED[0], DRAWN[2])),
         ],
         every=6,
     ),
@@ -193,7 +199,7 @@ def test_no_figure_of_the_robot_before_stays(
         tab.open(OPENED)
         shown = tab.figures()
         told = " ".join([*shown, *tab.client.notes])
-        assert WORDS in told or "cannot be analysed" in told
+        assert FAULT_TEXT in told or "cannot be analysed" in told
         assert "<h1>B</h1>" in told or "shown of B" in told
         fresh = Tab(workers, OPENED)
         assert shown == fresh.figures()

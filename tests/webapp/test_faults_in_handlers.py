@@ -9,7 +9,7 @@ import pytest
 import viser
 
 from finlab.layout import load_layout
-from tests.exhaustive import sampled
+from tests.sampled_cases import sampled
 from tests.webapp.stand_in import SilentClient, until
 from tests.webapp.test_app import app, on_loop, server, view
 from webapp.app import App
@@ -23,7 +23,8 @@ from webapp.view import View
 
 __all__ = ["app", "server", "view"]
 
-WORDS = "out of order"
+FAULT_TEXT = "out of order"
+"""Text of the exception that is raised."""
 ACTING = (Session, Guide, Designs, Fitting, Improver, Swimming)
 """Whose methods the handlers of the widgets call."""
 ASKED = ("ask", "tick", "resume")
@@ -40,10 +41,10 @@ def intents() -> Iterator[tuple[type, str]]:
 
 def handles(server: viser.ViserServer) -> list[Any]:
     """Every widget of the page that does anything."""
-    found = [
-        h for c in server.gui._container_handle_from_uuid.values() for h in c._children.values()
-    ]
-    return [handle for handle in found if getattr(handle._impl, "update_cb", ())]
+    handles = list[Any]()
+    for container in server.gui._container_handle_from_uuid.values():
+        handles += container._children.values()
+    return [handle for handle in handles if getattr(handle._impl, "update_cb", ())]
 
 
 def others(handle: Any) -> list[Any]:
@@ -71,7 +72,8 @@ def use(server: viser.ViserServer, view: View, handle: Any, value: Any) -> None:
 
 
 def broken(*_: Any, **__: Any) -> Any:
-    raise RuntimeError(WORDS)
+    """Raise this exception, whatever is asked."""
+    raise RuntimeError(FAULT_TEXT)
 
 
 def faults(view: View) -> list[str]:
@@ -101,11 +103,11 @@ def test_every_widget_survives_a_fault_in_what_it_does(
             for value in others(handle):
                 client.notes.clear()
                 use(server, view, handle, value)
-                told += any(WORDS in note for note in faults(view))
+                told += any(FAULT_TEXT in note for note in faults(view))
         assert told > 100, "most widgets do something"
         assert session.state == before
     printed = capsys.readouterr().err
-    assert "Task exception" not in printed and f"RuntimeError: {WORDS}" in printed
+    assert "Task exception" not in printed and f"RuntimeError: {FAULT_TEXT}" in printed
     on_loop(server, lambda: view.do(lambda: session.set_target(0, 0.4)))
     until(lambda: not view.busy)
     assert view.shown_allocation is not None and view.shown_allocation.target[0] == 0.4
@@ -147,7 +149,7 @@ def test_every_widget_survives_a_fault_in_what_is_written(
                 on_loop(
                     server, lambda: view.do(lambda: view.session.show_task(task))
                 )  # New shows another
-        assert any(WORDS in note for note in faults(view))
+        assert any(FAULT_TEXT in note for note in faults(view))
     view.client.notes.clear()
     on_loop(server, lambda: view.do(view.session.start_over))
     on_loop(server, lambda: view.do(lambda: view.session.set_target(0, 0.3)))

@@ -19,7 +19,7 @@ from finlab.files.guarded import packed
 from finlab.fit import fin_fit
 from finlab.layout import Layout, Thruster, load_layout
 from finlab.swim.design_files import read_archive, stored_table
-from tests.fit.cell import columns_of, commands, measured, soft, write
+from tests.fit.load_cell import columns_of, commands, measured, soft, write
 from tests.fit.test_thruster_fit import T200
 from tests.webapp.stand_in import LoneBell, context_of, until
 from webapp.markup.outcomes import fit_card
@@ -30,6 +30,7 @@ from webapp.tasks.fitting import Fitting
 from webapp.tasks.slot import Pool
 
 LAW = soft(k=4.0, p=1.4, x0=0.9, q=4.0, e=0.15, phi_e=1.0, d=0.12)
+"""The law of the fin that is measured."""
 
 
 @pytest.fixture(autouse=True)

@@ -11,6 +11,7 @@ import zlib
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from itertools import chain
 from types import SimpleNamespace
 from typing import Any
 
@@ -49,6 +50,7 @@ GARBAGE: tuple[Any, ...] = (
     [math.nan] * 3,
     {"a": 1},
 )
+"""Values that no widget sends."""
 
 
 def taken(handle: Any, value: Any) -> bool:
@@ -72,9 +74,8 @@ def test_garbage_from_the_page_changes_nothing_but_raises_no_fault(
 ) -> None:
     view.session.select("front_left")
     before = view.session.state.layout
-    handles = [
-        h for c in server.gui._container_handle_from_uuid.values() for h in c._children.values()
-    ]
+    containers = server.gui._container_handle_from_uuid.values()
+    handles = list(chain.from_iterable(container._children.values() for container in containers))
     heard = 0
     for handle in handles:
         if isinstance(handle, viser.GuiUploadButtonHandle):
@@ -187,27 +188,29 @@ def test_several_files_at_once_are_refused() -> None:
         Taken().heard["dropped"]("", "")
 
 
-EVIL = "<img src=x onerror=alert(1)>'\"&amp;"
+HOSTILE_TEXT = "<img src=x onerror=alert(1)>'\"&amp;"
+"""A text that would run as a script where it is not escaped."""
 ESCAPED = re.compile(r"&(lt|amp);")
+"""A character that was escaped."""
 
 
 def contents(server: viser.ViserServer) -> list[str]:
     """All markup on the page."""
     containers = server.gui._container_handle_from_uuid.values()
-    handles = [handle for container in containers for handle in container._children.values()]
+    handles = chain.from_iterable(container._children.values() for container in containers)
     return [handle.content for handle in handles if isinstance(handle, viser.GuiHtmlHandle)]
 
 
 def test_what_is_put_into_markup_is_escaped_once() -> None:
-    inner = html("<b title='{}'>{:.1f}</b>", EVIL, 2.345)
-    whole = str(html("<p>{}{}{}</p>", inner, EVIL, [inner, EVIL]))
+    inner = html("<b title='{}'>{:.1f}</b>", HOSTILE_TEXT, 2.345)
+    whole = str(html("<p>{}{}{}</p>", inner, HOSTILE_TEXT, [inner, HOSTILE_TEXT]))
     assert whole.count("<b title=") == 2 and "<img" not in whole and "2.3</b>" in whole
     assert whole.count("&lt;img") == 4 and "&amp;lt;" not in whole
 
 
 def test_text_that_is_not_marked_is_shown_as_text() -> None:
     handle: Any = type("Handle", (), {"content": ""})()
-    set_properties(handle, content=EVIL)
+    set_properties(handle, content=HOSTILE_TEXT)
     assert handle.content.startswith("&lt;img") and type(handle.content) is str
     set_properties(handle, content=html("<b>{}</b>", 1))
     assert handle.content == "<b>1</b>" and type(handle.content) is str
@@ -218,27 +221,27 @@ def test_no_page_shows_markup_of_ours_as_text(server: viser.ViserServer, view: V
         on_loop(server, lambda task=task: view.do(lambda: view.session.show_task(task)))
         on_loop(server, lambda: view.do(lambda: view.session.select("front_left")))
         until(lambda: not view.busy and not view.jobs.analyst.busy)
-        found = [ESCAPED.finditer(text) for text in contents(server)]
-        wrong = {
-            text.string[max(0, text.start() - 60) : text.end() + 30]
-            for part in found
-            for text in part
-        }
+        wrong = set[str]()
+        for text in contents(server):
+            for match in ESCAPED.finditer(text):
+                wrong.add(text[max(0, match.start() - 60) : match.end() + 30])
         assert wrong == set(), task
 
 
 def test_no_page_takes_names_for_markup(server: viser.ViserServer, view: View) -> None:
-    layout = view.session.state.layout.replace_actuator("front_left", name=EVIL[:40])
-    evil = replace(layout, name=EVIL[:40], description=f"{EVIL}<script>alert(2)</script>")
+    layout = view.session.state.layout.replace_actuator("front_left", name=HOSTILE_TEXT[:40])
+    evil = replace(
+        layout, name=HOSTILE_TEXT[:40], description=f"{HOSTILE_TEXT}<script>alert(2)</script>"
+    )
     evil = files.read_layout("robot.yaml", files.layout_file(evil)[1]).layout
     for task in DRAWERS:
         on_loop(server, lambda: view.do(lambda: view.session.open_layout(evil)))
         on_loop(server, lambda task=task: view.do(lambda: view.session.show_task(task)))
-        for chosen in (EVIL[:40], None):
+        for chosen in (HOSTILE_TEXT[:40], None):
             on_loop(server, lambda chosen=chosen: view.do(lambda: view.session.select(chosen)))
             until(lambda: not view.busy and not view.jobs.analyst.busy)
             texts = contents(server)
             assert any("&lt;img" in text for text in texts)
             assert not any(re.search("<img|<script|&amp;lt;", text) for text in texts)
-    on_loop(server, lambda: view.do(lambda: view.session.toggle_loss(EVIL[:40])))
-    assert view.session.state.lost == (EVIL[:40],)
+    on_loop(server, lambda: view.do(lambda: view.session.toggle_loss(HOSTILE_TEXT[:40])))
+    assert view.session.state.lost == (HOSTILE_TEXT[:40],)

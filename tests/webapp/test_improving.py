@@ -21,6 +21,7 @@ from webapp.tasks.improving import Clearance, Improver
 from webapp.tasks.slot import Pool, Slot
 
 NO_YAW = load_layout(shipped_layouts()["no_yaw"])
+"""A robot that cannot yaw."""
 
 
 def test_search_is_cancelled_and_what_it_found_is_offered(worker: Pool) -> None:

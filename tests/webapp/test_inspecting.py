@@ -16,7 +16,7 @@ from finlab.errors import FinlabError, LayoutError
 from finlab.files import yaml_text
 from finlab.layout import FinModelSpec, Layout, layout_to_dict, load_layout
 from finlab.physics import make_law, plant_of
-from tests.any_robot import FIN_ROBOTS
+from tests.allocator_cache import FIN_ROBOTS
 from webapp.markup.verdict import verdict_sentence
 from webapp.panels.actuator_list import actuator_list
 from webapp.panels.files_tab import command_line
@@ -26,28 +26,31 @@ from webapp.session.state import LEAST, State
 from webapp.session.targets import PRESETS
 from webapp.tasks.solver import Solver
 
-FRONT = ("front_right", "front_left")
+FRONT_FINS = ("front_right", "front_left")
+"""Names of U-CAT's front fins."""
 
 
 def fin(session: Session, name: str):  # type: ignore[no-untyped-def]
+    """A fin of a session's robot."""
     layout = session.state.layout
     return layout.fins[layout.index(name)]
 
 
-def choose(session: Session, *names: str) -> None:
+def select(session: Session, *names: str) -> None:
+    """Select actuators, one after the other."""
     session.select(names[0])
     for name in names[1:]:
         session.select_also(name)
 
 
 def test_selection_grows_and_shrinks(session: Session) -> None:
-    choose(session, "back_left", "front_right")
+    select(session, "back_left", "front_right")
     assert session.selection == ("front_right", "back_left") and session.selected == "front_right"
     session.select_also("front_left")
-    assert session.selected == "front_left" and set(session.selection) == {*FRONT, "back_left"}
+    assert session.selected == "front_left" and set(session.selection) == {*FRONT_FINS, "back_left"}
     session.select_also("back_left")
-    assert session.selection == FRONT
-    choose(session, *session.state.layout.names)
+    assert session.selection == FRONT_FINS
+    select(session, *session.state.layout.names)
     with pytest.raises(FinlabError, match="these are all actuators"):
         session.delete()
     session.select(None)
@@ -55,9 +58,9 @@ def test_selection_grows_and_shrinks(session: Session) -> None:
 
 
 def test_what_changes_counts_for_all_selected_in_one_step(session: Session) -> None:
-    choose(session, *FRONT)
+    select(session, *FRONT_FINS)
     session.place_selected((0.2, *fin(session, "front_left").position[1:]))
-    assert [fin(session, name).position for name in FRONT] == [
+    assert [fin(session, name).position for name in FRONT_FINS] == [
         (0.2, -0.1502, 0.0),
         (0.2, 0.1502, 0.0),
     ]
@@ -66,7 +69,7 @@ def test_what_changes_counts_for_all_selected_in_one_step(session: Session) -> N
     session.choose_model("lighthill")
     session.set_value("width", 0.12)
     session.turn_selected(math.radians(45))
-    for name in FRONT:
+    for name in FRONT_FINS:
         changed = fin(session, name)
         assert changed.limits.amplitude == (0.1, 0.5) and changed.limits.frequency == (0.1, 2.1)
         assert changed.model == FinModelSpec("lighthill", (("width", 0.12),))
@@ -142,18 +145,21 @@ def test_a_renamed_fin_keeps_its_damage_link_and_selection(session: Session) -> 
 def test_linked_fins_that_are_both_selected_move_once(session: Session) -> None:
     session.select("front_left")
     session.mirror()
-    choose(session, *FRONT)
+    select(session, *FRONT_FINS)
     session.place_selected((0.2, 0.2, 0.0))
     assert fin(session, "front_left").position == (0.2, 0.2, 0.0)
     assert fin(session, "front_right").position == (0.2, -0.2, 0.0)
 
 
 SOLVER = Solver()
+"""One for all tests here."""
 Target = tuple[float, float, float, float, float, float]
+"""A wrench as a state holds it."""
 needs_network = pytest.mark.skipif(
     not {"default", "paper"} <= set(shipped_checkpoints()),
     reason="no trained checkpoints in the tree",
 )
+"""Skips a test where no trained network is."""
 
 
 def reachable(layout: Layout) -> Target:
@@ -240,13 +246,11 @@ def test_one_error_everywhere() -> None:
     plant = plant_of(layout)
     assert answer.candidates is not None and answer.wrench_expected is not None
     modes = [named.mode for named in solver.modes(reply).visible]
-    told = [
-        (c, e)
-        for found in (answer.candidates, answer.samples)
-        if found
-        for c, e in zip(found.command, found.err_norm, strict=True)
-    ]
-    for command, error in [*told, *((mode.command, mode.err_norm) for mode in modes)]:
+    errors = [(mode.command, mode.err_norm) for mode in modes]
+    for candidates in (answer.candidates, answer.samples):
+        if candidates:
+            errors += zip(candidates.command, candidates.err_norm, strict=True)
+    for command, error in errors:
         missing = (np.array(state.target) - plant.wrench(command)) / answer.scale
         assert error == pytest.approx(float(np.linalg.norm(missing)), abs=1e-9)
     assert modes[0].err_norm == pytest.approx(answer.err_norm, rel=1e-9)

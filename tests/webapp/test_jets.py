@@ -22,11 +22,14 @@ from webapp.tasks.slot import Pools
 from webapp.tasks.solver import Solver
 
 HEAVY = load_layout("bluerov2_heavy")
-OWN = replace(HEAVY, interaction=Jets(hull=0.2, uncertain=0.1))
-AHEAD = (30.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+"""Eight thrusters without jets."""
+HEAVY_WITH_JETS = replace(HEAVY, interaction=Jets(hull=0.2, uncertain=0.1))
+"""The same with jets of constants that are not the default ones."""
+SURGE = (30.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+"""A wrench straight ahead [N, N m]."""
 
 
-@pytest.mark.parametrize("layout", [load_layout("ucat"), OWN], ids=["none", "own"])
+@pytest.mark.parametrize("layout", [load_layout("ucat"), HEAVY_WITH_JETS], ids=["none", "own"])
 def test_the_switch_can_be_undone_and_remembers_the_robots_own(layout: Layout) -> None:
     session = Session(layout)
     own = layout.interaction
@@ -46,20 +49,20 @@ def test_the_switch_can_be_undone_and_remembers_the_robots_own(layout: Layout) -
 
 
 def test_jets_travel_in_files_and_links() -> None:
-    assert files.read_layout(*files.layout_file(OWN)).layout == OWN
-    assert files.unpacked(files.packed(OWN)).layout == OWN
+    assert files.read_layout(*files.layout_file(HEAVY_WITH_JETS)).layout == HEAVY_WITH_JETS
+    assert files.unpacked(files.packed(HEAVY_WITH_JETS)).layout == HEAVY_WITH_JETS
 
 
 @pytest.mark.parametrize("speed", [0.0, 0.5])
 def test_commands_without_jets_are_judged_with_them(speed: float) -> None:
-    state = State(replace(HEAVY, interaction=Jets()), target=AHEAD, speed=speed)
+    state = State(replace(HEAVY, interaction=Jets()), target=SURGE, speed=speed)
     solver = Solver()
     both = solver.jet_comparison(state)
     best = both.with_jets
     blind = both.without_jets
-    alone = Allocator(HEAVY).allocate(AHEAD)
+    alone = Allocator(HEAVY).allocate(SURGE)
     flow = np.array(state.flow) if state.flow else None
-    miss = np.subtract(AHEAD, plant_of(state.layout).wrench(alone.command, flow=flow))
+    miss = np.subtract(SURGE, plant_of(state.layout).wrench(alone.command, flow=flow))
     assert blind.err_norm == pytest.approx(np.linalg.norm(miss / alone.scale), rel=1e-6)
     assert best.reachable and blind.err_norm > 0.02 and blind.power < best.power
     told = jets_table(both)
@@ -68,10 +71,11 @@ def test_commands_without_jets_are_judged_with_them(speed: float) -> None:
 
 @pytest.fixture(scope="module")
 def tab() -> Iterator[Tab]:
+    """A page on which this wrench is asked for."""
     workers = Pools()
     tab = Tab(workers, HEAVY, Solver())
     tab.on_loop(
-        lambda: tab.view.do(partial(tab.view.session.ask_for, [str(value) for value in AHEAD]))
+        lambda: tab.view.do(partial(tab.view.session.ask_for, [str(value) for value in SURGE]))
     )
     tab.settle()
     yield tab

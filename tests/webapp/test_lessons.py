@@ -18,11 +18,13 @@ from webapp.session.state import State
 
 
 def _answer(state: State) -> Allocation:
+    """The answer to a state."""
     allocator = Allocator(state.layout, state.method)
     return allocator.allocate(state.target, lost=state.lost, policy=state.policy)
 
 
 def _turn_a_shaft(session: Session) -> None:
+    """Turn the first fin of a session's robot."""
     name = session.state.layout.names[0]
     turn_fin(session, name, session.state.layout.fins[0].mounting_angle + 1.2)
 

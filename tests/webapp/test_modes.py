@@ -21,11 +21,14 @@ from webapp.tasks.answering import HOLD, Answering, Refining
 from webapp.tasks.modes import find_modes
 from webapp.tasks.solver import MAX_SHOWN, NO_MODES, Modes, NamedMode, Solver, named_modes
 
-PUSH = (0.3, 1.1, 0.0)
-REST = (0.05, 0.1, 0.0)
+PUSH_COMMAND = (0.3, 1.1, 0.0)
+"""A command of a fin that pushes."""
+REST_COMMAND = (0.05, 0.1, 0.0)
+"""A command of a fin that rests."""
 
 
-def candidates(*commands: list[tuple[float, float, float]]) -> Candidates:
+def candidates_of(*commands: list[tuple[float, float, float]]) -> Candidates:
+    """Candidates by the commands of their fins, the cheaper ones first."""
     command = np.array(commands)
     k = len(command)
     source = tuple(f"component {i + 1}" for i in range(k))
@@ -35,46 +38,56 @@ def candidates(*commands: list[tuple[float, float, float]]) -> Candidates:
 
 
 def modes_of(*commands: list[tuple[float, float, float]]) -> tuple[NamedMode, ...]:
+    """Named modes of such candidates."""
     command = np.array(commands)
     lower, upper = (
         np.tile(end, (command.shape[1], 1)) for end in ([0.05, 0.1, -np.pi], [0.6, 2.1, np.pi])
     )
     with np.errstate(invalid="ignore"):
         force = np.nan_to_num(np.sin(command[..., 0]) ** 2 * command[..., 1] ** 2)
-    return named_modes(find_modes(candidates(*commands), force, lower, upper), "network")
+    return named_modes(find_modes(candidates_of(*commands), force, lower, upper), "network")
 
 
 def test_how_a_fin_rests_is_no_news() -> None:
-    modes = modes_of([PUSH, REST], [PUSH, (0.2, 0.1, 3.0)], [REST, PUSH])
+    modes = modes_of(
+        [PUSH_COMMAND, REST_COMMAND], [PUSH_COMMAND, (0.2, 0.1, 3.0)], [REST_COMMAND, PUSH_COMMAND]
+    )
     assert [named.name for named in modes] == ["fin 2 rests", "fin 1 rests"]
     assert len(modes) == 2
 
 
 def test_directions_wrap() -> None:
-    assert len(modes_of([(0.3, 1.0, np.pi), PUSH], [(0.3, 1.0, -np.pi + 0.01), PUSH])) == 1
+    assert (
+        len(modes_of([(0.3, 1.0, np.pi), PUSH_COMMAND], [(0.3, 1.0, -np.pi + 0.01), PUSH_COMMAND]))
+        == 1
+    )
 
 
 def test_names_tell_modes_apart() -> None:
     modes = modes_of(
-        [PUSH, PUSH],
-        [PUSH, (0.3, 1.1, 3.1)],
-        [(0.5, 0.7, 0.0), PUSH],
-        [PUSH, (0.3, 1.1, 1.0)],
-        [(0.3, 1.6, 0.0), PUSH],
+        [PUSH_COMMAND, PUSH_COMMAND],
+        [PUSH_COMMAND, (0.3, 1.1, 3.1)],
+        [(0.5, 0.7, 0.0), PUSH_COMMAND],
+        [PUSH_COMMAND, (0.3, 1.1, 1.0)],
+        [(0.3, 1.6, 0.0), PUSH_COMMAND],
     )
     names = [named.name for named in modes]
     assert names == ["all fins push", *(f"all fins push ({k})" for k in (2, 3, 4, 5))]
 
 
 def test_failed_fins_are_left_out() -> None:
-    assert modes_of([(np.nan,) * 3, PUSH, REST])[0].name == "fin 3 rests"
+    assert modes_of([(np.nan,) * 3, PUSH_COMMAND, REST_COMMAND])[0].name == "fin 3 rests"
 
 
 def test_no_more_are_shown_than_have_colours() -> None:
-    assert len(modes_of(*([PUSH, PUSH, (0.3, 1.1, 0.5 * k)] for k in range(12)))) == MAX_SHOWN
+    assert (
+        len(modes_of(*([PUSH_COMMAND, PUSH_COMMAND, (0.3, 1.1, 0.5 * k)] for k in range(12))))
+        == MAX_SHOWN
+    )
 
 
-def found(method: str = "mdn") -> Modes:
+def modes_of_turn(method: str = "mdn") -> Modes:
+    """Modes of U-CAT that turns."""
     solver = Solver(load=load_stand_in)
     return solver.modes(
         solver.reply(State(load_layout("ucat"), target=PRESETS["Turn"], method=method))
@@ -82,7 +95,7 @@ def found(method: str = "mdn") -> Modes:
 
 
 def test_samples_and_modes_are_drawn_and_listed() -> None:
-    modes = found()
+    modes = modes_of_turn()
     samples, middle, end = modes.refinement
     assert len(modes.ends) == len(samples) == len(end)
     for source, place in zip(samples.source, modes.ends, strict=True):
@@ -176,7 +189,7 @@ def test_a_refinement_is_played_step_by_step_on_the_robot(monkeypatch: pytest.Mo
 
 @pytest.mark.parametrize("spread", [0.0, 1e-6, 0.01, 1.0])
 def test_dots_stand_at_their_values_and_their_numbers_beside_them(spread: float) -> None:
-    modes = found()
+    modes = modes_of_turn()
     first = modes.visible[0].mode
     effort = np.append(
         0.801 + spread * np.random.default_rng(3).uniform(size=MAX_SHOWN - 1), 0.957 + spread

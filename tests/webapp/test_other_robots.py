@@ -25,7 +25,9 @@ from webapp.tasks.slot import Pools
 from webapp.tasks.solver import Solver
 
 HYBRID = load_layout("turtle_hybrid")
+"""Fins and thrusters."""
 BLUEROV = load_layout("bluerov2_heavy")
+"""Eight thrusters."""
 FISH = Layout(
     "fish",
     (
@@ -50,6 +52,7 @@ FISH = Layout(
         Fin(name="left", position=(0.2, 0.15, 0.0), mounting_angle=np.pi / 2),
     ),
 )
+"""A pod, a rudder and two fins."""
 
 
 @pytest.fixture(scope="module")

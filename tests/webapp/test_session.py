@@ -16,6 +16,7 @@ from webapp.session import Session
 
 @pytest.fixture
 def session() -> Session:
+    """A session of robot A."""
     return Session(load_layout(shipped_layouts()["A"]))
 
 

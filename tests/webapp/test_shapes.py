@@ -26,6 +26,7 @@ from webapp.theme import ASKED, DELIVERED, FIN_COLORS, MISSING, Rgb, ink
 
 
 def solid(mesh: Mesh) -> trimesh.Trimesh:
+    """A mesh of the scene as trimesh takes it."""
     return trimesh.Trimesh(mesh.vertices, mesh.faces, process=True)
 
 
@@ -203,20 +204,22 @@ def test_actuators_move_as_commanded_or_hang(name: str) -> None:
             assert full.angle == part.upper[0]
 
 
-LMS = np.array(
+LINEAR_RGB_TO_LMS = np.array(
     [
         [0.4122214708, 0.5363325363, 0.0514459929],
         [0.2119034982, 0.6806995451, 0.1073969566],
         [0.0883024619, 0.2817188376, 0.6299787005],
     ]
 )
-OKLAB = np.array(
+"""Matrix from linear red, green and blue to the cones of the eye (Ottosson 2020)."""
+LMS_TO_OKLAB = np.array(
     [
         [0.2104542553, 0.7936177850, -0.0040720468],
         [1.9779984951, -2.4285922050, 0.4505937099],
         [0.0259040371, 0.7827717662, -0.8086757660],
     ]
 )
+"""Matrix from their cube roots to Oklab."""
 
 
 def linear(color: Rgb) -> np.ndarray:
@@ -227,7 +230,7 @@ def linear(color: Rgb) -> np.ndarray:
 
 def oklab(color: Rgb) -> np.ndarray:
     """Lightness and two opponent axes (3,), in which distances are as the eye sees them."""
-    return OKLAB @ np.cbrt(LMS @ linear(color))
+    return LMS_TO_OKLAB @ np.cbrt(LINEAR_RGB_TO_LMS @ linear(color))
 
 
 def reserved() -> dict[str, Rgb]:
@@ -260,6 +263,7 @@ def test_fins_differ_and_their_numbers_can_be_read() -> None:
 
 
 def _rgb(color: str) -> Rgb:
+    """Red, green and blue of a grey such as "#ccc"."""
     digit = int(color[1], 16) * 17
     return digit, digit, digit
 

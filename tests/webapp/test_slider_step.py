@@ -27,8 +27,10 @@ from webapp.tasks.slot import Pools
 from webapp.tasks.solver import Solver
 from webapp.view import View
 
-APP = f"{Path(webapp.__file__).parent}/"
-OURS = (f"{Path(finlab.__file__).parent}/", APP)
+APP_FOLDER = f"{Path(webapp.__file__).parent}/"
+"""Start of the paths of the app's files."""
+OWN_FOLDERS = (f"{Path(finlab.__file__).parent}/", APP_FOLDER)
+"""Start of the paths of files whose calls count."""
 SETTLED_S = 1.6
 """Longer than the page lets anything wait that belongs to a step [s]."""
 MOST_CALLS = {"Candidates": 1300, "folded": 450}
@@ -61,11 +63,11 @@ class CallCount:
         if not self.is_on or event != "call":
             return
         file = frame.f_code.co_filename
-        if not file.startswith(OURS):
+        if not file.startswith(OWN_FOLDERS):
             return
         self.calls_by_code[frame.f_code] += 1
         caller = frame.f_back
-        while caller is not None and not caller.f_code.co_filename.startswith(OURS):
+        while caller is not None and not caller.f_code.co_filename.startswith(OWN_FOLDERS):
             caller = caller.f_back
         if caller is not None:
             self.calls_between_files[caller.f_code.co_filename, file] += 1
@@ -85,7 +87,9 @@ class CallCount:
     def calls_of_app(self) -> int:
         """Those of the app's own functions."""
         return sum(
-            count for code, count in self.calls_by_code.items() if code.co_filename.startswith(APP)
+            count
+            for code, count in self.calls_by_code.items()
+            if code.co_filename.startswith(APP_FOLDER)
         )
 
     @property
@@ -98,14 +102,15 @@ class CallCount:
         """Files of the app that call each other."""
         pairs = set()
         for caller, called in self.calls_between_files:
-            in_app = caller.startswith(APP) and called.startswith(APP)
+            in_app = caller.startswith(APP_FOLDER) and called.startswith(APP_FOLDER)
             if in_app and caller < called and (called, caller) in self.calls_between_files:
-                pairs.add((caller.removeprefix(APP), called.removeprefix(APP)))
+                pairs.add((caller.removeprefix(APP_FOLDER), called.removeprefix(APP_FOLDER)))
         return pairs
 
 
 @pytest.fixture(scope="module")
 def count() -> Iterator[CallCount]:
+    """Counts calls while a test runs."""
     old_profiler = threading.getprofile()
     count = CallCount()
     threading.setprofile(count)
@@ -115,6 +120,7 @@ def count() -> Iterator[CallCount]:
 
 @pytest.fixture(scope="module")
 def tab(count: CallCount) -> Iterator[Tab]:
+    """A page of U-CAT without arrows."""
     pools = Pools()
     tab = Tab(pools, load_layout("ucat"), Solver())
     tab.on_loop(lambda: tab.view.do(lambda: tab.view.session.set_display("drawn", "none")))

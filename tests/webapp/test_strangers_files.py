@@ -24,11 +24,13 @@ from finlab.swim.hull import hull_of
 from webapp.session import files
 
 SECRET = "root:x:0:0"
+"""Start of a file of the server that must not be shown."""
 opened: list[str] = []
 """Every path that this process has opened since the list was emptied."""
 
 
 def _hear(event: str, arguments: tuple[Any, ...]) -> None:
+    """Audit hook of Python: keep the paths that are opened."""
     if event == "open" and isinstance(arguments[0], (str, bytes, os.PathLike)):
         opened.append(os.fsdecode(arguments[0]))
 
@@ -38,6 +40,7 @@ sys.addaudithook(_hear)
 
 @pytest.fixture(autouse=True)
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A folder of caches for this test alone."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     yield tmp_path / "cache" / "finlab"
 
@@ -50,7 +53,8 @@ def table(tmp_path: Path) -> bytes:
     return (tmp_path / "table.csv").read_bytes()
 
 
-def document(table: str = "", mesh: str = "") -> bytes:
+def layout_file(table: str = "", mesh: str = "") -> bytes:
+    """A layout file with a table of forces or a mesh at some path."""
     values = layout_to_dict(load_layout("ucat")) | {"name": "robot"}
     if table:
         values["actuators"][0]["model"] = {"type": "table", "path": table}
@@ -59,6 +63,7 @@ def document(table: str = "", mesh: str = "") -> bytes:
 
 
 def packed(parts: dict[str, bytes], link: str = "") -> bytes:
+    """A zip archive, with a link to another file if one is given."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
         for name, content in parts.items():
@@ -97,7 +102,8 @@ def secrets_of(tmp_path: Path, table: bytes) -> tuple[str, ...]:
     )
 
 
-def refused(name: str, content: bytes) -> str:
+def refusal_of(name: str, content: bytes) -> str:
+    """What the app says when it refuses a file, with a list of paths begun anew."""
     opened.clear()
     with pytest.raises(FinlabError) as error:
         files.read_layout(name, content)
@@ -113,9 +119,9 @@ def seen_of(tmp_path: Path) -> list[str]:
 
 def test_no_path_of_a_layout_is_opened(tmp_path: Path, table: bytes, cache: Path) -> None:
     for path in secrets_of(tmp_path, table):
-        text = document(path or "x.csv")
+        text = layout_file(path or "x.csv")
         for name, content in (("robot.yaml", text), ("robot.zip", packed({"robot.yaml": text}))):
-            sentence = refused(name, content)
+            sentence = refusal_of(name, content)
             assert "did not come along" in sentence or "model" in sentence, sentence
             assert SECRET not in sentence and seen_of(tmp_path) == [], path
     assert not cache.exists()
@@ -123,20 +129,20 @@ def test_no_path_of_a_layout_is_opened(tmp_path: Path, table: bytes, cache: Path
 
 def test_links_and_climbing_names_in_an_archive_are_data(tmp_path: Path, table: bytes) -> None:
     (path, *_) = secrets_of(tmp_path, table)
-    text = document("table.csv")
-    sentence = refused("robot.zip", packed({"robot.yaml": text}, link=path))
+    text = layout_file("table.csv")
+    sentence = refusal_of("robot.zip", packed({"robot.yaml": text}, link=path))
     assert "column A is missing" in sentence and seen_of(tmp_path) == []
     for name in ("../table.csv", "/table.csv", "a/../../table.csv", "..\\table.csv", "C:table.csv"):
-        assert "holds" in refused("robot.zip", packed({"robot.yaml": text, name: table}))
+        assert "holds" in refusal_of("robot.zip", packed({"robot.yaml": text, name: table}))
     assert not (tmp_path / "table.csv").is_symlink()
 
 
 def test_no_mesh_of_the_server_is_opened(tmp_path: Path) -> None:
     place = tmp_path / "private"
     place.mkdir()
-    (place / "hull.stl").write_bytes(cube())
+    (place / "hull.stl").write_bytes(cube_stl())
     for path in (str(place / "hull.stl"), os.path.relpath(place / "hull.stl"), "/dev/zero.stl"):
-        text = document(mesh=path)
+        text = layout_file(mesh=path)
         for name, content in (("robot.yaml", text), ("robot.zip", packed({"robot.yaml": text}))):
             opened.clear()
             found = files.read_layout(name, content)
@@ -145,15 +151,16 @@ def test_no_mesh_of_the_server_is_opened(tmp_path: Path) -> None:
             assert seen_of(tmp_path) == []
 
 
-def cube() -> bytes:
+def cube_stl() -> bytes:
+    """A mesh file."""
     import trimesh
 
     return bytes(trimesh.creation.box((0.4, 0.2, 0.1)).export(file_type="stl"))
 
 
 def test_what_comes_along_is_kept_and_goes_along(tmp_path: Path, table: bytes, cache: Path) -> None:
-    text = document("forces/soft.csv", "shapes/hull.stl")
-    parts = {"a/robot.yaml": text, "a/forces/soft.csv": table, "a/shapes/hull.stl": cube()}
+    text = layout_file("forces/soft.csv", "shapes/hull.stl")
+    parts = {"a/robot.yaml": text, "a/forces/soft.csv": table, "a/shapes/hull.stl": cube_stl()}
     found = files.read_layout("robot.zip", packed(parts))
     assert found.missing == () and hull_of(found.layout).file is not None
     path = str(found.layout.fins[0].model.values()["path"])
@@ -183,7 +190,7 @@ def test_a_bundle_names_only_what_is_in_it(tmp_path: Path, table: bytes) -> None
         forged = {**parts, ROBOT_FILE: json.dumps(robot).encode()}
         del forged[CHECKSUM_FILE]
         forged[CHECKSUM_FILE] = checksums(forged)
-        assert "not in the bundle" in refused("robot.zip", packed(forged))
+        assert "not in the bundle" in refusal_of("robot.zip", packed(forged))
         assert seen_of(tmp_path) == [], path
 
 

@@ -15,7 +15,7 @@ from finlab.layout import Damage, Layout, load_layout
 from finlab.research.evaluation.experiments.hard_days import HARD_DAYS
 from finlab.swim.simulation import Fault, make_trajectory
 from tests.webapp.stand_in import AtOnce, context_of, until
-from tests.webapp.test_swimming import SHORT, now
+from tests.webapp.test_swimming import SHORT_PATH, now
 from webapp.markup.outcomes import pace_words, swim_card
 from webapp.markup.words import righting_sentences
 from webapp.session.state import State
@@ -26,6 +26,7 @@ from webapp.tasks.swimmer import POWER, Figures, Swimmer, closed_loop
 from webapp.tasks.swimming import Swimming
 
 UCAT = load_layout("ucat")
+"""Four fins."""
 
 
 class Shelf:
@@ -42,10 +43,12 @@ class Shelf:
         self.files = Designs(client, silent, context.solver, AtOnce(), lambda *_, **__: None)
 
     def begun(self) -> Swimmer:
+        """The swim that has begun."""
         assert self.swimming.swimmer is not None
         return self.swimming.swimmer
 
     def swim(self, seconds: float, method: str) -> None:
+        """Swim some seconds with a method."""
         self.swimming.start(Plan(UCAT, (), make_trajectory("circle"), method))
         until(lambda: self.swimming.swimmer is not None)
         self.swimming.set_running(False)
@@ -57,6 +60,7 @@ class Shelf:
 
 @pytest.fixture
 def shelf(worker: Pool) -> Iterator[Shelf]:
+    """Swims of one test."""
     shelf = Shelf(worker)
     yield shelf
     shelf.swimming.halt()
@@ -114,7 +118,8 @@ def test_a_swim_that_capsizes_says_so(shelf: Shelf) -> None:
     assert f"capsized at {swimmer.visible_moment.capsized:.1f} s" in pace_words(shelf.swimming)
 
 
-def chosen(name: str, **then: Any) -> SwimSettings:
+def settings_of_scenario(name: str, **then: Any) -> SwimSettings:
+    """Settings of a scenario, and of then some more."""
     settings = SwimSettings().with_value("scenario", name)
     for key, value in then.items():
         settings = settings.with_value(key, value)
@@ -124,7 +129,7 @@ def chosen(name: str, **then: Any) -> SwimSettings:
 @pytest.mark.parametrize("name", list(SCENARIOS))
 def test_every_scenario_plans_what_its_day_says(name: str) -> None:
     day = SCENARIOS[name]
-    settings = chosen(name)
+    settings = settings_of_scenario(name)
     plan = settings.plan(State(UCAT))
     assert plan.day == day
     assert plan.path.name == day.trajectory and plan.path.duration_s == day.path().duration_s
@@ -142,18 +147,22 @@ def test_days_of_robots_of_their_own_are_left_out() -> None:
 def test_a_fin_is_lost_without_which_an_own_robot_can_be_steered(layout: str) -> None:
     robot: Layout = load_layout(layout)
     if layout == "pair":
-        assert len(chosen("lost-one").plan(State(robot)).losses) == 1
+        assert len(settings_of_scenario("lost-one").plan(State(robot)).losses) == 1
         with pytest.raises(FinlabError, match="lost-two takes 2 of the 2 working fins away"):
-            chosen("lost-two").plan(State(robot))
+            settings_of_scenario("lost-two").plan(State(robot))
         return
-    (loss,) = chosen("lost-in-current").plan(State(robot, damage=Damage((robot.names[0],)))).losses
+    (loss,) = (
+        settings_of_scenario("lost-in-current")
+        .plan(State(robot, damage=Damage((robot.names[0],))))
+        .losses
+    )
     assert loss.name in robot.names[1:]
 
 
 def test_what_is_true_is_not_what_is_believed(swimming: Swimming) -> None:
-    settings = chosen("weak")
+    settings = settings_of_scenario("weak")
     plan = settings.plan(State(UCAT, damage=Damage(("back_right",)), method="analytic"))._replace(
-        path=SHORT
+        path=SHORT_PATH
     )
     swimming.start(plan)
     until(lambda: swimming.swimmer is not None)

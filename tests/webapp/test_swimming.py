@@ -22,7 +22,11 @@ from webapp.tasks.swimmer import ERROR, FORCES, TIME
 from webapp.tasks.swimming import LAG_S, Swimming
 
 UCAT = load_layout(shipped_layouts()["ucat"])
-SHORT = Trajectory("short", np.array([0.0, 2.0]), np.array([[0.0, 0.0, -1.0], [0.2, 0.0, -1.0]]))
+"""Four fins."""
+SHORT_PATH = Trajectory(
+    "short", np.array([0.0, 2.0]), np.array([[0.0, 0.0, -1.0], [0.2, 0.0, -1.0]])
+)
+"""A path of two seconds."""
 
 
 def now(swimming: Swimming) -> tuple[Any, ...]:
@@ -33,7 +37,8 @@ def now(swimming: Swimming) -> tuple[Any, ...]:
 
 
 def begin(swimming: Swimming, **settings: Any) -> None:
-    swimming.start(Plan(UCAT, (), **{"path": SHORT, "method": "analytic", **settings}))
+    """Begin a swim along this path, and wait for it."""
+    swimming.start(Plan(UCAT, (), **{"path": SHORT_PATH, "method": "analytic", **settings}))
     until(lambda: swimming.swimmer is not None)
 
 
@@ -100,7 +105,7 @@ def test_fins_break_and_are_mended_while_it_swims(swimming: Swimming) -> None:
 
 def test_a_robot_that_no_fins_can_steer_is_told_with_all_its_fins(swimming: Swimming) -> None:
     aligned = replace(UCAT, actuators=tuple(replace(fin, mounting_angle=0.0) for fin in UCAT.fins))
-    swimming.start(Plan(aligned, (), path=SHORT, method="analytic"))
+    swimming.start(Plan(aligned, (), path=SHORT_PATH, method="analytic"))
     until(lambda: swimming.swimmer is not None)
     assert swimming.swimmer.visible_moment.believed_lost == ()
     assert "With these actuators surge, heave and yaw are not free" in swim_card(*now(swimming))

@@ -3,6 +3,7 @@
 import gzip
 import http.client
 from http.client import HTTPConnection
+from itertools import chain
 from typing import Any
 from urllib.request import Request, urlopen
 
@@ -78,7 +79,8 @@ class Sending:
     def kept(self) -> int:
         """Bytes that are held."""
         states = self.gui._current_file_upload_states.values()
-        return sum(len(part) for state in states for part in state["parts"].values())
+        parts = chain.from_iterable(state["parts"].values() for state in states)
+        return sum(map(len, parts))
 
 
 def test_a_file_that_sends_more_than_it_announced_is_dropped_there(
@@ -117,7 +119,8 @@ def test_files_on_their_way_are_bounded_and_an_honest_one_arrives() -> None:
     stop_server(server)
 
 
-OWN = {"host": "localhost:8080"}
+OWN_HEADERS = {"host": "localhost:8080"}
+"""Headers of a page that the server itself has sent."""
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "localhost", "::1", "[::1]", "127.8.8.8"])
@@ -127,15 +130,15 @@ def test_loopback_needs_no_token(host: str) -> None:
 
 def test_foreign_origin_and_foreign_host_are_refused() -> None:
     guard = Guard.of("127.0.0.1")
-    assert guard.check("/", OWN) is None
-    assert guard.check("/", {**OWN, "origin": "http://localhost:8080"}) is None
+    assert guard.check("/", OWN_HEADERS) is None
+    assert guard.check("/", {**OWN_HEADERS, "origin": "http://localhost:8080"}) is None
     for origin in (
         "https://evil.example",
         "http://localhost:9999",
         "null",
         "http://localhost:8080.evil.example",
     ):
-        refused = guard.check("/", {**OWN, "origin": origin})
+        refused = guard.check("/", {**OWN_HEADERS, "origin": origin})
         assert refused is not None and refused.status_code == 403
     rebound = guard.check("/", {"host": "evil.example:8080", "origin": "http://evil.example:8080"})
     assert rebound is not None and rebound.status_code == 403

@@ -23,7 +23,7 @@ from webapp.session import Session
 from webapp.tasks.solver import Solver
 from webapp.viser_internals import start_server, stop_server
 
-CAMERA: dict[str, Any] = {
+CAMERA_FIELDS: dict[str, Any] = {
     "wxyz": (1.0, 0.0, 0.0, 0.0),
     "position": (1.0, 1.0, 1.0),
     "fov": 1.0,
@@ -34,6 +34,7 @@ CAMERA: dict[str, Any] = {
     "look_at": (0.0, 0.0, 0.0),
     "up_direction": (0.0, 0.0, 1.0),
 }
+"""A message of the camera as pages send it."""
 
 
 class Visitor:
@@ -62,7 +63,7 @@ class Visitor:
 
     async def look(self) -> None:
         """Say where the camera is, which is a page's first message."""
-        await self.send("ViewerCameraMessage", **CAMERA)
+        await self.send("ViewerCameraMessage", **CAMERA_FIELDS)
 
     async def enter(self, keys: str | None = None) -> None:
         """Answer until the server has opened a page."""
@@ -123,6 +124,7 @@ class Blank:
 
 @pytest.fixture
 def app(monkeypatch: pytest.MonkeyPatch) -> Iterator[App]:
+    """An app whose pages show nothing."""
     monkeypatch.setattr(app_module, "View", Blank)
     server = start_server()
     app = App(server, Solver(load=load_stand_in), load_layout("A"))
@@ -132,6 +134,7 @@ def app(monkeypatch: pytest.MonkeyPatch) -> Iterator[App]:
 
 
 def port_of(app: App) -> int:
+    """The port of an app."""
     return app._server.get_port()
 
 

@@ -4,6 +4,7 @@ import ast
 import re
 from dataclasses import replace
 from html import unescape
+from itertools import chain
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -252,16 +253,17 @@ def test_the_panel_shows_what_the_command_line_prints(name: str) -> None:
 def test_no_option_of_a_command_is_named_where_the_page_has_a_control() -> None:
     rooms = ("analysis", "allocation", "exchange", "fit", "layout")
     option = re.compile(r"--[a-z]+")
-    texts = [
-        node.value
-        for room in rooms
-        for path in (Path(finlab.__file__).parent / room).rglob("*.py")
-        if path.name != "convert.py"  # which writes files of others
-        for node in ast.walk(ast.parse(path.read_text("utf-8")))
-        if isinstance(node, ast.Constant)
-        and isinstance(node.value, str)
-        and option.search(node.value)
-    ]
+    paths = chain.from_iterable(
+        (Path(finlab.__file__).parent / room).rglob("*.py") for room in rooms
+    )
+    texts = []
+    for path in paths:
+        if path.name == "convert.py":  # which writes files of others
+            continue
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.Constant) and isinstance(node.value, str):
+                texts.append(node.value)
+    texts = [text for text in texts if option.search(text)]
     assert any("--flow" in text for text in texts) and any("--frame" in text for text in texts)
     for text in texts:
         for named in option.finditer(in_app(text)):

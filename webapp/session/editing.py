@@ -16,19 +16,18 @@ from finlab.layout.body import Hull
 from finlab.layout.damage import Damage
 from finlab.swim.hull import estimated
 from webapp.session import layout_edits
-from webapp.session.core import Core
+from webapp.session.base import BaseSession
 from webapp.session.key_words import key_words
 from webapp.session.layout_edits import partner, unlinked, with_twin
 from webapp.session.lessons import Guide
-from webapp.session.looking import Desk, Display, SearchRequest
+from webapp.session.looking import Display
 from webapp.session.state import method_for
-from webapp.session.swim_plan import SwimSettings
 
 UNITS = ("kg", "kgm2", "m", "n")
 """Ends of the names of a body's fields that say a unit, and are no part of what undo calls them."""
 
 
-class Session(Core):
+class Session(BaseSession):
     """What one browser has made so far."""
 
     def __init__(self, layout: Layout, display: Display | None = None) -> None:
@@ -37,21 +36,12 @@ class Session(Core):
 
     def start_over(self) -> None:
         """Everything as at first sight, outside of tour and lessons; the way here can be undone.
-        What is looked at, and how, stays: see `forget_view`."""
+        What is looked at, and how, stays."""
         self.guide.stop = None  # nothing comes back
         self._commit("Start over", self._first)
         self.saved = self._first.layout
         self.selection_order = ()
         self.mode = 0
-
-    def forget_view(self, display: Display) -> None:
-        """All that `start_over` keeps, as at first sight: what is shown and which task is open, the
-        request for a better layout and the settings of a swim. `display` are the switches of a new
-        page."""
-        self.display = display
-        self.desk = Desk()
-        self.draft = SearchRequest()
-        self.swim = SwimSettings()
 
     # Robots.
 

@@ -12,7 +12,7 @@ from msgspec import Struct
 from finlab.allocation.allocation import Allocation
 from finlab.files import parse_yaml
 from finlab.files.schema import checked
-from webapp.session.core import Core
+from webapp.session.base import BaseSession
 from webapp.session.files import shipped
 from webapp.session.looking import Desk
 from webapp.session.state import History, State, least_of, one_of
@@ -54,7 +54,7 @@ def _aligned(answer: Allocation) -> bool:
     return size > 0.0 and float(delivered @ target) / size > ALIGNED
 
 
-DONE: dict[str, Callable[[Core, Allocation], bool]] = {
+DONE: dict[str, Callable[[BaseSession, Allocation], bool]] = {
     "two-ways": lambda session, answer: session.mode > 0 and answer.reachable,
     "refinement": lambda session, _: session.step is not None and session.step > 0,
     "temperature": lambda session, _: (session.state.temperature or 0.0) > 1.9,
@@ -93,7 +93,7 @@ class Guide:
     """A stop of the tour, or a lesson, that is open; the scene brings its camera back with the
     work."""
 
-    def __init__(self, session: Core) -> None:
+    def __init__(self, session: BaseSession) -> None:
         self._session = session
         self.stop: Stop | None = None
         self.solved = False

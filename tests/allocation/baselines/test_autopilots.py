@@ -22,6 +22,7 @@ from finlab.physics import plant_of
 from finlab.physics.objective import wrench_scale_of
 
 HEAVY = load_layout("bluerov2_heavy")
+"""Eight thrusters, for which PX4's results were worked out by hand."""
 GOLDEN = {
     (20, 0, 0, 0, 0, 0): (-7.0711, -7.0711, 7.0711, 7.0711, 0.4661, 0.4661, -0.4661, -0.4661),
     (0, 20, 0, 0, 0, 0): (-7.2202, 7.2202, -6.9219, 6.9219, -0.2558, 0.2558, -0.2558, 0.2558),
@@ -35,12 +36,14 @@ GOLDEN = {
 
 
 def px4(layout: Layout, desaturation: str = "airmode 0") -> Px4:
+    """PX4's method of a robot, with the way in which it gives up axes."""
     return Px4(layout, Px4Settings(desaturation), wrench_scale_of(layout))
 
 
 def forces(layout: Layout, method: str, target: Array, **settings: str) -> Array:
-    found: Array = Allocator(layout, method, **settings).allocate(target).command[:, 0]
-    return found
+    """Forces (n,) [N] that a method gives for a wrench."""
+    command: Array = Allocator(layout, method, **settings).allocate(target).command[:, 0]
+    return command
 
 
 @pytest.mark.parametrize("wrench", GOLDEN)
@@ -70,11 +73,11 @@ def test_the_mix_is_normalised_as_px4_does() -> None:
 
 def test_at_its_limits_px4_keeps_roll_and_gives_up_yaw_and_lift() -> None:
     plant = plant_of(HEAVY)
-    wanted = np.array([0.0, 0, 150, 12, 0, 60])
-    given = plant.wrench(Allocator(HEAVY, "px4").allocate(wanted).command)
-    clipped = plant.wrench(Allocator(HEAVY, "px4", desaturation="none").allocate(wanted).command)
-    assert given[3] == pytest.approx(12.0, rel=1e-3) and clipped[3] < 11.5
-    assert given[2] < 150 and 0 < given[5] < 60
+    target = np.array([0.0, 0, 150, 12, 0, 60])
+    wrench = plant.wrench(Allocator(HEAVY, "px4").allocate(target).command)
+    clipped = plant.wrench(Allocator(HEAVY, "px4", desaturation="none").allocate(target).command)
+    assert wrench[3] == pytest.approx(12.0, rel=1e-3) and clipped[3] < 11.5
+    assert wrench[2] < 150 and 0 < wrench[5] < 60
 
 
 def test_desaturation_makes_the_excess_of_both_sides_alike() -> None:
@@ -121,11 +124,15 @@ def test_one_axis_of_ardusub_alone_gives_what_is_asked_up_to_its_limits(axis: in
     target[axis] = 5.0 if axis < 3 else 1.0
     near = plant.wrench(allocator.allocate(target).command)
     assert near[axis] == pytest.approx(target[axis])
-    far = allocator.allocate(1e3 * target).command
+    command_out_of_reach = allocator.allocate(1e3 * target).command
     np.testing.assert_allclose(
-        plant.wrench(far)[axis] * near / target[axis], plant.wrench(far), atol=1e-9
+        plant.wrench(command_out_of_reach)[axis] * near / target[axis],
+        plant.wrench(command_out_of_reach),
+        atol=1e-9,
     )
-    assert ((far == plant.lower) | (far == plant.upper))[:, 0].any()
+    assert ((command_out_of_reach == plant.lower) | (command_out_of_reach == plant.upper))[
+        :, 0
+    ].any()
 
 
 def test_ardusub_scales_its_groups_apart() -> None:

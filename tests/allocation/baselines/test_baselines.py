@@ -16,21 +16,24 @@ from finlab.physics import Plant, plant_of
 from finlab.physics.objective import wrench_scale_of
 from finlab.research.networks.trained import WrenchNormalization
 from finlab.research.random_layouts import random_layout
-from tests.any_robot import AnyRobot, normalized_error
+from tests.allocator_cache import AllocatorCache, normalized_error
 
 NORMALIZATION = WrenchNormalization(np.zeros(6), np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.35]))
-EXACT = ("analytic", "sqp", "ipopt")
-ALL = (*EXACT, "qp")
+"""Scale of errors in the six axes [N, N m]."""
+METHODS_THAT_SERVE_EXACTLY = ("analytic", "sqp", "ipopt")
+"""Methods that have no error left on a wrench within reach."""
+METHODS = (*METHODS_THAT_SERVE_EXACTLY, "qp")
+"""The model-based methods; `qp` works on a linear model and stays near."""
 THRUST = 4.737410112522892
 """Thrust of the default fin over f^2 sin^2(A) [N s^2]."""
 
 
-def make(method: str, **aim: Any) -> AnyRobot:
+def make(method: str, **aim: Any) -> AllocatorCache:
     """A method, the slow ones with few starts."""
     if method == "ipopt":
         pytest.importorskip("casadi", reason="method ipopt is an optional extra")
-        return AnyRobot(method, n_starts=4, **aim)
-    return AnyRobot(method, **aim)
+        return AllocatorCache(method, n_starts=4, **aim)
+    return AllocatorCache(method, **aim)
 
 
 def one_fin(**changes: object) -> Layout:
@@ -38,7 +41,8 @@ def one_fin(**changes: object) -> Layout:
     return Layout("one", (Fin("fin", (0.0, 0.0, 0.0), 0.0, **changes),))  # type: ignore[arg-type]
 
 
-def within(command: np.ndarray, layout: Layout) -> bool:
+def is_within_limits(command: np.ndarray, layout: Layout) -> bool:
+    """Whether commands (..., n, 3) are finite and within the limits of a robot."""
     lower = layout.lower
     upper = layout.upper
     return bool(
@@ -46,7 +50,7 @@ def within(command: np.ndarray, layout: Layout) -> bool:
     )
 
 
-@pytest.mark.parametrize("method", EXACT)
+@pytest.mark.parametrize("method", METHODS_THAT_SERVE_EXACTLY)
 @pytest.mark.parametrize("direction", [0.0, math.pi / 2, 2.5, -1.0])
 def test_one_fin_pushes_where_it_is_asked(method: str, direction: float) -> None:
     target = [0.0, 1.5 * math.cos(direction), 1.5 * math.sin(direction), 0.0, 0.0, 0.0]
@@ -57,13 +61,13 @@ def test_one_fin_pushes_where_it_is_asked(method: str, direction: float) -> None
     assert result.err_norm < 2e-4
 
 
-@pytest.mark.parametrize("method", ALL)
+@pytest.mark.parametrize("method", METHODS)
 def test_asked_too_much_one_fin_gives_all_it_has(method: str) -> None:
     command = make(method).allocate(one_fin(), [0.0, 50.0, 0.0, 0.0, 0.0, 0.0]).command[0]
     np.testing.assert_allclose(command, [0.6, 2.1, 0.0], atol=1e-3)
 
 
-@pytest.mark.parametrize("method", EXACT)
+@pytest.mark.parametrize("method", METHODS_THAT_SERVE_EXACTLY)
 def test_two_fins_turn_the_robot(method: str) -> None:
     layout = Layout(
         "pair",
@@ -77,7 +81,7 @@ def test_two_fins_turn_the_robot(method: str) -> None:
     )
 
 
-@pytest.mark.parametrize("method", EXACT)
+@pytest.mark.parametrize("method", METHODS_THAT_SERVE_EXACTLY)
 def test_every_reachable_target_is_met(method: str) -> None:
     layout = random_layout(np.random.default_rng(3), n_fins=4)
     command = np.random.default_rng(4).uniform([0.05, 0.1, -3], [0.6, 2.1, 3], (3, 4, 3))
@@ -95,7 +99,7 @@ def test_qp_returns_its_reference_where_that_is_the_answer() -> None:
     np.testing.assert_allclose(result.command, reference, atol=1e-9)
 
 
-@pytest.mark.parametrize("method", ALL)
+@pytest.mark.parametrize("method", METHODS)
 def test_a_failed_fin_is_a_removed_fin(method: str) -> None:
     layout = random_layout(np.random.default_rng(9), n_fins=3)
     target = [0.5, 0.2, -0.5, 0.0, 0.0, 0.05]
@@ -110,7 +114,7 @@ def test_a_failed_fin_is_a_removed_fin(method: str) -> None:
     np.testing.assert_array_equal(lost[[0, 2]], removed)
 
 
-@pytest.mark.parametrize("method", ALL)
+@pytest.mark.parametrize("method", METHODS)
 def test_degenerate_layouts_answer_within_their_limits(method: str) -> None:
     here = (0.1, 0.1, 0.0)
     fixed = Limits((0.3, 0.3), (1.0, 1.0), (0.5, 0.5))
@@ -119,10 +123,10 @@ def test_degenerate_layouts_answer_within_their_limits(method: str) -> None:
     half_rigid = Layout("half", (Fin("a", here, 0.3, fixed), Fin("b", (0.0, 0.1, 0.0), 1.3)))
     for layout in (coincident, rigid, half_rigid):
         result = make(method).allocate(layout, [1.0, 0.0, 0.5, 0.0, 0.0, 0.1])
-        assert within(result.command, layout), layout.name
+        assert is_within_limits(result.command, layout), layout.name
 
 
-@pytest.mark.parametrize("method", EXACT)
+@pytest.mark.parametrize("method", METHODS_THAT_SERVE_EXACTLY)
 def test_other_fin_models_and_mixtures_of_them(method: str) -> None:
     lighthill = FinModelSpec("lighthill")
     layout = Layout(
@@ -132,7 +136,7 @@ def test_other_fin_models_and_mixtures_of_them(method: str) -> None:
     assert make(method).allocate(layout, target).err_norm < 5e-4
 
 
-@pytest.mark.parametrize("method", ALL)
+@pytest.mark.parametrize("method", METHODS)
 def test_unknown_and_last_fins_cannot_fail(method: str) -> None:
     with pytest.raises(LayoutError):
         make(method).allocate(one_fin(), np.zeros(6), lost=["fin"])
@@ -165,7 +169,8 @@ def test_feasible_wraps_full_turns_and_clips_the_rest() -> None:
     np.testing.assert_array_equal(plant.feasible(tame), tame)
 
 
-def targets_of(layout: Layout, count: int, seed: int) -> np.ndarray:
+def reachable_wrenches(layout: Layout, count: int, seed: int) -> np.ndarray:
+    """Wrenches (count, 6) that random commands of a robot give."""
     plant = plant_of(layout)
     return plant.wrench(plant.sample(np.random.default_rng(seed), (count,)))
 
@@ -173,7 +178,7 @@ def targets_of(layout: Layout, count: int, seed: int) -> np.ndarray:
 @pytest.mark.parametrize("name", ["A", "B", "C", "D"])
 def test_the_papers_sqp_is_as_exact_as_slsqp_where_wrenches_can_be_had(name: str) -> None:
     layout = load_layout(name)
-    targets = targets_of(layout, 6, 17)
+    targets = reachable_wrenches(layout, 6, 17)
     for method in ("paper_sqp", "sqp"):
         answer = Allocator(layout, method, time_limit_s=60.0).allocate_batch(targets)
         assert answer.reachable.all() and answer.err_norm.max() < 2e-6, method
@@ -206,7 +211,7 @@ def test_a_descent_never_goes_up_nor_out(seed: int, reach: float) -> None:
     layout = random_layout(rng, limits="varied")
     method = PaperSqp(layout, PaperSqpSettings(), wrench_scale_of(layout))
     plant = plant_of(layout)
-    target = reach * targets_of(layout, 1, seed)[0]
+    target = reach * reachable_wrenches(layout, 1, seed)[0]
     end, errors = method.descent(target, plant.sample(rng, (1,))[0])
     assert len(errors) > 2 and (np.diff(errors) <= 0.0).all()
     missing = (plant.wrench(end) - target) / method.asked_scale
@@ -219,11 +224,11 @@ def test_a_box_qp_meets_its_optimality_conditions() -> None:
     held = 0
     for _ in range(20):
         matrix = rng.normal(size=(6, 9))
-        wanted = 4.0 * rng.normal(size=6)
+        target = 4.0 * rng.normal(size=6)
         low = -rng.uniform(0.0, 1.0, 9)
         high = rng.uniform(0.1, 1.0, 9)
-        x = box_qp(matrix, wanted, 0.1, low, high)
-        pull = -(matrix.T @ (matrix @ x - wanted) + 0.1 * x)  # downhill
+        x = box_qp(matrix, target, 0.1, low, high)
+        pull = -(matrix.T @ (matrix @ x - target) + 0.1 * x)  # downhill
         at_low = np.isclose(x, low, atol=1e-12)
         at_high = np.isclose(x, high, atol=1e-12)
         held += int(at_low.sum() + at_high.sum())
@@ -250,7 +255,7 @@ def test_on_board_the_force_sets_amplitude_and_direction(frequency: float) -> No
 
 def test_on_board_all_forces_are_scaled_down_together() -> None:
     layout = load_layout("A")
-    targets = 40.0 * targets_of(layout, 10, 5)
+    targets = 40.0 * reachable_wrenches(layout, 10, 5)
     answer = Allocator(layout, "fixed_frequency").allocate_batch(targets)
     assert set(np.unique(answer.command[..., 1])) <= {0.1, 2.1}
     cosine = np.einsum("ni,ni->n", answer.wrench, targets)

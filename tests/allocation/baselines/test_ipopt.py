@@ -15,21 +15,23 @@ from finlab.errors import AllocationError
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout
 from finlab.physics import Plant, plant_of
 from finlab.research.random_layouts import random_layout
-from tests.any_robot import AnyRobot
-from tests.exhaustive import crossed, sampled
-from tests.mixed_robots import load, random_flow, random_plant, random_robot, within
+from tests.allocator_cache import AllocatorCache
+from tests.random_robots import load, random_flow, random_plant, random_robot, within
+from tests.sampled_cases import crossed, sampled
 
 casadi = pytest.importorskip("casadi", reason="method ipopt is an optional extra")
 UNEVEN = FinModelSpec("soft", (("d", 0.12), ("e", 0.15), ("p", 1.5), ("phi_e", 0.4)))
+"""A soft fin whose force is not the same in all directions."""
 
 
-def targets_of(layout: Layout, count: int = 3) -> np.ndarray:
+def reachable_wrenches(layout: Layout, count: int = 3) -> np.ndarray:
+    """Wrenches (count, 6), 0.6 times those of random commands of a robot."""
     plant = plant_of(layout)
     return 0.6 * plant.wrench(plant.sample(np.random.default_rng(1), (count,)))
 
 
 def answered(
-    allocator: AnyRobot, layout: Layout, targets: np.ndarray
+    allocator: AllocatorCache, layout: Layout, targets: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Power and error of the answers."""
     answers = [allocator.allocate(layout, target) for target in targets]
@@ -39,9 +41,9 @@ def answered(
 @pytest.mark.parametrize("name", sampled(["ucat", "hexa", "restricted"], 3))
 def test_it_agrees_with_the_search_on_shipped_robots(name: str) -> None:
     layout = load_layout(name)
-    targets = targets_of(layout)
-    least, _ = answered(AnyRobot(), layout, targets)
-    power, error = answered(AnyRobot("ipopt"), layout, targets)
+    targets = reachable_wrenches(layout)
+    least, _ = answered(AllocatorCache(), layout, targets)
+    power, error = answered(AllocatorCache("ipopt"), layout, targets)
     assert error.max() < 1e-3
     np.testing.assert_allclose(power, least, rtol=2e-3)
 
@@ -57,12 +59,16 @@ def test_it_agrees_with_the_search_on_shipped_robots(name: str) -> None:
 def test_it_agrees_with_the_search_on_any_fin_and_arc(
     model: FinModelSpec, arc: tuple[float, float]
 ) -> None:
-    drawn = random_layout(np.random.default_rng(5), n_fins=5)
-    fins = [replace(fin, model=model, limits=Limits(zero_direction=arc)) for fin in drawn.fins]
-    layout = replace(drawn, actuators=(*fins[:2], replace(fins[2], limits=Limits()), *fins[3:]))
-    targets = targets_of(layout)
-    least, missed = answered(AnyRobot(), layout, targets)
-    power, error = answered(AnyRobot("ipopt"), layout, targets)
+    layout_of_five = random_layout(np.random.default_rng(5), n_fins=5)
+    fins = [
+        replace(fin, model=model, limits=Limits(zero_direction=arc)) for fin in layout_of_five.fins
+    ]
+    layout = replace(
+        layout_of_five, actuators=(*fins[:2], replace(fins[2], limits=Limits()), *fins[3:])
+    )
+    targets = reachable_wrenches(layout)
+    least, missed = answered(AllocatorCache(), layout, targets)
+    power, error = answered(AllocatorCache("ipopt"), layout, targets)
     exact = missed < 1e-4
     assert exact.any() and error[exact].max() < 5e-3
     np.testing.assert_allclose(power[exact], least[exact], rtol=0.01)
@@ -76,9 +82,9 @@ def test_it_agrees_with_the_search_on_any_actuators_and_in_any_flow(kind: str) -
         layout = load(random_robot(kind, number, 7))
         targets = np.array([within(plant, np.random.default_rng([7, k])) for k in range(2)])
         best = Allocator(layout).allocate_batch(targets, flow=flow)
-        found = Allocator(layout, "ipopt").allocate_batch(targets, flow=flow)
-        assert found.err_norm.max() < 1e-4
-        np.testing.assert_allclose(found.power, best.power, rtol=2e-3)
+        batch = Allocator(layout, "ipopt").allocate_batch(targets, flow=flow)
+        assert batch.err_norm.max() < 1e-4
+        np.testing.assert_allclose(batch.power, best.power, rtol=2e-3)
 
 
 def test_it_delivers_exactly_what_power_would_pull_aside() -> None:
@@ -103,9 +109,9 @@ def test_it_keeps_watts_least_and_nothing_else() -> None:
 
 def test_out_of_reach_it_comes_as_near_as_the_search() -> None:
     layout = load_layout("ucat")
-    far = 20.0 * targets_of(layout)
-    _, nearest = answered(AnyRobot(), layout, far)
-    _, error = answered(AnyRobot("ipopt"), layout, far)
+    out_of_reach = 20.0 * reachable_wrenches(layout)
+    _, nearest = answered(AllocatorCache(), layout, out_of_reach)
+    _, error = answered(AllocatorCache("ipopt"), layout, out_of_reach)
     np.testing.assert_allclose(error, nearest, rtol=1e-3, atol=1e-3)
 
 
@@ -173,7 +179,8 @@ def plane_of(low: float, high: float, least: float, is_uneven: bool) -> Plane:
     top = 1.5 * np.sqrt(20.0)
     force = np.clip((price_grid(top) / 1.5) ** 2, 20.0 * least, 20.0)
     table = RadialTable.of_forces(top, force, (20.0 * least) ** 1.5)
-    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    middle = 0.5 * (low + high)
+    half = 0.5 * (high - low)
     around = np.linspace(0.0, 2.0 * np.pi, 90, endpoint=False)
     gauge = 1.0 + 0.1 * np.cos(around - 0.5) if is_uneven else None
     return Plane(np.eye(2, 6), table, sector_center=middle, sector_half_angle=half, gauge=gauge)
@@ -183,7 +190,8 @@ def plane_of(low: float, high: float, least: float, is_uneven: bool) -> Plane:
 def test_the_conditions_of_a_plane_hold_for_its_forces_alone(
     case: tuple[float, float, float, bool],
 ) -> None:
-    plane, least = plane_of(*case), case[2]
+    plane = plane_of(*case)
+    least = case[2]
     share = casadi.MX.sym("share", 2)
     part = _PlaneProgram(casadi, plane, share)
     told = casadi.Function(
@@ -192,7 +200,7 @@ def test_the_conditions_of_a_plane_hold_for_its_forces_alone(
     strongest = 1.0 if plane.gauge is None else float(plane.gauge.max())
     assert part.full_power == pytest.approx(20.0**1.5, rel=1e-3)
     rng = np.random.default_rng(1)
-    judged = set[bool]()
+    verdicts = set[bool]()
     for _ in range(300):
         angle = plane.sector_center + rng.uniform(-1.0, 1.0) * min(
             1.5 * plane.sector_half_angle + 0.1, np.pi
@@ -209,15 +217,15 @@ def test_the_conditions_of_a_plane_hold_for_its_forces_alone(
         outside = max(of_most - 1.0, least - of_most if least else -1.0, size * off)
         if abs(outside) < 0.02:
             continue  # too near to an edge to tell
-        kept = all(
+        is_allowed = all(
             low - 1e-6 <= one <= high + 1e-6
             for one, (_, low, high) in zip(values, part.constraints, strict=True)
         )
-        assert kept == (outside < 0.0), (angle, size)
-        judged.add(kept)
-        if kept:
+        assert is_allowed == (outside < 0.0), (angle, size)
+        verdicts.add(is_allowed)
+        if is_allowed:
             assert cost == pytest.approx((20.0 * of_most) ** 1.5, rel=1e-2, abs=0.05)
-    assert False in judged
+    assert False in verdicts
 
 
 @pytest.mark.parametrize("case", PLANES)
@@ -227,11 +235,11 @@ def test_random_starts_of_a_plane_are_anywhere_in_its_arc(
     plane = plane_of(*case)
     part = _PlaneProgram(casadi, plane, casadi.MX.sym("share", 2))
     rng = np.random.default_rng(2)
-    drawn = np.array([part.random(rng) for _ in range(300)])
-    off = [math.remainder(math.atan2(y, x) - plane.sector_center, 2.0 * np.pi) for x, y in drawn]
+    forces = np.array([part.random(rng) for _ in range(300)])
+    off = [math.remainder(math.atan2(y, x) - plane.sector_center, 2.0 * np.pi) for x, y in forces]
     assert np.abs(off).max() <= plane.sector_half_angle + 1e-9
     assert min(off) <= -0.9 * plane.sector_half_angle and max(off) >= 0.9 * plane.sector_half_angle
-    size = np.hypot(*drawn.T)
+    size = np.hypot(*forces.T)
     assert size.max() <= 1.0 and size.max() > 0.9 and size.min() < 0.1
 
 
@@ -239,6 +247,6 @@ def test_random_starts_of_a_plane_are_anywhere_in_its_arc(
 def test_power_is_measured_by_that_of_all_actuators_at_full_load(kind: str) -> None:
     layout = load(random_robot(kind, 1, 7))
     flow = random_flow(kind, 1, 7)
-    program = AnyRobot("ipopt").method(layout).at(flow)._program
-    most = AnyRobot().method(layout).at(flow).compiled.robot.largest_power
+    program = AllocatorCache("ipopt").method(layout).at(flow)._program
+    most = AllocatorCache().method(layout).at(flow).compiled.robot.largest_power
     assert sum(part.full_power for part in program._actuators) == pytest.approx(most, rel=0.02)

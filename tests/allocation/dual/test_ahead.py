@@ -10,10 +10,20 @@ from finlab import Allocator, Azimuth, Layout, PowerLaw, load_layout
 from finlab.arrays import Array
 
 PERIOD_S = 0.1
-QUARTER = math.pi / 2.0
-PLACES = ((1.8, 0.8), (1.8, -0.8), (-1.8, 0.8), (-1.8, -0.8))
-ARCS = ((QUARTER, 2.0 * QUARTER), (-2.0 * QUARTER, -QUARTER), (0.0, QUARTER), (-QUARTER, 0.0))
-AHEAD = 8
+"""Length of a tick [s]."""
+QUARTER_TURN = math.pi / 2.0
+"""An angle of 90 degrees [rad]."""
+POD_POSITIONS = ((1.8, 0.8), (1.8, -0.8), (-1.8, 0.8), (-1.8, -0.8))
+"""Where the four pods stand: x and y [m], one in each corner."""
+POD_ARCS = (
+    (QUARTER_TURN, 2.0 * QUARTER_TURN),
+    (-2.0 * QUARTER_TURN, -QUARTER_TURN),
+    (0.0, QUARTER_TURN),
+    (-QUARTER_TURN, 0.0),
+)
+"""Angles that each pod can turn to [rad]: a quarter turn each."""
+TICKS_AHEAD = 8
+"""How many ticks ahead the wrenches are known."""
 
 
 def four_pods() -> Layout:
@@ -30,14 +40,14 @@ def four_pods() -> Layout:
             turn_rate=0.5,
             rate=200.0,
         )
-        for i, (place, arc) in enumerate(zip(PLACES, ARCS, strict=True))
+        for i, (place, arc) in enumerate(zip(POD_POSITIONS, POD_ARCS, strict=True))
     )
     return Layout(name="four", axes=("Fx", "Fy", "Tz"), actuators=pods)
 
 
 def waves(ticks: int, seed: int) -> Array:
     """Wrenches (ticks + AHEAD, 6) of a slow load, waves and noise [N, N m]."""
-    time = PERIOD_S * np.arange(ticks + AHEAD)
+    time = PERIOD_S * np.arange(ticks + TICKS_AHEAD)
     wrench = np.zeros((len(time), 6))
     wrench[:, 0] = 150.0 * np.sin(0.05 * time) + 60.0 * np.sin(0.9 * time)
     wrench[:, 1] = 120.0 * np.sin(0.04 * time + 1.0) + 80.0 * np.sin(0.8 * time + 0.4)
@@ -52,9 +62,9 @@ def ride(known: int, seed: int, ticks: int = 300) -> tuple[float, float, int]:
     known."""
     allocator = Allocator(four_pods(), calm=10.0, period_s=PERIOD_S)
     wrench = waves(ticks, seed)
-    command = np.array([[sum(arc) / 2.0, 0.0, 0.0] for arc in ARCS])
+    command = np.array([[sum(arc) / 2.0, 0.0, 0.0] for arc in POD_ARCS])
     power = 0.0
-    turned = 0.0
+    total_turn = 0.0
     missed = 0
     for tick in range(ticks):
         reference = wrench[tick + 1 : tick + 1 + known] if known else None
@@ -63,16 +73,16 @@ def ride(known: int, seed: int, ticks: int = 300) -> tuple[float, float, int]:
         turn = np.abs(answer.command[:, 0] - command[:, 0])
         assert turn.max() <= 0.5 * PERIOD_S * (1.0 + 1e-6)
         power += answer.power / ticks
-        turned += turn.sum()
+        total_turn += turn.sum()
         missed += not answer.reachable
         command = answer.command
-    return power, turned, missed
+    return power, total_turn, missed
 
 
 @pytest.mark.parametrize("seed", [2, 11])
 def test_known_waves_take_a_tenth_less_power_for_no_more_turning(seed: int) -> None:
     blind_power, blind_turned, blind_missed = ride(0, seed)
-    power, turned, missed = ride(AHEAD, seed)
+    power, turned, missed = ride(TICKS_AHEAD, seed)
     assert power < 0.92 * blind_power
     assert turned < 1.02 * blind_turned
     assert missed <= blind_missed + 1
@@ -82,7 +92,7 @@ def test_a_pod_turns_before_the_wrench_does() -> None:
     """A push ahead becomes one to port in eight ticks: the stern's pods have begun to turn."""
     allocator = Allocator(load_layout("catamaran"), calm=2.0, period_s=PERIOD_S)
     now = np.zeros(6)
-    later = np.zeros((AHEAD, 6))
+    later = np.zeros((TICKS_AHEAD, 6))
     now[0] = 40.0
     later[:, 0] = 10.0
     later[:, 1] = 20.0
@@ -99,7 +109,7 @@ def test_what_stays_the_same_asks_for_no_turning() -> None:
     wrench = np.array([40.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     before = allocator.allocate(wrench).command
     alone = allocator.allocate(wrench, previous=before).command
-    known = allocator.allocate(wrench, previous=before, reference=[wrench] * AHEAD).command
+    known = allocator.allocate(wrench, previous=before, reference=[wrench] * TICKS_AHEAD).command
     np.testing.assert_allclose(known, alone, atol=1e-3)
 
 
@@ -107,7 +117,7 @@ def test_lost_pods_and_free_axes_keep_out_of_it() -> None:
     allocator = Allocator(load_layout("catamaran"), period_s=PERIOD_S)
     wrench = np.array([30.0, 0.0, 0.0, 0.0, 0.0, 2.0])
     before = allocator.allocate(wrench).command
-    known = [wrench] * AHEAD
+    known = [wrench] * TICKS_AHEAD
     answer = allocator.allocate(
         wrench, previous=before, reference=known, lost=["left"], free=("Fy",)
     )

@@ -14,8 +14,8 @@ from finlab.assets import shipped_layouts
 from finlab.layout import Fin, FinModelSpec, Layout, load_layout
 from finlab.physics import Plant, make_law, write_table
 from finlab.research.random_layouts import random_layout
-from tests.allocation.test_levenberg_marquardt import HOSTILE as SIMPLE
-from tests.any_robot import AnyRobot, normalized_error
+from tests.allocation.test_levenberg_marquardt import HOSTILE_LAYOUTS as SIMPLE_LAYOUTS
+from tests.allocator_cache import AllocatorCache, normalized_error
 
 GOOD = 1e-5
 """Normalized error below which an answer counts as exact, here."""
@@ -29,7 +29,8 @@ def reachable(layout: Layout, n: int, seed: int = 0) -> np.ndarray:
     return Plant(layout).wrench(lower + share * (upper - lower))
 
 
-def keeps_limits(layout: Layout, command: np.ndarray) -> bool:
+def is_within_limits(layout: Layout, command: np.ndarray) -> bool:
+    """Whether commands (..., n, 3) are finite and within the limits of a robot."""
     within = (command >= layout.lower).all() and (command <= layout.upper).all()
     return bool(np.isfinite(command).all() and within)
 
@@ -37,24 +38,24 @@ def keeps_limits(layout: Layout, command: np.ndarray) -> bool:
 def errors(method: Allocator, layout: Layout, targets: np.ndarray) -> np.ndarray:
     """Normalized errors by the plant; commands must keep their limits to the last bit."""
     command = method.allocate_batch(layout, targets).command
-    assert keeps_limits(layout, command)
+    assert is_within_limits(layout, command)
     return normalized_error(method.normalization, Plant(layout).wrench(command), targets)
 
 
 @pytest.mark.parametrize("name", list(shipped_layouts()))
-def test_exact_on_shipped_layouts(name: str, search: AnyRobot) -> None:
+def test_exact_on_shipped_layouts(name: str, search: AllocatorCache) -> None:
     layout = load_layout(shipped_layouts()[name])
     assert errors(search, layout, reachable(layout, 25)).max() < GOOD
 
 
 @pytest.mark.parametrize("limits", ["nominal", "varied"])
-def test_exact_on_random_layouts(limits: str, search: AnyRobot) -> None:
+def test_exact_on_random_layouts(limits: str, search: AllocatorCache) -> None:
     for seed in range(5000, 5015):
         layout = random_layout(np.random.default_rng(seed), limits=limits)  # type: ignore[arg-type]
         assert errors(search, layout, reachable(layout, 20, seed)).max() < GOOD, seed
 
 
-def test_exact_outside_the_training_box_and_with_more_fins(search: AnyRobot) -> None:
+def test_exact_outside_the_training_box_and_with_more_fins(search: AllocatorCache) -> None:
     for seed in range(5000, 5005):
         rng = np.random.default_rng(seed)
         wide = random_layout(rng, box=(0.45, 0.45, 0.2), outside=(0.3, 0.3, 0.1))
@@ -64,7 +65,7 @@ def test_exact_outside_the_training_box_and_with_more_fins(search: AnyRobot) -> 
 
 
 @pytest.mark.parametrize("name", ["A", "B", "C", "D"])
-def test_exact_after_the_loss_of_any_fin(name: str, search: AnyRobot) -> None:
+def test_exact_after_the_loss_of_any_fin(name: str, search: AllocatorCache) -> None:
     layout = load_layout(shipped_layouts()[name])
     for fin in layout.names:
         for target in reachable(layout.without([fin]), 2):
@@ -73,31 +74,32 @@ def test_exact_after_the_loss_of_any_fin(name: str, search: AnyRobot) -> None:
             assert np.isnan(result.command[layout.index(fin)]).all()
 
 
-HOSTILE = {
-    **SIMPLE,
+HOSTILE_LAYOUTS = {
+    **SIMPLE_LAYOUTS,
     "far out": Layout("far", (Fin("a", (10.0, 10.0, 10.0), 0.0), Fin("b", (-10.0, 0.0, 0.0), 1.0))),
     "sixteen": Layout(
         "many", tuple(Fin(f"f{i}", (0.1, 0.02 * i, 0.0), 0.4 * i) for i in range(16))
     ),
 }
+"""Robots on which solvers stumble: singular, far out, with ranges of no width."""
 
 
 @pytest.mark.parametrize(
     "name", ["one fin", "two at one place", "all parallel", "may rest", "sixteen"]
 )
-def test_hostile_layouts_still_get_what_they_can_do(name: str, search: AnyRobot) -> None:
-    layout = HOSTILE[name]
+def test_hostile_layouts_still_get_what_they_can_do(name: str, search: AllocatorCache) -> None:
+    layout = HOSTILE_LAYOUTS[name]
     error = errors(search, layout, reachable(layout, 10))
     assert error.max() < GOOD
 
 
-def test_what_cannot_be_done_is_done_as_far_as_possible(search: AnyRobot) -> None:
-    result = search.allocate(HOSTILE["one fin"], [0.0, 50.0, 0.0, 0.0, 0.0, 0.0])
+def test_what_cannot_be_done_is_done_as_far_as_possible(search: AllocatorCache) -> None:
+    result = search.allocate(HOSTILE_LAYOUTS["one fin"], [0.0, 50.0, 0.0, 0.0, 0.0, 0.0])
     np.testing.assert_allclose(result.command[0], [0.6, 2.1, 0.0], atol=1e-2)
     assert result.unallocated[1] > 40.0
 
 
-def test_many_targets_are_answered_as_well_as_one(search: AnyRobot) -> None:
+def test_many_targets_are_answered_as_well_as_one(search: AllocatorCache) -> None:
     layout = load_layout(shipped_layouts()["A"])
     targets = reachable(layout, CHUNK + 3)
     batch = search.allocate_batch(layout, targets)
@@ -109,7 +111,7 @@ def test_many_targets_are_answered_as_well_as_one(search: AnyRobot) -> None:
 
 
 def test_a_force_table_that_was_measured_again_is_read_again(
-    search: AnyRobot, tmp_path: Path
+    search: AllocatorCache, tmp_path: Path
 ) -> None:
     grid = np.linspace(0.0, 0.6, 9), np.linspace(0.0, 2.1, 10), np.linspace(-np.pi, np.pi, 13)
     table = FinModelSpec("table", (("path", str(tmp_path / "fin.csv")),))
@@ -121,7 +123,7 @@ def test_a_force_table_that_was_measured_again_is_read_again(
         assert search.allocate(layout, [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]).err_norm < GOOD
 
 
-def test_turning_the_robot_does_not_make_it_worse(search: AnyRobot) -> None:
+def test_turning_the_robot_does_not_make_it_worse(search: AllocatorCache) -> None:
     layout = load_layout(shipped_layouts()["C"])
     yaw = 0.8
     c = math.cos(yaw)
@@ -136,15 +138,20 @@ def test_turning_the_robot_does_not_make_it_worse(search: AnyRobot) -> None:
         )
         for fin in layout.fins
     ]
-    turned = Layout("turned", tuple(fins))
+    rotated_layout = Layout("turned", tuple(fins))
     targets = reachable(layout, 10)
     rotated = np.concatenate([targets[:, :3] @ rotation.T, targets[:, 3:] @ rotation.T], axis=1)
     straight = search.allocate_batch(layout, targets).command
-    again = search.allocate_batch(turned, rotated).command
-    assert normalized_error(search.normalization, Plant(turned).wrench(again), rotated).max() < GOOD
+    command_of_rotated = search.allocate_batch(rotated_layout, rotated).command
+    assert (
+        normalized_error(
+            search.normalization, Plant(rotated_layout).wrench(command_of_rotated), rotated
+        ).max()
+        < GOOD
+    )
     # Forces in the fins' own frames know nothing of where forward is: the old answer serves the new
     # robot.
-    np.testing.assert_allclose(Plant(turned).wrench(straight), rotated, atol=1e-5)
+    np.testing.assert_allclose(Plant(rotated_layout).wrench(straight), rotated, atol=1e-5)
 
 
 def test_targets_of_single_precision_are_delivered_by_few_fins() -> None:
@@ -155,5 +162,5 @@ def test_targets_of_single_precision_are_delivered_by_few_fins() -> None:
         allocator = Allocator(layout)
         rounded = reachable(layout, 5, seed).astype(np.float32).astype(float)
         assert allocator.allocate_batch(rounded).err_norm.max() < 1e-6
-        far = allocator.allocate(1000.0 * rounded[0], policy="direction")
-        assert 0.001 - 1e-6 < far.share < 1.0
+        answer_out_of_reach = allocator.allocate(1000.0 * rounded[0], policy="direction")
+        assert 0.001 - 1e-6 < answer_out_of_reach.share < 1.0

@@ -17,8 +17,10 @@ from finlab.physics.plant import Plant
 
 FLOW = np.array([1.5, 0.1, 0.05, 0.0, 0.0, 0.0])
 """A velocity through the water [m/s, rad/s]."""
-ROBOTS = 50
-EACH = 4
+N_ROBOTS = 50
+"""How many random robots there are in each test."""
+N_WRENCHES = 4
+"""How many wrenches are asked of each robot."""
 
 
 def robot(rng: np.random.Generator, limit: float) -> Layout:
@@ -27,14 +29,14 @@ def robot(rng: np.random.Generator, limit: float) -> Layout:
     parts: list[Actuator] = []
     for i in range(rng.integers(2, 5)):
         turn = rng.uniform(0.0, 2.0 * math.pi)
-        place = rng.uniform(-1.0, 1.0, 3) * [1.0, 0.3, 0.3]
+        position = rng.uniform(-1.0, 1.0, 3) * [1.0, 0.3, 0.3]
         shaft = 0.0, math.cos(turn), math.sin(turn)
-        parts.append(Rudder(f"f{i}", tuple(place), shaft, (1, 0, 0), 0.01, (-limit, limit), 2.0))
+        parts.append(Rudder(f"f{i}", tuple(position), shaft, (1, 0, 0), 0.01, (-limit, limit), 2.0))
     for i in range(rng.integers(2, 5)):
         axis = rng.normal(size=3) if rng.random() < 0.5 else np.array([1.0, 0.0, 0.0])
-        place = rng.uniform(-1.0, 1.0, 3) * [1.0, 0.3, 0.3]
+        position = rng.uniform(-1.0, 1.0, 3) * [1.0, 0.3, 0.3]
         unit = tuple(axis / np.linalg.norm(axis))
-        parts.append(Thruster(f"t{i}", tuple(place), unit, (-30.0, 40.0), PowerLaw(1.0)))
+        parts.append(Thruster(f"t{i}", tuple(position), unit, (-30.0, 40.0), PowerLaw(1.0)))
     return Layout("foils", tuple(parts))
 
 
@@ -42,11 +44,11 @@ def questions(seed: int, limit: float, turned: float) -> Iterator[tuple[Allocato
     """Robots whose foils turn by a limit, wrenches (6,) of deflections up to `turned` [deg], their
     power."""
     rng = np.random.default_rng(seed)
-    for _ in range(ROBOTS):
+    for _ in range(N_ROBOTS):
         layout = robot(rng, math.radians(limit))
         allocator = Allocator(layout)
         plant = Plant(layout)
-        for _ in range(EACH):
+        for _ in range(N_WRENCHES):
             command = plant.sample(rng, ())
             for i, part in enumerate(layout.actuators):
                 if isinstance(part, Rudder):
@@ -87,5 +89,5 @@ def test_policies_of_a_sheet_answer_wrenches_beside_it() -> None:
             wrench = rng.normal(size=6) * [20.0, 5.0, 5.0, 2.0, 5.0, 5.0]
             answer = allocator.allocate(wrench, policy=policy, flow=FLOW)
             assert not answer.reachable and np.isfinite(answer.power)
-            given = Plant(layout).wrench(answer.command, flow=FLOW)
-            np.testing.assert_allclose(given, answer.wrench, atol=1e-9)
+            wrench_of_plant = Plant(layout).wrench(answer.command, flow=FLOW)
+            np.testing.assert_allclose(wrench_of_plant, answer.wrench, atol=1e-9)

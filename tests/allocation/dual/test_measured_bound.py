@@ -17,9 +17,9 @@ from finlab.assets import shipped_layouts
 from finlab.axes import TURN
 from finlab.layout import load_layout
 from finlab.physics import Plant, TableLaw, make_law
-from tests.exhaustive import sampled
-from tests.mixed_robots import load, random_robot
-from tests.random_fins import write_fin_table
+from tests.random_fin_robots import write_fin_table
+from tests.random_robots import load, random_robot
+from tests.sampled_cases import sampled
 
 
 def random_table(rng: np.random.Generator, limits: Array, noise: float) -> TableLaw:
@@ -86,14 +86,14 @@ def test_no_command_is_worth_more_and_hardly_any_less(
         near = np.add.outer(fine, TURN * np.arange(-2, 3) * (k == 2)).ravel()
         grid.append(np.append(np.linspace(*limits[k], 9), near.clip(*limits[k])))
     command = np.stack(np.meshgrid(*map(np.unique, grid), indexing="ij"), axis=-1).reshape(-1, 3)
-    worth = law.force(command) @ price.T - law.power(command)[:, None]
-    scale = np.abs(worth).max(axis=0)
-    assert (worth.max(axis=0) <= bound + 1e-12 * scale).all()
-    assert (bound <= worth.max(axis=0) + 0.05 * scale).all()
+    net_value = law.force(command) @ price.T - law.power(command)[:, None]
+    scale = np.abs(net_value).max(axis=0)
+    assert (net_value.max(axis=0) <= bound + 1e-12 * scale).all()
+    assert (bound <= net_value.max(axis=0) + 0.05 * scale).all()
     monkeypatch.setattr(bernstein_bound, "MOST_KEPT", 0)
     np.testing.assert_allclose(TableBound(law, *limits.T)(price), bound, rtol=1e-9)
     monkeypatch.setattr(bernstein_bound, "MOST_CELLS", 50)  # ends early
-    assert (worth.max(axis=0) <= TableBound(law, *limits.T)(price) + 1e-12 * scale).all()
+    assert (net_value.max(axis=0) <= TableBound(law, *limits.T)(price) + 1e-12 * scale).all()
 
 
 @pytest.mark.parametrize("number", sampled(range(2)))
@@ -113,8 +113,8 @@ def test_no_command_takes_less(kind: str, number: int, tmp_path: Path) -> None:
     one = allocator.allocate(wrench[0])
     assert one.bound == pytest.approx(batch.bound[0], rel=0.05)
     for policy in ("direction", "closest"):
-        far = allocator.allocate_batch(3.0 * wrench, policy=policy)
-        assert (far.bound <= far.power).all()
+        batch_out_of_reach = allocator.allocate_batch(3.0 * wrench, policy=policy)
+        assert (batch_out_of_reach.bound <= batch_out_of_reach.power).all()
 
 
 @pytest.mark.parametrize("power", [False, True])

@@ -1,5 +1,5 @@
-"""Raised multipliers prove nearly as much as drawn commands allow: beside a linear program over their
-mixtures."""
+"""Raised multipliers prove nearly as much as drawn commands allow: beside a linear program over
+their mixtures."""
 
 import numpy as np
 import pytest
@@ -11,18 +11,20 @@ from finlab.arrays import Array
 from finlab.layout import load_layout
 from finlab.physics import Plant
 
-DRAWN = 400
+N_COMMANDS = 400
+"""How many random commands bound from above what multipliers can prove."""
 
 
 def commands_around(plant: Plant, command: Array, rng: np.random.Generator) -> Array:
     """Commands (DRAWN, n, 3) near a command and anywhere within the limits."""
-    low, high = plant.layout.lower, plant.layout.upper
-    spread = np.geomspace(1e-3, 1.0, DRAWN)[:, None, None] * rng.uniform(
-        -1.0, 1.0, (DRAWN, *command.shape)
+    low = plant.layout.lower
+    high = plant.layout.upper
+    spread = np.geomspace(1e-3, 1.0, N_COMMANDS)[:, None, None] * rng.uniform(
+        -1.0, 1.0, (N_COMMANDS, *command.shape)
     )
-    drawn = np.clip(command + spread * (high - low), low, high)
-    drawn[0] = command
-    return np.asarray(drawn)
+    commands = np.clip(command + spread * (high - low), low, high)
+    commands[0] = command
+    return np.asarray(commands)
 
 
 def proved(price: Array, wrench: Array, given: Array, power: Array) -> float:
@@ -37,9 +39,9 @@ def least_of_mixtures(wrench: Array, given: Array, power: Array, scale: Array) -
     wrenches = given.reshape(n * count, 6).T / scale[:, None]
     rows = np.concatenate([wrenches, ones])
     right = np.concatenate([wrench / scale, np.ones(n)])
-    found = linprog(power.ravel(), A_eq=rows, b_eq=right, bounds=(0.0, None))
-    assert found.success
-    return float(found.fun)
+    optimum = linprog(power.ravel(), A_eq=rows, b_eq=right, bounds=(0.0, None))
+    assert optimum.success
+    return float(optimum.fun)
 
 
 @pytest.mark.parametrize("name", ["A", "bluerov2_heavy"])
@@ -54,11 +56,11 @@ def test_prices_are_raised_to_what_mixtures_of_commands_take(name: str, off: flo
     begun = off * answer.multipliers
     raised = raised_multipliers(plant, answer.scale, answer.wrench, begun, answer.command)
 
-    drawn = commands_around(plant, answer.command, rng)
-    given = np.einsum("kna,naw->nkw", plant.force(drawn), plant.effectiveness)
-    power = plant.power(drawn).T
-    value = proved(raised, answer.wrench, given, power)
-    most = least_of_mixtures(answer.wrench, given, power, answer.scale)
+    commands = commands_around(plant, answer.command, rng)
+    wrenches_of_commands = np.einsum("kna,naw->nkw", plant.force(commands), plant.effectiveness)
+    power = plant.power(commands).T
+    value = proved(raised, answer.wrench, wrenches_of_commands, power)
+    most = least_of_mixtures(answer.wrench, wrenches_of_commands, power, answer.scale)
     # What one draw proves of another: its commands are elsewhere.
-    assert value >= proved(begun, answer.wrench, given, power) - 0.02 * answer.power
+    assert value >= proved(begun, answer.wrench, wrenches_of_commands, power) - 0.02 * answer.power
     assert most - 0.03 * answer.power <= value <= most + 1e-6 * answer.power

@@ -27,10 +27,11 @@ from finlab.layout import Layout, load_layout
 from finlab.layout.load import parse_layout
 from finlab.physics import Plant
 from finlab.research.random_layouts import random_jet_robot
-from tests.mixed_robots import bluerov2_heavy
+from tests.random_robots import bluerov2_heavy
 
 MOST_STEPS = 540.0
-"""Steps of the iterations of all questions: what they took when this was written, and a tenth more."""
+"""Steps of the iterations of all questions: what they took when this was written, and a tenth
+more."""
 
 
 def test_other_starts_rotate_planes_and_change_sizes() -> None:
@@ -43,25 +44,25 @@ def test_other_starts_rotate_planes_and_change_sizes() -> None:
     assert starts.shape == (patterns + RANDOM_STARTS, 6, 2)
 
     complex_force = force[:, 0] + 1j * force[:, 1]
-    turned = (starts[..., 0] + 1j * starts[..., 1]) / complex_force
+    rotation = (starts[..., 0] + 1j * starts[..., 1]) / complex_force
     # By the patterns each plane turns by the same angle, one way or the other, and keeps its size.
-    np.testing.assert_allclose(np.abs(turned[:patterns, ~lines]), 1.0, rtol=1e-12)
+    np.testing.assert_allclose(np.abs(rotation[:patterns, ~lines]), 1.0, rtol=1e-12)
     np.testing.assert_allclose(
-        np.abs(np.angle(turned[:patterns, ~lines])), JET_ROTATION, rtol=1e-12
+        np.abs(np.angle(rotation[:patterns, ~lines])), JET_ROTATION, rtol=1e-12
     )
-    signs = np.sign(np.angle(turned[:patterns, ~lines]))
+    signs = np.sign(np.angle(rotation[:patterns, ~lines]))
     np.testing.assert_allclose(
         signs[:8].T @ signs[:8], 8.0 * np.eye(4), atol=1e-12
     )  # independent of each other
     np.testing.assert_array_equal(signs[8], -signs[0])
     # At random angles and sizes differ, and no line turns.
-    assert (np.abs(turned) <= 2.0).all() and np.abs(
-        np.abs(turned[patterns:, ~lines]) - 1.0
+    assert (np.abs(rotation) <= 2.0).all() and np.abs(
+        np.abs(rotation[patterns:, ~lines]) - 1.0
     ).min() > 1e-6
-    assert np.unique(np.angle(turned[patterns:, ~lines]).round(9)).size == 4 * RANDOM_STARTS
-    np.testing.assert_allclose(turned[:, lines].imag, 0.0, atol=1e-12)
-    assert np.unique(turned[:, lines].real.round(9)).size == 2 * (patterns + RANDOM_STARTS)
-    assert (turned[:, lines].real >= 0.0).all()
+    assert np.unique(np.angle(rotation[patterns:, ~lines]).round(9)).size == 4 * RANDOM_STARTS
+    np.testing.assert_allclose(rotation[:, lines].imag, 0.0, atol=1e-12)
+    assert np.unique(rotation[:, lines].real.round(9)).size == 2 * (patterns + RANDOM_STARTS)
+    assert (rotation[:, lines].real >= 0.0).all()
 
 
 def largest_share(layout: Layout, target: Array, scale: Array, start: Array) -> float:
@@ -85,7 +86,7 @@ def largest_share(layout: Layout, target: Array, scale: Array, start: Array) -> 
     own = ((start - layout.lower) / np.where(used, layout.upper - layout.lower, 1.0))[used]
     for spread in (0.0, 0.1, 0.3):
         first = np.clip(own + spread * rng.normal(size=own.shape), 0.0, 1.0)
-        found = minimize(
+        optimum = minimize(
             lambda x: -x[-1],
             np.append(first, 0.3),
             method="SLSQP",
@@ -93,8 +94,8 @@ def largest_share(layout: Layout, target: Array, scale: Array, start: Array) -> 
             constraints={"type": "eq", "fun": missing},
             options={"maxiter": 100},
         )
-        if np.abs(missing(found.x)).max() < 1e-6:
-            best = max(best, float(found.x[-1]))
+        if np.abs(missing(optimum.x)).max() < 1e-6:
+            best = max(best, float(optimum.x[-1]))
     return best
 
 
@@ -108,10 +109,10 @@ def test_a_direction_goes_as_far_as_steps_on_commands_find(name: str) -> None:
     for target in 4.0 * drawn:
         answer = allocator.allocate(target, policy="direction")
         along = np.nan_to_num(target / answer.scale) * (~np.isnan(answer.target))
-        share = float(along @ (answer.wrench / answer.scale) / (along @ along))
-        assert 0.05 < share < 1.0
+        ray_share = float(along @ (answer.wrench / answer.scale) / (along @ along))
+        assert 0.05 < ray_share < 1.0
         other = largest_share(layout, target, answer.scale, answer.command)
-        assert share >= other * (1.0 - 2e-3)
+        assert ray_share >= other * (1.0 - 2e-3)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -123,9 +124,9 @@ def test_a_direction_is_kept_on_its_ray_whatever_the_robot(seed: int) -> None:
     for target in 5.0 * plant.wrench(plant.sample(rng, (3,))):
         answer = allocator.allocate(target, policy="direction")
         along = target / answer.scale
-        given = answer.wrench / answer.scale
-        share = float(along @ given / (along @ along))
-        assert np.linalg.norm(given - share * along) <= 1e-5
+        wrench = answer.wrench / answer.scale
+        share = float(along @ wrench / (along @ along))
+        assert np.linalg.norm(wrench - share * along) <= 1e-5
         assert answer.err_norm == pytest.approx(
             (1.0 - share) * np.linalg.norm(along), rel=1e-4, abs=1e-6
         )

@@ -12,13 +12,15 @@ from finlab.allocation import Allocation
 from finlab.layout import Layout
 from finlab.physics import Plant
 from finlab.research.random_layouts import random_layout
-from tests.any_robot import AnyRobot, normalized_error
+from tests.allocator_cache import AllocatorCache, normalized_error
 from webapp.tasks.modes import force_sizes, mode_signature, same_signature
 
 GOOD = 1e-5
 """Normalized error below which an answer counts as exact here."""
 SEEDS = st.integers(0, 2**32 - 1)
+"""Seeds of random robots."""
 LIMITS = st.sampled_from(["nominal", "varied"])
+"""Whether all fins of a random robot have the same limits."""
 MIRROR = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
 """What becomes of a wrench when y changes its sign."""
 
@@ -38,26 +40,29 @@ def drawn(seed: int, limits: str = "nominal") -> tuple[Layout, np.ndarray]:
     """A layout and a wrench of one of its commands."""
     rng = np.random.default_rng(seed)
     layout = random_layout(rng, limits=limits)  # type: ignore[arg-type]
-    return layout, reachable(layout, rng)
+    return layout, reachable_wrench(layout, rng)
 
 
-def reachable(layout: Layout, rng: np.random.Generator) -> np.ndarray:
+def reachable_wrench(layout: Layout, rng: np.random.Generator) -> np.ndarray:
+    """The wrench (6,) of a random command."""
     lower = layout.lower
     upper = layout.upper
     return Plant(layout).wrench(lower + rng.uniform(size=lower.shape) * (upper - lower))
 
 
-def same_power(one: Allocation, other: Allocation, share: float) -> bool:
+def is_same_power(one: Allocation, other: Allocation, share: float) -> bool:
+    """Whether two answers take as much power, but for a share of it."""
     return abs(one.power - other.power) <= share * one.power
 
 
 def wrapped(angle: float) -> float:
+    """An angle [rad] in [-pi, pi)."""
     return (angle + math.pi) % (2.0 * math.pi) - math.pi
 
 
 @few(20)
 @given(seed=SEEDS)
-def test_the_order_of_the_fins_does_not_matter(search: AnyRobot, seed: int) -> None:
+def test_the_order_of_the_fins_does_not_matter(search: AllocatorCache, seed: int) -> None:
     layout, target = drawn(seed)
     order = np.random.default_rng(seed).permutation(layout.n_fins)
     shuffled = replace(layout, actuators=tuple(layout.fins[i] for i in order))
@@ -65,13 +70,13 @@ def test_the_order_of_the_fins_does_not_matter(search: AnyRobot, seed: int) -> N
     other = search.allocate(shuffled, target)
     assert one.err_norm < GOOD and other.err_norm < GOOD
     assert normalized_error(search.normalization, one.wrench, other.wrench) < GOOD
-    assert same_power(one, other, 0.002)
+    assert is_same_power(one, other, 0.002)
 
 
 @few(20)
 @given(seed=SEEDS, limits=LIMITS, yaw=st.floats(-math.pi, math.pi))
 def test_a_turned_robot_gets_the_turned_answer(
-    search: AnyRobot, seed: int, limits: str, yaw: float
+    search: AllocatorCache, seed: int, limits: str, yaw: float
 ) -> None:
     layout, target = drawn(seed, limits)
     c = math.cos(yaw)
@@ -85,17 +90,19 @@ def test_a_turned_robot_gets_the_turned_answer(
         )
         for fin in layout.fins
     ]
-    turned = replace(layout, actuators=tuple(fins))
+    turned_layout = replace(layout, actuators=tuple(fins))
     one = search.allocate(layout, target)
-    other = search.allocate(turned, np.concatenate([rotation @ target[:3], rotation @ target[3:]]))
+    other = search.allocate(
+        turned_layout, np.concatenate([rotation @ target[:3], rotation @ target[3:]])
+    )
     assert one.err_norm < GOOD and other.err_norm < GOOD
-    assert same_power(one, other, 0.002)
+    assert is_same_power(one, other, 0.002)
 
 
 @few(20)
 @given(seed=SEEDS, limits=LIMITS)
 def test_a_mirrored_robot_gets_the_mirrored_answer(
-    search: AnyRobot, seed: int, limits: str
+    search: AllocatorCache, seed: int, limits: str
 ) -> None:
     layout, target = drawn(seed, limits)
     # The thrust axis e_h is mirrored, so zero directions and with them the energy stay what they
@@ -111,12 +118,12 @@ def test_a_mirrored_robot_gets_the_mirrored_answer(
     one = search.allocate(layout, target)
     other = search.allocate(replace(layout, actuators=tuple(fins)), MIRROR * target)
     assert one.err_norm < GOOD and other.err_norm < GOOD
-    assert same_power(one, other, 0.002)
+    assert is_same_power(one, other, 0.002)
 
 
 @few(15)
 @given(seed=SEEDS, limits=LIMITS, place=st.integers(0, 4))
-def test_a_lost_one_is_removed(search: AnyRobot, seed: int, limits: str, place: int) -> None:
+def test_a_lost_one_is_removed(search: AllocatorCache, seed: int, limits: str, place: int) -> None:
     layout, target = drawn(seed, limits)
     name = layout.names[place % layout.n_fins]
     # What is nearest depends on the wrench scale, which is that of the whole robot.
@@ -134,7 +141,7 @@ def test_a_lost_one_is_removed(search: AnyRobot, seed: int, limits: str, place: 
 @few(15)
 @given(seed=SEEDS)
 def test_a_small_change_of_the_layout_changes_the_answer_little(
-    search: AnyRobot, seed: int
+    search: AllocatorCache, seed: int
 ) -> None:
     layout, target = drawn(seed)
     rng = np.random.default_rng(seed + 1)
@@ -154,7 +161,7 @@ def test_a_small_change_of_the_layout_changes_the_answer_little(
     # Fins that hardly span a wrench make the least power itself sensitive: then both are proved to
     # be least.
     is_least = [answer.power <= (1.0 + 1e-4) * answer.bound for answer in (one, other)]
-    assert same_power(one, other, 0.002) or all(is_least)
-    ways = [mode_signature(a.command, force_sizes(a.layout, a.command)) for a in (one, other)]
-    if same_signature(*ways):
+    assert is_same_power(one, other, 0.002) or all(is_least)
+    signatures = [mode_signature(a.command, force_sizes(a.layout, a.command)) for a in (one, other)]
+    if same_signature(*signatures):
         np.testing.assert_allclose(one.forces, other.forces, atol=0.05)

@@ -14,18 +14,21 @@ from finlab.layout import Fin, FinModelSpec, Layout, load_layout
 from finlab.physics import Plant
 from finlab.physics.objective import Name, cost_meter
 from finlab.research.evaluation.splits import make_split
-from tests.any_robot import AnyRobot
-from tests.exhaustive import crossed, sampled
-from tests.random_fins import KINDS, random_robot_of_fins
+from tests.allocator_cache import AllocatorCache
+from tests.random_fin_robots import KINDS, random_robot_of_fins
+from tests.sampled_cases import crossed, sampled
 
 Array = NDArray[np.float64]
-LAWS = KINDS[:3]
-AXES = np.concatenate(
+FORMULAS = KINDS[:3]
+"""Kinds of fin whose law is a formula, not a table."""
+AXIS_WRENCHES = np.concatenate(
     [np.diag([1.0, 1.0, 1.0, 0.1, 0.1, 0.1]), -np.diag([1.0, 1.0, 1.0, 0.1, 0.1, 0.1])]
 )
+"""A wrench (6,) [N, N m] either way along each axis."""
 
 
-def reachable(layout: Layout, n: int, seed: int = 0) -> Array:
+def reachable_wrenches(layout: Layout, n: int, seed: int = 0) -> Array:
+    """Wrenches (n, 6) of random commands."""
     plant = Plant(layout)
     return plant.wrench(plant.sample(np.random.default_rng(seed), (n,)))
 
@@ -42,17 +45,17 @@ def with_arcs(name: str, arcs: dict[int, tuple[float, float]]) -> Layout:
     ("limits", "kinds"),
     crossed(
         ["nominal", "varied"],
-        [("drag",), ("lighthill",), ("soft",), LAWS, ("table",), KINDS],
+        [("drag",), ("lighthill",), ("soft",), FORMULAS, ("table",), KINDS],
         every=7,
     ),
 )
 def test_exact_on_any_fin(kinds: tuple[str, ...], limits: str, tmp_path: Path) -> None:
-    method = AnyRobot()
+    method = AllocatorCache()
     for seed in range(4):
         layout = random_robot_of_fins(
             np.random.default_rng(seed), kinds, tmp_path, limits=limits, n_fins=(2, 7)
         )
-        batch = method.allocate_batch(layout, reachable(layout, 12, seed))
+        batch = method.allocate_batch(layout, reachable_wrenches(layout, 12, seed))
         lower = layout.lower
         upper = layout.upper
         assert (batch.command >= lower).all() and (batch.command <= upper).all()
@@ -61,11 +64,11 @@ def test_exact_on_any_fin(kinds: tuple[str, ...], limits: str, tmp_path: Path) -
 
 
 def test_no_more_than_brute_force_finds() -> None:
-    method = AnyRobot()
+    method = AllocatorCache()
     ratio = []
     for seed in range(2):
-        layout = random_robot_of_fins(np.random.default_rng(seed), LAWS, n_fins=(2, 4))
-        for target in reachable(layout, 2, seed) * [[1.0], [0.5]]:
+        layout = random_robot_of_fins(np.random.default_rng(seed), FORMULAS, n_fins=(2, 4))
+        for target in reachable_wrenches(layout, 2, seed) * [[1.0], [0.5]]:
             answer = method.allocate(layout, target)
             if answer.err_norm < 1e-5:
                 least = least_cost(
@@ -76,7 +79,7 @@ def test_no_more_than_brute_force_finds() -> None:
     assert np.max(ratio) < 1.001
 
 
-@pytest.mark.parametrize("target", AXES, ids=str)
+@pytest.mark.parametrize("target", AXIS_WRENCHES, ids=str)
 def test_robots_with_stops_are_as_cheap(target: Array) -> None:
     """Fins that start outside their arcs must come back to where they are pulled."""
     layout = load_layout(shipped_layouts()["restricted"])
@@ -89,7 +92,7 @@ def test_robots_with_stops_are_as_cheap(target: Array) -> None:
 def test_arcs_wider_than_half_a_turn_are_as_cheap(axis: int) -> None:
     """Which side of the gap each fin takes is no convex question."""
     layout = with_arcs("A", dict.fromkeys(range(4), (-2.4, 2.4)))
-    target = AXES[axis]
+    target = AXIS_WRENCHES[axis]
     answer = Allocator(layout).allocate(target)
     least = least_cost(layout, target, answer.scale, "power", n_starts=6, also=answer.command)
     assert answer.err_norm < 1e-5 and answer.power < 1.002 * least
@@ -98,8 +101,8 @@ def test_arcs_wider_than_half_a_turn_are_as_cheap(axis: int) -> None:
 @pytest.mark.parametrize("name", ["A", "B", "penta", "hexa", "octo"])
 def test_pure_axes_of_symmetric_robots(name: str) -> None:
     layout = load_layout(shipped_layouts()[name])
-    method = AnyRobot()
-    for target in AXES[[0, 2, 5, 6]]:
+    method = AllocatorCache()
+    for target in AXIS_WRENCHES[[0, 2, 5, 6]]:
         answer = method.allocate(layout, target)
         assert answer.err_norm < 1e-5
 
@@ -108,7 +111,7 @@ def test_coincident_fins_share() -> None:
     """Two at one place: each gives half."""
     pair = Layout("twins", tuple(Fin(name, (0.1, 0.05, 0.0), 0.3) for name in "ab"))
     plant = Plant(pair)
-    method = AnyRobot()
+    method = AllocatorCache()
     for force in (0.5, 2.0, 6.0, 12.0):
         command = np.array([[0.6, 2.1, 0.4]] * 2)
         target = plant.wrench(command) * force / 13.32
@@ -132,8 +135,8 @@ def test_tiny_fins_are_as_exact_beside_their_own_strength(area: float) -> None:
     layout = load_layout(shipped_layouts()["A"])
     model = FinModelSpec("drag", (("area", area),))
     tiny = replace(layout, actuators=tuple(replace(fin, model=model) for fin in layout.fins))
-    method = AnyRobot()
-    for target in reachable(tiny, 6):
+    method = AllocatorCache()
+    for target in reachable_wrenches(tiny, 6):
         answer = method.allocate(tiny, target)
         assert answer.err_norm < 1e-4 * 1.0
 
@@ -177,30 +180,33 @@ def least_cost(
     starts[..., :2] = np.where(resting[..., None], 0.0, starts[..., :2])
     if also is not None:
         starts = np.concatenate([(also - low)[None] / width, starts])
-    bounds = [
-        (None, None) if axis == 2 and full[i] else (0.0, 1.0) for i in range(n) for axis in range(3)
-    ]
+    bounds = list[tuple[float | None, float | None]]()
+    for turns_all_round in full:
+        direction_bounds = (None, None) if turns_all_round else (0.0, 1.0)
+        bounds += [(0.0, 1.0), (0.0, 1.0), direction_bounds]
     # Equations beyond the rank of what the fins can do only confuse the solver.
     axes = np.linalg.svd(plant.effectiveness[:, 1:].reshape(2 * n, 6) / sigma, full_matrices=False)
     rank = int((axes[1] > 1e-9 * axes[1][0]).sum())
-    seen = axes[2][:rank] if not plant.force(plant.sample(rng, (3,)))[..., 0].any() else np.eye(6)
+    served_axes = (
+        axes[2][:rank] if not plant.force(plant.sample(rng, (3,)))[..., 0].any() else np.eye(6)
+    )
     scale = max(float(meter(plant.upper[None])[0]), 1e-9)
     best = np.inf
     for start in starts:
-        found = minimize(
+        optimum = minimize(
             lambda s: float(meter(command(s)[None])[0]) / scale,
             start.ravel(),
             jac=lambda s: (meter.gradient(command(s)[None])[0] * width).ravel() / scale,
             bounds=bounds,
             constraints={
                 "type": "eq",
-                "fun": lambda s: seen @ missing(s),
-                "jac": lambda s: seen @ bent(s),
+                "fun": lambda s: served_axes @ missing(s),
+                "jac": lambda s: served_axes @ bent(s),
             },
             method="SLSQP",
             options={"maxiter": 150, "ftol": 1e-10},
         )
-        answer = plant.feasible(command(found.x))
+        answer = plant.feasible(command(optimum.x))
         error = float(np.linalg.norm((plant.wrench(answer) - target) / sigma))
         if error < 1e-5:
             best = min(best, float(meter(answer[None])[0]))

@@ -15,55 +15,57 @@ from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
 from finlab.layout.load import parse_layout
-from tests import mixed_robots
-from tests.exhaustive import sampled
-from tests.least_power import conic_optimum, farthest, least_known, least_miss, lower_bound
-from tests.own_plant import OwnPlant
+from tests import random_robots
+from tests.oracle_optima import conic_optimum, farthest, least_known, least_miss, lower_bound
+from tests.oracle_plant import OraclePlant
+from tests.sampled_cases import sampled
 
-REACHED = 1e-3
+ERROR_LIMIT = 1e-3
+"""Largest error of a wrench that counts as served, in units of the wrench scale."""
 
 
-def missing(plant: OwnPlant, commands: Array, wrench: Array) -> float:
+def relative_error(plant: OraclePlant, commands: Array, wrench: Array) -> float:
+    """The error of commands, in units of the judge's wrench scale."""
     return float(np.linalg.norm((plant.wrench(commands) - wrench) / plant.scales))
 
 
 def test_a_heavy_takes_the_watts_of_clarabel() -> None:
-    plant = OwnPlant(mixed_robots.bluerov2_heavy())
+    plant = OraclePlant(random_robots.bluerov2_heavy())
     rng = np.random.default_rng(4)
-    allocator = finlab.Allocator(mixed_robots.load(plant.layout))
+    allocator = finlab.Allocator(random_robots.load(plant.layout))
     for _ in range(10):
-        wrench = mixed_robots.within(plant, rng)
+        wrench = random_robots.within(plant, rng)
         commands = plant.commands_of(allocator.allocate(wrench))
-        assert missing(plant, commands, wrench) <= 1e-6
+        assert relative_error(plant, commands, wrench) <= 1e-6
         assert plant.excess(commands) == 0.0
         assert plant.power(commands) <= 1.00001 * conic_optimum(plant, wrench)[0]
 
 
 def test_a_heavy_beyond_reach_keeps_the_direction_or_comes_nearest() -> None:
-    plant = OwnPlant(mixed_robots.bluerov2_heavy())
+    plant = OraclePlant(random_robots.bluerov2_heavy())
     rng = np.random.default_rng(5)
-    allocator = finlab.Allocator(mixed_robots.load(plant.layout))
+    allocator = finlab.Allocator(random_robots.load(plant.layout))
     for times in (1.2, 2.0, 3.0):
-        wrench = mixed_robots.beyond(plant, rng, times)
+        wrench = random_robots.beyond(plant, rng, times)
         along = plant.commands_of(allocator.allocate(wrench, policy="direction"))
         most = farthest(plant, wrench)
-        assert missing(plant, along, most * wrench) <= 2e-3
+        assert relative_error(plant, along, most * wrench) <= 2e-3
         near = plant.commands_of(allocator.allocate(wrench))
-        assert missing(plant, near, wrench) <= 1.0005 * least_miss(plant, wrench)
+        assert relative_error(plant, near, wrench) <= 1.0005 * least_miss(plant, wrench)
 
 
 @pytest.mark.parametrize("number", sampled(range(3)))
-@pytest.mark.parametrize("kind", mixed_robots.KINDS)
+@pytest.mark.parametrize("kind", random_robots.KINDS)
 def test_exact_within_limits_at_the_least_watts(kind: str, number: int) -> None:
-    plant = mixed_robots.random_plant(kind, number, 7)
+    plant = random_robots.random_plant(kind, number, 7)
     rng = np.random.default_rng(number)
-    allocator = finlab.Allocator(mixed_robots.load(plant.layout))
+    allocator = finlab.Allocator(random_robots.load(plant.layout))
     most = plant.power(np.array([each.limits[1] for each in plant.actuators]))
     for _ in range(2):
-        wrench = mixed_robots.within(plant, rng)
+        wrench = random_robots.within(plant, rng)
         result = allocator.allocate(wrench, flow=plant.flow)
         commands = plant.commands_of(result)
-        assert missing(plant, commands, wrench) <= REACHED
+        assert relative_error(plant, commands, wrench) <= ERROR_LIMIT
         assert plant.excess(commands) == 0.0
         watts = plant.power(commands)
         assert result.power == pytest.approx(watts, rel=1e-6)
@@ -75,24 +77,24 @@ def test_exact_within_limits_at_the_least_watts(kind: str, number: int) -> None:
 
 @pytest.mark.parametrize("kind", ["thrusters", "azimuths", "fins", "mixed"])
 def test_a_random_robot_beyond_reach_keeps_the_direction(kind: str) -> None:
-    plant = mixed_robots.random_plant(kind, 3, 7)
+    plant = random_robots.random_plant(kind, 3, 7)
     rng = np.random.default_rng(0)
-    allocator = finlab.Allocator(mixed_robots.load(plant.layout))
+    allocator = finlab.Allocator(random_robots.load(plant.layout))
     for times in (1.2, 3.0):
-        wrench = mixed_robots.beyond(plant, rng, times)
+        wrench = random_robots.beyond(plant, rng, times)
         commands = plant.commands_of(allocator.allocate(wrench, policy="direction"))
-        assert missing(plant, commands, wrench / times) <= 2e-3
+        assert relative_error(plant, commands, wrench / times) <= 2e-3
 
 
 def test_fins_of_mixed_laws_have_no_dear_answers() -> None:
     for number in range(4):
-        plant = OwnPlant(mixed_robots.fins_with_a_tail(number, 3))
+        plant = OraclePlant(random_robots.fins_with_a_tail(number, 3))
         rng = np.random.default_rng(number)
-        wrench = mixed_robots.within(plant, rng)
+        wrench = random_robots.within(plant, rng)
         commands = plant.commands_of(
-            finlab.Allocator(mixed_robots.load(plant.layout)).allocate(wrench)
+            finlab.Allocator(random_robots.load(plant.layout)).allocate(wrench)
         )
-        assert missing(plant, commands, wrench) <= REACHED
+        assert relative_error(plant, commands, wrench) <= ERROR_LIMIT
         assert plant.power(commands) <= 1.01 * lower_bound(plant, wrench)
 
 
@@ -101,11 +103,11 @@ def test_fins_of_mixed_laws_have_no_dear_answers() -> None:
 def test_ticks_of_a_wandering_wrench(kind: str, period: float) -> None:
     """No limit and no rate is broken, and an answer that misses is the nearest, or the farthest in
     its direction, among those that may follow."""
-    plant = OwnPlant(mixed_robots.with_rates(mixed_robots.random_robot(kind, 1, 7)))
+    plant = OraclePlant(random_robots.with_rates(random_robots.random_robot(kind, 1, 7)))
     rng = np.random.default_rng(1)
-    allocator = finlab.Allocator(mixed_robots.load(plant.layout), period_s=period)
-    first = mixed_robots.within(plant, rng)
-    last = mixed_robots.within(plant, rng)
+    allocator = finlab.Allocator(random_robots.load(plant.layout), period_s=period)
+    first = random_robots.within(plant, rng)
+    last = random_robots.within(plant, rng)
     before: Array | None = None
     for share in np.linspace(0.0, 1.0, 6):
         wrench = (1.0 - share) * first + share * last
@@ -114,18 +116,20 @@ def test_ticks_of_a_wandering_wrench(kind: str, period: float) -> None:
         assert plant.excess(commands) == 0.0
         if before is not None:
             assert plant.rate_excess(before, commands, period) <= 1e-9
-            error = missing(plant, commands, wrench)
+            error = relative_error(plant, commands, wrench)
             near = plant.after(before, period)
-            if error > REACHED and error > least_miss(near, wrench, 33) + 2e-3:
+            if error > ERROR_LIMIT and error > least_miss(near, wrench, 33) + 2e-3:
                 most = min(farthest(near, wrench, 33), 1.0)
-                assert missing(plant, commands, most * wrench) <= 1e-2 * np.linalg.norm(
+                assert relative_error(plant, commands, most * wrench) <= 1e-2 * np.linalg.norm(
                     wrench / plant.scales
                 )
         before = commands
 
 
-ROBOTS = range(24)
-LAW = {"type": "power_law", "forward": 1.0, "reverse": 1.5, "exponent": 1.5}
+ROBOT_NUMBERS = range(24)
+"""Numbers of the random robots."""
+THRUST_LAW = {"type": "power_law", "forward": 1.0, "reverse": 1.5, "exponent": 1.5}
+"""Power over force of the thrusters made by hand, as a layout file says it."""
 
 
 @cache
@@ -139,21 +143,21 @@ def _robot(number: int) -> tuple[Allocator, Array, Array, Array]:
     for k in range(rng.integers(2, 13)):
         axis = np.eye(3)[rng.integers(3)] if rng.random() < 0.4 else rng.normal(size=3)
         axis /= np.linalg.norm(axis)
-        place = rng.uniform(-0.5, 0.5, 3)
+        position = rng.uniform(-0.5, 0.5, 3)
         turn = float(rng.choice([0.0, 0.02]))
         ends.append([-float(rng.choice([0.0, 10.0, 40.0])), float(rng.uniform(1.0, 60.0))])
-        columns.append([*axis, *(np.cross(place, axis) + turn * axis)])
+        columns.append([*axis, *(np.cross(position, axis) + turn * axis)])
         parts.append(
             {
                 "name": f"m{k}",
                 "type": "thruster",
-                "position_m": place.tolist(),
+                "position_m": position.tolist(),
                 "axis": axis.tolist(),
             }
             | {"force_n": ends[-1], "torque_per_newton_m": turn}
-            | {"model": LAW}
+            | {"model": THRUST_LAW}
         )
-    allocator = Allocator(parse_layout(mixed_robots.layout_of(f"r{number}", parts)))
+    allocator = Allocator(parse_layout(random_robots.layout_of(f"r{number}", parts)))
     return allocator, np.array(columns).T, *np.array(ends).T
 
 
@@ -166,7 +170,7 @@ def _targets(number: int, allocator: Allocator, by: Array, low: Array, high: Arr
     return np.concatenate([some, own]) * 10.0 ** rng.uniform(0.0, 1.5, (4, 1))
 
 
-@pytest.mark.parametrize("number", ROBOTS)
+@pytest.mark.parametrize("number", ROBOT_NUMBERS)
 def test_direction_gives_the_share_of_the_linear_programme_and_nothing_beside(number: int) -> None:
     allocator, by, low, high = robot = _robot(number)
     scale = allocator.scale
@@ -183,7 +187,7 @@ def test_direction_gives_the_share_of_the_linear_programme_and_nothing_beside(nu
         assert answer.share >= 0.998 * best.x[-1] - 1e-6
 
 
-@pytest.mark.parametrize("number", ROBOTS)
+@pytest.mark.parametrize("number", ROBOT_NUMBERS)
 def test_closest_and_the_first_group_miss_no_more_than_least_squares(number: int) -> None:
     allocator, by, low, high = robot = _robot(number)
     for target in _targets(number, *robot):
@@ -193,15 +197,15 @@ def test_closest_and_the_first_group_miss_no_more_than_least_squares(number: int
         ):
             answer = allocator.allocate(target, policy=policy or "closest")
             scaled = (by / allocator.scale[:, None])[rows]
-            wanted = (target / allocator.scale)[rows]
-            best = lsq_linear(scaled, wanted, (low, high), method="bvls", tol=1e-14)
-            least = np.linalg.norm(scaled @ best.x - wanted)
+            target_of_rows = (target / allocator.scale)[rows]
+            best = lsq_linear(scaled, target_of_rows, (low, high), method="bvls", tol=1e-14)
+            least = np.linalg.norm(scaled @ best.x - target_of_rows)
             assert np.linalg.norm((answer.unallocated / allocator.scale)[rows]) <= least + 1e-5
 
 
 @pytest.mark.parametrize("policy", ["closest", "direction", "priority"])
 def test_one_code_one_answer_whose_bound_is_below_its_power(policy: str) -> None:
-    for number in ROBOTS:
+    for number in ROBOT_NUMBERS:
         allocator, *_ = robot = _robot(number)
         targets = np.concatenate([_targets(number, *robot), 0.05 * _targets(number, *robot)])
         batch = allocator.allocate_batch(targets, policy=policy)
@@ -223,7 +227,7 @@ def test_a_command_inside_a_dead_band_is_neutral() -> None:
         "name": "t",
         "type": "thruster",
         "force_n": [-40.0, 50.0],
-        "model": LAW,
+        "model": THRUST_LAW,
         "dead_band_n": 3.0,
     }
     for number in range(12):
@@ -239,7 +243,7 @@ def test_a_command_inside_a_dead_band_is_neutral() -> None:
                     "position_m": rng.uniform(-1, 1, 3).tolist(),
                 }
             )
-        allocator = Allocator(parse_layout(mixed_robots.layout_of(f"b{number}", parts)))
+        allocator = Allocator(parse_layout(random_robots.layout_of(f"b{number}", parts)))
         targets = rng.normal(size=(20, 6)) * allocator.scale * 10.0 ** rng.uniform(-2, 1, (20, 1))
         for policy, target in itertools.product(("closest", "direction", "priority"), targets):
             force = allocator.allocate(target, policy=policy).command[:, 0]

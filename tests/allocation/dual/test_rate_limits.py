@@ -16,13 +16,14 @@ from finlab.layout import Layout, Servo, load_layout
 from finlab.physics import Plant
 from finlab.research.evaluation.method_specs import load_method_spec
 from finlab.swim.vehicle.fin_motion import LagStep
-from tests.any_robot import AnyRobot
+from tests.allocator_cache import AllocatorCache
 
 TICKS = np.arange(150) * 0.1
 """15 s at 10 Hz."""
 SLOW_PATH = np.array([0.98, 0.98, 1.4, 0.175, 0.175, 0.175])
 """Amplitudes of the path [N, N m], about 0.7 standard deviations of what random commands give."""
 TARGET = [1.0, 0.5, 2.0, 0.0, 0.1, 0.1]
+"""A wrench that the robots are asked for [N, N m]."""
 STEP = np.array([0.1, 0.3, 0.5])
 """What the usual servo's commands change by in a tick [rad, Hz, rad]."""
 
@@ -45,7 +46,11 @@ class Drive(NamedTuple):
         return np.abs(change)
 
 
-def drive(method: AnyRobot, layout: Layout, path: np.ndarray, *, bound: bool) -> Drive:
+def answers_along(
+    method: AllocatorCache, layout: Layout, path: np.ndarray, *, bound: bool
+) -> Drive:
+    """Answers to the wrenches of a path; with `bound`, each within the rates from the one
+    before."""
     previous = None
     results = []
     for wrench in path:
@@ -69,22 +74,26 @@ def smooth_path(seed: int) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def penta() -> Layout:
+    """Five fins."""
     return load_layout("penta")
 
 
 @pytest.fixture(scope="module")
-def method() -> AnyRobot:
-    return AnyRobot()
+def method() -> AllocatorCache:
+    """The default method."""
+    return AllocatorCache()
 
 
 @pytest.fixture(scope="module")
-def free(method: AnyRobot, penta: Layout) -> Drive:
-    return drive(method, penta, smooth_path(0), bound=False)
+def free(method: AllocatorCache, penta: Layout) -> Drive:
+    """Answers along a path with no regard for rates."""
+    return answers_along(method, penta, smooth_path(0), bound=False)
 
 
 @pytest.fixture(scope="module")
-def steady(method: AnyRobot, penta: Layout) -> Drive:
-    return drive(method, penta, smooth_path(0), bound=True)
+def steady(method: AllocatorCache, penta: Layout) -> Drive:
+    """Answers along the same path, each within the rates from the one before."""
+    return answers_along(method, penta, smooth_path(0), bound=True)
 
 
 def test_no_command_changes_faster_than_its_servo(free: Drive, steady: Drive) -> None:
@@ -98,18 +107,18 @@ def test_the_path_is_still_tracked_at_about_the_same_cost(free: Drive, steady: D
     assert steady.cost.mean() < 1.002 * free.cost.mean()
 
 
-def test_rates_are_those_of_each_fin(search: AnyRobot, penta: Layout) -> None:
+def test_rates_are_those_of_each_fin(search: AllocatorCache, penta: Layout) -> None:
     first = replace(
         penta.fins[0], servo=replace(penta.fins[0].servo, frequency_rate=0.5, direction_rate=1.0)
     )
     other = replace(penta, actuators=(first, *penta.fins[1:]))
-    ride = drive(search, other, smooth_path(1)[:60], bound=True)
+    ride = answers_along(search, other, smooth_path(1)[:60], bound=True)
     assert (ride.change[:, 0] <= np.array([0.1, 0.05, 0.1]) + 1e-9).all()
     assert (ride.change[:, 1:, 2] > 0.1).any()
 
 
 def test_ticks_may_be_longer(penta: Layout) -> None:
-    slow = AnyRobot(period_s=0.4)
+    slow = AllocatorCache(period_s=0.4)
     before = slow.allocate(penta, TARGET).command
     after = slow.allocate(penta, -np.array(TARGET), previous=before).command
     change = np.abs(after - before)
@@ -123,7 +132,7 @@ def test_commands_stay_inside_the_limits_across_the_seam(steady: Drive, penta: L
     assert jumps.any()  # fins do pass the seam
 
 
-def test_a_fin_follows_a_turning_force_over_the_seam(search: AnyRobot) -> None:
+def test_a_fin_follows_a_turning_force_over_the_seam(search: AllocatorCache) -> None:
     layout = load_layout("pair")
     previous = None
     for angle in np.linspace(0.0, 4.0 * math.pi, 80):
@@ -134,22 +143,22 @@ def test_a_fin_follows_a_turning_force_over_the_seam(search: AnyRobot) -> None:
         previous = result.command
 
 
-def test_arcs_are_kept(search: AnyRobot) -> None:
+def test_arcs_are_kept(search: AllocatorCache) -> None:
     layout = load_layout("restricted")
-    ride = drive(search, layout, smooth_path(1)[:60], bound=True)
+    ride = answers_along(search, layout, smooth_path(1)[:60], bound=True)
     assert ((ride.command >= layout.lower) & (ride.command <= layout.upper)).all()
 
 
 def test_a_previous_command_that_is_the_answer_stays(
-    method: AnyRobot, penta: Layout, free: Drive
+    method: AllocatorCache, penta: Layout, free: Drive
 ) -> None:
     plant = Plant(penta)
     for tick in (0, 50, 120):
         before = free.command[tick]
         result = method.allocate(penta, smooth_path(0)[tick], previous=before)
         np.testing.assert_allclose(result.forces, plant.body_forces(before), atol=1e-3)
-        again = method.allocate(penta, smooth_path(0)[tick], previous=result.command)
-        np.testing.assert_allclose(again.forces, result.forces, atol=1e-3)
+        result_again = method.allocate(penta, smooth_path(0)[tick], previous=result.command)
+        np.testing.assert_allclose(result_again.forces, result.forces, atol=1e-3)
         assert result.power < 1.005 * free.cost[tick]
 
 
@@ -157,18 +166,21 @@ def test_the_first_tick_knows_no_past(free: Drive, steady: Drive) -> None:
     np.testing.assert_array_equal(steady.command[0], free.command[0])
 
 
-def test_a_failed_fin_comes_back(search: AnyRobot, penta: Layout) -> None:
+def test_a_failed_fin_comes_back(search: AllocatorCache, penta: Layout) -> None:
     lost = search.allocate(penta, TARGET, lost=["port_back"])
-    still = search.allocate(penta, TARGET, lost=["port_back"], previous=lost.command)
-    assert np.isnan(still.command[2]).all() and np.isfinite(still.command[[0, 1, 3, 4]]).all()
+    result_still_lost = search.allocate(penta, TARGET, lost=["port_back"], previous=lost.command)
+    assert (
+        np.isnan(result_still_lost.command[2]).all()
+        and np.isfinite(result_still_lost.command[[0, 1, 3, 4]]).all()
+    )
     back = search.allocate(penta, TARGET, previous=lost.command)
     assert np.isfinite(back.command).all() and back.err_norm < 1e-5
-    known = [0, 1, 3, 4]
-    assert (np.abs(back.command - lost.command)[known] <= STEP + 1e-9).all()
+    working = [0, 1, 3, 4]
+    assert (np.abs(back.command - lost.command)[working] <= STEP + 1e-9).all()
 
 
 def test_a_target_that_needs_a_turn_is_reached_tick_by_tick(
-    method: AnyRobot, penta: Layout
+    method: AllocatorCache, penta: Layout
 ) -> None:
     """From rise to dive all fins turn by half a circle: seven ticks, in which less and less is
     missing."""
@@ -184,15 +196,19 @@ def test_a_target_that_needs_a_turn_is_reached_tick_by_tick(
 
 
 PERIOD_S = 0.1
+"""Length of a tick [s]."""
 RISING = np.outer(np.arange(1.0, 41.0), [1.0, 0.0, 0.5, 0.0, 0.0, 0.1])
 """What is asked for grows by a newton a tick."""
 
 
 def in_time(robot: Layout, target: Array, reference: Array) -> Array:
+    """The wrench (6,) that a robot whose drives lag is asked for, so that it gives `target` in
+    time."""
     return Allocator(robot)._whole.method.in_time(target, reference)
 
 
 def with_pole(pole: float) -> Layout:
+    """Robot A, one of whose fins follows its direction with a pole [1/s]."""
     robot = load_layout("A")
     slow = replace(robot.fins[0], servo=Servo(direction_pole=pole))
     return replace(robot, actuators=(slow, *robot.fins[1:]))

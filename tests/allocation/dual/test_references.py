@@ -14,11 +14,13 @@ from finlab.allocation.dual.robot import CommandLimits, DualRobot
 from finlab.axes import AXES
 from finlab.layout import load_layout
 from finlab.research.evaluation.experiments.thrusters import _draws, misses_more, missing_by_group
-from tests.least_power import conic_optimum, farthest, least_known, least_miss, lower_bound
-from tests.mixed_robots import KINDS, bluerov2_heavy, random_plant, within
-from tests.own_plant import OwnPlant
+from tests.core.internal_functions import dual_function
+from tests.oracle_optima import conic_optimum, farthest, least_known, least_miss, lower_bound
+from tests.oracle_plant import OraclePlant
+from tests.random_robots import KINDS, bluerov2_heavy, random_plant, within
 
-HEAVY = OwnPlant(bluerov2_heavy())
+HEAVY = OraclePlant(bluerov2_heavy())
+"""The judge's model of a BlueROV2 Heavy."""
 
 
 @pytest.mark.parametrize(
@@ -120,7 +122,7 @@ def test_costly_reverse_is_within_reach() -> None:
         robot.basis.T @ (robot.axis_scale * answer.multipliers[0]), np.zeros(3)
     )
     assert answer.is_attainable[0]
-    dual_value = robot.core.dual_value(wrench, lambda_reduced)[1]
+    dual_value = dual_function(robot.block, wrench, lambda_reduced)[1]
     np.testing.assert_allclose(dual_value, 3 * 5.0 * 9.0**1.5, rtol=1e-9)
     np.testing.assert_allclose(answer.command[0, :, 0], -9.0, atol=1e-9)
 

@@ -16,14 +16,19 @@ from finlab.arrays import Array
 from finlab.layout import Azimuth, Layout, Thruster, load_layout
 from finlab.layout.save import save_layout
 from finlab.physics.plant import Plant
-from tests.exhaustive import sampled
+from tests.sampled_cases import sampled
 
-HALF = math.radians(45.0)
-LEAST = -100.0
-MOST = 250.0
+ARC_HALF_ANGLE = math.radians(45.0)
+"""Half of the arc that a pod can turn within [rad]."""
+FORCE_MIN = -100.0
+"""Force of a pod in reverse [N]."""
+FORCE_MAX = 250.0
+"""Force of a pod ahead [N]."""
 
 
-def table(forward: float, reverse: float, least: float = LEAST, most: float = MOST) -> PowerTable:
+def table(
+    forward: float, reverse: float, least: float = FORCE_MIN, most: float = FORCE_MAX
+) -> PowerTable:
     """A table of watts over F^1.5, with another factor in reverse."""
     force = np.concatenate(
         [least * np.linspace(1.0, 0.02, 50), [0.0], most * np.linspace(0.02, 1.0, 50)]
@@ -35,8 +40,8 @@ def table(forward: float, reverse: float, least: float = LEAST, most: float = MO
 def pair(model: PowerLaw | PowerTable) -> Layout:
     """Two pods at the stern, within 45 degrees of ahead."""
     sides = (("left", 0.5), ("right", -0.5))
-    ends = (LEAST, MOST)
-    arc = (-HALF, HALF)
+    ends = (FORCE_MIN, FORCE_MAX)
+    arc = (-ARC_HALF_ANGLE, ARC_HALF_ANGLE)
     return Layout(
         "pair",
         tuple(
@@ -49,13 +54,16 @@ def scanned(wrench: Array, factors: tuple[float, float]) -> float:
     """Least power of the pair for surge, sway and yaw, over the sway of the left pod."""
     surge, sway, yaw = wrench[[0, 1, 5]]
     apart = -(sway + yaw) / 0.5  # yaw = -sway - (left's surge - right's surge) / 2
-    left = np.linspace(-MOST, MOST, 400_001)
-    total = np.zeros(len(left))
-    for ahead, aside in ((0.5 * (surge + apart), left), (0.5 * (surge - apart), sway - left)):
+    force_left = np.linspace(-FORCE_MAX, FORCE_MAX, 400_001)
+    total = np.zeros(len(force_left))
+    for ahead, aside in (
+        (0.5 * (surge + apart), force_left),
+        (0.5 * (surge - apart), sway - force_left),
+    ):
         size = np.hypot(ahead, aside)
-        least = np.full(len(left), np.inf)
-        for sign, most, factor in ((1.0, MOST, factors[0]), (-1.0, -LEAST, factors[1])):
-            inside = (np.abs(np.arctan2(sign * aside, sign * ahead)) <= HALF + 1e-9) & (
+        least = np.full(len(force_left), np.inf)
+        for sign, most, factor in ((1.0, FORCE_MAX, factors[0]), (-1.0, -FORCE_MIN, factors[1])):
+            inside = (np.abs(np.arctan2(sign * aside, sign * ahead)) <= ARC_HALF_ANGLE + 1e-9) & (
                 size <= most
             )
             least = np.where(inside, np.minimum(least, factor * size**1.5), least)
@@ -101,13 +109,13 @@ def random_pods(rng: np.random.Generator) -> Layout:
         reverse = rng.uniform(0.6, 2.5)
         law = PowerLaw(forward, forward * reverse, rng.choice([1.5, rng.uniform(1.2, 2.5)]))
         model = law if rng.random() < 0.6 else table(forward, forward * reverse, *ends)
-        place = (rng.uniform(-1, 1), rng.uniform(-1, 1), 0.0)
-        parts.append(Azimuth(f"p{i}", place, (0, 0, 1), (1, 0, 0), ends, model, arc))
+        position = (rng.uniform(-1, 1), rng.uniform(-1, 1), 0.0)
+        parts.append(Azimuth(f"p{i}", position, (0, 0, 1), (1, 0, 0), ends, model, arc))
     for i in range(rng.integers(0, 3)):
         angle = rng.uniform(-3, 3)
-        place = (rng.uniform(-1, 1), rng.uniform(-1, 1), 0.0)
+        position = (rng.uniform(-1, 1), rng.uniform(-1, 1), 0.0)
         axis = (math.cos(angle), math.sin(angle), 0.0)
-        parts.append(Thruster(f"t{i}", place, axis, (-40.0, 50.0), PowerLaw(0.3)))
+        parts.append(Thruster(f"t{i}", position, axis, (-40.0, 50.0), PowerLaw(0.3)))
     return Layout("pods", tuple(parts))
 
 
@@ -120,14 +128,14 @@ def test_random_pods_give_what_they_can_and_nobody_finds_less_power(seed: int) -
     commands = plant.sample(rng, (4,))
     targets = plant.wrench(commands)
     together = allocator.allocate_batch(targets)
-    for row, (target, own) in enumerate(zip(targets, commands, strict=True)):
+    for row, (target, command) in enumerate(zip(targets, commands, strict=True)):
         answer = allocator.allocate(target)
         assert answer.reachable and answer.err_norm <= 1e-6
         assert answer.bound is not None and answer.bound <= answer.power
         assert together.power[row] == pytest.approx(answer.power, rel=1e-6)
 
         others = searched(plant, target, answer.scale, answer.power, rng)
-        assert answer.power <= min(others, float(plant.power(own).sum())) * (1.0 + 1e-4)
+        assert answer.power <= min(others, float(plant.power(command).sum())) * (1.0 + 1e-4)
 
 
 def searched(
@@ -162,7 +170,7 @@ def searched(
 def test_beyond_reach_pods_give_as_much_as_forward_and_reverse_allow(policy: str) -> None:
     allocator = Allocator(pair(PowerLaw(0.05, 0.11)))
     answer = allocator.allocate([-900.0, 0, 0, 0, 0, 0], policy=policy)
-    np.testing.assert_allclose(answer.wrench, [2.0 * LEAST, 0, 0, 0, 0, 0], atol=1e-3)
+    np.testing.assert_allclose(answer.wrench, [2.0 * FORCE_MIN, 0, 0, 0, 0, 0], atol=1e-3)
 
 
 def test_from_tick_to_tick_a_pod_goes_through_rest_to_reverse() -> None:

@@ -13,10 +13,11 @@ from finlab.allocation.dual.robot import POINTS, _usual_price, gauge_numbers
 from finlab.arrays import Array
 from finlab.core.fields import actuators_of
 from finlab.layout import Azimuth, Layout, load_layout
-from tests.any_robot import AnyRobot
-from tests.mixed_robots import T200, T200_FORCE, bluerov2_heavy, layout_of, load
+from tests.allocator_cache import AllocatorCache
+from tests.random_robots import T200, T200_FORCE, bluerov2_heavy, layout_of, load
 
-DENSE = np.linspace(0.0, 2.0 * math.pi, 20_001)
+FINE_ANGLES = np.linspace(0.0, 2.0 * math.pi, 20_001)
+"""Angles of a scan [rad], so fine that its best one is as good as exact."""
 
 
 def uneven(direction: Array) -> Array:
@@ -34,8 +35,8 @@ def test_the_support_function_of_a_gauge_and_its_derivative() -> None:
     for place, angle in enumerate(np.arange(POINTS) * 2.0 * math.pi / POINTS):
         # h(angle) = max over psi of rho(psi) cos(angle - psi); h' = -rho sin(angle - psi) at the
         # best psi.
-        worth = uneven(DENSE) * np.cos(angle - DENSE)
-        first = DENSE[int(worth.argmax())]
+        support_of_angles = uneven(FINE_ANGLES) * np.cos(angle - FINE_ANGLES)
+        first = FINE_ANGLES[int(support_of_angles.argmax())]
         ends = (first - 1e-3, first + 1e-3)
         best = minimize_scalar(
             lambda psi, angle=angle: -float(uneven(psi) * math.cos(angle - psi)),
@@ -51,7 +52,7 @@ def test_the_support_function_of_a_gauge_and_its_derivative() -> None:
 
 
 def test_the_largest_power_is_that_of_all_thrusters_at_their_dearer_end() -> None:
-    robot = AnyRobot().method(load(bluerov2_heavy())).compiled.robot
+    robot = AllocatorCache().method(load(bluerov2_heavy())).compiled.robot
     dearer = max(
         T200["forward"] * T200_FORCE[1] ** 1.5, T200["reverse"] * abs(T200_FORCE[0]) ** 1.5
     )
@@ -60,7 +61,7 @@ def test_the_largest_power_is_that_of_all_thrusters_at_their_dearer_end() -> Non
 
 def test_the_usual_price_of_a_thruster_is_that_of_its_dearer_end() -> None:
     """P = c F^1.5 has the price dP/dF = 1.5 c sqrt(F)."""
-    response = AnyRobot().method(load(bluerov2_heavy())).compiled.robot.responses[0]
+    response = AllocatorCache().method(load(bluerov2_heavy())).compiled.robot.responses[0]
     ahead = 1.5 * T200["forward"] * math.sqrt(T200_FORCE[1])
     astern = 1.5 * T200["reverse"] * math.sqrt(-T200_FORCE[0])
     assert _usual_price(response) == pytest.approx(max(ahead, astern), rel=0.02)
@@ -81,18 +82,18 @@ def test_a_pod_is_searched_in_reverse_only_where_that_brings_anything(
 ) -> None:
     model = PowerLaw(0.3, reverse)
     pod = Azimuth("pod", (0.3, 0, 0), (0, 0, 1), (1, 0, 0), ends, model, (-half, half))
-    own = actuators_of(AnyRobot().method(Layout("one", (pod,))).compiled.robot.block)[0]
-    assert own["force_min"] == pytest.approx(ends[0])
-    assert own["force_min_needed"] == (own["force_min"] if is_needed else 0.0)
+    actuator = actuators_of(AllocatorCache().method(Layout("one", (pod,))).compiled.robot.block)[0]
+    assert actuator["force_min"] == pytest.approx(ends[0])
+    assert actuator["force_min_needed"] == (actuator["force_min"] if is_needed else 0.0)
 
 
 def test_a_method_in_a_flow_is_kept_for_the_next_question() -> None:
-    method = AnyRobot().method(load_layout("torpedo"))
+    method = AllocatorCache().method(load_layout("torpedo"))
     slow = np.array([1.0, 0, 0, 0, 0, 0])
     fast = np.array([2.0, 0, 0, 0, 0, 0])
-    kept = method.at(slow)
-    assert kept is not method and method.at(slow.copy()) is kept
-    assert method.at(fast) is not kept and method.at(None) is method
+    slow_method = method.at(slow)
+    assert slow_method is not method and method.at(slow.copy()) is slow_method
+    assert method.at(fast) is not slow_method and method.at(None) is method
 
 
 def test_axes_that_come_together_only_are_told_where_they_are_asked_for_apart() -> None:

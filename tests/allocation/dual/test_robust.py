@@ -13,9 +13,10 @@ from finlab.arrays import Array
 from finlab.errors import AllocationError
 from finlab.layout import Layout, Uncertainty, load_layout
 from finlab.physics import plant_of
-from tests.mixed_robots import load, random_flow, random_robot
+from tests.random_robots import load, random_flow, random_robot
 
 HEAVY = load_layout("bluerov2_heavy")
+"""Eight thrusters, to whose forces the tests give standard deviations."""
 
 
 def doubtful(layout: Layout, shares: Array) -> Layout:
@@ -68,8 +69,10 @@ def test_thrusters_answer_as_scipy_does(robust: float) -> None:
 
         ends = list(zip(layout.lower[:, 0], layout.upper[:, 0], strict=True))
         start = np.linalg.lstsq(plant.effectiveness[:, 0].T, target)[0]
-        told = {"type": "eq", "fun": missing}
-        best = minimize(value, start, bounds=ends, constraints=told, method="SLSQP", tol=1e-10)
+        constraint = {"type": "eq", "fun": missing}
+        best = minimize(
+            value, start, bounds=ends, constraints=constraint, method="SLSQP", tol=1e-10
+        )
         assert answer <= best.fun * (1.0 + 1e-4)
 
 
@@ -105,8 +108,8 @@ def test_one_doubtful_thruster_costs_few_watts_to_avoid(worst: int) -> None:
     rng = np.random.default_rng(worst)
     least = Allocator(layout)
     trusted = Allocator(layout, robust=5.0)
-    ways = rng.standard_normal((60, 6)) * least.scale
-    rim = least.allocate_batch(100.0 * ways, policy="direction").wrench
+    directions = rng.standard_normal((60, 6)) * least.scale
+    rim = least.allocate_batch(100.0 * directions, policy="direction").wrench
     targets = rng.uniform(0.2, 0.6, (60, 1)) * rim
     cheap = least.allocate_batch(targets)
     sure = trusted.allocate_batch(targets)

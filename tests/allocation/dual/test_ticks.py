@@ -17,7 +17,7 @@ from finlab.layout import Layout, load_layout
 from finlab.layout.load import parse_layout
 from finlab.physics import plant_of
 from tests.hostile_robots import hostile_robot
-from tests.mixed_robots import (
+from tests.random_robots import (
     KINDS,
     bluerov2_heavy,
     layout_of,
@@ -27,7 +27,9 @@ from tests.mixed_robots import (
 )
 
 PERIOD_S = 0.1
+"""Length of a tick [s]."""
 POLICIES = ("closest", "direction", "priority")
+"""The kinds of policy."""
 
 
 def beyond_what_is_allowed(robot: Layout, before: Array, after: Array) -> float:
@@ -42,9 +44,9 @@ def beyond_what_is_allowed(robot: Layout, before: Array, after: Array) -> float:
         rates = np.array(part.rates)
         outside = np.maximum(np.maximum(lower - new, new - upper), 0.0)
         change = np.abs(new - old)
-        around = np.abs((new - old + math.pi) % (2.0 * math.pi) - math.pi)
+        turn = np.abs((new - old + math.pi) % (2.0 * math.pi) - math.pi)
         angle = np.isclose(upper - lower, 2.0 * math.pi)
-        change = np.where(angle, np.minimum(change, around), change)
+        change = np.where(angle, np.minimum(change, turn), change)
         allowed = np.where(np.isfinite(rates), rates * PERIOD_S, np.inf)
         # Where the command before was unknown, any may follow.
         faster = np.where(np.isnan(old), 0.0, np.maximum(change - allowed, 0.0))
@@ -142,6 +144,7 @@ def turned(answers: list[Allocation]) -> float:
 
 
 def pods_in_waves(calm: float) -> list[Allocation]:
+    """Answers of a catamaran to a wrench that swings, 120 ticks one after the other."""
     allocator = Allocator(load_layout("catamaran"), period_s=PERIOD_S, calm=calm)
     scale = allocator.scale
     answers = list[Allocation]()

@@ -17,7 +17,17 @@ from finlab.research.evaluation.experiment import EXPERIMENTS, load_experiment
 from finlab.research.evaluation.experiments import wrench
 from tests.terminal import refused
 
-WRENCH = ["eval", "wrench", "--layouts", "2", "--targets", "3", "--methods", "analytic,qp"]
+WRENCH_EXPERIMENT = [
+    "eval",
+    "wrench",
+    "--layouts",
+    "2",
+    "--targets",
+    "3",
+    "--methods",
+    "analytic,qp",
+]
+"""A small run of the experiment `wrench`."""
 
 
 @pytest.mark.parametrize("name", EXPERIMENTS)
@@ -44,7 +54,9 @@ def test_rows_table_and_json_are_the_same(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = tmp_path / "rows.json"
-    assert main([*WRENCH, "--split", "limits", "--seed", "1000", "--json", str(file)]) == 0
+    assert (
+        main([*WRENCH_EXPERIMENT, "--split", "limits", "--seed", "1000", "--json", str(file)]) == 0
+    )
     text = capsys.readouterr().out
     rows = json.loads(file.read_text())["rows"]
     assert [(row["split"], row["method"], row["n"]) for row in rows] == [
@@ -55,13 +67,15 @@ def test_rows_table_and_json_are_the_same(
     for row in rows:
         low, high = row["err_norm_mean_interval"]
         assert low <= row["err_norm_mean"] <= high
-    assert main([*WRENCH, "--split", "limits", "--seed", "1000", "--json", "-"]) == 0
+    assert main([*WRENCH_EXPERIMENT, "--split", "limits", "--seed", "1000", "--json", "-"]) == 0
     again = json.loads(capsys.readouterr().out)["rows"]
     assert [row["err_norm_mean"] for row in again] == [row["err_norm_mean"] for row in rows]
 
 
 def test_a_terminal_is_told_before_the_work(monkeypatch: pytest.MonkeyPatch) -> None:
     class Terminal(io.StringIO):
+        """A terminal that keeps what is written to it."""
+
         def isatty(self) -> bool:
             return True
 
@@ -127,7 +141,7 @@ def test_an_unknown_option_is_named() -> None:
         load_experiment("nothing")
 
 
-BLOCK = """
+PROGRAM_WITHOUT_TORCH = """
 import sys
 class Blocked:
     def find_spec(self, name, path=None, target=None):
@@ -139,18 +153,23 @@ code = main(sys.argv[1:])
 assert "torch" not in sys.modules
 sys.exit(code)
 """
+"""A program in which torch cannot be imported."""
 
 
 def _run(*arguments: str) -> str:
+    """What this program prints."""
     done = subprocess.run(
-        [sys.executable, "-c", BLOCK, *arguments], capture_output=True, text=True, timeout=300
+        [sys.executable, "-c", PROGRAM_WITHOUT_TORCH, *arguments],
+        capture_output=True,
+        text=True,
+        timeout=300,
     )
     assert done.returncode == 0, done.stderr
     return done.stdout
 
 
 def test_the_block_blocks() -> None:
-    code = BLOCK.replace("code = main(sys.argv[1:])", "import torch")
+    code = PROGRAM_WITHOUT_TORCH.replace("code = main(sys.argv[1:])", "import torch")
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
     assert done.returncode != 0 and "torch is not installed here" in done.stderr
 

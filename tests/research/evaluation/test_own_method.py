@@ -19,7 +19,7 @@ from finlab.research.evaluation.method_specs import (
 )
 from tests.terminal import refused
 
-SOURCE = """
+METHODS_SOURCE = """
 import numpy as np
 def rests(layout, targets):
     print("an answer?")
@@ -38,12 +38,14 @@ def leaves(layout, targets):
 def wants_more(targets, weather):
     return targets
 """
+"""A file of a user, with functions that are methods."""
 
 
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
+    """This file."""
     path = tmp_path / "methods.py"
-    path.write_text(SOURCE)
+    path.write_text(METHODS_SOURCE)
     return path
 
 

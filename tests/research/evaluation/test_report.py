@@ -24,12 +24,13 @@ from finlab.research.evaluation.plots import candidates_picture, fins_picture, t
 from finlab.research.evaluation.report_page import PAGE_FILE, ROWS_FILE, make_report
 from tests.terminal import refused
 
-TINY: dict[str, dict[str, Any]] = {
+TINY_SIZES: dict[str, dict[str, Any]] = {
     "wrench": {"split": ("id", "tables"), "methods": ("dual", "qp"), "layouts": 2, "targets": 2},
     "latency": {"robots": ("fins-2",), "methods": ("dual", "qp"), "calls": 2},
     "ablation": {"variants": ("ours",), "layouts": 2, "targets": 1, "candidates": 4},
     "temperature": {"temperatures": (0.01, 1.0), "layouts": 2, "targets": 1, "candidates": 4},
 }
+"""Experiment -> sizes at which it takes seconds."""
 
 
 @pytest.fixture(scope="module")
@@ -37,8 +38,8 @@ def tiny() -> Iterator[None]:
     """Experiments with quick sizes that take a second."""
     pytest.importorskip("casadi")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(report_page, "EXPERIMENTS", dict.fromkeys(TINY))
-        for name, sizes in TINY.items():
+        patch.setattr(report_page, "EXPERIMENTS", dict.fromkeys(TINY_SIZES))
+        for name, sizes in TINY_SIZES.items():
             module = import_module(f"finlab.research.evaluation.experiments.{name}")
             patch.setattr(module, "experiment", replace(module.experiment, quick=sizes))
         yield
@@ -46,6 +47,7 @@ def tiny() -> Iterator[None]:
 
 @pytest.fixture(scope="module")
 def folder(tiny: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A report at these sizes."""
     out = tmp_path_factory.mktemp("report")
     make_report(out, size="quick", seed=3)
     return out
@@ -62,7 +64,7 @@ def without_times(rows: Any) -> Any:
 def test_page_and_rows_say_the_same(folder: Path) -> None:
     page = (folder / PAGE_FILE).read_text("utf-8")
     tables = json.loads((folder / ROWS_FILE).read_text("utf-8"))
-    assert list(tables) == list(TINY)
+    assert list(tables) == list(TINY_SIZES)
     for words in ("How far off are the wrenches", "0.086", "seed 3"):
         assert words in page
     for name, rows in tables.items():
@@ -76,9 +78,9 @@ def test_each_table_has_the_command_that_makes_it_again(
     commands = re.findall(
         r"^Made by `finlab (.*)` at (?:commit [0-9a-f]{12}|version)", page_of(folder), re.M
     )
-    assert [command.split()[1] for command in commands] == list(TINY)
+    assert [command.split()[1] for command in commands] == list(TINY_SIZES)
     tables = json.loads((folder / ROWS_FILE).read_text("utf-8"))
-    for name, command in zip(TINY, commands, strict=True):
+    for name, command in zip(TINY_SIZES, commands, strict=True):
         assert main([*shlex.split(command), "--json"]) == 0
         rows = json.loads(capsys.readouterr().out)["rows"]
         assert without_times(rows) == without_times(tables[name])
@@ -102,6 +104,7 @@ def test_the_stored_report_knows_all_experiments_and_no_other() -> None:
 
 
 def page_of(folder: Path) -> str:
+    """The page of a report."""
     return (folder / PAGE_FILE).read_text("utf-8")
 
 
@@ -141,10 +144,12 @@ def test_bad_input_is_one_sentence(
 
 
 COLUMNS = (Column("name", "method"), Column("value", "error <", "error", "ends"))
+"""Columns of a table, with a target and an interval."""
 ROWS: list[dict[str, Any]] = [
     {"name": "`ours`", "value": 0.00029, "ends": [0.0002, 0.0004], "_kind": "ours"},
     {"name": "theirs"},
 ]
+"""Rows of this table, one of which has no value."""
 
 
 BLOCKS = (
@@ -154,6 +159,7 @@ BLOCKS = (
     ReportTable(COLUMNS, ROWS),
     "- one\n- two",
 )
+"""A report: lines and tables."""
 
 
 def test_markdown() -> None:
@@ -193,7 +199,7 @@ def test_numbers(name: str, value: float, shown: str) -> None:
     assert FORMATS[name](value) == shown
 
 
-SMALL = {
+SMALL_RUNS = {
     "temperature": [
         "--layouts",
         "2",
@@ -207,13 +213,14 @@ SMALL = {
     "ablation": ["--layouts", "2", "--targets", "1", "--candidates", "8"],
     "wrench": ["--layouts", "3", "--targets", "2", "--methods", "analytic,qp"],
 }
+"""Experiment -> options with which its picture is drawn soon."""
 
 
-@pytest.mark.parametrize("name", SMALL)
+@pytest.mark.parametrize("name", SMALL_RUNS)
 def test_the_verb_draws_its_picture(name: str, tmp_path: Path) -> None:
     image = pytest.importorskip("PIL.Image")
     path = tmp_path / "picture.png"
-    assert main(["eval", name, *SMALL[name], "--plot", str(path)]) == 0
+    assert main(["eval", name, *SMALL_RUNS[name], "--plot", str(path)]) == 0
     with image.open(path) as picture:
         assert (
             min(picture.size) > 500
@@ -239,7 +246,7 @@ def test_a_picture_shows_the_rows() -> None:
     )
     raw, refined = (each.get_offsets() for each in candidates_picture(rows).axes[0].collections)
     points = rows[0]["points"]
-    np.testing.assert_allclose(raw, [each for point in points for each in point["raw"]])
+    np.testing.assert_allclose(raw, np.concatenate([point["raw"] for point in points]))
     assert len(raw) == 16 and len(refined) == 8
     assert refined[:, 0].mean() < raw[:, 0].mean()
 

@@ -1,7 +1,9 @@
 """Splits hold what they promise, and the same numbers give the same cases."""
 
 import math
+from collections.abc import Iterable
 from functools import cache
+from itertools import chain, product
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +11,7 @@ import pytest
 
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.errors import DataError
-from finlab.layout import Limits
+from finlab.layout import Fin, Limits
 from finlab.physics import plant_of
 from finlab.research.evaluation.splits import (
     NEAR_ANGLE,
@@ -19,7 +21,8 @@ from finlab.research.evaluation.splits import (
     make_split,
 )
 
-N = 60
+N_CASES = 60
+"""How many cases of a split are made."""
 FINS = {"ood-fins": (6, 8), "many-fins": (9, 12)}
 """Least and most fins where they are not two and five."""
 ROBOTS = {
@@ -36,10 +39,17 @@ QUICK = [split for split in SPLITS if split != "tables" and split not in ROBOTS]
 
 @cache
 def _cases(split: str) -> list[SplitCase]:
-    return make_split(split, N, 2, 1234)
+    """Cases of a split."""
+    return make_split(split, N_CASES, 2, 1234)
+
+
+def _fins(cases: Iterable[SplitCase]) -> list[Fin]:
+    """The fins of all robots of some cases."""
+    return list(chain.from_iterable(case.layout.fins for case in cases))
 
 
 def _outside(case: SplitCase) -> bool:
+    """Whether a fin of a case is outside of the box of the other splits."""
     return any((np.abs(fin.position) > (0.3, 0.3, 0.1)).any() for fin in case.layout.fins)
 
 
@@ -59,7 +69,7 @@ def test_a_small_run_is_the_beginning_of_a_large_one(split: str) -> None:
 
 
 def test_seeds_and_splits_differ() -> None:
-    layouts = [make_split(split, 1, 1, seed)[0].layout for split in SPLITS for seed in (0, 1)]
+    layouts = [make_split(split, 1, 1, seed)[0].layout for split, seed in product(SPLITS, (0, 1))]
     assert len({layout.actuators for layout in layouts}) == len(layouts)
 
 
@@ -91,9 +101,10 @@ def test_boxes() -> None:
 
 
 def test_limits() -> None:
-    for split in (name for name in QUICK if name != "limits"):
-        assert all(fin.limits == Limits() for case in _cases(split) for fin in case.layout.fins)
-    limits = [fin.limits for case in _cases("limits") for fin in case.layout.fins]
+    for split in QUICK:
+        if split != "limits":
+            assert all(fin.limits == Limits() for fin in _fins(_cases(split))), split
+    limits = [fin.limits for fin in _fins(_cases("limits"))]
     assert all(
         0.3 <= each.amplitude[1] <= 0.8 and 1.0 <= each.frequency[1] <= 3.0 for each in limits
     )
@@ -110,7 +121,9 @@ def test_failures() -> None:
     cases = _cases("failure")
     assert {len(case.lost) for case in cases} == {1, 2}
     assert all(set(case.lost) < set(case.layout.names) for case in cases)
-    assert not any(case.lost for split in QUICK if split != "failure" for case in _cases(split))
+    for split in QUICK:
+        if split != "failure":
+            assert not any(case.lost for case in _cases(split)), split
 
 
 def test_near_singular_layouts_are() -> None:
@@ -142,7 +155,7 @@ FIN_RANGES = {
 @pytest.mark.parametrize("split", ["fins", "fins-mixed"])
 def test_random_fins_keep_to_the_contract(split: str) -> None:
     cases = _cases(split)
-    models = [fin.model for case in cases for fin in case.layout.fins]
+    models = [fin.model for fin in _fins(cases)]
     of_kind = {kind: [model for model in models if model.type == kind] for kind in FIN_RANGES}
     assert sum(map(len, of_kind.values())) == len(models)
     for kind, ranges in FIN_RANGES.items():
@@ -178,9 +191,8 @@ def test_tables_are_noisy_grids_of_random_fins() -> None:
 
 
 def test_robots_of_other_fins_are_measured_by_their_own_wrenches() -> None:
-    assert all(
-        case.sigma is None for split in ("id", "limits", "many-fins") for case in _cases(split)
-    )
+    for split in ("id", "limits", "many-fins"):
+        assert all(case.sigma is None for case in _cases(split)), split
     for case in _cases("fins"):
         plant = plant_of(case.layout)
         wrench = plant.wrench(plant.sample(np.random.default_rng(1), (20_000,)))

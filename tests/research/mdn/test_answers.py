@@ -19,13 +19,15 @@ from finlab.research.mdn.answers import (
 from finlab.research.mdn.descent import descend, wrench
 from finlab.research.random_layouts import random_layout
 
-SCALE = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
+WRENCH_SCALE = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
+"""Scale of errors in the six axes [N, N m]."""
 
 
 def robot_of(n: int, limits: str = "nominal") -> EffortRobot:
+    """A random robot of n fins, one of which is uneven."""
     layout = random_layout(np.random.default_rng(n), n_fins=n, limits=limits)  # type: ignore[arg-type]
     uneven = FinModelSpec("soft", (("e", 0.2), ("d", 0.1)))
-    return effort_robot(plant_of(layout.replace_actuator("fin_1", model=uneven)), SCALE)
+    return effort_robot(plant_of(layout.replace_actuator("fin_1", model=uneven)), WRENCH_SCALE)
 
 
 def targets_of(robot: EffortRobot, count: int) -> tuple[Array, Array]:
@@ -35,6 +37,7 @@ def targets_of(robot: EffortRobot, count: int) -> tuple[Array, Array]:
 
 
 def random_forces(robot: EffortRobot, rows: int) -> Array:
+    """Forces (rows, ...) of a robot within its limits, as complex numbers."""
     rng = np.random.default_rng(2)
     largest = robot.forces.fins.maximum
     shape = rows, len(largest)
@@ -87,7 +90,7 @@ def test_hopeless_targets_are_left_where_they_are_nearest() -> None:
 
 
 def test_robots_of_one_layout_see_the_same(layout_a: Layout) -> None:
-    one, other = (effort_robot(plant_of(layout_a), s) for s in (SCALE, 3.0 * SCALE))
+    one, other = (effort_robot(plant_of(layout_a), s) for s in (WRENCH_SCALE, 3.0 * WRENCH_SCALE))
     np.testing.assert_allclose(one.view.static, other.view.static)
     np.testing.assert_allclose(one.view.solver, other.view.solver / 3.0, rtol=1e-9)
 

@@ -26,10 +26,12 @@ from finlab.research.mdn.network import NODE_SIZE, PAIR_SIZE, ForceMixture, Forc
 from finlab.research.networks.checkpoint import read_checkpoint
 from finlab.research.random_layouts import random_layout
 
-STD = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
+WRENCH_SCALE = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
+"""Scale of errors in the six axes [N, N m]."""
 
 
-def problem_of(layout: Layout, std: np.ndarray = STD) -> EffortProblem:
+def problem_of(layout: Layout, std: np.ndarray = WRENCH_SCALE) -> EffortProblem:
+    """The problem of least effort of a robot."""
     return effort_robot(plant_of(layout), std).forces
 
 
@@ -63,7 +65,7 @@ def test_forces_that_give_the_wrench_are_those_that_give_the_least_shares(layout
         np.testing.assert_allclose(twice, acted(view, share[row]), atol=1e-3)
 
 
-def seen(layout: Layout, target: np.ndarray, std: np.ndarray = STD) -> list[np.ndarray]:
+def seen(layout: Layout, target: np.ndarray, std: np.ndarray = WRENCH_SCALE) -> list[np.ndarray]:
     """What is seen of a target (6,) [N, N m]."""
     found = features_of(robot_view(problem_of(layout, std)), target[None] / std)
     return [found.nodes[0], found.pairs[0]]
@@ -172,10 +174,13 @@ def test_no_target_is_no_trouble(layout: Layout) -> None:
 
 
 WEIGHTS = read_checkpoint(checkpoint_path())
+"""The checkpoint in the tree."""
 CONFIG = WEIGHTS.network_of(ForceNetworkConfig)
+"""Sizes of its network."""
 
 
-def inputs(n: int) -> tuple[np.ndarray, np.ndarray]:
+def random_inputs(n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Features of nodes and of pairs, for six robots of n fins."""
     rng = np.random.default_rng(n)
     sizes = (6, n, NODE_SIZE), (6, n, n, PAIR_SIZE)
     nodes, pairs = (rng.normal(size=size).astype(np.float32) for size in sizes)
@@ -184,7 +189,7 @@ def inputs(n: int) -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.mark.parametrize("n", [1, 5, 12])
 def test_numpy_and_torch_agree(n: int) -> None:
-    nodes, pairs = inputs(n)
+    nodes, pairs = random_inputs(n)
     tensors = {name: torch.tensor(value) for name, value in WEIGHTS.network.items()}
     expected = CONFIG(tensors, torch.tensor(nodes), torch.tensor(pairs))
     for got, other in zip(CONFIG(WEIGHTS.network, nodes, pairs), expected, strict=True):
@@ -193,7 +198,7 @@ def test_numpy_and_torch_agree(n: int) -> None:
 
 
 def test_fins_may_come_in_any_order() -> None:
-    nodes, pairs = inputs(5)
+    nodes, pairs = random_inputs(5)
     order = np.array([3, 0, 4, 1, 2])
     straight = CONFIG(WEIGHTS.network, nodes, pairs)
     turned = CONFIG(WEIGHTS.network, nodes[:, order], pairs[:, order][:, :, order])
@@ -227,26 +232,30 @@ def test_likelihood_is_that_of_one_mixture_over_all_fins() -> None:
     assert (given.log_prob(way, 50.0) > given.log_prob(way)).all()
 
 
-ARC = Limits(zero_direction=(-0.6, 1.4))
+ARC_LIMITS = Limits(zero_direction=(-0.6, 1.4))
+"""Limits of a fin with an arc."""
 UNEVEN = FinModelSpec("soft", (("e", 0.2), ("d", 0.15), ("phi_e", 1.0)))
-KINDS = [
+"""A soft fin whose force is not the same in all directions."""
+FINS = [
     (FinModelSpec("drag", ()), Limits()),
-    (FinModelSpec("lighthill", ()), ARC),
+    (FinModelSpec("lighthill", ()), ARC_LIMITS),
     (UNEVEN, Limits()),
-    (UNEVEN, ARC),
+    (UNEVEN, ARC_LIMITS),
 ]
+"""Models and limits of fins."""
 
 
-def compiled(model: FinModelSpec, limits: Limits) -> tuple[Layout, EffortProblem]:
+def problem_of_one_fin(model: FinModelSpec, limits: Limits) -> tuple[Layout, EffortProblem]:
+    """A robot of one fin, and its problem of least effort."""
     layout = Layout("one", (Fin("a", (0.2, 0.1, 0.0), 0.3, limits, model=model),))
     return layout, effort_robot(plant_of(layout), np.ones(6)).forces
 
 
-@pytest.mark.parametrize(("model", "limits"), KINDS)
+@pytest.mark.parametrize(("model", "limits"), FINS)
 def test_commands_give_the_forces_with_the_least_effort(
     model: FinModelSpec, limits: Limits
 ) -> None:
-    layout, problem = compiled(model, limits)
+    layout, problem = problem_of_one_fin(model, limits)
     fins = problem.fins
     plant = plant_of(layout)
     rng = np.random.default_rng(0)
@@ -273,7 +282,7 @@ def test_commands_give_the_forces_with_the_least_effort(
 
 
 def test_what_a_fin_cannot_give_becomes_the_nearest_that_it_can() -> None:
-    fins = compiled(FinModelSpec("drag", ()), ARC)[1].fins
+    fins = problem_of_one_fin(FinModelSpec("drag", ()), ARC_LIMITS)[1].fins
     asked = np.array(
         [2.0 * fins.maximum * np.exp(0.4j), [1.0 * np.exp(2.0j)], [0.0j], [np.exp(-2.9j)]]
     )

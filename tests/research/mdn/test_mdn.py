@@ -18,19 +18,22 @@ from finlab.research.mdn.features import features_of, shares
 from finlab.research.mdn.method import STEPS, Mdn, MdnSettings
 from finlab.research.networks.checkpoint import read_checkpoint
 from finlab.research.random_layouts import random_layout
-from tests.any_robot import AnyRobot
+from tests.allocator_cache import AllocatorCache
 
 TARGET = [0.5, -0.3, 1.0, 0.05, -0.02, 0.1]
+"""A wrench within reach of the robots here [N, N m]."""
 
 
 @pytest.fixture(scope="module")
-def untrained(untrained_mdn: Path) -> AnyRobot:
-    return AnyRobot("mdn", checkpoint=untrained_mdn)
+def untrained(untrained_mdn: Path) -> AllocatorCache:
+    """The method with weights that nobody trained."""
+    return AllocatorCache("mdn", checkpoint=untrained_mdn)
 
 
 @pytest.fixture(scope="module")
-def shipped() -> AnyRobot:
-    return AnyRobot("mdn")
+def shipped() -> AllocatorCache:
+    """The method with the checkpoint in the tree."""
+    return AllocatorCache("mdn")
 
 
 def plant_force(layout: Layout, command: np.ndarray) -> np.ndarray:
@@ -38,43 +41,48 @@ def plant_force(layout: Layout, command: np.ndarray) -> np.ndarray:
     return np.asarray(Plant(layout).force(command))
 
 
-def reachable(layout: Layout, count: int, seed: int = 0) -> np.ndarray:
+def reachable_wrenches(layout: Layout, count: int, seed: int = 0) -> np.ndarray:
+    """Wrenches (count, 6) of random commands."""
     plant = Plant(layout)
     return plant.wrench(plant.sample(np.random.default_rng(seed), (count,)))
 
 
 @pytest.mark.parametrize("n", [2, 4, 8, 12])
-def test_answers_are_exact_even_where_nothing_was_learned(n: int, untrained: AnyRobot) -> None:
+def test_answers_are_exact_even_where_nothing_was_learned(
+    n: int, untrained: AllocatorCache
+) -> None:
     layout = random_layout(np.random.default_rng(n), n_fins=n, limits="varied")
     layout = layout.replace_actuator("fin_1", model=FinModelSpec("soft", (("e", 0.2), ("d", 0.1))))
-    targets = reachable(layout, 20)
+    targets = reachable_wrenches(layout, 20)
     answer = untrained.allocate_batch(layout, targets)
     error = answer.err_norm
     assert np.mean(error < 1e-4) >= 0.95 and error.max() < 0.05
 
 
-def test_a_batch_costs_what_single_calls_do(shipped: AnyRobot, layout_a: Layout) -> None:
-    targets = reachable(layout_a, 6)
+def test_a_batch_costs_what_single_calls_do(shipped: AllocatorCache, layout_a: Layout) -> None:
+    targets = reachable_wrenches(layout_a, 6)
     together = shipped.allocate_batch(layout_a, targets)
     np.testing.assert_allclose(Plant(layout_a).wrench(together.command), targets, atol=1e-4)
     alone = [shipped.allocate(layout_a, target).effort for target in targets]
     np.testing.assert_allclose(np.array(together.effort), np.array(alone), rtol=0.01)
 
 
-def method_of(robot: AnyRobot, layout: Layout) -> tuple[Mdn, np.ndarray]:
+def method_of(robot: AllocatorCache, layout: Layout) -> tuple[Mdn, np.ndarray]:
     """The method of a robot, and `TARGET` (1, 6) as it is normalized there."""
     method = robot.on(layout)._whole.method
     assert isinstance(method, Mdn)
     return method, np.array([TARGET]) / method.asked_scale
 
 
-def weights(robot: AnyRobot, layout: Layout) -> np.ndarray:
+def weights(robot: AllocatorCache, layout: Layout) -> np.ndarray:
     """Of the mixture's components, for `TARGET`."""
     method, target = method_of(robot, layout)
     return np.asarray(method.mixture(features_of(method.robot.view, target)).complex_parts()[0][0])
 
 
-def test_candidates_keep_the_name_of_their_component(shipped: AnyRobot, layout_a: Layout) -> None:
+def test_candidates_keep_the_name_of_their_component(
+    shipped: AllocatorCache, layout_a: Layout
+) -> None:
     answer = shipped.allocate(layout_a, TARGET)
     count = MdnSettings().n_candidates
     expected = [f"component {k + 1}" for k in np.argsort(-weights(shipped, layout_a))[:count]]
@@ -96,7 +104,7 @@ def test_candidates_keep_the_name_of_their_component(shipped: AnyRobot, layout_a
         )
 
 
-def test_from_tick_to_tick_candidates_keep_it_too(shipped: AnyRobot) -> None:
+def test_from_tick_to_tick_candidates_keep_it_too(shipped: AllocatorCache) -> None:
     layout = load_layout("octo")
     alone = shipped.allocate(layout, TARGET)
     again = shipped.allocate(layout, TARGET, previous=alone.command)
@@ -108,20 +116,22 @@ def test_from_tick_to_tick_candidates_keep_it_too(shipped: AnyRobot) -> None:
 
 
 def test_more_candidates_than_components_are_drawn_by_a_seed(
-    shipped: AnyRobot, layout_a: Layout
+    shipped: AllocatorCache, layout_a: Layout
 ) -> None:
-    many = AnyRobot("mdn", n_candidates=40)
+    many = AllocatorCache("mdn", n_candidates=40)
     first, again, other = (many.allocate(layout_a, TARGET, seed=seed).samples for seed in (0, 0, 1))
     assert first is not None and other is not None
     assert len(first) == 40 and first == again and first != other
-    still = AnyRobot("mdn", n_candidates=40, temperature=0.0)
+    still = AllocatorCache("mdn", n_candidates=40, temperature=0.0)
     means = still.allocate(layout_a, TARGET).samples
     assert (
         means is not None and len({command.tobytes() for command in means.command.round(9)}) <= 16
     )
 
 
-def test_components_are_drawn_as_often_as_they_weigh(shipped: AnyRobot, layout_a: Layout) -> None:
+def test_components_are_drawn_as_often_as_they_weigh(
+    shipped: AllocatorCache, layout_a: Layout
+) -> None:
     """Behind the means, 8,000 draws; and their spread is the component's own, by the
     temperature."""
     weight = weights(shipped, layout_a)
@@ -135,7 +145,7 @@ def test_components_are_drawn_as_often_as_they_weigh(shipped: AnyRobot, layout_a
     assert (np.diff(weight[proposal.component[0, :m]]) <= 0.0).all()
 
 
-def test_it_goes_on_from_the_previous_command(shipped: AnyRobot, layout_a: Layout) -> None:
+def test_it_goes_on_from_the_previous_command(shipped: AllocatorCache, layout_a: Layout) -> None:
     before = shipped.allocate(layout_a, TARGET)
     near = np.array(TARGET) + [0.02, 0.0, 0.01, 0.0, 0.0, 0.0]
     answer = shipped.allocate(layout_a, near, previous=before.command)
@@ -151,11 +161,11 @@ def test_shares_are_squares_of_roots_and_at_most_one() -> None:
 
 def test_refuses_other_networks_and_settings() -> None:
     with pytest.raises(CheckpointError, match="fed 'raw', expected one that is fed 'forces'"):
-        AnyRobot("mdn", read_checkpoint(checkpoint_path("paper"))).on(load_layout("A"))
+        AllocatorCache("mdn", read_checkpoint(checkpoint_path("paper"))).on(load_layout("A"))
     with pytest.raises(AllocationError, match="n_candidates: expected"):
-        AnyRobot("mdn", n_candidates=0)
+        AllocatorCache("mdn", n_candidates=0)
     with pytest.raises(AllocationError, match="temperature: expected"):
-        AnyRobot("mdn", temperature=-1.0)
+        AllocatorCache("mdn", temperature=-1.0)
 
 
 def test_it_needs_no_torch() -> None:
@@ -168,7 +178,9 @@ def test_it_needs_no_torch() -> None:
     subprocess.run([sys.executable, "-c", code], timeout=60, check=True)
 
 
-def test_samples_tell_what_the_plant_says_of_them(shipped: AnyRobot, layout_a: Layout) -> None:
+def test_samples_tell_what_the_plant_says_of_them(
+    shipped: AllocatorCache, layout_a: Layout
+) -> None:
     plant = Plant(layout_a)
     told = shipped.allocate(layout_a, TARGET).samples
     assert told is not None and len(told) == 48
@@ -180,7 +192,7 @@ def test_samples_tell_what_the_plant_says_of_them(shipped: AnyRobot, layout_a: L
     np.testing.assert_allclose(told.power, plant.power(told.command).sum(-1), rtol=1e-9)
 
 
-def test_samples_are_the_proposed_forces(shipped: AnyRobot, layout_a: Layout) -> None:
+def test_samples_are_the_proposed_forces(shipped: AllocatorCache, layout_a: Layout) -> None:
     """As near as the compiled fins come, where a fin can give what is proposed."""
     method, target = method_of(shipped, layout_a)
     told = shipped.allocate(layout_a, TARGET).samples
@@ -197,11 +209,11 @@ def test_samples_are_the_proposed_forces(shipped: AnyRobot, layout_a: Layout) ->
 
 @pytest.mark.parametrize("policy", ["closest", "direction", "priority"])
 def test_out_of_reach_it_delivers_what_the_default_method_does(
-    policy: str, shipped: AnyRobot, layout_a: Layout
+    policy: str, shipped: AllocatorCache, layout_a: Layout
 ) -> None:
     far = 20.0 * np.array(TARGET)
     answer, other = (
-        method.allocate(layout_a, far, policy=policy) for method in (shipped, AnyRobot())
+        method.allocate(layout_a, far, policy=policy) for method in (shipped, AllocatorCache())
     )
     np.testing.assert_allclose(answer.wrench, other.wrench, atol=1e-3 * answer.scale[0])
     assert answer.effort is not None and other.effort is not None
@@ -211,7 +223,7 @@ def test_out_of_reach_it_delivers_what_the_default_method_does(
     assert batch.err_norm[1] < 1e-6
 
 
-def test_from_tick_to_tick_no_fin_turns_faster_than_its_servo(shipped: AnyRobot) -> None:
+def test_from_tick_to_tick_no_fin_turns_faster_than_its_servo(shipped: AllocatorCache) -> None:
     layout = load_layout("hexa")
     before = None
     plant = Plant(layout)

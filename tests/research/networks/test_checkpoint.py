@@ -23,14 +23,16 @@ from finlab.errors import CheckpointError
 from finlab.layout import load_layout
 from finlab.research.networks import checkpoint
 from finlab.research.networks.trained import to_command, to_normalized
-from tests.any_robot import AnyRobot
+from tests.allocator_cache import AllocatorCache
 
 
 def file_sha256(path: Path) -> str:
+    """Hash of a file's content."""
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 Config = dict[str, Any]
+"""The configuration of a checkpoint as JSON."""
 
 
 @pytest.fixture
@@ -40,6 +42,7 @@ def folder(untrained_checkpoint: Path, tmp_path: Path) -> Path:
 
 
 def change_config(folder: Path, change: Callable[[Config], object]) -> None:
+    """Change the configuration of a checkpoint, and leave its hash as it was."""
     path = folder / "config.json"
     config = json.loads(path.read_text())
     change(config)
@@ -55,6 +58,7 @@ def sign(folder: Path) -> None:
 
 
 def change_weights(folder: Path, change: Callable[[dict[str, torch.Tensor]], object]) -> None:
+    """Change the weights of a checkpoint, and sign it anew."""
     path = folder / "model.safetensors"
     tensors = load_file(path)
     change(tensors)
@@ -67,7 +71,7 @@ def refusal(folder: Path) -> str:
     with it."""
     with pytest.raises(CheckpointError) as caught:
         checkpoint.read_checkpoint(folder)
-        AnyRobot("paper", checkpoint=folder).on(load_layout("A"))
+        AllocatorCache("paper", checkpoint=folder).on(load_layout("A"))
     message = str(caught.value)
     assert "\n" not in message and folder.name in message
     return message
@@ -260,7 +264,7 @@ def test_a_surrogate_alone_loads_but_cannot_allocate(folder: Path) -> None:
     )
     assert checkpoint.read_checkpoint(folder).network_sizes is None
     with pytest.raises(CheckpointError, match="holds no network, .* of the shipped `paper`"):
-        AnyRobot("paper", checkpoint=folder).on(load_layout("A"))
+        AllocatorCache("paper", checkpoint=folder).on(load_layout("A"))
 
 
 def test_a_network_over_forces_comes_back_without_a_surrogate(
@@ -270,7 +274,7 @@ def test_a_network_over_forces_comes_back_without_a_surrogate(
     assert first.surrogate_sizes is None and first.network_sizes is not None
     assert checkpoint.write_checkpoint(tmp_path / "again", first).sha256 == first.sha256
     with pytest.raises(CheckpointError, match="fed 'forces', expected one that is fed 'raw'"):
-        AnyRobot("paper", checkpoint=untrained_mdn).on(load_layout("A"))
+        AllocatorCache("paper", checkpoint=untrained_mdn).on(load_layout("A"))
 
 
 def test_a_checkpoint_of_an_earlier_finlab_is_refused(folder: Path) -> None:
@@ -296,31 +300,40 @@ def test_names_and_folders_are_told_apart(folder: Path) -> None:
         checkpoint.resolve_checkpoint("away/from/home")
 
 
-LOWER = torch.tensor(
+COMMAND_MIN = torch.tensor(
     [[0.05, 0.1, -math.pi], [0.1, 0.2, 0.5], [0.3, 0.7, -2.5]], dtype=torch.float64
 )
-UPPER = torch.tensor([[0.6, 2.1, math.pi], [0.5, 1.0, 2.0], [0.3, 0.7, -2.0]], dtype=torch.float64)
+"""Lower limits (3, 3) of three fins, the last of which hardly moves."""
+COMMAND_MAX = torch.tensor(
+    [[0.6, 2.1, math.pi], [0.5, 1.0, 2.0], [0.3, 0.7, -2.0]], dtype=torch.float64
+)
+"""Their upper limits."""
 
 
 def test_normalized_coordinates_go_from_minus_one_to_one_and_back() -> None:
-    torch.testing.assert_close(to_normalized(LOWER, LOWER, UPPER)[:2], -torch.ones(2, 3).double())
-    torch.testing.assert_close(to_normalized(UPPER, LOWER, UPPER)[:2], torch.ones(2, 3).double())
-    command = LOWER + 0.3 * (UPPER - LOWER)
     torch.testing.assert_close(
-        to_command(to_normalized(command, LOWER, UPPER), LOWER, UPPER), command
+        to_normalized(COMMAND_MIN, COMMAND_MIN, COMMAND_MAX)[:2], -torch.ones(2, 3).double()
+    )
+    torch.testing.assert_close(
+        to_normalized(COMMAND_MAX, COMMAND_MIN, COMMAND_MAX)[:2], torch.ones(2, 3).double()
+    )
+    command = COMMAND_MIN + 0.3 * (COMMAND_MAX - COMMAND_MIN)
+    torch.testing.assert_close(
+        to_command(to_normalized(command, COMMAND_MIN, COMMAND_MAX), COMMAND_MIN, COMMAND_MAX),
+        command,
     )
 
 
 def test_a_range_of_no_width_normalizes_to_zero() -> None:
-    assert to_normalized(LOWER, LOWER, UPPER)[2, :2].tolist() == [0.0, 0.0]
+    assert to_normalized(COMMAND_MIN, COMMAND_MIN, COMMAND_MAX)[2, :2].tolist() == [0.0, 0.0]
 
 
 def test_arrays_are_answered_as_tensors() -> None:
     command = np.random.default_rng(0).normal(size=(50, 3, 3)) * 5
-    lower = LOWER.numpy()
-    upper = UPPER.numpy()
+    lower = COMMAND_MIN.numpy()
+    upper = COMMAND_MAX.numpy()
     for function in (to_normalized, to_command):
-        expected = function(torch.from_numpy(command), LOWER, UPPER).numpy()
+        expected = function(torch.from_numpy(command), COMMAND_MIN, COMMAND_MAX).numpy()
         np.testing.assert_allclose(function(command, lower, upper), expected, rtol=1e-12)
         single = function(*(part.astype(np.float32) for part in (command, lower, upper)))
         assert single.dtype == np.float32

@@ -3,6 +3,7 @@ itself."""
 
 import math
 from dataclasses import replace
+from itertools import permutations
 
 import numpy as np
 import pytest
@@ -18,9 +19,13 @@ from finlab.research.paper.network import RAW_SIZE, Mixture, NetworkConfig, raw_
 from finlab.research.random_layouts import random_layout
 
 CONFIG = NetworkConfig(width=32, heads=4, transformer_layers=2, feedforward=40, n_components=6)
-B = 4
-N = 3
-M = 5
+"""A network that is small enough to be compared quickly."""
+N_ROBOTS = 4
+"""Robots of a batch."""
+N_FINS = 3
+"""Fins of a robot."""
+N_COMPONENTS = 5
+"""Components of a mixture."""
 
 
 def random_weights(config: NetworkConfig = CONFIG) -> dict[str, torch.Tensor]:
@@ -31,11 +36,13 @@ def random_weights(config: NetworkConfig = CONFIG) -> dict[str, torch.Tensor]:
     }
 
 
-def arrays(weights: dict[str, torch.Tensor]) -> dict[str, np.ndarray]:
+def arrays_of(weights: dict[str, torch.Tensor]) -> dict[str, np.ndarray]:
+    """Weights as arrays."""
     return {name: value.numpy() for name, value in weights.items()}
 
 
 def tensors(weights: ArraysByName) -> dict[str, torch.Tensor]:
+    """Weights as tensors."""
     return {name: torch.tensor(value) for name, value in weights.items()}
 
 
@@ -61,7 +68,7 @@ def test_graph_attention_is_that_of_pytorch_geometric(n: int) -> None:
             theirs.bias.copy_(weights[f"graph.0.{ours}.bias"])
         reference.att.copy_(weights["graph.0.attention"][None])
         reference.bias.copy_(weights["graph.0.bias"])
-    edges = torch.tensor([(i, j) for i in range(n) for j in range(n) if i != j]).T
+    edges = torch.tensor(list(permutations(range(n), 2))).T
     x = torch.randn(3, n, CONFIG.width)
     found = graph_attention(weights, "graph.0", x)
     for row in range(3):
@@ -125,7 +132,7 @@ def test_fins_may_come_in_any_order() -> None:
 def test_huge_inputs_are_no_warning(recwarn: pytest.WarningsRecorder) -> None:
     x = np.full((2, 3, RAW_SIZE), 1e4, dtype=np.float32)
     target = np.array([[1e6] * 6, [-1e6] * 6], dtype=np.float32)
-    assert all(np.isfinite(part).all() for part in CONFIG(arrays(random_weights()), x, target))
+    assert all(np.isfinite(part).all() for part in CONFIG(arrays_of(random_weights()), x, target))
     assert not recwarn.list
 
 
@@ -140,21 +147,26 @@ def test_documented_meaning_of_the_features() -> None:
 
 
 def random_mixture() -> Mixture:
+    """A mixture of each fin of each robot."""
     draw = np.random.default_rng(11)
-    mean = 1.8 * draw.random((B, N, M, 3)) - 0.9
+    mean = 1.8 * draw.random((N_ROBOTS, N_FINS, N_COMPONENTS, 3)) - 0.9
     return Mixture(
-        2.0 * draw.normal(size=(B, N, M)), mean, 0.3 * draw.normal(size=(B, N, M, 3)) - 1.0
+        2.0 * draw.normal(size=(N_ROBOTS, N_FINS, N_COMPONENTS)),
+        mean,
+        0.3 * draw.normal(size=(N_ROBOTS, N_FINS, N_COMPONENTS, 3)) - 1.0,
     )
 
 
 def drawn(mixture: Mixture, count: int, temperature: float = 1.0) -> np.ndarray:
+    """Samples (robots, fins, count, 3) of a mixture."""
     rng = np.random.default_rng(0)
-    uniform = rng.random((B, N, count))
-    normal = rng.standard_normal((B, N, count, 3))
+    uniform = rng.random((N_ROBOTS, N_FINS, count))
+    normal = rng.standard_normal((N_ROBOTS, N_FINS, count, 3))
     return np.asarray(mixture.sample(uniform, normal, temperature))
 
 
-def distribution(mixture: Mixture, temperature: float = 1.0) -> MixtureSameFamily:
+def torch_distribution(mixture: Mixture, temperature: float = 1.0) -> MixtureSameFamily:
+    """The same mixture by torch's own classes."""
     logits, mean, log_std = map(torch.from_numpy, mixture)
     return MixtureSameFamily(
         Categorical(logits=logits / temperature), Independent(Normal(mean, log_std.exp()), 1)
@@ -163,8 +175,10 @@ def distribution(mixture: Mixture, temperature: float = 1.0) -> MixtureSameFamil
 
 def test_likelihoods_are_those_of_torchs_distributions() -> None:
     mixture = random_mixture()
-    x = np.random.default_rng(2).uniform(-1.2, 1.2, (B, 7, N, 3))
-    expected = distribution(mixture).log_prob(torch.from_numpy(x).transpose(0, 1)).transpose(0, 1)
+    x = np.random.default_rng(2).uniform(-1.2, 1.2, (N_ROBOTS, 7, N_FINS, 3))
+    expected = (
+        torch_distribution(mixture).log_prob(torch.from_numpy(x).transpose(0, 1)).transpose(0, 1)
+    )
     np.testing.assert_allclose(mixture.log_prob(x), expected.numpy(), rtol=1e-9)
     tensors = Mixture(*map(torch.from_numpy, mixture))
     np.testing.assert_allclose(
@@ -178,7 +192,7 @@ def test_samples_have_the_moments_of_the_mixture_and_a_temperature_sharpens_weig
 ) -> None:
     mixture = random_mixture()
     x = drawn(mixture, 40_000, temperature)
-    expected = distribution(mixture, temperature)
+    expected = torch_distribution(mixture, temperature)
     np.testing.assert_allclose(x.mean(1), expected.mean.numpy(), atol=0.03)
     np.testing.assert_allclose(x.std(1), expected.stddev.numpy(), atol=0.03)
     if temperature == 1.0:

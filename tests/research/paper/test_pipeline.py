@@ -26,11 +26,12 @@ from finlab.research.paper.network import NetworkConfig
 from finlab.research.paper.pipeline import ADAM_RATE, CHUNK
 from finlab.research.paper.surrogate import SurrogateConfig
 from finlab.research.training.loop import first_weights
-from tests.any_robot import AnyRobot, normalized_error
-from tests.research.paper.asked_in_torch import wrench_in_torch
+from tests.allocator_cache import AllocatorCache, normalized_error
+from tests.research.paper.surrogate_in_torch import wrench_in_torch
 from tests.torch_weights import arrays_of
 
 TARGET = [0.5, -0.3, 1.0, 0.05, -0.02, 0.1]
+"""A wrench within reach of the robots here [N, N m]."""
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +62,8 @@ def robot() -> Layout:
     return layout.replace_actuator(first, limits=arc).replace_actuator(second, limits=stiff)
 
 
-def keeps_limits(layout: Layout, command: np.ndarray) -> bool:
+def is_within_limits(layout: Layout, command: np.ndarray) -> bool:
+    """Whether commands (..., n, 3) are finite and within the limits of a robot."""
     lower = layout.lower
     upper = layout.upper
     return bool(
@@ -79,21 +81,22 @@ ABLATIONS: list[dict[str, object]] = [
     {"n_candidates": 1},
     {"temperature": 1.0, "n_refined": 100},
 ]
+"""Settings that leave out parts of the method."""
 
 
 @pytest.mark.parametrize("options", ABLATIONS)
 def test_every_variant_keeps_the_limits_bit_for_bit(
     options: dict[str, object], checkpoint: TrainedWeights, robot: Layout
 ) -> None:
-    method = AnyRobot("paper", checkpoint, n_steps=5, **options)  # type: ignore[arg-type]
+    method = AllocatorCache("paper", checkpoint, n_steps=5, **options)  # type: ignore[arg-type]
     targets = np.random.default_rng(0).normal(size=(6, 6)) * np.array(
         [[1.0], [1], [1], [50], [0], [1e5]]
     )
-    assert keeps_limits(robot, method.allocate_batch(robot, targets).command)
+    assert is_within_limits(robot, method.allocate_batch(robot, targets).command)
     result = method.allocate(robot, TARGET, seed=1)
-    assert keeps_limits(robot, result.command)
+    assert is_within_limits(robot, result.command)
     assert result.candidates is not None and result.samples is not None
-    assert keeps_limits(robot, result.candidates.command) and keeps_limits(
+    assert is_within_limits(robot, result.candidates.command) and is_within_limits(
         robot, result.samples.command
     )
 
@@ -102,7 +105,7 @@ def test_every_variant_keeps_the_limits_bit_for_bit(
 def test_the_same_seed_gives_the_same_answer(
     options: dict[str, object], checkpoint: TrainedWeights, robot: Layout
 ) -> None:
-    method = AnyRobot("paper", checkpoint, n_steps=5, **options)  # type: ignore[arg-type]
+    method = AllocatorCache("paper", checkpoint, n_steps=5, **options)  # type: ignore[arg-type]
     first, second, other = (method.allocate(robot, TARGET, seed=seed).command for seed in (4, 4, 5))
     np.testing.assert_array_equal(first, second)
     if not options.get("mean_only"):
@@ -113,7 +116,7 @@ def test_refinement_lowers_what_the_surrogate_sees(
     checkpoint: TrainedWeights, robot: Layout
 ) -> None:
     def believed(**options: object) -> float:
-        method = AnyRobot("paper", checkpoint, **options)  # type: ignore[arg-type]
+        method = AllocatorCache("paper", checkpoint, **options)  # type: ignore[arg-type]
         wrench = method.allocate_batch(robot, targets).wrench_expected
         return float(normalized_error(method.normalization, wrench, targets).mean())
 
@@ -126,7 +129,9 @@ def test_refinement_lowers_what_the_surrogate_sees(
 
 def test_candidates_come_best_first(checkpoint: TrainedWeights, robot: Layout) -> None:
     """By J, so that the answer is the first of them."""
-    method = AnyRobot("paper", checkpoint, n_candidates=20, n_refined=3, n_steps=5, gamma=0.01)
+    method = AllocatorCache(
+        "paper", checkpoint, n_candidates=20, n_refined=3, n_steps=5, gamma=0.01
+    )
     result = method.allocate(robot, TARGET)
     assert result.candidates is not None and result.samples is not None
     np.testing.assert_array_equal(result.candidates.command[0], result.command)
@@ -141,7 +146,7 @@ def test_candidates_come_best_first(checkpoint: TrainedWeights, robot: Layout) -
 
 
 def test_failed_fins_are_left_out(checkpoint: TrainedWeights, robot: Layout) -> None:
-    method = AnyRobot("paper", checkpoint, n_steps=5)
+    method = AllocatorCache("paper", checkpoint, n_steps=5)
     lost = robot.names[2]
     result = method.allocate(robot, TARGET, lost=[lost])
     assert np.isnan(result.command[2]).all()
@@ -150,7 +155,7 @@ def test_failed_fins_are_left_out(checkpoint: TrainedWeights, robot: Layout) -> 
 
 
 def test_targets_beyond_one_chunk_get_their_answers(checkpoint: TrainedWeights) -> None:
-    method = AnyRobot("paper", checkpoint, n_candidates=2, refinement="none")
+    method = AllocatorCache("paper", checkpoint, n_candidates=2, refinement="none")
     layout = Layout("pair", (Fin("a", (0.1, 0.0, 0.0), 0.0), Fin("b", (-0.1, 0.0, 0.0), 2.0)))
     targets = np.random.default_rng(0).normal(size=(CHUNK + 1, 6))
     batch = method.allocate_batch(layout, targets)
@@ -160,7 +165,7 @@ def test_targets_beyond_one_chunk_get_their_answers(checkpoint: TrainedWeights) 
 
 
 def test_the_shipped_networks_reach_the_target() -> None:
-    method = AnyRobot("paper")
+    method = AllocatorCache("paper")
     layout = load_layout(shipped_layouts()["A"])
     lower = layout.lower
     upper = layout.upper
@@ -176,24 +181,27 @@ def test_the_shipped_networks_reach_the_target() -> None:
 def test_refuses_a_checkpoint_without_network(checkpoint: TrainedWeights) -> None:
     alone = replace(checkpoint, name="alone", network_sizes=None, network={})
     with pytest.raises(CheckpointError, match="checkpoint 'alone' holds no network, expected one"):
-        AnyRobot("paper", alone).on(load_layout("A"))
+        AllocatorCache("paper", alone).on(load_layout("A"))
 
 
-def place_of(robot: Layout) -> list[torch.Tensor]:
+def tensors_of_robot(robot: Layout) -> list[torch.Tensor]:
+    """Positions, angles and limits of a robot as tensors."""
     layout = (robot.position, robot.mounting_angle, robot.lower, robot.upper)
     return [torch.tensor(part, dtype=torch.float32) for part in layout]
 
 
 def test_adam_goes_where_torch_goes(checkpoint: TrainedWeights, robot: Layout) -> None:
     """The whole refinement in PyTorch, from the raw candidates that the method drew."""
-    method = AnyRobot("paper", checkpoint, n_candidates=3, n_refined=3, gamma=0.05, n_steps=25)
-    before = AnyRobot(
+    method = AllocatorCache(
+        "paper", checkpoint, n_candidates=3, n_refined=3, gamma=0.05, n_steps=25
+    )
+    before = AllocatorCache(
         "paper", checkpoint, n_candidates=3, n_refined=3, gamma=0.05, refinement="none"
     )
     target = np.array(TARGET) * 0.3
     start = before.allocate(robot, target).candidates
     assert start is not None
-    layout = place_of(robot)
+    layout = tensors_of_robot(robot)
     std = torch.tensor(method.normalization.std, dtype=torch.float32)
     wanted = torch.tensor(target, dtype=torch.float32)
     lower, upper = layout[2:]
@@ -258,7 +266,7 @@ def test_refuses_settings_that_leave_nothing_to_answer_with(
     options: dict[str, object], message: str, checkpoint: TrainedWeights
 ) -> None:
     with pytest.raises(AllocationError, match=message):
-        AnyRobot("paper", checkpoint, **options)
+        AllocatorCache("paper", checkpoint, **options)
 
 
 def test_each_ranking_takes_what_it_ranks_first(checkpoint: TrainedWeights) -> None:
@@ -269,7 +277,7 @@ def test_each_ranking_takes_what_it_ranks_first(checkpoint: TrainedWeights) -> N
     chosen = {}
     for ranking in ("physics", "nll"):
         options = {"ranking": ranking, "refinement": "none", "n_candidates": 12, "gamma": 0.2}
-        paper = AnyRobot("paper", checkpoint, **options)
+        paper = AllocatorCache("paper", checkpoint, **options)
         method = paper.method(layout)
         std = paper.normalization.std
         mixture = method._predict((target - paper.normalization.mean) / std)

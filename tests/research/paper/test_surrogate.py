@@ -10,7 +10,7 @@ from finlab.research.networks.checkpoint import read_checkpoint, resolve_checkpo
 from finlab.research.networks.trained import TrainedWeights, WrenchNormalization
 from finlab.research.paper.surrogate import BLOCK, LayoutSurrogate, SurrogateConfig
 from finlab.research.random_layouts import random_layout
-from tests.research.paper.asked_in_torch import wrench_in_torch
+from tests.research.paper.surrogate_in_torch import wrench_in_torch
 
 
 @pytest.fixture
@@ -40,7 +40,8 @@ def untrained(*hidden: int) -> TrainedWeights:
     )
 
 
-def commands(robot: Layout, rows: int) -> np.ndarray:
+def random_commands(robot: Layout, rows: int) -> np.ndarray:
+    """Commands (rows, n, 3) within the limits of a robot."""
     unit = np.random.default_rng(0).random((rows, robot.n_fins, 3))
     return robot.lower + unit * (robot.upper - robot.lower)
 
@@ -51,7 +52,7 @@ def test_wrench_and_gradient_are_those_of_torch(
     hidden: tuple[int, ...], rows: int, robot: Layout
 ) -> None:
     weights = untrained(*hidden)
-    command = commands(robot, rows)
+    command = random_commands(robot, rows)
     surrogate = LayoutSurrogate(robot, weights)
     tensor = torch.tensor(command, requires_grad=True)
     expected = wrench_in_torch(weights, robot, tensor)
@@ -68,7 +69,7 @@ def test_wrench_and_gradient_are_those_of_torch(
 
 def test_order_does_not_matter(robot: Layout) -> None:
     weights = untrained(16, 8)
-    command = torch.tensor(commands(robot, 6))
+    command = torch.tensor(random_commands(robot, 6))
     order = [2, 0, 3, 1]
     shuffled = Layout("shuffled", tuple(robot.fins[i] for i in order))
     whole = wrench_in_torch(weights, robot, command)

@@ -16,7 +16,9 @@ from finlab.research.training.device import Workplace, workplace
 from finlab.research.training.loop import LoopSettings, Training, learning_rate, seeded_generator
 
 SETTINGS = LoopSettings(steps=45, batch_size=8, learning_rate=0.05, warmup=5, ema=0.9)
+"""A training of 45 steps."""
 CPU = torch.device("cpu")
+"""Where tensors are."""
 
 
 def terms_with(weights: dict[str, Tensor]) -> loop.Terms:
@@ -49,6 +51,7 @@ def run(
 
 
 def log_of(folder: Path) -> list[dict[str, str]]:
+    """Rows of a training's log."""
     with (folder / "log.csv").open(newline="") as file:
         return list(csv.DictReader(file))
 

@@ -12,14 +12,18 @@ from finlab.swim import control
 from finlab.swim.control.body_frame import Pid
 from finlab.swim.control.contract import NO_WRENCH
 from finlab.swim.simulation import NO_NOISE, ClosedLoop, RunLog, Trajectory, straight
-from tests.any_robot import AnyRobot
+from tests.allocator_cache import AllocatorCache
 
 AT_REST = control.Measurement(
     0.0, np.array([0.0, 0.0, -1.0]), 0.0, np.zeros(3), 1.0, np.zeros(3), 0.0, 0.0
 )
+"""A measurement of a robot that is at rest, one metre under water."""
 
 
-def swim(name: str, method: AnyRobot, task: Trajectory, controller: str, lost: int = 0) -> RunLog:
+def swim_log(
+    name: str, method: AllocatorCache, task: Trajectory, controller: str, lost: int = 0
+) -> RunLog:
+    """A swim along a path, with `lost` fins lost that leave it steerable."""
     robot = load_layout(name)
     loop = ClosedLoop(
         robot,
@@ -34,9 +38,9 @@ def swim(name: str, method: AnyRobot, task: Trajectory, controller: str, lost: i
 
 
 @pytest.mark.parametrize(("name", "lost"), [("A", 0), ("A", 2), ("B", 0), ("C", 1), ("D", 0)])
-def test_a_waypoint_is_reached_and_kept(name: str, lost: int, analytic: AnyRobot) -> None:
+def test_a_waypoint_is_reached_and_kept(name: str, lost: int, analytic: AllocatorCache) -> None:
     there = np.array([0.9, -0.7, -1.4])
-    log = swim(
+    log = swim_log(
         name,
         analytic,
         Trajectory("there", np.array([0.0, 45.0]), np.tile(there, (2, 1))),
@@ -48,14 +52,15 @@ def test_a_waypoint_is_reached_and_kept(name: str, lost: int, analytic: AnyRobot
 
 
 @pytest.mark.parametrize(("name", "speed"), [("A", 0.1), ("B", 0.15), ("C", 0.15), ("D", 0.2)])
-def test_speed_and_depth_are_kept(name: str, speed: float, analytic: AnyRobot) -> None:
-    log = swim(name, analytic, straight(30.0, speed), "velocity")
+def test_speed_and_depth_are_kept(name: str, speed: float, analytic: AllocatorCache) -> None:
+    log = swim_log(name, analytic, straight(30.0, speed), "velocity")
     late = log.time > 20.0
     assert log.motion[late, 0].mean() == pytest.approx(speed, rel=0.03)
     assert np.abs(log.position[late, 2] + 1.0).max() < 0.04
 
 
 def wrench_at(controller: control.WaypointController, x: float, y: float, z: float) -> Array:
+    """Wrench (6,) of a controller at rest, whose setpoint is at x, y, z [m]."""
     controller.reset()
     return controller.wrench(AT_REST, control.Setpoint(np.array([x, y, z]), 0.0), NO_WRENCH)
 

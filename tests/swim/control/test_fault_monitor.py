@@ -21,10 +21,11 @@ from finlab.swim.simulation import (
     make_trajectory,
     perturbed,
 )
-from tests.any_robot import AnyRobot
-from tests.ripple import rippled
+from tests.allocator_cache import AllocatorCache
+from tests.ripple_force import rippled
 
 CURRENT = (0.03, -0.02, 0.0)
+"""Current of the water [m/s]."""
 PRIOR = 0.01
 """More than any fin's prior probability of being broken."""
 
@@ -47,15 +48,16 @@ def swim(
     )
 
 
-def until(loop: ClosedLoop, seconds: float) -> RunLog:
+def log_at(loop: ClosedLoop, seconds: float) -> RunLog:
+    """The log of a swim at a time [s]."""
     while loop.time < seconds:
         loop.step()
     return loop.log
 
 
-def test_whole_fins_are_left_alone(layout_a: Layout, analytic: AnyRobot) -> None:
+def test_whole_fins_are_left_alone(layout_a: Layout, analytic: AllocatorCache) -> None:
     loop = swim(layout_a, analytic.on(layout_a), [])
-    log = until(loop, 30.0)
+    log = log_at(loop, 30.0)
     assert loop.damage == Damage()
     assert log.fault_probability.max() < 0.5 and np.median(log.fault_probability) < PRIOR
     np.testing.assert_allclose(log.strength[-1], 1.0, atol=0.15)
@@ -65,8 +67,8 @@ def test_whole_fins_are_left_alone(layout_a: Layout, analytic: AnyRobot) -> None
     "name", ["front_right", pytest.param("back_left", marks=pytest.mark.exhaustive)]
 )
 def test_a_lost_fin_is_found_and_no_longer_used(layout_a: Layout, name: str) -> None:
-    loop = swim(layout_a, AnyRobot().on(layout_a), [Fault(name, 12.0)])
-    log = until(loop, 16.0)
+    loop = swim(layout_a, AllocatorCache().on(layout_a), [Fault(name, 12.0)])
+    log = log_at(loop, 16.0)
     fin = layout_a.index(name)
     assert loop.damage.lost == (name,)
     lost = log.time >= 12.0
@@ -82,16 +84,16 @@ def test_a_lost_fin_is_found_and_no_longer_used(layout_a: Layout, name: str) -> 
 @pytest.mark.parametrize("lost", [("front_right", "back_left"), ("front_left", "back_right")])
 def test_two_fins_lost_at_one_moment_are_found(layout_a: Layout, lost: tuple[str, str]) -> None:
     """Each alone explains as little of it as any other fin would."""
-    loop = swim(layout_a, AnyRobot().on(layout_a), [Fault(name, 12.0) for name in lost])
-    until(loop, 12.0)
+    loop = swim(layout_a, AllocatorCache().on(layout_a), [Fault(name, 12.0) for name in lost])
+    log_at(loop, 12.0)
     assert loop.damage.lost == ()
-    until(loop, 16.0)
+    log_at(loop, 16.0)
     assert loop.damage.lost == lost
 
 
-def test_a_weak_fin_keeps_its_share(layout_a: Layout, analytic: AnyRobot) -> None:
+def test_a_weak_fin_keeps_its_share(layout_a: Layout, analytic: AllocatorCache) -> None:
     loop = swim(layout_a, analytic.on(layout_a), [Fault("back_left", 12.0, "torn", 0.4)])
-    log = until(loop, 30.0)
+    log = log_at(loop, 30.0)
     fin = layout_a.index("back_left")
     assert loop.damage.lost == () and loop.damage.faults_by_kind
     assert log.strength[-1, fin] == pytest.approx(0.4, abs=0.12)
@@ -99,9 +101,9 @@ def test_a_weak_fin_keeps_its_share(layout_a: Layout, analytic: AnyRobot) -> Non
     assert 0.0 < log.strength_std[-1, fin] < 0.15
 
 
-def test_a_stuck_fin_is_told_from_a_lost_one(layout_a: Layout, analytic: AnyRobot) -> None:
+def test_a_stuck_fin_is_told_from_a_lost_one(layout_a: Layout, analytic: AllocatorCache) -> None:
     loop = swim(layout_a, analytic.on(layout_a), [Fault("front_left", 12.0, "stuck")])
-    log = until(loop, 20.0)
+    log = log_at(loop, 20.0)
     assert loop.damage.lost == () and loop.damage.faults_by_kind
     held = log.fin_motion[-1, layout_a.index("front_left"), 2]
     assert math.remainder(loop.damage.stuck["front_left"] - held, 2 * math.pi) == pytest.approx(
@@ -111,14 +113,14 @@ def test_a_stuck_fin_is_told_from_a_lost_one(layout_a: Layout, analytic: AnyRobo
 
 def test_a_repaired_fin_is_taken_back(layout_a: Layout) -> None:
     events = [Fault("back_right", 10.0), Fault("back_right", 15.0, "whole")]
-    loop = swim(layout_a, AnyRobot().on(layout_a), events)
-    until(loop, 15.0)
+    loop = swim(layout_a, AllocatorCache().on(layout_a), events)
+    log_at(loop, 15.0)
     assert loop.damage.lost == ("back_right",)
-    until(loop, 60.0)
+    log_at(loop, 60.0)
     assert loop.damage == Damage()
 
 
-def test_fins_at_rest_cannot_be_told(layout_a: Layout, analytic: AnyRobot) -> None:
+def test_fins_at_rest_cannot_be_told(layout_a: Layout, analytic: AllocatorCache) -> None:
     """The allocator rests a fin, of which nothing is known then: its probability stays at its
     prior."""
     loop = ClosedLoop(
@@ -177,13 +179,13 @@ def test_a_single_odd_sample_decides_nothing(layout_a: Layout) -> None:
 
 @pytest.mark.parametrize("truth", ["ripple", "askew"])
 def test_a_model_that_does_not_fit_raises_no_alarm(
-    layout_a: Layout, analytic: AnyRobot, truth: str
+    layout_a: Layout, analytic: AllocatorCache, truth: str
 ) -> None:
     """Fins that shake the robot by several newtons, or push elsewhere than the model says."""
     built = perturbed(layout_a, **BUILT_OFF) if truth == "askew" else None
     loop = swim(layout_a, analytic.on(layout_a), [], truth=built)
     loop = rippled(loop) if truth == "ripple" else loop
-    until(loop, 25.0)
+    log_at(loop, 25.0)
     assert loop.damage == Damage()
 
 

@@ -16,10 +16,12 @@ from finlab.swim.vehicle.fossen import complete_body
 from finlab.swim.vehicle.vehicle import Vehicle
 
 PERIOD_S = 0.1
+"""Length of a tick [s]."""
 
 
 @pytest.fixture(scope="module")
 def robot() -> Layout:
+    """Robot A, four fins."""
     return load_layout("A")
 
 

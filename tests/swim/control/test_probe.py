@@ -10,29 +10,32 @@ from finlab.physics import plant_of
 from finlab.swim.control import FaultMonitor, MonitorSettings
 from finlab.swim.control.probe import PROBE_FORCE_N, Probe
 
-LEAST = MonitorSettings().least_push
-NONE = np.zeros(4, dtype=bool)
+LEAST_PUSH = MonitorSettings().least_push
+"""Force below which the monitor learns nothing of a fin [N]."""
+NO_FIN_LOST = np.zeros(4, dtype=bool)
+"""Which of four fins are lost."""
 
 
-def forces(layout: Layout, command: np.ndarray) -> np.ndarray:
+def planar_forces(layout: Layout, command: np.ndarray) -> np.ndarray:
+    """Forces (n, 2) [N] of fins in their planes."""
     return plant_of(layout).forces(command)[:, 1:]
 
 
 def test_fins_that_all_but_rest_push_up_and_down(layout_a: Layout) -> None:
     probe = Probe(layout_a, MonitorSettings(), 0.1)
     command = np.array([[0.5, 1.5, 0.2], [0.5, 0.3, 0.0], [np.nan] * 3, [0.5, 0.2, 1.0]])
-    before = forces(layout_a, command)
-    after = forces(layout_a, probe.added(command, NONE, np.zeros(4)))
+    before = planar_forces(layout_a, command)
+    after = planar_forces(layout_a, probe.added(command, NO_FIN_LOST, np.zeros(4)))
     np.testing.assert_array_equal(after[[0, 2]], before[[0, 2]])
     for fin in (1, 3):
-        assert np.linalg.norm(before[fin]) < LEAST
-        assert np.linalg.norm(after[fin]) == pytest.approx(LEAST, rel=0.05)
+        assert np.linalg.norm(before[fin]) < LEAST_PUSH
+        assert np.linalg.norm(after[fin]) == pytest.approx(LEAST_PUSH, rel=0.05)
         assert after[fin, 0] == pytest.approx(before[fin, 0], abs=0.02), (
             "what it pushes ahead is kept"
         )
     assert after[1, 1] * after[3, 1] < 0.0, "together they lift little"
     command[1, 2] = np.pi  # now it is told to push astern: the side stays
-    again = forces(layout_a, probe.added(command, NONE, np.zeros(4)))
+    again = planar_forces(layout_a, probe.added(command, NO_FIN_LOST, np.zeros(4)))
     np.testing.assert_allclose(again[1], after[1] * [-1.0, 1.0], atol=1e-6)
 
 
@@ -51,7 +54,7 @@ def test_a_lost_fin_is_probed_unless_somebody_said_that_it_is_lost(layout_a: Lay
         40
     ):  # ten ticks into a probe: it is turned and swings up as fast as the servos may
         probed = found.probed(command)
-    push = forces(layout_a, probed)[2]
+    push = planar_forces(layout_a, probed)[2]
     assert push[1] == pytest.approx(PROBE_FORCE_N, rel=0.05) and abs(push[0]) < 1e-9
 
 

@@ -13,15 +13,17 @@ from finlab.swim.control import Controller, Measurement, Setpoint, TrackingContr
 from finlab.swim.control.tracking_controller import SENSOR_DELAY_S
 from finlab.swim.simulation import ClosedLoop, make_trajectory
 from finlab.swim.simulation.truth import perturbed
-from tests.any_robot import AnyRobot
+from tests.allocator_cache import AllocatorCache
 
 
 @pytest.fixture(scope="module")
 def robot() -> Layout:
+    """Robot A, four fins."""
     return load_layout("A")
 
 
 def first_wrench(robot: Layout, setpoint: Setpoint, yaw: float = 0.0) -> np.ndarray:
+    """Wrench (6,) of a new controller for a robot at rest."""
     still = Measurement(
         0.0, np.array([0.0, 0.0, -1.0]), yaw, np.zeros(3), 1.0, np.zeros(3), 0.0, 0.0
     )
@@ -74,7 +76,7 @@ def error(
     """Root mean square distance from a path [m]."""
     path_ = make_trajectory(path)
     flow = (current, 0.0, 0.0)
-    loop = ClosedLoop(robot, AnyRobot().on(robot), path_, pilot, truth=truth, current=flow)
+    loop = ClosedLoop(robot, AllocatorCache().on(robot), path_, pilot, truth=truth, current=flow)
     log = loop.run()
     return float(np.sqrt(((log.position - log.reference) ** 2).sum(1).mean()))
 

@@ -14,20 +14,22 @@ from finlab.swim.hull.hydrodynamics import (
 )
 
 
-def box(
+def box_triangles(
     size: tuple[float, float, float], center: tuple[float, float, float] = (0, 0, 0)
 ) -> np.ndarray:
+    """Triangles (N, 3, 3) of a box of a size [m]."""
     mesh = trimesh.creation.box(size)
     return np.asarray(mesh.vertices[mesh.faces] + np.array(center))
 
 
-def sphere(radii: tuple[float, float, float]) -> np.ndarray:
+def spheroid_triangles(radii: tuple[float, float, float]) -> np.ndarray:
+    """Triangles (N, 3, 3) of an ellipsoid with three radii [m]."""
     mesh = trimesh.creation.icosphere(subdivisions=5)
     return np.asarray((mesh.vertices * np.array(radii))[mesh.faces])
 
 
 def test_a_box_has_the_inertia_of_every_textbook_wherever_it_stands() -> None:
-    solid = HullSolid.of(box((0.6, 0.3, 0.2), (1.0, -2.0, 0.5)))
+    solid = HullSolid.of(box_triangles((0.6, 0.3, 0.2), (1.0, -2.0, 0.5)))
     assert solid.volume == pytest.approx(0.036)
     assert solid.center == pytest.approx((1.0, -2.0, 0.5))
     assert solid.inertia(12.0) == pytest.approx((0.09 + 0.04, 0.04 + 0.36, 0.36 + 0.09))
@@ -37,7 +39,7 @@ def test_a_box_has_the_inertia_of_every_textbook_wherever_it_stands() -> None:
 
 
 def test_an_ellipsoid_stands_for_itself() -> None:
-    solid = HullSolid.of(sphere((0.3, 0.15, 0.1)))
+    solid = HullSolid.of(spheroid_triangles((0.3, 0.15, 0.1)))
     assert solid.ellipsoid() == pytest.approx((0.3, 0.15, 0.1), rel=2e-3)
     assert solid.inertia(5.0)[0] == pytest.approx(5.0 / 5 * (0.15**2 + 0.1**2), rel=4e-3)
 
@@ -77,7 +79,7 @@ def test_a_spheres_drag_is_the_measured_one_and_none_around() -> None:
     radius = 0.25
     speed = 0.2
     quadratic = pressure_damping(np.full(3, radius))
-    linear = friction_damping(HullSolid.of(sphere((radius,) * 3)), speed)
+    linear = friction_damping(HullSolid.of(spheroid_triangles((radius,) * 3)), speed)
     drag = quadratic[0] * speed**2 + linear[0] * speed
     assert drag / (0.5 * 1000.0 * math.pi * radius**2 * speed**2) == pytest.approx(0.47, abs=0.02)
     assert not quadratic[3:].any() and linear[3:].min() > 0.0

@@ -10,7 +10,8 @@ import trimesh
 from finlab.errors import FinlabError
 from finlab.swim.hull.mesh_file import read_mesh
 
-BOX = trimesh.creation.box((0.4, 0.2, 0.1))
+BOX_MESH = trimesh.creation.box((0.4, 0.2, 0.1))
+"""A box of twelve triangles."""
 
 
 def glb(count: int, **more: Any) -> bytes:
@@ -28,6 +29,7 @@ def glb(count: int, **more: Any) -> bytes:
 
 
 def instanced(mesh: trimesh.Trimesh, count: int) -> bytes:
+    """A file of glTF that shows one mesh many times."""
     scene = trimesh.Scene()
     for i in range(count):
         place = trimesh.transformations.translation_matrix([0.01 * i, 0.0, 0.0])
@@ -56,15 +58,17 @@ def test_what_asks_for_more_than_it_holds_is_refused(content: bytes, sentence: s
 
 
 def test_instances_of_an_honest_file_are_read() -> None:
-    mesh, report = read_mesh("a.glb", instanced(BOX, 5), 1.0)
-    assert report.triangles == 5 * len(BOX.faces)
+    mesh, report = read_mesh("a.glb", instanced(BOX_MESH, 5), 1.0)
+    assert report.triangles == 5 * len(BOX_MESH.faces)
     assert max(mesh.vertices[:, 0]) - min(mesh.vertices[:, 0]) == pytest.approx(0.44)
 
 
 @pytest.mark.parametrize("word", ["g", "o", "usemtl", "s"])
 def test_an_obj_is_read_in_one_part_however_many_it_names(word: str) -> None:
-    lines = [f"v {x} {y} {z}" for x, y, z in BOX.vertices]
-    for i, (a, b, c) in enumerate(BOX.faces + 1):
+    lines = [f"v {x} {y} {z}" for x, y, z in BOX_MESH.vertices]
+    for i, (a, b, c) in enumerate(BOX_MESH.faces + 1):
         lines += [f"{word} part{i}", f"f {a} {b} {c}"]
     mesh, report = read_mesh("a.obj", "\n".join(lines).encode(), 1.0)
-    assert report.triangles == len(BOX.faces) and report.is_watertight and len(mesh.vertices) == 8
+    assert (
+        report.triangles == len(BOX_MESH.faces) and report.is_watertight and len(mesh.vertices) == 8
+    )

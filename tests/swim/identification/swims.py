@@ -14,6 +14,8 @@ from finlab.swim.vehicle.fossen import complete_body
 from finlab.swim.vehicle.vehicle import Vehicle
 
 NOISE = np.array([0.01] * 3 + [0.005] * 6 + [0.005] * 3)
+"""Standard deviations (12,) of position [m], angles [rad], velocity [m/s] and angular velocity
+[rad/s]."""
 
 
 def swim(
@@ -51,7 +53,8 @@ def swim(
 def write_csv(path: Path, layout: Layout, commands: np.ndarray, measured: np.ndarray) -> None:
     """The swim as a CSV file, every 0.1 s."""
     names = ["t", "x", "y", "z", "roll", "pitch", "yaw", "u", "v", "w", "p", "q", "r"]
-    names += [f"{fin}.{part}" for fin in layout.names for part in ("A", "f", "phi")]
+    for fin in layout.names:
+        names += [f"{fin}.A", f"{fin}.f", f"{fin}.phi"]
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(names)

@@ -15,7 +15,7 @@ from finlab.swim.control import FaultMonitor
 from finlab.swim.identification.fitted_robot import with_lean
 from finlab.swim.identification.online_fit import OnlineFit
 from finlab.swim.simulation import ClosedLoop, Fault, make_trajectory
-from tests.exhaustive import sampled
+from tests.sampled_cases import sampled
 
 
 @pytest.mark.parametrize("name", sampled(["A", "bluerov2_heavy"]))

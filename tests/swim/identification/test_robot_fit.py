@@ -15,13 +15,16 @@ from finlab.swim.identification.fitted_robot import summary, table, write_robot
 from finlab.swim.identification.robot_fit import RobotFit, fit_robot
 from finlab.swim.identification.swim import Swim, only_new, read_swim, replay
 from finlab.swim.simulation.excite import excitation
-from tests.any_robot import AnyRobot
-from tests.exhaustive import sampled
+from tests.allocator_cache import AllocatorCache
+from tests.sampled_cases import sampled
 from tests.swim.identification.swims import swim, write_csv
 
 CENTER = np.array([0.015, -0.01, 0.005])
+"""Where the center of gravity is, in the drawn robot's axes [m]."""
 STRENGTH = {"front_right": 0.8, "front_left": 1.15, "back_left": 1.0}
-TURNED = {"front_right": 0.08, "front_left": -0.05, "back_left": 0.0}
+"""Fin -> force over that of its law."""
+ANGLE_ERRORS = {"front_right": 0.08, "front_left": -0.05, "back_left": 0.0}
+"""Fin -> true mounting angle less the drawn one [rad]."""
 
 
 def strengths(fit: RobotFit) -> dict[str, tuple[float, float]]:
@@ -34,15 +37,18 @@ def strengths(fit: RobotFit) -> dict[str, tuple[float, float]]:
 
 @pytest.fixture(scope="module")
 def drawn() -> Layout:
+    """The robot as a designer drew it: three fins."""
     return load_layout("ucat").without(["back_right"])
 
 
 @pytest.fixture(scope="module")
 def truth(drawn: Layout) -> Layout:
+    """The robot as it was built."""
+
     def changed(fin: Fin) -> Fin:
         model = FinModelSpec("drag", (("drag_coefficient", 0.15 * STRENGTH[fin.name]),))
         x, y, z = (np.array(fin.position) - CENTER).tolist()
-        angle = fin.mounting_angle + TURNED[fin.name]
+        angle = fin.mounting_angle + ANGLE_ERRORS[fin.name]
         return replace(fin, position=(x, y, z), mounting_angle=angle, model=model)
 
     return replace(drawn, actuators=tuple(changed(fin) for fin in drawn.fins))
@@ -50,6 +56,7 @@ def truth(drawn: Layout) -> Layout:
 
 @pytest.fixture(scope="module")
 def fit(drawn: Layout, truth: Layout) -> RobotFit:
+    """What a minute of swimming says of it."""
     command, measured = swim(truth, 60.0, seed=1)
     return fit_robot(drawn, [Swim("made up", replay(drawn, command), only_new(measured))])
 
@@ -60,7 +67,7 @@ def test_strengths_directions_and_centre_are_found_within_their_errors(fit: Robo
     turned = fit.estimate("mounting")
     error = fit.standard_error("mounting")
     np.testing.assert_array_less(
-        np.abs(turned - list(TURNED.values())), np.maximum(4.0 * error, 0.01)
+        np.abs(turned - list(ANGLE_ERRORS.values())), np.maximum(4.0 * error, 0.01)
     )
     center = fit.estimate("center")
     error = fit.standard_error("center")
@@ -88,7 +95,7 @@ def test_the_fitted_layout_allocates_for_the_true_robot(
     assert fitted.description.startswith("fitted to 60 s of swimming")
     true = plant_of(truth)
     targets = 0.6 * true.wrench(true.sample(np.random.default_rng(3), (30,)))
-    allocator = AnyRobot()
+    allocator = AllocatorCache()
     missed = [
         np.linalg.norm(
             true.wrench(allocator.allocate_batch(robot, targets).command) - targets, axis=1

@@ -17,12 +17,14 @@ from finlab.swim.simulation import ClosedLoop, make_trajectory
 from finlab.swim.simulation.excite import excitation
 
 
-def swum(path: Path, layout: Layout, truth: Layout, seed: int) -> Path:
+def swim_file(path: Path, layout: Layout, truth: Layout, seed: int) -> Path:
+    """The file of a swim of a robot that is not as drawn."""
     excitation(layout, 60.0, truth=truth, seed=seed).run().save(path)
     return path
 
 
-def fitted(layout: Layout, path: Path) -> RobotFit:
+def fit_of(layout: Layout, path: Path) -> RobotFit:
+    """What a file of a swim says of a robot."""
     return fit_robot(layout, [read_swim(path, layout)])
 
 
@@ -41,9 +43,9 @@ def test_a_reversed_motor_is_named_and_the_rest_is_fitted(
     """The robot is sound and the layout wrong, so that no motor makes the swim end."""
     right = load_layout(name)
     wrong = opposed_in(right, [right.names[motor]])
-    path = swum(tmp_path / "swim.npz", right, right, seed=motor)
-    good = fitted(right, path)
-    found = fitted(wrong, path)
+    path = swim_file(tmp_path / "swim.npz", right, right, seed=motor)
+    good = fit_of(right, path)
+    found = fit_of(wrong, path)
     assert good.opposed == () and found.opposed == (right.names[motor],)
     assert found.explained > good.explained - 0.03
     np.testing.assert_allclose(np.exp(found.estimate("strength")), 1.0, atol=0.15)
@@ -54,7 +56,7 @@ def test_the_command_line_names_it_and_writes_the_corrected_layout(
 ) -> None:
     drawn = load_layout("bluerov2_heavy")
     truth = opposed_in(drawn, ["rear_left"])
-    path = swum(tmp_path / "swim.npz", drawn, truth, seed=3)
+    path = swim_file(tmp_path / "swim.npz", drawn, truth, seed=3)
     output = tmp_path / "found.yaml"
     assert main(["fit", "robot", "bluerov2_heavy", str(path), "-o", str(output)]) == 0
     assert "rear_left pushes the other way" in capsys.readouterr().out
@@ -78,7 +80,7 @@ def test_a_tumbling_robot_tells_its_reversed_lift_motor_too(tmp_path: Path) -> N
     ClosedLoop(
         layout, Allocator(layout), make_trajectory("lissajous", 60.0), truth=truth, seed=4
     ).run().save(tmp_path / "swim.npz")
-    assert fitted(layout, tmp_path / "swim.npz").opposed == ("lift_front_right",)
+    assert fit_of(layout, tmp_path / "swim.npz").opposed == ("lift_front_right",)
 
 
 @pytest.mark.parametrize(

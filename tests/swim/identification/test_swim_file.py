@@ -11,32 +11,40 @@ from finlab.layout import Layout, load_layout
 from finlab.swim.identification.swim import read_swim, smoothed
 from tests.swim.identification.swims import write_csv
 
-STEPS = 400
+N_STEPS = 400
+"""Length of a swim."""
 
 
 @pytest.fixture(scope="module")
 def pair() -> Layout:
+    """Two fins."""
     return load_layout("pair")
 
 
 @pytest.fixture(scope="module")
 def made() -> tuple[np.ndarray, np.ndarray]:
+    """Commands and measurements of a made-up swim."""
     rng = np.random.default_rng(0)
-    command = np.tile([0.4, 1.0, 0.3], (STEPS, 2, 1)) + 0.01 * rng.standard_normal((STEPS, 2, 3))
-    return command, 0.1 * rng.standard_normal((STEPS, 12)).cumsum(axis=0) / 10.0
+    command = np.tile([0.4, 1.0, 0.3], (N_STEPS, 2, 1)) + 0.01 * rng.standard_normal(
+        (N_STEPS, 2, 3)
+    )
+    return command, 0.1 * rng.standard_normal((N_STEPS, 12)).cumsum(axis=0) / 10.0
 
 
 Rows = list[list[str]]
+"""Cells of a file of CSV."""
 
 
 @pytest.fixture
 def rows(pair: Layout, made: tuple[np.ndarray, np.ndarray], tmp_path: Path) -> Rows:
+    """Cells of a good file."""
     write_csv(tmp_path / "whole.csv", pair, *made)
     with (tmp_path / "whole.csv").open(newline="") as file:
         return list(csv.reader(file))
 
 
 def read(rows: Rows, layout: Layout, tmp_path: Path) -> object:
+    """Read cells as a file of a swim."""
     with (tmp_path / "swim.csv").open("w", newline="") as file:
         csv.writer(file).writerows(rows)
     return read_swim(tmp_path / "swim.csv", layout)
@@ -54,7 +62,7 @@ def test_columns_in_any_order_with_units_and_strangers(
         row[at] = repr(float(np.degrees(float(row[at]))))
     again = read(turned, pair, tmp_path)
     np.testing.assert_allclose(again.measured, plain.measured, atol=1e-9)
-    np.testing.assert_allclose(plain.measured[1:], made[1][1 : STEPS - 1], atol=1e-6)
+    np.testing.assert_allclose(plain.measured[1:], made[1][1 : N_STEPS - 1], atol=1e-6)
     np.testing.assert_array_equal(again.motion, plain.motion)
 
 
@@ -63,7 +71,8 @@ def test_what_is_empty_or_held_is_not_new(rows: Rows, pair: Layout, tmp_path: Pa
     v = rows[0].index("v")
     for k, row in enumerate(rows[1:]):
         if k % 2:
-            row[u], row[v] = "", rows[k][v]
+            row[u] = ""
+            row[v] = rows[k][v]
     swim = read(rows, pair, tmp_path)
     known = np.isfinite(swim.measured)
     assert known[::2, 6].all() and not known[1::2, 6].any()
@@ -80,6 +89,7 @@ def test_a_fin_without_commands_was_lost(rows: Rows, pair: Layout, tmp_path: Pat
 
 
 def _set(rows: Rows, line: int, name: str, value: str) -> None:
+    """Write a cell by its line, counted from one, and its column."""
     rows[line - 1][rows[0].index(name)] = value
 
 

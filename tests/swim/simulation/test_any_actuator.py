@@ -10,15 +10,17 @@ from finlab.layout import Layout
 from finlab.research.evaluation.experiments.hard_days import OTHER_HEAVY
 from finlab.swim.control import FaultMonitor
 from finlab.swim.simulation import NO_NOISE, ClosedLoop, Fault, RunLog, make_trajectory, straight
-from tests.exhaustive import crossed, sampled
+from tests.sampled_cases import crossed, sampled
 
 
 @pytest.fixture(scope="module")
 def heavy() -> Layout:
+    """Eight thrusters."""
     return load_layout("bluerov2_heavy")
 
 
-def error(log: RunLog) -> float:
+def rms_error(log: RunLog) -> float:
+    """Root mean square of the distance from the path [m]."""
     return float(np.sqrt(np.square(log.position - log.reference).sum(axis=1).mean()))
 
 
@@ -28,14 +30,14 @@ def error(log: RunLog) -> float:
 def test_robots_of_any_actuators_follow_a_path(name: str) -> None:
     robot = load_layout(name)
     log = ClosedLoop(robot, Allocator(robot), make_trajectory("circle"), seed=1).run()
-    assert error(log) < 0.06
+    assert rms_error(log) < 0.06
     assert log.command.shape[1:] == log.fin_motion.shape[1:] == (robot.n, 3)
 
 
 def test_a_torpedo_follows_a_path_at_speed() -> None:
     torpedo = load_layout("torpedo")
     log = ClosedLoop(torpedo, Allocator(torpedo), straight(20.0, 1.5), seed=1).run()
-    assert log.motion[-1, 0] > 1.4 and error(log) < 0.5
+    assert log.motion[-1, 0] > 1.4 and rms_error(log) < 0.5
 
 
 def test_thrusters_give_what_is_allocated_a_moment_later(heavy: Layout) -> None:
@@ -60,7 +62,7 @@ def test_a_thruster_breaks_and_the_robot_keeps_its_path(
         announced=announced,
         seed=2,
     )
-    assert error(loop.run()) < 0.08
+    assert rms_error(loop.run()) < 0.08
 
 
 def test_a_loss_that_nobody_announced_costs_a_tenth_of_the_error_at_most(heavy: Layout) -> None:
@@ -70,7 +72,7 @@ def test_a_loss_that_nobody_announced_costs_a_tenth_of_the_error_at_most(heavy: 
     loop = ClosedLoop(
         heavy, Allocator(heavy), path, failures=[lost], monitor=FaultMonitor(heavy), seed=0
     )
-    assert error(loop.run()) < 1.1 * error(whole)
+    assert rms_error(loop.run()) < 1.1 * rms_error(whole)
     assert loop.damage.lost == (lost.name,)
 
 
@@ -79,7 +81,7 @@ def test_a_body_that_is_less_damped_in_yaw_than_its_model_is_not_spun(heavy: Lay
     log = ClosedLoop(
         heavy, Allocator(heavy), make_trajectory("lissajous"), truth=truth, seed=0
     ).run()
-    assert error(log) < 0.06 and np.abs(log.motion[:, 5]).max() < 2.0
+    assert rms_error(log) < 0.06 and np.abs(log.motion[:, 5]).max() < 2.0
 
 
 def test_a_torn_thruster_that_is_known_is_asked_for_more(heavy: Layout) -> None:

@@ -14,8 +14,8 @@ from finlab.swim import simulation as sim
 from finlab.swim.control import FaultMonitor, TrackingController
 from finlab.swim.simulation.log import log_of_ticks
 from finlab.swim.vehicle.fossen import ucat_body
-from tests.any_robot import AnyRobot
-from tests.ripple import rippled
+from tests.allocator_cache import AllocatorCache
+from tests.ripple_force import rippled
 
 
 def swum(swim: sim.ClosedLoop, seconds: float) -> sim.RunLog:
@@ -27,7 +27,7 @@ def swum(swim: sim.ClosedLoop, seconds: float) -> sim.RunLog:
 
 @pytest.mark.parametrize("truth", ["drawn", "ripple", "askew"])
 def test_it_follows_a_circle_whatever_its_fins_do(
-    layout_a: Layout, analytic: AnyRobot, truth: str
+    layout_a: Layout, analytic: AllocatorCache, truth: str
 ) -> None:
     built = sim.perturbed(layout_a, **BUILT_OFF) if truth == "askew" else None
     loop = sim.ClosedLoop(
@@ -39,7 +39,7 @@ def test_it_follows_a_circle_whatever_its_fins_do(
     assert np.sqrt((error**2).mean()) < 0.1
 
 
-def test_same_seed_same_swim(layout_a: Layout, analytic: AnyRobot) -> None:
+def test_same_seed_same_swim(layout_a: Layout, analytic: AllocatorCache) -> None:
     swims = [
         sim.ClosedLoop(
             layout_a, analytic.on(layout_a), sim.make_trajectory("circle", 20.0), seed=seed
@@ -51,7 +51,7 @@ def test_same_seed_same_swim(layout_a: Layout, analytic: AnyRobot) -> None:
     assert (first != other).any()
 
 
-def test_a_straight_path_holds_speed_and_depth(layout_a: Layout, analytic: AnyRobot) -> None:
+def test_a_straight_path_holds_speed_and_depth(layout_a: Layout, analytic: AllocatorCache) -> None:
     log = swum(
         sim.ClosedLoop(
             layout_a, analytic.on(layout_a), sim.straight(30.0, 0.15), sensors=sim.NO_NOISE
@@ -63,7 +63,7 @@ def test_a_straight_path_holds_speed_and_depth(layout_a: Layout, analytic: AnyRo
     assert np.abs(log.position[late, 2] + 1.0).max() < 0.02
 
 
-def test_fins_fail_and_mend(layout_a: Layout, analytic: AnyRobot) -> None:
+def test_fins_fail_and_mend(layout_a: Layout, analytic: AllocatorCache) -> None:
     swim = sim.ClosedLoop(
         layout_a,
         analytic.on(layout_a),
@@ -87,7 +87,7 @@ def test_fins_fail_and_mend(layout_a: Layout, analytic: AnyRobot) -> None:
         swim.mend("tail")
 
 
-def test_bad_swims_are_refused(layout_a: Layout, analytic: AnyRobot) -> None:
+def test_bad_swims_are_refused(layout_a: Layout, analytic: AllocatorCache) -> None:
     task = sim.make_trajectory("circle", 20.0)
     with pytest.raises(LayoutError, match="no fin 'tail'"):
         sim.ClosedLoop(layout_a, analytic.on(layout_a), task, failures=[("tail", 1.0)])
@@ -95,7 +95,7 @@ def test_bad_swims_are_refused(layout_a: Layout, analytic: AnyRobot) -> None:
         sim.ClosedLoop(layout_a, analytic.on(layout_a), task, failures=[("front_left", -1.0)])
 
 
-def test_logs_survive_the_disk(layout_a: Layout, analytic: AnyRobot, tmp_path: Path) -> None:
+def test_logs_survive_the_disk(layout_a: Layout, analytic: AllocatorCache, tmp_path: Path) -> None:
     swim = sim.ClosedLoop(
         layout_a, analytic.on(layout_a), sim.make_trajectory("circle", 20.0), seed=3
     )
@@ -123,7 +123,7 @@ def log_of_ticks_like(log: object, ticks: list[sim.Tick]) -> object:
     return log_of_ticks(ticks, seed=log.seed, **about)  # type: ignore[attr-defined]
 
 
-def test_what_becomes_of_fins_without_a_word(layout_a: Layout, analytic: AnyRobot) -> None:
+def test_what_becomes_of_fins_without_a_word(layout_a: Layout, analytic: AllocatorCache) -> None:
     events = [sim.Fault("front_left", 2.0), sim.Fault("back_left", 2.0, "torn", 0.5)]
     events += [sim.Fault("back_right", 2.0, "stuck"), sim.Fault("back_left", 4.0, "whole")]
     swim = sim.ClosedLoop(
@@ -154,7 +154,9 @@ def test_what_becomes_of_fins_without_a_word(layout_a: Layout, analytic: AnyRobo
     assert np.isnan(log.fault_probability).all(), "nobody watches"
 
 
-def test_what_is_announced_reaches_the_allocator(layout_a: Layout, analytic: AnyRobot) -> None:
+def test_what_is_announced_reaches_the_allocator(
+    layout_a: Layout, analytic: AllocatorCache
+) -> None:
     swim = sim.ClosedLoop(layout_a, analytic.on(layout_a), sim.make_trajectory("circle"))
     swum(swim, 1.0)
     swim.fail("front_left", "torn", 0.4)
@@ -171,7 +173,9 @@ def test_what_is_announced_reaches_the_allocator(layout_a: Layout, analytic: Any
 
 
 @pytest.mark.parametrize(("kind", "share"), [("melted", 0.5), ("torn", 1.0), ("torn", 0.0)])
-def test_no_such_failures(layout_a: Layout, analytic: AnyRobot, kind: str, share: float) -> None:
+def test_no_such_failures(
+    layout_a: Layout, analytic: AllocatorCache, kind: str, share: float
+) -> None:
     with pytest.raises(FinlabError, match="fault of front_left: expected"):
         sim.Fault("front_left", 1.0, kind, share).checked()
     with pytest.raises(FinlabError, match="fault of front_left: expected"):
@@ -201,7 +205,11 @@ def test_odd_bodies_keep_loop_and_monitor_finite(layout_a: Layout, body: dict[st
     monitor = FaultMonitor(layout)
     task = sim.make_trajectory("lissajous")
     loop = sim.ClosedLoop(
-        layout, AnyRobot("analytic").on(layout), task, TrackingController(layout), monitor=monitor
+        layout,
+        AllocatorCache("analytic").on(layout),
+        task,
+        TrackingController(layout),
+        monitor=monitor,
     )
     for _ in range(60):
         tick = loop.step()

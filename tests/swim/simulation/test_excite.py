@@ -14,6 +14,7 @@ from tests.terminal import refused
 
 @pytest.fixture(scope="module", params=["A", "penta"])
 def swim(request: pytest.FixtureRequest) -> RunLog:
+    """A minute of the manoeuvre."""
     return excitation(load_layout(request.param), 60.0, seed=3).run()
 
 

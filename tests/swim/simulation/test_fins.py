@@ -8,13 +8,15 @@ from finlab.layout import Layout, load_layout
 from finlab.physics import Plant
 from finlab.swim.simulation.devices import ActuatorForce
 from finlab.swim.vehicle.fin_motion import FinMotion
-from tests.ripple import RippleForce
+from tests.ripple_force import RippleForce
 
-DT = 0.01
+STEP_S = 0.01
+"""A step of the simulation [s]."""
 
 
 @pytest.fixture(scope="module")
 def pair() -> Layout:
+    """Two fins."""
     return load_layout(shipped_layouts()["pair"])
 
 
@@ -32,11 +34,11 @@ def cycle_mean(
 ) -> np.ndarray:
     """Mean force (3,) of the first fin over whole cycles."""
     command = motion.command.copy()
-    per_cycle = round(1.0 / (command[0, 1] * DT))
+    per_cycle = round(1.0 / (command[0, 1] * STEP_S))
     forces = []
     for _ in range((cycles + skip) * per_cycle):
-        motion.step(command, DT)
-        forces.append(force.of_fins(DT)[0])
+        motion.step(command, STEP_S)
+        forces.append(force.of_fins(STEP_S)[0])
     return np.mean(forces[skip * per_cycle :], axis=0)
 
 
@@ -44,8 +46,8 @@ def test_a_fin_that_hangs_still_gives_nothing(pair: Layout) -> None:
     motion = flapping(pair, 0.4, 1.5, 0.8)
     command = motion.command.copy()
     command[0] = np.nan
-    motion.step(command, DT)
-    assert (ActuatorForce(pair, motion).of_fins(DT)[0] == 0.0).all()
+    motion.step(command, STEP_S)
+    assert (ActuatorForce(pair, motion).of_fins(STEP_S)[0] == 0.0).all()
 
 
 @pytest.mark.parametrize("name", ["A", "mixed"])
@@ -54,8 +56,8 @@ def test_steady_fins_give_the_plants_force(name: str) -> None:
     motion = FinMotion(layout)
     command = np.tile([0.4, 1.3, 0.7], (layout.n_fins, 1))
     for _ in range(400):
-        motion.step(command, DT)
-    force = ActuatorForce(layout, motion).of_fins(DT)
+        motion.step(command, STEP_S)
+    force = ActuatorForce(layout, motion).of_fins(STEP_S)
     wanted = np.linalg.norm(Plant(layout).body_forces(command), axis=1)
     np.testing.assert_allclose(np.linalg.norm(force, axis=1), wanted, rtol=1e-6)
 
@@ -63,6 +65,6 @@ def test_steady_fins_give_the_plants_force(name: str) -> None:
 @pytest.mark.parametrize("direction", [0.0, 1.1])
 def test_ripple_has_the_mean_of_the_fin_law(pair: Layout, direction: float) -> None:
     still, motion = (flapping(pair, 0.45, 2.0, direction) for _ in range(2))
-    mean = ActuatorForce(pair, still).of_fins(DT)[0]
+    mean = ActuatorForce(pair, still).of_fins(STEP_S)[0]
     ripple = cycle_mean(RippleForce(pair, motion), motion)
     np.testing.assert_allclose(ripple, mean, atol=0.01 * np.linalg.norm(mean))

@@ -15,6 +15,7 @@ from finlab.swim.vehicle.attitude import euler
 STATE = np.zeros(13)
 STATE[:4] = (1.0, 2.0, -3.0, 1.0)
 STATE[7] = 0.2
+"""State (13,) of a robot at 1, 2, -3 m, upright, with a surge of 0.2 m/s."""
 
 
 def seen(settings: SensorSettings, steps: int, seed: int = 0) -> list[Measurement]:

@@ -11,11 +11,12 @@ from finlab.layout.effectiveness import own_effectiveness
 from finlab.research.evaluation.experiments.hard_days import BUILT_OFF
 from finlab.swim.simulation import ClosedLoop, make_trajectory, perturbed
 from finlab.swim.vehicle.attitude import euler
-from tests.any_robot import AnyRobot
+from tests.allocator_cache import AllocatorCache
 
 
 @pytest.fixture(scope="module")
 def robot() -> Layout:
+    """Robot A as it is drawn."""
     return load_layout("A")
 
 
@@ -34,7 +35,10 @@ def test_a_robot_built_askew_feels_its_fins_elsewhere(robot: Layout) -> None:
 
 def test_a_robot_built_askew_stays_afoot(robot: Layout) -> None:
     loop = ClosedLoop(
-        robot, AnyRobot().on(robot), make_trajectory("circle"), truth=perturbed(robot, **BUILT_OFF)
+        robot,
+        AllocatorCache().on(robot),
+        make_trajectory("circle"),
+        truth=perturbed(robot, **BUILT_OFF),
     )
     for _ in range(120):
         loop.step()
@@ -44,7 +48,7 @@ def test_a_robot_built_askew_stays_afoot(robot: Layout) -> None:
     assert np.linalg.norm(given[60:].mean(axis=0)) > 0.01
 
 
-def test_what_makes_no_sense_is_refused(robot: Layout, analytic: AnyRobot) -> None:
+def test_what_makes_no_sense_is_refused(robot: Layout, analytic: AllocatorCache) -> None:
     for wrong in ({"damping": 0.0}, {"buoyancy": math.nan}):
         with pytest.raises(LayoutError):
             perturbed(robot, **wrong)  # type: ignore[arg-type]

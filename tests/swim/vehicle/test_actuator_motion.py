@@ -13,9 +13,11 @@ from finlab.swim.vehicle.actuator_motion import ActuatorMotion
 from finlab.swim.vehicle.fin_motion import FinLag
 
 LAW = PowerLaw(1.0)
+"""Power over force of the thrusters."""
 THRUSTER = Thruster(
     "t", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (-20.0, 30.0), LAW, time_constant=0.3, rate=25.0
 )
+"""A thruster with a lag and a rate."""
 AZIMUTH = Azimuth(
     "a",
     (0.0, 0.0, 0.0),
@@ -26,6 +28,7 @@ AZIMUTH = Azimuth(
     turn_rate=1.5,
     time_constant=0.2,
 )
+"""A pod with a lag and rates."""
 RUDDER = Rudder(
     "r",
     (-1.0, 0.0, 0.0),
@@ -37,10 +40,12 @@ RUDDER = Rudder(
     time_constant=0.1,
     rate=1.0,
 )
+"""A rudder with a rate."""
 
 
 @pytest.fixture
 def mixed() -> Layout:
+    """A robot of all kinds, its fins not side by side."""
     fins = load_layout("pair").actuators
     return Layout("mixed", (THRUSTER, fins[0], AZIMUTH, RUDDER, fins[1]))
 

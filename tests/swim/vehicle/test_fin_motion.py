@@ -12,11 +12,13 @@ from finlab.assets import shipped_layouts
 from finlab.layout import Layout, Servo, load_layout
 from finlab.swim.vehicle.fin_motion import FinLag, FinMotion, fin_power
 
-DT = 0.01
+STEP_S = 0.01
+"""A step of the simulation [s]."""
 
 
 @pytest.fixture(scope="module")
 def pair() -> Layout:
+    """Two fins."""
     return load_layout(shipped_layouts()["pair"])
 
 
@@ -41,7 +43,7 @@ def test_the_filters_are_critically_damped_and_exact(pair: Layout) -> None:
     motion = FinMotion(layout)
     command = np.array([[0.3, 1.0, 1.2], [0.5, 0.7, -0.4]])
     for _ in range(37):
-        motion.step(command, DT)
+        motion.step(command, STEP_S)
     for value, aim, gains in (
         (motion.value[0], command[:, 0], (15.0, 6.0)),
         (motion.value[1], command[:, 1], (15.0, 10.0)),
@@ -50,7 +52,7 @@ def test_the_filters_are_critically_damped_and_exact(pair: Layout) -> None:
         for i, k in enumerate(gains):
             exact = solve_ivp(
                 lambda _, y, k=k, goal=aim[i]: [y[1], k * (k / 4 * (goal - y[0]) - y[1])],
-                (0.0, 37 * DT),
+                (0.0, 37 * STEP_S),
                 [0.0, 0.0],
                 rtol=1e-10,
                 atol=1e-12,
@@ -62,7 +64,7 @@ def test_fins_turn_the_short_way_over_the_seam(pair: Layout) -> None:
     motion = FinMotion(pair)
     motion.value[2][:] = 3.0
     for _ in range(300):
-        motion.step(np.tile([0.2, 1.0, -3.0], (2, 1)), DT)
+        motion.step(np.tile([0.2, 1.0, -3.0], (2, 1)), STEP_S)
     np.testing.assert_allclose(motion.value[2], 2 * math.pi - 3.0, atol=1e-3)
 
 
@@ -70,17 +72,17 @@ def test_speed_limit_cuts_fast_flapping_and_turning(pair: Layout) -> None:
     motion = FinMotion(driven(pair, Servo(speed_limit=4.0)))
     speeds = []
     for _ in range(300):
-        motion.step(np.tile([0.6, 2.0, 3.1], (2, 1)), DT)
+        motion.step(np.tile([0.6, 2.0, 3.1], (2, 1)), STEP_S)
         speeds.append(np.abs(motion.value[0] * 2 * math.pi * motion.value[1]).max())
     assert speeds[-1] == pytest.approx(4.0) and max(speeds) <= 4.0 + 1e-9
     for _ in range(30):  # the frequency falls, the amplitude may grow again
-        motion.step(np.tile([0.6, 1.0, 3.1], (2, 1)), DT)
+        motion.step(np.tile([0.6, 1.0, 3.1], (2, 1)), STEP_S)
         assert np.abs(motion.value[0] * 2 * math.pi * motion.value[1]).max() <= 4.0 + 1e-9
     free = FinMotion(pair)
     slow = FinMotion(driven(pair, Servo(speed_limit=0.5)))
     for _ in range(50):
         for each in (free, slow):
-            each.step(np.tile([0.05, 0.1, 3.0], (2, 1)), DT)
+            each.step(np.tile([0.05, 0.1, 3.0], (2, 1)), STEP_S)
     assert slow.value[2][0] < free.value[2][0] - 0.5
 
 
@@ -111,8 +113,8 @@ def test_mean_power_is_what_a_sinusoid_has(pair: Layout) -> None:
     inertial = []
     torque = []
     driving = []
-    for _ in range(10 * round(1 / (frequency * DT))):
-        motion.step(command, DT)
+    for _ in range(10 * round(1 / (frequency * STEP_S))):
+        motion.step(command, STEP_S)
         power = fin_power(*motion.speed_and_acceleration(), Blade(), 0.7)
         inertial.append(power.inertial[0])
         torque.append(fin_power(*motion.speed_and_acceleration(), Blade(), 0.0).driving[0])

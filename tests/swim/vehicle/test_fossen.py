@@ -26,9 +26,11 @@ from finlab.swim.vehicle.vehicle import Vehicle
 SIGNS = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
 """Of surge, sway, heave, roll, pitch, yaw under half a turn about x, from NED to FLU or back."""
 FLIP = np.diag(SIGNS[:3])
+"""Matrix (3, 3) between z up and y left, and z down and y right."""
 
 
 def skew(a: np.ndarray) -> np.ndarray:
+    """Matrix (3, 3) S(a) with S(a) b = a x b."""
     return np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])
 
 
@@ -40,12 +42,14 @@ def coriolis(m: np.ndarray, nu: np.ndarray) -> np.ndarray:
 
 
 def euler_of(r: np.ndarray) -> np.ndarray:
+    """Roll, pitch and yaw [rad] of a rotation matrix."""
     return np.array(
         [np.arctan2(r[2, 1], r[2, 2]), -np.arcsin(r[2, 0]), np.arctan2(r[1, 0], r[0, 0])]
     )
 
 
 def rotation_of(phi: float, theta: float, psi: float) -> np.ndarray:
+    """Rotation matrix (3, 3) of roll, pitch and yaw [rad]: Fossen's R(Theta)."""
     c = np.cos
     s = np.sin
     rx = np.array([[1, 0, 0], [0, c(phi), -s(phi)], [0, s(phi), c(phi)]])

@@ -10,16 +10,23 @@ from finlab.swim.vehicle.many_bodies import Bodies, body_rates, body_velocity, d
 from finlab.swim.vehicle.vehicle import Vehicle
 
 CURRENT = (0.07, -0.04)
+"""Current of the water, horizontal [m/s]."""
 
 
-CENTER = (0.001, -0.002, 0.05)
-MORE_LIFT = 1.5
+CENTER_OF_BUOYANCY = (0.001, -0.002, 0.05)
+"""Of the body [m]."""
+NET_BUOYANCY = 1.5
+"""Buoyancy less weight [N]."""
 BODY = ucat_body()
 assert BODY.mass_kg is not None
-BODY = replace(BODY, center_of_buoyancy_m=CENTER, buoyancy_n=BODY.mass_kg * GRAVITY + MORE_LIFT)
+BODY = replace(
+    BODY, center_of_buoyancy_m=CENTER_OF_BUOYANCY, buoyancy_n=BODY.mass_kg * GRAVITY + NET_BUOYANCY
+)
+"""U-CAT's body, lighter than water, with its center of buoyancy a little off the vertical."""
 
 
 def quaternion(angles: np.ndarray) -> np.ndarray:
+    """Quaternion (4,) of roll, pitch and yaw (3,) [rad]."""
     return np.array(quaternion_of(*angles.tolist()))
 
 
@@ -32,7 +39,8 @@ def bodies(count: int) -> tuple[Bodies, np.ndarray]:
     return Dynamics(*map(spread, dynamics_of(BODY))), spread(CURRENT)
 
 
-def of_vehicle() -> Vehicle:
+def vehicle_of_body() -> Vehicle:
+    """The vehicle of the body in this current."""
     return Vehicle(BODY, (*CURRENT, 0.0))
 
 
@@ -45,7 +53,7 @@ def test_derivatives_agree_with_the_vehicle() -> None:
         angles = state[3:6, k]
         full = np.concatenate([state[:3, k], quaternion(angles), state[6:, k]])
         np.testing.assert_allclose(euler(full[3:7]), angles, atol=1e-12)
-        exact = np.array(of_vehicle().derivative(full.tolist(), wrench[:, k].tolist()))
+        exact = np.array(vehicle_of_body().derivative(full.tolist(), wrench[:, k].tolist()))
         np.testing.assert_allclose(
             rate[[0, 1, 2, *range(6, 12)], k], exact[[0, 1, 2, *range(7, 13)]], atol=1e-9
         )
@@ -59,7 +67,7 @@ def test_integration_follows_the_vehicle() -> None:
     start = np.concatenate([rng.uniform(-0.2, 0.2, 6), rng.uniform(-0.1, 0.1, 6)])
     found = integrate(start[:, None], wrench[..., None], *bodies(1), 0.1)[..., 0]
     state = np.concatenate([start[:3], quaternion(start[3:6]), start[6:]])
-    vehicle = of_vehicle()
+    vehicle = vehicle_of_body()
     for k in range(80):
         np.testing.assert_allclose(
             found[k, [0, 1, 2, *range(6, 12)]], state[[0, 1, 2, *range(7, 13)]], atol=2e-3

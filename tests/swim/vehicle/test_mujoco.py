@@ -14,14 +14,20 @@ from finlab.layout import Body
 from finlab.swim.vehicle.vehicle import STATE_SIZE, Vehicle
 
 MASS = 19.0
+"""Of the body [kg]."""
 INERTIA = (0.1574, 0.4646, 0.51151)
-DT = 0.01
-SECONDS = 60.0
-HOLD = 50
-AXES = [" ".join("1" if i == k else "0" for i in range(6)) for k in range(6)]
-MODEL = f"""
+"""About its axes [kg m2]."""
+STEP_S = 0.01
+"""A step of both simulations [s]."""
+DURATION_S = 60.0
+"""Length of the comparison [s]."""
+HELD_STEPS = 50
+"""Steps during which a wrench is held."""
+MOTOR_GEARS = [" ".join("1" if i == k else "0" for i in range(6)) for k in range(6)]
+"""MuJoCo's `gear` of a motor along each axis."""
+MUJOCO_MODEL = f"""
 <mujoco>
-  <option timestep="{DT}" integrator="RK4" gravity="0 0 0" density="0" viscosity="0"/>
+  <option timestep="{STEP_S}" integrator="RK4" gravity="0 0 0" density="0" viscosity="0"/>
   <worldbody>
     <body name="robot">
       <freejoint/>
@@ -30,10 +36,11 @@ MODEL = f"""
     </body>
   </worldbody>
   <actuator>
-    {"".join(f'<motor site="center" gear="{axis}"/>' for axis in AXES)}
+    {"".join(f'<motor site="center" gear="{axis}"/>' for axis in MOTOR_GEARS)}
   </actuator>
 </mujoco>
 """
+"""A free body with a motor along each axis."""
 
 
 def matrix_of(quaternion: np.ndarray) -> np.ndarray:
@@ -43,19 +50,19 @@ def matrix_of(quaternion: np.ndarray) -> np.ndarray:
 
 def test_a_minute_under_changing_wrenches_agrees() -> None:
     rng = np.random.default_rng(0)
-    model = mujoco.MjModel.from_xml_string(MODEL)
+    model = mujoco.MjModel.from_xml_string(MUJOCO_MODEL)
     data = mujoco.MjData(model)
     vehicle = Vehicle(Body(mass_kg=MASS, inertia_kgm2=INERTIA, buoyancy_n=MASS * 9.81))
     state = np.zeros(STATE_SIZE)
     state[3] = 1.0
     wrench = np.zeros(6)
     worst_place = worst_angle = 0.0
-    for k in range(round(SECONDS / DT)):
-        if k % HOLD == 0:
+    for k in range(round(DURATION_S / STEP_S)):
+        if k % HELD_STEPS == 0:
             wrench = rng.uniform(-1, 1, 6) * (4.0, 4.0, 4.0, 0.05, 0.05, 0.05)
         data.ctrl[:] = wrench
         mujoco.mj_step(model, data)
-        state = vehicle.step(state, wrench.tolist(), DT)
+        state = vehicle.step(state, wrench.tolist(), STEP_S)
         turn = matrix_of(state[3:7]).T @ matrix_of(data.qpos[3:7])
         angle = (
             np.linalg.norm(

@@ -12,7 +12,8 @@ from finlab.swim.vehicle.attitude import quaternion_of
 from finlab.swim.vehicle.fossen import complete_body
 from finlab.swim.vehicle.vehicle import STATE_SIZE, Vehicle
 
-STILL = (0.0,) * 6
+NO_WRENCH = (0.0,) * 6
+"""No force and no torque."""
 
 
 @pytest.fixture
@@ -22,14 +23,16 @@ def ucat(layout_a: Layout) -> Body:
 
 
 def at_rest() -> np.ndarray:
+    """State at rest at the origin, upright."""
     state = np.zeros(STATE_SIZE)
     state[3] = 1.0
     return state
 
 
-def swim(
+def state_after(
     vehicle: Vehicle, state: np.ndarray, wrench: tuple[float, ...], seconds: float, dt: float
 ) -> np.ndarray:
+    """State of a vehicle after some seconds of a constant wrench."""
     for _ in range(round(seconds / dt)):
         state = vehicle.step(state, wrench, dt)
     return state
@@ -42,7 +45,7 @@ def test_surge_under_quadratic_drag_is_a_hyperbolic_tangent(ucat: Body) -> None:
     vehicle = Vehicle(replace(ucat, linear_damping=(0.0,) * 6))
     mass = vehicle.inertia[0]
     drag = ucat.quadratic_damping[0]
-    state = swim(vehicle, at_rest(), (force, 0, 0, 0, 0, 0), time, 0.01)
+    state = state_after(vehicle, at_rest(), (force, 0, 0, 0, 0, 0), time, 0.01)
     rate = math.sqrt(force * drag) / mass
     assert state[7] == pytest.approx(math.sqrt(force / drag) * math.tanh(rate * time), abs=1e-9)
     assert state[0] == pytest.approx(mass / drag * math.log(math.cosh(rate * time)), abs=1e-8)
@@ -53,8 +56,8 @@ def test_a_robot_without_thrust_ends_up_drifting_with_the_water(ucat: Body) -> N
     state = at_rest()
     state[3:7] = quaternion_of(0.0, 0.0, 0.7)
     vehicle = Vehicle(ucat, current)
-    state = swim(vehicle, state, STILL, 150.0, 0.1)
-    after = vehicle.step(state, STILL, 0.1)
+    state = state_after(vehicle, state, NO_WRENCH, 150.0, 0.1)
+    after = vehicle.step(state, NO_WRENCH, 0.1)
     np.testing.assert_allclose((after[:3] - state[:3]) / 0.1, current, atol=2e-3)
 
 
@@ -75,7 +78,7 @@ def test_without_drag_the_energy_is_kept(ucat: Body) -> None:
     state = at_rest()
     state[7:] = (0.3, 0.1, -0.2, 0.4, 0.3, 0.5)
     before = energy_of(vehicle, state)
-    assert energy_of(vehicle, swim(vehicle, state, STILL, 10.0, 0.01)) == pytest.approx(
+    assert energy_of(vehicle, state_after(vehicle, state, NO_WRENCH, 10.0, 0.01)) == pytest.approx(
         before, abs=1e-5
     )
 
@@ -86,13 +89,14 @@ def test_runge_kutta_is_of_fourth_order(ucat: Body) -> None:
     start = at_rest()
     start[7:] = (0.4, -0.2, 0.1, 0.5, -0.4, 0.6)
     wrench = (4.0, 1.0, -2.0, 0.3, 0.2, 0.8)
-    fine = swim(vehicle, start, wrench, 2.0, 0.000625)
+    fine = state_after(vehicle, start, wrench, 2.0, 0.000625)
     errors = [
-        np.abs(swim(vehicle, start, wrench, 2.0, dt) - fine).max() for dt in (0.04, 0.02, 0.01)
+        np.abs(state_after(vehicle, start, wrench, 2.0, dt) - fine).max()
+        for dt in (0.04, 0.02, 0.01)
     ]
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
     assert (orders > 3.7).all(), orders
-    assert np.abs(swim(vehicle, start, wrench, 2.0, 0.01) - fine).max() < 1e-7, (
+    assert np.abs(state_after(vehicle, start, wrench, 2.0, 0.01) - fine).max() < 1e-7, (
         "the step that is used"
     )
 
@@ -103,7 +107,7 @@ def test_water_that_holds_a_light_body_fast_does_not_shake_it(ucat: Body) -> Non
     body = replace(
         ucat, linear_damping=(0.0,) * 6, quadratic_damping=(2e3,) * 6, added_mass=None, mass_kg=1.0
     )
-    state = swim(Vehicle(body), at_rest(), (8.0, 0, 0, 0, 0, 0), 2.0, 0.02)
+    state = state_after(Vehicle(body), at_rest(), (8.0, 0, 0, 0, 0, 0), 2.0, 0.02)
     assert state[7] == pytest.approx(math.sqrt(8.0 / 2e3), rel=1e-4)
 
 
@@ -113,9 +117,9 @@ def test_shipped_robots_need_one_step_and_impossible_ones_say_so(ucat: Body) -> 
     with pytest.raises(
         LayoutError, match=r"body: its motion changes .* times a second.*check mass, inertia"
     ):
-        vehicle.step(at_rest(), STILL, 0.02)
+        vehicle.step(at_rest(), NO_WRENCH, 0.02)
     with pytest.raises(LayoutError, match="beyond all bounds"):
-        vehicle.step(np.full(STATE_SIZE, np.nan), STILL, 0.02)
+        vehicle.step(np.full(STATE_SIZE, np.nan), NO_WRENCH, 0.02)
 
 
 def test_a_motion_beyond_all_bounds_is_a_sentence(ucat: Body) -> None:
@@ -133,7 +137,7 @@ def test_a_motion_beyond_all_bounds_is_a_sentence(ucat: Body) -> None:
         vehicle = Vehicle(light)
         wrench = tuple((10.0 ** rng.uniform(0, 6, 6)).tolist())
         try:
-            swim(vehicle, at_rest(), wrench, 0.5, 0.1)
+            state_after(vehicle, at_rest(), wrench, 0.5, 0.1)
         except LayoutError as error:
             refused += "its motion changes" in str(error)
     assert refused > 100

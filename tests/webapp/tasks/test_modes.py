@@ -1,6 +1,7 @@
 """Distinct ways to deliver a wrench: what counts as the same, and what is told of each."""
 
 import math
+from itertools import combinations, starmap
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from finlab.allocation.solution import Candidates
 from finlab.assets import shipped_layouts
 from finlab.layout import load_layout
 from finlab.physics import Plant
-from tests.any_robot import AnyRobot, normalized_error
+from tests.allocator_cache import AllocatorCache, normalized_error
 from webapp.tasks.modes import (
     ModeSignature,
     cluster,
@@ -20,13 +21,18 @@ from webapp.tasks.modes import (
     signature_difference,
 )
 
-LOWER = np.tile([0.05, 0.1, -math.pi], (2, 1))
-UPPER = np.tile([0.6, 2.1, math.pi], (2, 1))
-PUSH = (0.4, 1.5, 0.0)
-REST = (0.05, 0.1, 0.0)
+COMMAND_MIN = np.tile([0.05, 0.1, -math.pi], (2, 1))
+"""Lower limits (2, 3) of two fins."""
+COMMAND_MAX = np.tile([0.6, 2.1, math.pi], (2, 1))
+"""Their upper limits."""
+PUSH_COMMAND = (0.4, 1.5, 0.0)
+"""A command of a fin that pushes."""
+REST_COMMAND = (0.05, 0.1, 0.0)
+"""A command of a fin that rests."""
 
 
-def candidates(*commands: list[tuple[float, ...]]) -> Candidates:
+def candidates_of(*commands: list[tuple[float, ...]]) -> Candidates:
+    """Candidates by the commands of their fins, the cheaper ones first."""
     command = np.array(commands)
     k = len(command)
     return Candidates(
@@ -53,27 +59,31 @@ def signature_of(command: np.ndarray) -> ModeSignature:
 def test_a_fin_rests_by_its_own_law() -> None:
     """The same beat is rest for a small fin beside a large one; nothing rests where nothing
     pushes."""
-    command = np.array([PUSH, PUSH, (math.nan,) * 3])
+    command = np.array([PUSH_COMMAND, PUSH_COMMAND, (math.nan,) * 3])
     force = np.array([(2.0, 0.2, 0.0), (2.0, 0.0, 0.0), (0.0, 0.0, 0.0)])
     resting = mode_signature(np.array([command] * 3), force).resting
     assert resting.tolist() == [[False, True, False], [False, True, False], [False] * 3]
 
 
 def test_the_same_fins_at_rest_are_the_same_mode_whatever_they_do_there() -> None:
-    told = candidates([PUSH, REST], [PUSH, (0.05, 0.1, 2.0)], [REST, PUSH])
-    modes = find_modes(told, drag(told.command), LOWER, UPPER)
+    told = candidates_of(
+        [PUSH_COMMAND, REST_COMMAND], [PUSH_COMMAND, (0.05, 0.1, 2.0)], [REST_COMMAND, PUSH_COMMAND]
+    )
+    modes = find_modes(told, drag(told.command), COMMAND_MIN, COMMAND_MAX)
     assert [mode.resting for mode in modes] == [(1,), (0,)]
     assert modes[1].effort == 3.0 and modes[1].power == 9.0 and modes[0].saturation < 1.0
 
 
 def test_angles_are_compared_the_shorter_way_round() -> None:
-    one = signature_of(np.array([PUSH, (0.4, 1.5, math.pi - 0.05)]))
-    assert same_signature(one, signature_of(np.array([PUSH, (0.4, 1.5, 0.05 - math.pi)])))
-    assert not same_signature(one, signature_of(np.array([PUSH, (0.4, 1.5, 0.6 - math.pi)])))
+    one = signature_of(np.array([PUSH_COMMAND, (0.4, 1.5, math.pi - 0.05)]))
+    assert same_signature(one, signature_of(np.array([PUSH_COMMAND, (0.4, 1.5, 0.05 - math.pi)])))
+    assert not same_signature(
+        one, signature_of(np.array([PUSH_COMMAND, (0.4, 1.5, 0.6 - math.pi)]))
+    )
 
 
 def test_modes_of_an_answer_deliver_the_wrench_in_different_ways() -> None:
-    search = AnyRobot("mdn")
+    search = AllocatorCache("mdn")
     layout = load_layout(shipped_layouts()["penta"])
     target = np.array([1.0, 0.5, 2.0, 0.0, 0.1, 0.1])
     before = search.allocate(layout, 0.9 * target).command
@@ -88,8 +98,8 @@ def test_modes_of_an_answer_deliver_the_wrench_in_different_ways() -> None:
     )
     wrench = Plant(layout).wrench(np.array([mode.command for mode in modes]))
     assert normalized_error(search.normalization, wrench, target).max() < 1e-3
-    ways = [mode.signature for mode in modes]
-    assert not any(same_signature(a, b) for i, a in enumerate(ways) for b in ways[:i])
+    signatures = [mode.signature for mode in modes]
+    assert not any(starmap(same_signature, combinations(signatures, 2)))
     bow = layout.index("bow")
     assert all(np.isnan(mode.command[bow]).all() for mode in modes)
 
@@ -137,5 +147,5 @@ def test_what_counts_as_different() -> None:
 
 def test_groups_are_led_by_their_first() -> None:
     """The third differs from the first, though not from the second: it leads a group of its own."""
-    ways = np.array([[PUSH, (0.4, 1.5, angle)] for angle in (0.0, 0.3, 0.6, 0.1, 0.7)])
+    ways = np.array([[PUSH_COMMAND, (0.4, 1.5, angle)] for angle in (0.0, 0.3, 0.6, 0.1, 0.7)])
     assert cluster(signature_of(ways)) == [[0, 1, 3], [2, 4]]

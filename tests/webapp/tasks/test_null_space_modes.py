@@ -20,15 +20,18 @@ from webapp.tasks.null_space_modes import MOST, null_space_modes
 from webapp.tasks.solver import Solver
 
 HYBRID = load_layout("turtle_hybrid")
+"""Fins and thrusters."""
 BLUEROV = load_layout("bluerov2_heavy")
-ASKED = (1.2, 0.0, 0.0, 0.0, 0.0, 0.25)
+"""Eight thrusters."""
+TARGET = (1.2, 0.0, 0.0, 0.0, 0.0, 0.25)
+"""A wrench in surge and yaw [N, N m]."""
 
 
 @pytest.mark.parametrize(
     "layout", [HYBRID, BLUEROV, load_layout("ucat")], ids=lambda layout: layout.name
 )
 def test_another_way_is_exact_and_dearer_and_the_mean_stands_beside_it(layout: Layout) -> None:
-    answer = Solver().solve(State(layout, target=ASKED))
+    answer = Solver().solve(State(layout, target=TARGET))
     (alone,) = null_space_modes(answer, ()).visible
     assert alone.badge == "optimum" and np.array_equal(alone.mode.command, answer.command)
     modes = null_space_modes(answer, (0.0, 4.0))
@@ -86,7 +89,7 @@ def test_sliders_move_the_robot_until_something_else_is_asked() -> None:
 
 
 def test_the_table_of_candidates_has_commands_that_give_its_figures() -> None:
-    answer = Solver().solve(State(HYBRID, target=ASKED))
+    answer = Solver().solve(State(HYBRID, target=TARGET))
     rows = list(
         csv.DictReader(io.StringIO(modes_csv(answer, null_space_modes(answer, (5.0,))).decode()))
     )
@@ -94,6 +97,6 @@ def test_the_table_of_candidates_has_commands_that_give_its_figures() -> None:
     for row in rows:
         force = [[float(row[f"{name}.F{axis}_n"]) for axis in "xyz"] for name in HYBRID.names]
         if row["origin"] != "average":
-            np.testing.assert_allclose(np.sum(force, axis=0), ASKED[:3], atol=1e-6)
+            np.testing.assert_allclose(np.sum(force, axis=0), TARGET[:3], atol=1e-6)
         assert float(row["power_w"]) >= answer.power * (1 - 1e-9) and row["effort"] == ""
     assert float(rows[0]["lift_left.force_n"]) == pytest.approx(answer.command[4, 0])

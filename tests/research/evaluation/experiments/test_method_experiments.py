@@ -30,6 +30,7 @@ from tools import cost
 
 
 def by(rows: list[Row], *keys: str) -> dict[Any, Row]:
+    """Rows of a table by the value of a column, or by those of several."""
     return {tuple(row[key] for key in keys) if len(keys) > 1 else row[keys[0]]: row for row in rows}
 
 
@@ -169,22 +170,27 @@ def test_the_ablation_scores_twice(monkeypatch: pytest.MonkeyPatch) -> None:
         experiment.rows(variants=("theirs",))
 
 
-GROUPS = 100
-EACH = 20
-SPREAD = 1.96 * np.sqrt(2.0)
+N_GROUPS = 100
+"""How many groups the made-up values have."""
+GROUP_SIZE = 20
+"""How many values a group has."""
+INTERVAL_HALF_WIDTH = 1.96 * np.sqrt(2.0)
+"""Half of a 95 % interval of a difference of two normal values: 1.96 sqrt(2)."""
 
 
 def _draw(seed: int) -> tuple[np.ndarray, np.ndarray]:
     """Values that resemble each other within a group: the spread of groups is what counts."""
     rng = np.random.default_rng(seed)
-    group = np.repeat(np.arange(GROUPS), EACH)
-    return 5.0 + np.repeat(rng.normal(size=GROUPS), EACH) + 0.1 * rng.normal(size=len(group)), group
+    group = np.repeat(np.arange(N_GROUPS), GROUP_SIZE)
+    return 5.0 + np.repeat(rng.normal(size=N_GROUPS), GROUP_SIZE) + 0.1 * rng.normal(
+        size=len(group)
+    ), group
 
 
 def test_the_width_is_that_of_the_groups() -> None:
     values, group = _draw(0)
     low, high = mean_interval(values, group)
-    assert high - low == pytest.approx(2 * SPREAD / np.sqrt(GROUPS), rel=0.15)
+    assert high - low == pytest.approx(2 * INTERVAL_HALF_WIDTH / np.sqrt(N_GROUPS), rel=0.15)
 
 
 @pytest.mark.parametrize("kind", ["mean", "share", "ratio"])
@@ -195,11 +201,13 @@ def test_reruns_land_inside(kind: str) -> None:
             return values.mean(), mean_interval(values, group)
         if kind == "share":
             return (values < 5.5).mean(), scoring.share_interval(values < 5.5, group)
-        below = values + np.random.default_rng(seed + 999).normal(size=GROUPS).repeat(EACH)
+        below = values + np.random.default_rng(seed + 999).normal(size=N_GROUPS).repeat(GROUP_SIZE)
         return values.sum() / below.sum(), ratio_interval(values, below, group)
 
     seen = [look(seed) for seed in range(24)]
-    inside = [low <= value <= high for value, _ in seen for _, (low, high) in seen]
+    values = np.array([value for value, _ in seen])[:, None]
+    low, high = np.array([interval for _, interval in seen]).T
+    inside = (low <= values) & (values <= high)
     assert np.mean(inside) > 0.88
 
 
@@ -211,7 +219,7 @@ def test_no_failure_is_no_proof() -> None:
 def test_one_layout_is_drawn_by_its_targets() -> None:
     values = np.random.default_rng(0).normal(size=400)
     low, high = mean_interval(values, np.zeros(400, np.int64))
-    assert 0 < high - low == pytest.approx(2 * SPREAD / 20, rel=0.2)
+    assert 0 < high - low == pytest.approx(2 * INTERVAL_HALF_WIDTH / 20, rel=0.2)
 
 
 def test_same_seed_same_interval() -> None:

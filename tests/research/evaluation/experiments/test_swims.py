@@ -12,11 +12,11 @@ from finlab.research.evaluation.experiments.swims import DAYS, day_rows, swim_fi
 from finlab.swim.simulation import RunLog
 from finlab.swim.vehicle.fossen import complete_body
 from finlab.swim.vehicle.vehicle import Vehicle
-from tests.any_robot import AnyRobot
+from tests.allocator_cache import AllocatorCache
 
 
 @pytest.mark.parametrize("day", HARD_DAYS, ids=lambda day: day.name)
-def test_every_day_can_be_swum(day: HardDay, analytic: AnyRobot) -> None:
+def test_every_day_can_be_swum(day: HardDay, analytic: AllocatorCache) -> None:
     """One tick of the first case of every layout."""
     first = {case.layout: case for case in reversed(day.cases())}
     assert set(first) == set(day.layouts)
@@ -26,7 +26,7 @@ def test_every_day_can_be_swum(day: HardDay, analytic: AnyRobot) -> None:
         assert (loop.monitor is None) == day.announced
 
 
-def test_what_is_true_is_not_what_is_believed(analytic: AnyRobot) -> None:
+def test_what_is_true_is_not_what_is_believed(analytic: AllocatorCache) -> None:
     damped = DAYS["damping-double"].swim(HardDaySwim("A", ()), analytic, 0)
     plain = DAYS["nominal"].swim(HardDaySwim("A", ()), analytic, 0)
     assert damped.layout == plain.layout
@@ -40,7 +40,7 @@ def test_what_is_true_is_not_what_is_believed(analytic: AnyRobot) -> None:
     )
 
 
-def test_a_body_that_is_drawn_too_small_and_who_steers_it(analytic: AnyRobot) -> None:
+def test_a_body_that_is_drawn_too_small_and_who_steers_it(analytic: AllocatorCache) -> None:
     high = DAYS["parameters-high"].swim(HardDaySwim("B", ()), analytic, 0)
     drawn = high.layout
     true = high.vehicle
@@ -106,7 +106,7 @@ def test_figures_of_a_swim() -> None:
     assert found["cpu_s_per_min"] == pytest.approx(2.0)
 
 
-def test_a_short_day(analytic: AnyRobot) -> None:
+def test_a_short_day(analytic: AllocatorCache) -> None:
     day = replace(DAYS["lost-two"], duration_s=12.0, trajectory="station")
     (row,) = day_rows(day, {"analytic": analytic}, [1])
     assert row["swims"] == 4 and 0.0 < row["ate"] < 0.5

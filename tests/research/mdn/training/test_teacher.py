@@ -1,6 +1,8 @@
 """What the teacher tells: exact ways, told apart, the cheapest first, with weights by their
 cost."""
 
+from itertools import chain
+
 import numpy as np
 import pytest
 
@@ -12,20 +14,22 @@ from finlab.research.mdn.descent import realize, wrench
 from finlab.research.mdn.training import teacher
 from finlab.research.random_layouts import FIN_COUNTS, WIDE, random_fin_kinds, random_fin_robot
 
-STD = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
+WRENCH_SCALE = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
+"""Scale of errors in the six axes [N, N m]."""
 
 
-def told() -> tuple[EffortRobot, np.ndarray, teacher.Minima]:
+def robot_targets_and_minima() -> tuple[EffortRobot, np.ndarray, teacher.Minima]:
+    """A robot, targets of it, and the local minima that the teacher finds."""
     rng = np.random.default_rng(6)
     layout = random_fin_robot(rng, random_fin_kinds(rng, 2), 6)
-    robot = effort_robot(Plant(layout), STD)
+    robot = effort_robot(Plant(layout), WRENCH_SCALE)
     target = teacher.random_targets(rng, robot, 12)
     return robot, target, teacher.local_minima(rng, robot.forces, target)
 
 
 @pytest.fixture(scope="module")
 def effort() -> tuple[EffortRobot, np.ndarray, teacher.Minima]:
-    return told()
+    return robot_targets_and_minima()
 
 
 def test_ways_deliver_the_target_at_the_cost_that_is_told(
@@ -73,6 +77,7 @@ def test_roots_of_shares_keep_the_direction() -> None:
 
 @pytest.fixture(scope="module")
 def robots() -> list[Layout]:
+    """Sixty robots as training draws them."""
     rng = np.random.default_rng(1)
     kinds = random_fin_kinds(rng, 3)
     return [random_fin_robot(rng, kinds, int(rng.choice(list(FIN_COUNTS)))) for _ in range(60)]
@@ -82,7 +87,8 @@ def test_robots_are_of_all_kinds(robots: list[Layout]) -> None:
     assert {robot.n_fins for robot in robots} == set(range(2, 13))
     one_kind = [len({(fin.model, fin.limits) for fin in robot.fins}) == 1 for robot in robots]
     assert any(one_kind) and not all(one_kind)
-    assert {fin.model.type for robot in robots for fin in robot.fins} == set(WIDE)
+    fins = chain.from_iterable(robot.fins for robot in robots)
+    assert {fin.model.type for fin in fins} == set(WIDE)
     # Some robots have a fin whose mirror image, or whose twin above it, is a fin as well.
     symmetric = 0
     for robot in robots:

@@ -21,10 +21,12 @@ from finlab.research.training import loop
 from finlab.research.training.loop import first_weights
 
 SMOKE = RECIPES["smoke"]
+"""The recipe of a training of seconds."""
 
 
 @pytest.fixture(scope="module")
 def shard(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A file of the teacher's answers."""
     return write_answers(tmp_path_factory.mktemp("answers"), SMOKE.answers, 0, 0)
 
 
@@ -35,7 +37,8 @@ def test_a_file_of_answers_depends_on_its_seed_and_number(shard: Path, tmp_path:
     assert first.keys() == again.keys()
     for n, arrays in first.items():
         assert all(np.array_equal(values, again[n][name]) for name, values in arrays.items())
-    asked = [np.abs(group["asked"]).sum() for part in (first, other) for group in part.values()]
+    groups = [*first.values(), *other.values()]
+    asked = [np.abs(group["asked"]).sum() for group in groups]
     assert len(set(asked)) == len(asked)
 
 
@@ -73,6 +76,7 @@ def test_the_loss_is_per_fin_and_rewards_components_that_are_used(shard: Path) -
 
 @pytest.fixture(scope="module")
 def trained(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of a training that is done."""
     folder = tmp_path_factory.mktemp("trained")
     train_mdn("smoke", folder)
     return folder

@@ -21,12 +21,16 @@ from finlab.research.paper.training.samples import (
 )
 
 SETTINGS = DataSettings(layouts=30, commands=40, seed=3)
+"""A small data set."""
 CPU = torch.device("cpu")
-ALL = slice(None)
+"""Where tensors are."""
+ALL_COMMANDS = slice(None)
+"""Of a batch."""
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A data set of these settings."""
     path = tmp_path_factory.mktemp("data")
     generate(path, SETTINGS)
     return path
@@ -82,13 +86,17 @@ def test_an_epoch_has_every_sample_once_in_an_order_of_its_own(folder: Path) -> 
     samples = SampleSet(folder, CPU)
     size = 100
     epochs = [
-        torch.cat([samples.batch(12 * epoch + k, size, 1, False, ALL).wrench for k in range(12)])
+        torch.cat(
+            [samples.batch(12 * epoch + k, size, 1, False, ALL_COMMANDS).wrench for k in range(12)]
+        )
         for epoch in range(2)
     ]
     assert not torch.equal(*epochs)
     first, second = (np.unique(epoch.numpy(), axis=0) for epoch in epochs)
     assert len(first) == 1200 and np.array_equal(first, second)
-    again = SampleSet(folder, CPU).batch(7, size, 1, False, ALL)  # whatever was asked before
+    again = SampleSet(folder, CPU).batch(
+        7, size, 1, False, ALL_COMMANDS
+    )  # whatever was asked before
     assert torch.equal(again.wrench, epochs[0][700:800])
     halves = [samples.batch(7, size, 1, False, slice(k, k + 50)).wrench for k in (0, 50)]
     assert torch.equal(torch.cat(halves), again.wrench)
@@ -98,7 +106,7 @@ def test_a_step_of_one_layout_has_random_commands_of_it(folder: Path) -> None:
     samples = SampleSet(folder, CPU)
     seen = []
     for step in range(30):
-        batch = samples.batch(step, 16, 1, True, ALL)
+        batch = samples.batch(step, 16, 1, True, ALL_COMMANDS)
         assert (batch.position == batch.position[:1]).all() and len(batch.command.unique(dim=0)) > 8
         seen.append(batch.position[0])
     assert len(torch.stack(seen).unique(dim=0)) == 30

@@ -18,13 +18,19 @@ from finlab.research.random_layouts import random_layout
 from finlab.research.training.loop import first_weights
 from tests.torch_weights import arrays_of
 
-SIZES = NetworkConfig(width=32, heads=4, transformer_layers=2, feedforward=40, n_components=6)
-HIDDEN = SurrogateConfig(hidden=(24, 16))
-PLACE = ("position", "mounting_angle", "lower", "upper")
+NETWORK_SIZES = NetworkConfig(
+    width=32, heads=4, transformer_layers=2, feedforward=40, n_components=6
+)
+"""A network that is small enough to be compared quickly."""
+SURROGATE_SIZES = SurrogateConfig(hidden=(24, 16))
+"""A surrogate of two small layers."""
+GEOMETRY_FIELDS = ("position", "mounting_angle", "lower", "upper")
+"""Fields of a robot's fins that a network sees."""
 
 
 @pytest.fixture(scope="module")
 def robots() -> list[Layout]:
+    """Eight robots of two to five fins."""
     rng = np.random.default_rng(3)
     return [random_layout(rng, n_fins=n, limits="varied") for n in (2, 5, 3, 4, 5, 2, 3, 4)]
 
@@ -35,7 +41,7 @@ def padded(robots: list[Layout], fill: float) -> SampleBatch:
     parts: dict[str, list[np.ndarray]] = {name: [] for name in SampleBatch._fields}
     for layout in robots:
         command = rng.uniform(layout.lower, layout.upper)
-        own = {name: getattr(layout, name) for name in PLACE} | {"command": command}
+        own = {name: getattr(layout, name) for name in GEOMETRY_FIELDS} | {"command": command}
         for name, values in own.items():
             whole = np.full((N_FINS, *values.shape[1:]), fill)
             whole[: layout.n] = values
@@ -62,12 +68,14 @@ def weights_of(sizes: NetworkConfig | SurrogateConfig) -> dict[str, torch.Tensor
 def test_mixtures_of_a_padded_batch_are_those_of_each_robot_alone(
     robots: list[Layout], fill: float
 ) -> None:
-    weights = weights_of(SIZES)
+    weights = weights_of(NETWORK_SIZES)
     batch = padded(robots, fill)
-    together = SIZES(weights, modules.features(batch), batch.wrench, batch.mask)
+    together = NETWORK_SIZES(weights, modules.features(batch), batch.wrench, batch.mask)
     for row, layout in enumerate(robots):
-        x = raw_features(*(getattr(layout, name) for name in PLACE)).astype(np.float32)[None]
-        alone = SIZES(arrays_of(weights), x, batch.wrench[row : row + 1].numpy())
+        x = raw_features(*(getattr(layout, name) for name in GEOMETRY_FIELDS)).astype(np.float32)[
+            None
+        ]
+        alone = NETWORK_SIZES(arrays_of(weights), x, batch.wrench[row : row + 1].numpy())
         for got, expected in zip(together, alone, strict=True):
             np.testing.assert_allclose(got[row, : layout.n].detach(), expected[0], atol=1e-5)
 
@@ -76,15 +84,15 @@ def test_mixtures_of_a_padded_batch_are_those_of_each_robot_alone(
 def test_wrenches_of_a_padded_batch_are_those_of_each_robot_alone(
     robots: list[Layout], fill: float
 ) -> None:
-    tensors = weights_of(HIDDEN)
+    tensors = weights_of(SURROGATE_SIZES)
     batch = padded(robots, fill)
     weights = TrainedWeights(
         "one",
         WrenchNormalization(np.zeros(6), np.ones(6)),
-        surrogate_sizes={"kind": "mlp", "hidden": list(HIDDEN.hidden)},
+        surrogate_sizes={"kind": "mlp", "hidden": list(SURROGATE_SIZES.hidden)},
         surrogate=arrays_of(tensors),
     )
-    together = modules.surrogate_wrench(HIDDEN, tensors, batch.command, batch).detach()
+    together = modules.surrogate_wrench(SURROGATE_SIZES, tensors, batch.command, batch).detach()
     for row, layout in enumerate(robots):
         command = batch.command[row, : layout.n].numpy()
         np.testing.assert_allclose(
@@ -94,9 +102,9 @@ def test_wrenches_of_a_padded_batch_are_those_of_each_robot_alone(
 
 def test_no_gradient_comes_from_fins_that_do_not_exist(robots: list[Layout]) -> None:
     batch = padded(robots, 7.0)
-    weights = weights_of(SIZES)
+    weights = weights_of(NETWORK_SIZES)
     x = modules.features(batch).requires_grad_()
-    mixture = SIZES(weights, x, batch.wrench, batch.mask)
+    mixture = NETWORK_SIZES(weights, x, batch.wrench, batch.mask)
     sum(
         (part * batch.mask[..., None, None].squeeze(-1 if part.dim() == 3 else ())).sum()
         for part in mixture
@@ -105,18 +113,20 @@ def test_no_gradient_comes_from_fins_that_do_not_exist(robots: list[Layout]) -> 
     assert (x.grad[~batch.mask] == 0.0).all() and (x.grad[batch.mask].abs().sum(-1) > 0.0).all()
 
 
-M = 3
+N_COMPONENTS = 3
+"""Components of a mixture."""
 
 
 @pytest.fixture(scope="module")
 def batch() -> SampleBatch:
+    """Samples of twelve robots, two of each."""
     return fresh_batch(DataSettings(layouts=12, commands=2, seed=5))
 
 
 def mixture_of(batch: SampleBatch, log_std: float) -> Mixture:
     """A mixture whose components stand in the middle of the limits."""
     draw = torch.Generator().manual_seed(1)
-    shape = (*batch.mask.shape, M)
+    shape = (*batch.mask.shape, N_COMPONENTS)
     flat = torch.full((*shape, 3), log_std)
     return Mixture(torch.randn(shape, generator=draw), torch.zeros(*shape, 3), flat)
 

@@ -25,6 +25,7 @@ PATIENT = (
 
 @pytest.fixture(scope="module")
 def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A small data set."""
     folder = tmp_path_factory.mktemp("runs") / "data"
     assert main(["data", "generate", "-o", str(folder), "--layouts", "60", "--commands", "80"]) == 0
     return folder
@@ -43,6 +44,7 @@ def trained(data: Path) -> Path:
 
 
 def losses(folder: Path) -> list[float]:
+    """Losses of a log, step by step."""
     with (folder / "log.csv").open(newline="") as file:
         return [float(row["loss"]) for row in csv.DictReader(file)]
 
@@ -115,6 +117,7 @@ def test_a_killed_run_that_goes_on_has_the_weights_of_one_that_was_not(
 
 
 def _time_of(path: Path) -> float:
+    """When a file was written last [s]; 0 where there is none."""
     return path.stat().st_mtime if path.exists() else 0.0
 
 

@@ -1,4 +1,9 @@
-"""A method for whatever robot a test asks about."""
+"""`AllocatorCache`: a method with its settings, and its allocator of each robot that a test asks
+about.
+
+Tests of several robots load the networks of a method once, and not once a robot. Used by all rooms
+that allocate.
+"""
 
 from copy import copy
 from dataclasses import replace
@@ -22,19 +27,18 @@ from finlab.research.networks.checkpoint import read_normalization, resolve_chec
 from finlab.research.networks.trained import WrenchNormalization
 
 
-class AnyRobot:
+class AllocatorCache:
     """Makes an allocator for each robot, and keeps it."""
 
     def __init__(
         self, method: str | type[Method] = "dual", checkpoint: Checkpoint = None, **settings: Any
     ) -> None:
-        self.choice = (
-            choose_method(
-                method, checkpoint if method_class(method).needs_networks else None, **settings
-            )
-            if isinstance(method, str)
-            else MethodChoice(method, checked_settings(method, settings))
-        )
+        if not isinstance(method, str):
+            self.choice = MethodChoice(method, checked_settings(method, settings))
+        elif method_class(method).needs_networks:
+            self.choice = choose_method(method, checkpoint, **settings)
+        else:
+            self.choice = choose_method(method, None, **settings)
         self.name = self.choice.kind.name
         self._made: dict[Layout, Allocator] = {}
 
@@ -47,9 +51,11 @@ class AnyRobot:
 
     @property
     def settings(self) -> Settings:
+        """Settings of the method."""
         return self.choice.settings
 
-    def with_settings(self, **changes: Any) -> "AnyRobot":
+    def with_settings(self, **changes: Any) -> "AllocatorCache":
+        """The same method with some settings changed."""
         other = copy(self)
         settings = checked_settings(self.choice.kind, {**vars(self.settings), **changes})
         other.choice = replace(self.choice, settings=settings)
@@ -57,6 +63,7 @@ class AnyRobot:
         return other
 
     def on(self, layout: Layout) -> Allocator:
+        """The allocator of a robot, made at the first question."""
         if layout not in self._made:
             self._made[layout] = Allocator.of_choice(layout, self.choice)
         return self._made[layout]
@@ -66,9 +73,11 @@ class AnyRobot:
         return self.on(layout)._whole.method
 
     def allocate(self, layout: Layout, wrench: Any, **question: Any) -> Allocation:
+        """`Allocator.allocate` of a robot."""
         return self.on(layout).allocate(wrench, **question)
 
     def allocate_batch(self, layout: Layout, wrenches: Any, **question: Any) -> BatchAllocation:
+        """`Allocator.allocate_batch` of a robot."""
         return self.on(layout).allocate_batch(wrenches, **question)
 
 
@@ -77,9 +86,12 @@ def normalized_error(normalization: WrenchNormalization, wrench: Any, target: An
     return np.linalg.norm((np.asarray(wrench) - np.asarray(target)) / normalization.std, axis=-1)
 
 
-def _is_one(layout: Layout) -> bool:
+def _is_of_planar_fins(layout: Layout) -> bool:
+    """Whether a robot has fins alone, all with shafts across the hull as in the paper."""
     return layout.is_of_fins and all(fin.mounting_angle is not None for fin in layout.fins)
 
 
-FIN_ROBOTS = {name: path for name, path in shipped_layouts().items() if _is_one(load_layout(path))}
-"""Names and layout files."""
+FIN_ROBOTS = {
+    name: path for name, path in shipped_layouts().items() if _is_of_planar_fins(load_layout(path))
+}
+"""Name of a shipped robot of such fins -> its layout file."""

@@ -22,15 +22,18 @@ from finlab.core.library import PATH, library
 from finlab.layout import Azimuth, Layout
 from finlab.layout.load import parse_layout
 from finlab.physics.plant import Plant
-from tests.mixed_robots import KINDS, random_flow, random_robot, with_dead_bands, with_rates
+from tests.random_robots import KINDS, random_flow, random_robot, with_dead_bands, with_rates
 
-CORE = Path(core.__path__[0])
+CORE_FOLDER = Path(core.__path__[0])
+"""Where the headers stand."""
 REAL = ctypes.c_double
+"""`fl_real` and `fl_wide` of the library in this package."""
 MOST = 64
 """Most actuators of a robot."""
 FIN = constant("FL_FIN")
+"""Form of a fin's command, FL_FIN."""
 POD = constant("FL_POD")
-"""Forms of commands, FL_FIN and FL_POD."""
+"""Form of a pod's command, FL_POD."""
 POINTS = 8
 """Most points of a mixture, FL_POINTS."""
 _LENGTHS = {"FL_MOST": MOST, "FL_POINTS": POINTS}
@@ -56,9 +59,9 @@ def _fields(declarations: str) -> list[tuple[str, Any]]:
             kind = words[1]
         names = declaration.partition(kind)[2]
         for member in names.split(","):
-            found = _MEMBER.fullmatch(member)
-            assert found is not None, declaration
-            is_pointer, name, lengths = found.groups()
+            match = _MEMBER.fullmatch(member)
+            assert match is not None, declaration
+            is_pointer, name, lengths = match.groups()
             field_type = ctypes.c_void_p if is_pointer else _KINDS[kind]
             for length in reversed(re.findall(r"\w+", lengths)):
                 field_type = field_type * (_LENGTHS[length] if length in _LENGTHS else int(length))
@@ -68,7 +71,7 @@ def _fields(declarations: str) -> list[tuple[str, Any]]:
 
 def _members(header: str, name: str) -> list[tuple[str, Any]]:
     """Fields of a struct that a header defines, such as `typedef struct { ... } fl_set;`."""
-    text = (CORE / header).read_text(encoding="utf-8")
+    text = (CORE_FOLDER / header).read_text(encoding="utf-8")
     return _fields(text[: text.index(f"}} {name};")].rpartition("typedef struct {")[2])
 
 
@@ -119,7 +122,7 @@ _KINDS |= {
 
 def _work_until(last: str) -> list[tuple[str, Any]]:
     """Fields of the work area, `fl_work`, from the first one to a last one."""
-    text = (CORE / "fl_work.h").read_text(encoding="utf-8")
+    text = (CORE_FOLDER / "fl_work.h").read_text(encoding="utf-8")
     fields = text.partition("struct fl_work {")[2]
     end = re.search(rf"\b{last}\b[^;]*;", fields)
     assert end is not None
@@ -169,7 +172,7 @@ class CommandForm(ctypes.Structure):
 def functions() -> ctypes.PyDLL:
     """The library once more, with what its internal functions return."""
     assert library()
-    made = ctypes.PyDLL(str(PATH))
+    loaded = ctypes.PyDLL(str(PATH))
     returns: dict[str, Any] = {
         "fl_response": Response,
         "fl_response_with_turning": Response,
@@ -194,14 +197,31 @@ def functions() -> ctypes.PyDLL:
         ),
     }
     for name, kind in returns.items():
-        getattr(made, name).restype = kind
-    return made
+        getattr(loaded, name).restype = kind
+    return loaded
 
 
 def at(values: Array) -> ctypes.c_void_p:
     """Where an array of numbers lies."""
     assert values.dtype == np.float64 and values.flags["C_CONTIGUOUS"]
     return ctypes.c_void_p(values.ctypes.data)
+
+
+def prepared_work(block: Array) -> Any:
+    """A work area that is prepared for a robot's block."""
+    work = ctypes.create_string_buffer(constant("sizeof fl_work"))
+    assert functions().fl_prepare(at(block), work) == 0
+    return work
+
+
+def dual_function(block: Array, wrench: Array, lambda_reduced: Array) -> tuple[Array, float]:
+    """Responses (n, 2) [N] (Eq. 5) and the dual value [W] (Eq. 3) of a robot that is whole, for a
+    wrench (6,) [N, N m] at multipliers (6,) [W] in the basis of what its actuators span."""
+    force = np.zeros((len(actuators_of(block)), 2))
+    value = functions().fl_dual_value(
+        at(block), prepared_work(block), at(wrench), at(lambda_reduced), at(force)
+    )
+    return force, float(value)
 
 
 @dataclass(frozen=True)
@@ -230,28 +250,26 @@ class Robot:
         """Fields of each actuator (n,)."""
         return actuators_of(self.block)
 
-    def table(self, place: float) -> Array:
-        """The numbers of the block from a place on."""
-        return self.block[int(place) :]
+    def table(self, offset: float) -> Array:
+        """The numbers of the block from an offset on."""
+        return self.block[int(offset) :]
 
     def is_plane(self, i: int) -> bool:
         """Whether an actuator pushes in a plane."""
-        own = self.actuators[i]
-        return bool(own["rows"] == 2.0 and own["flow_speed"] == 0.0)
+        actuator = self.actuators[i]
+        return bool(actuator["rows"] == 2.0 and actuator["flow_speed"] == 0.0)
 
     def work(self) -> Any:
         """A work area that is prepared."""
-        made = ctypes.create_string_buffer(constant("sizeof fl_work"))
-        assert functions().fl_prepare(at(self.block), made) == 0
-        return made
+        return prepared_work(self.block)
 
     def whole_box(self) -> Box:
         """The limits of all commands."""
         box = Box()
-        for i, own in enumerate(self.actuators):
-            box.command_min[i][:] = own["command_min"]
-            box.command_max[i][:] = own["command_max"]
-            box.is_free_angle[i] = int(own["is_free_angle"] != 0.0)
+        for i, actuator in enumerate(self.actuators):
+            box.command_min[i][:] = actuator["command_min"]
+            box.command_max[i][:] = actuator["command_max"]
+            box.is_free_angle[i] = int(actuator["is_free_angle"] != 0.0)
         return box
 
     def set_of(self, i: int, low: float, high: float, middle: float, half: float) -> Set:
@@ -263,9 +281,13 @@ class Robot:
 
     def whole_set(self, i: int) -> Set:
         """All that an actuator may give."""
-        own = self.actuators[i]
+        actuator = self.actuators[i]
         return self.set_of(
-            i, own["force_min"], own["force_max"], own["sector_center"], own["sector_half_angle"]
+            i,
+            actuator["force_min"],
+            actuator["force_max"],
+            actuator["sector_center"],
+            actuator["sector_half_angle"],
         )
 
     def power(self, i: int, force: float) -> float:
@@ -293,44 +315,46 @@ class Robot:
 
     def response(self, i: int, limits: Set, price: Array) -> Response:
         """The answer of an actuator to prices (2,) along its rows."""
-        made: Response = functions().fl_response(at(self.block), i, ctypes.byref(limits), at(price))
-        return made
+        response: Response = functions().fl_response(
+            at(self.block), i, ctypes.byref(limits), at(price)
+        )
+        return response
 
-    def answer(self, wrench: Array, **asked: Any) -> Record:
+    def answer(self, wrench: Array, **fields: Any) -> Record:
         """The answer to a wrench (6,), with other fields of the question."""
-        question, _kept = question_of(wrench, asked)
+        question, _kept = question_of(wrench, fields)
         answer = np.zeros(1, struct("fl_answer"))
         places = ctypes.c_void_p(question.ctypes.data), ctypes.c_void_p(answer.ctypes.data)
         assert functions().fl_answer_one(at(self.block), self.work(), *places) == 0
         return answer[0]
 
-    def sets_now(self, **asked: Any) -> list[Set]:
+    def sets_now(self, **fields: Any) -> list[Set]:
         """What each actuator may give in a question, by its fields."""
-        question, _kept = question_of(np.zeros(6), asked)
+        question, _kept = question_of(np.zeros(6), fields)
         work = self.work()
-        place = ctypes.c_void_p(question.ctypes.data)
-        assert functions().fl_prepare_question(at(self.block), work, place)
-        return [Set.from_buffer_copy(one) for one in Work.from_buffer(work).set[: self.n]]
+        question_address = ctypes.c_void_p(question.ctypes.data)
+        assert functions().fl_prepare_question(at(self.block), work, question_address)
+        return [Set.from_buffer_copy(limits) for limits in Work.from_buffer(work).set[: self.n]]
 
 
-def question_of(wrench: Array, asked: dict[str, Any]) -> tuple[Record, list[Any]]:
+def question_of(wrench: Array, fields: dict[str, Any]) -> tuple[Record, list[Any]]:
     """A question as the core reads it, and the arrays at which it points."""
     question = np.zeros(1, struct("fl_question"))
     question["wrench"] = wrench
-    kept = list[Any]()
-    for name, value in asked.items():
+    arrays = list[Any]()
+    for name, value in fields.items():
         if isinstance(value, np.ndarray):
-            kept.append(np.ascontiguousarray(value))
-            value = kept[-1].ctypes.data
+            arrays.append(np.ascontiguousarray(value))
+            value = arrays[-1].ctypes.data
         question[name] = value
-    return question, kept
+    return question, arrays
 
 
 def in_the_core(layout: Layout, flow: Array | None = None) -> Robot:
     """A robot of the default method, in a flow."""
     method = Allocator(layout)._whole.method.at(flow)  # type: ignore[attr-defined]
-    made = method.compiled.robot
-    return Robot(layout, method.plant, made.block.copy(), made.axes)
+    dual_robot = method.compiled.robot
+    return Robot(layout, method.plant, dual_robot.block.copy(), dual_robot.axes)
 
 
 def pods_either_way(seed: int) -> Layout:
@@ -338,10 +362,10 @@ def pods_either_way(seed: int) -> Layout:
     rng = np.random.default_rng(seed)
     pods = []
     for k, half in enumerate((0.15, 0.8, 2.2, math.pi)):
-        most = rng.uniform(20.0, 60.0)
+        force_max = rng.uniform(20.0, 60.0)
         middle = rng.uniform(-3.0, 3.0) if half == 0.15 else rng.uniform(-0.5, 0.5)
         arc = (-math.pi, math.pi) if half == math.pi else (middle - half, middle + half)
-        ends = (-rng.uniform(0.3, 1.3) * most, most)
+        ends = (-rng.uniform(0.3, 1.3) * force_max, force_max)
         pods.append(
             Azimuth(
                 f"p{k}",
@@ -352,7 +376,7 @@ def pods_either_way(seed: int) -> Layout:
                 PowerLaw(0.3, 0.3 * rng.uniform(0.7, 2.0), float(rng.choice([1.5, 1.8]))),
                 arc,
                 dead_band=float(rng.choice([0.0, 3.0])),
-                rate=float(2.0 * most),
+                rate=float(2.0 * force_max),
                 turn_rate=1.0,
             )
         )
@@ -360,6 +384,7 @@ def pods_either_way(seed: int) -> Layout:
 
 
 EITHER_WAY = "pods either way"
+"""Name of the robots whose pods push either way."""
 ROBOTS = (*KINDS, EITHER_WAY)
 """Names of robots: kinds, and pods that push either way."""
 

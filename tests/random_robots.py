@@ -2,13 +2,14 @@
 beyond.
 
 Written apart from the library's makers (`finlab/research/random_layouts.py`): these robots are
-mappings of layout files, which the library reads by its loader and `tests/own_plant.py` by itself,
-so that a fault in a maker, the loader or a law cannot stand in both. They have what no training
-needs: rudders, dead bands, rates, fins that cannot rest.
+mappings of layout files, which the library reads by its loader and `tests/oracle_plant.py` by
+itself, so that a fault in a maker, the loader or a law cannot stand in both. They have what no
+training needs: rudders, dead bands, rates, fins that cannot rest.
 """
 
 import math
 from collections.abc import Callable, Mapping
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -16,8 +17,8 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.layout.load import parse_layout
-from tests.least_power import farthest
-from tests.own_plant import LIMITS, NOMINAL, OwnPlant, edge_forces
+from tests.oracle_optima import farthest
+from tests.oracle_plant import LIMIT_KEYS, NOMINAL, OraclePlant, edge_forces
 
 DOMAIN = 0x3A11
 """Leads the seed of every robot."""
@@ -74,7 +75,7 @@ def fins_with_a_tail(number: int, seed: int) -> dict[str, Any]:
         fins.append(_any_fin(rng, f"a{i + 1}", model, None))
         fins[-1]["position_m"] = (rng.uniform(-1.0, 1.0, 3) * [0.3, 0.3, 0.1]).tolist()
         nominal = [list(ends) for ends in NOMINAL]
-        fins[-1]["limits"] = dict(zip(LIMITS, nominal, strict=True))
+        fins[-1]["limits"] = dict(zip(LIMIT_KEYS, nominal, strict=True))
     return layout_of("tail", fins)
 
 
@@ -87,19 +88,21 @@ def random_flow(kind: str, number: int, seed: int) -> Array | None:
     return along + 0.03 * rng.normal(size=6)
 
 
-def random_plant(kind: str, number: int, seed: int) -> OwnPlant:
+def random_plant(kind: str, number: int, seed: int) -> OraclePlant:
     """The own plant of `random_robot` in its `random_flow`."""
-    return OwnPlant(random_robot(kind, number, seed), random_flow(kind, number, seed))
+    return OraclePlant(random_robot(kind, number, seed), random_flow(kind, number, seed))
 
 
-def within(plant: OwnPlant, rng: np.random.Generator, low: float = 0.2, high: float = 1.0) -> Array:
+def within(
+    plant: OraclePlant, rng: np.random.Generator, low: float = 0.2, high: float = 1.0
+) -> Array:
     """A wrench (6,) within reach: that of a random command whose sizes are up to 0.2 to 1 of their
     range."""
     wrench: Array = plant.wrench(plant.draw(rng, float(rng.uniform(low, high))))
     return wrench
 
 
-def beyond(plant: OwnPlant, rng: np.random.Generator, times: float) -> Array:
+def beyond(plant: OraclePlant, rng: np.random.Generator, times: float) -> Array:
     """A wrench (6,) so many times as far as what is pushed at most along its direction."""
     wrench = plant.wrench(plant.draw(rng))
     return times * farthest(plant, wrench) * wrench
@@ -112,7 +115,8 @@ def bluerov2_heavy() -> dict[str, Any]:
     places = [(0.14, -0.092), (0.14, 0.092), (-0.15, -0.092), (-0.15, 0.092)]
     axes = [(-s, -s), (-s, s), (s, -s), (s, s)]
     rows = [((x, y, -0.011), (*axis, 0.0)) for (x, y), axis in zip(places, axes, strict=True)]
-    rows += [((x, y, 0.053), (0.0, 0.0, -1.0)) for x in (0.118, -0.118) for y in (-0.215, 0.215)]
+    for x, y in product((0.118, -0.118), (-0.215, 0.215)):
+        rows.append(((x, y, 0.053), (0.0, 0.0, -1.0)))
     thrusters = [
         {"name": f"t{i}", "type": "thruster", "position_m": list(position), "axis": list(axis)}
         | {"force_n": T200_FORCE, "model": T200}
@@ -127,11 +131,13 @@ def layout_of(name: str, actuators: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def _condition(layout: Mapping[str, Any]) -> float:
-    plant = OwnPlant(layout)
+    """Condition number of a robot's scaled effectiveness."""
+    plant = OraclePlant(layout)
     return float(np.linalg.cond(plant.effectiveness / plant.scales[:, None]))
 
 
 Maker = Callable[[np.random.Generator, str, float], dict[str, Any]]
+"""Makes an actuator of a layout file of a generator, a name and a scale of forces."""
 
 
 def _makers(kind: str, rng: np.random.Generator) -> list[Maker]:
@@ -160,11 +166,13 @@ def _makers(kind: str, rng: np.random.Generator) -> list[Maker]:
 
 
 def _position(rng: np.random.Generator) -> list[float]:
+    """A random position [m]."""
     place: list[float] = (rng.uniform(-1.0, 1.0, 3) * [0.3, 0.3, 0.15]).tolist()
     return place
 
 
 def _unit(rng: np.random.Generator) -> Array:
+    """A random direction (3,)."""
     drawn = rng.normal(size=3)
     return np.asarray(drawn / np.linalg.norm(drawn))
 
@@ -177,6 +185,7 @@ def _plane(rng: np.random.Generator) -> tuple[list[float], list[float]]:
 
 
 def _law(rng: np.random.Generator) -> dict[str, Any]:
+    """A random law of power over force."""
     exponent = float(rng.choice([1.5, rng.uniform(1.2, 2.5)]))
     forward = float(10.0 ** rng.uniform(-0.5, 0.5)) * 20.0 ** (1.5 - exponent)
     return {
@@ -187,6 +196,7 @@ def _law(rng: np.random.Generator) -> dict[str, Any]:
 
 
 def _thruster(rng: np.random.Generator, name: str, scale: float) -> dict[str, Any]:
+    """A random thruster."""
     high = float(scale * rng.uniform(4.0, 30.0))
     low = -high * float(rng.choice([0.0, 1.0, rng.uniform(0.2, 1.2)], p=[0.1, 0.1, 0.8]))
     spec: dict[str, Any] = {"name": name, "type": "thruster", "position_m": _position(rng)}
@@ -220,6 +230,7 @@ def with_rates(layout: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _azimuth(rng: np.random.Generator, name: str, scale: float) -> dict[str, Any]:
+    """A random pod."""
     axis, zero = _plane(rng)
     spec: dict[str, Any] = {
         "name": name,
@@ -238,6 +249,7 @@ def _azimuth(rng: np.random.Generator, name: str, scale: float) -> dict[str, Any
 
 
 def _rudder(rng: np.random.Generator, name: str, scale: float) -> dict[str, Any]:
+    """A random rudder."""
     around = rng.uniform(-math.pi, math.pi)
     zero = [1.0, 0.0, 0.0]
     shaft = [0.0, math.cos(around), math.sin(around)]
@@ -253,12 +265,14 @@ def _rudder(rng: np.random.Generator, name: str, scale: float) -> dict[str, Any]
 
 
 def _arc(rng: np.random.Generator, least: float, most: float) -> list[float]:
+    """A random arc [deg] of a width between two."""
     width = float(rng.uniform(least, most))
     start = float(rng.uniform(-180.0, 180.0 - width))
     return [start, start + width]
 
 
 def _fin_model(rng: np.random.Generator, uneven: float = 0.0) -> dict[str, Any]:
+    """A random model of a fin, with an unevenness where one is given."""
     kind = ("drag", "lighthill", "soft")[rng.integers(3)] if not uneven else "soft"
 
     def log(low: float, high: float) -> float:
@@ -279,12 +293,14 @@ def _fin_model(rng: np.random.Generator, uneven: float = 0.0) -> dict[str, Any]:
 
 
 def _fin(rng: np.random.Generator, name: str, scale: float) -> dict[str, Any]:
+    """A random fin with its shaft across the hull, two of five with an arc."""
     return _any_fin(
         rng, name, _fin_model(rng), _arc(rng, 30.0, 170.0) if rng.random() < 0.4 else None
     )
 
 
 def _shaft_fin(rng: np.random.Generator, name: str, scale: float) -> dict[str, Any]:
+    """A random fin with its shaft in any direction."""
     spec = _fin(rng, name, scale)
     del spec["mounting_angle_deg"]
     spec["shaft"], spec["zero"] = _plane(rng)
@@ -292,10 +308,12 @@ def _shaft_fin(rng: np.random.Generator, name: str, scale: float) -> dict[str, A
 
 
 def _uneven_fin(rng: np.random.Generator, name: str, scale: float) -> dict[str, Any]:
+    """A random fin whose force is not the same in all directions."""
     return _any_fin(rng, name, _fin_model(rng, float(rng.uniform(0.02, 0.2))), None)
 
 
 def _wide_fin(rng: np.random.Generator, name: str, scale: float) -> dict[str, Any]:
+    """A random fin with an arc beyond half a circle."""
     return _any_fin(rng, name, _fin_model(rng), _arc(rng, 190.0, 340.0))
 
 
@@ -308,7 +326,9 @@ def _restless_fin(rng: np.random.Generator, name: str, scale: float) -> dict[str
     limits["amplitude_rad"][0] = 0.3
     for frequency in np.linspace(0.1, 1.5, 141):
         limits["frequency_hz"][0] = float(frequency)
-        size = np.linalg.norm(edge_forces(OwnPlant({"actuators": [spec]}).actuators[0], 3), axis=1)
+        size = np.linalg.norm(
+            edge_forces(OraclePlant({"actuators": [spec]}).actuators[0], 3), axis=1
+        )
         if size.min() >= share * size.max():
             break
     limits["frequency_hz"][0] = max(float(frequency) - 0.01, 0.1)
@@ -318,6 +338,7 @@ def _restless_fin(rng: np.random.Generator, name: str, scale: float) -> dict[str
 def _any_fin(
     rng: np.random.Generator, name: str, model: dict[str, Any], arc: list[float] | None
 ) -> dict[str, Any]:
+    """A fin with a model, and in an arc [deg] or all round."""
     directions = [-math.pi, math.pi] if arc is None else np.radians(arc).tolist()
     limits = {
         "amplitude_rad": [0.05, float(rng.uniform(0.4, 0.8))],

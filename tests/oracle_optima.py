@@ -8,6 +8,7 @@ actuators' sets, `least_miss` a quadratic one, `conic_optimum` Clarabel on thrus
 import itertools
 import math
 from functools import cache
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import linprog, minimize, nnls
 
 from finlab.arrays import Array
-from tests.own_plant import OwnActuator, OwnPlant, edge_forces
+from tests.oracle_plant import OracleActuator, OraclePlant, edge_forces
 
 LEVELS = 3001
 """Sizes of force in a table of costs."""
@@ -24,14 +25,14 @@ SHARES = np.linspace(0.0, 1.0, LEVELS) ** 2
 """Dense where a cost bends most: near rest."""
 
 
-class OwnSet:
+class OracleSet:
     """What an actuator can push and at what cost, in polar form: size times unevenness along an
     angle.
 
     A thruster is two rays. `sizes` (LEVELS,) [N] and `costs` (LEVELS,) [W], by ray.
     """
 
-    def __init__(self, actuator: OwnActuator, arc: tuple[float, float] | None = None) -> None:
+    def __init__(self, actuator: OracleActuator, arc: tuple[float, float] | None = None) -> None:
         self.actuator = actuator
         low, high = actuator.limits
         if actuator.kind == "thruster":
@@ -55,7 +56,7 @@ class OwnSet:
         self.rays = [_Ray(sizes, costs)]
 
     @staticmethod
-    def _ray(actuator: OwnActuator, sign: float, low: float, high: float) -> "_Ray":
+    def _ray(actuator: OracleActuator, sign: float, low: float, high: float) -> "_Ray":
         low, high = (low, high) if sign > 0.0 else (-high, -low)
         least = max(low, 0.0)
         most = max(high, 0.0)
@@ -158,7 +159,7 @@ class _Ray:
         return size + step, earned + step * (price - slope - bend * step)
 
 
-def fin_costs(actuator: OwnActuator) -> tuple[Array, Array]:
+def fin_costs(actuator: OracleActuator) -> tuple[Array, Array]:
     """Thrusts (LEVELS,) [N] of a fin and the least watts of each, over all amplitudes and
     frequencies."""
     low, high = actuator.limits
@@ -193,33 +194,34 @@ def fin_costs(actuator: OwnActuator) -> tuple[Array, Array]:
 
 
 @cache
-def _sets(plant: OwnPlant) -> tuple[OwnSet, ...]:
-    return tuple(OwnSet(each) for each in plant.actuators)
+def _sets(plant: OraclePlant) -> tuple[OracleSet, ...]:
+    """What each actuator of a robot may give."""
+    return tuple(OracleSet(each) for each in plant.actuators)
 
 
-def _halves(plant: OwnPlant, most: int) -> list[tuple[OwnSet, ...]]:
+def _halves(plant: OraclePlant, most: int) -> list[tuple[OracleSet, ...]]:
     """The robot with each arc that is no convex set cut into two, in all ways; at most `most` such
     arcs."""
-    choices: list[list[OwnSet]] = []
+    choices: list[list[OracleSet]] = []
     cut = 0
     for each in _sets(plant):
         if each.wide and cut < most:
             cut += 1
             ends = (each.middle - each.half, each.middle, each.middle + each.half)
-            choices.append([OwnSet(each.actuator, arc) for arc in itertools.pairwise(ends)])
+            choices.append([OracleSet(each.actuator, arc) for arc in itertools.pairwise(ends)])
         else:
             choices.append([each])
     return list(itertools.product(*choices))
 
 
-def lower_bound(plant: OwnPlant, wrench: Array, cut: int = 4) -> float:
+def lower_bound(plant: OraclePlant, wrench: Array, cut: int = 4) -> float:
     """Watts that no commands undercut which give a wrench (6,): the largest dual value that BFGS
     finds, the least over all ways to halve up to `cut` wide arcs; infinite where it shows the
     wrench out of reach."""
     return min(_dual(plant, sets, wrench)[0] for sets in _halves(plant, cut))
 
 
-def _polar(sets: tuple[OwnSet, ...], forces: list[Array]) -> Array:
+def _polar(sets: tuple[OracleSet, ...], forces: list[Array]) -> Array:
     """Forces as sizes and zero directions, those of a thruster as they are."""
     parts = []
     for each, force in zip(sets, forces, strict=True):
@@ -236,7 +238,9 @@ def _polar(sets: tuple[OwnSet, ...], forces: list[Array]) -> Array:
     return np.concatenate(parts)
 
 
-def _dual(plant: OwnPlant, sets: tuple[OwnSet, ...], wrench: Array) -> tuple[float, list[Array]]:
+def _dual(
+    plant: OraclePlant, sets: tuple[OracleSet, ...], wrench: Array
+) -> tuple[float, list[Array]]:
     """The largest value of the dual of one robot of convex sets, and the forces that answer its
     prices."""
     effectiveness = plant.effectiveness / plant.scales[:, None]
@@ -279,7 +283,7 @@ def _dual(plant: OwnPlant, sets: tuple[OwnSet, ...], wrench: Array) -> tuple[flo
     return best * top, forces
 
 
-def least_known(plant: OwnPlant, wrench: Array, starts: int = 8, seed: int = 0) -> float | None:
+def least_known(plant: OraclePlant, wrench: Array, starts: int = 8, seed: int = 0) -> float | None:
     """The fewest watts (or None) that SLSQP finds for a wrench (6,) over sizes and directions of
     forces."""
     rng = np.random.default_rng(seed)
@@ -338,7 +342,7 @@ def least_known(plant: OwnPlant, wrench: Array, starts: int = 8, seed: int = 0) 
     return best
 
 
-def _ends(sets: tuple[OwnSet, ...]) -> tuple[list[Array], list[Array]]:
+def _ends(sets: tuple[OracleSet, ...]) -> tuple[list[Array], list[Array]]:
     """Least and largest size and direction by actuator; thrusters have a force alone."""
     low = []
     high = []
@@ -355,7 +359,7 @@ def _ends(sets: tuple[OwnSet, ...]) -> tuple[list[Array], list[Array]]:
     return low, high
 
 
-def farthest(plant: OwnPlant, wrench: Array, count: int = 257) -> float:
+def farthest(plant: OraclePlant, wrench: Array, count: int = 257) -> float:
     """How many times a wrench (6,) can be given at most: a linear program over the corners of the
     hulls of the actuators' forces, at least 0.9999 of the truth; wide arcs are halved in all
     ways."""
@@ -366,7 +370,8 @@ def farthest(plant: OwnPlant, wrench: Array, count: int = 257) -> float:
 
 
 @cache
-def _corners(each: OwnSet, count: int) -> list[Array]:
+def _corners(each: OracleSet, count: int) -> list[Array]:
+    """Points on the edges of what an actuator may give, of a wide sector in two halves."""
     edge = edge_forces(each.actuator, count)
     if not each.wide:
         return [edge]
@@ -377,8 +382,8 @@ def _corners(each: OwnSet, count: int) -> list[Array]:
     ]
 
 
-def least_miss(plant: OwnPlant, wrench: Array, count: int = 257) -> float:
-    """The least length of the missing wrench over `OwnPlant.scales` for a wrench (6,): least
+def least_miss(plant: OraclePlant, wrench: Array, count: int = 257) -> float:
+    """The least length of the missing wrench over `OraclePlant.scales` for a wrench (6,): least
     squares over the corners of the hulls of the actuators' forces (nonnegative, each hull's shares
     add up to 1)."""
     best = np.inf
@@ -391,7 +396,7 @@ def least_miss(plant: OwnPlant, wrench: Array, count: int = 257) -> float:
     return best
 
 
-def _hulls(plant: OwnPlant, corners: tuple[Array, ...]) -> tuple[Array, Array]:
+def _hulls(plant: OraclePlant, corners: tuple[Array, ...]) -> tuple[Array, Array]:
     """Scaled wrenches (6, K) of the corners of all hulls, and which hull (n, K) each belongs to."""
     blocks = [
         points @ each.effectiveness.T for each, points in zip(plant.actuators, corners, strict=True)
@@ -401,7 +406,8 @@ def _hulls(plant: OwnPlant, corners: tuple[Array, ...]) -> tuple[Array, Array]:
     return columns, (hull == np.arange(len(blocks))[:, None]).astype(float)
 
 
-def _farthest(plant: OwnPlant, corners: tuple[Array, ...], wrench: Array) -> float:
+def _farthest(plant: OraclePlant, corners: tuple[Array, ...], wrench: Array) -> float:
+    """How many times a wrench a robot can give, by a linear program over corners."""
     columns, ones = _hulls(plant, corners)
     columns = np.hstack([columns, -(wrench / plant.scales)[:, None]])
     ones = np.hstack([ones, np.zeros((len(ones), 1))])
@@ -412,7 +418,7 @@ def _farthest(plant: OwnPlant, corners: tuple[Array, ...], wrench: Array) -> flo
     return float(answer.x[-1]) if answer.status == 0 else 0.0
 
 
-def conic_optimum(plant: OwnPlant, wrench: Array) -> tuple[float, Array]:
+def conic_optimum(plant: OraclePlant, wrench: Array) -> tuple[float, Array]:
     """Least watts and forces (n,) [N] of thrusters that give a wrench (6,), by Clarabel on power
     cones.
 
@@ -426,7 +432,7 @@ def conic_optimum(plant: OwnPlant, wrench: Array) -> tuple[float, Array]:
     from scipy import sparse
 
     n = len(plant.actuators)
-    parts = [(i, sign) for i in range(n) for sign in (1.0, -1.0)]
+    parts = list(product(range(n), (1.0, -1.0)))
     ends = np.array([each.limits for each in plant.actuators])[:, :, 0]
     if (ends[:, 0] > 0.0).any() or (ends[:, 1] < 0.0).any():
         raise ValueError("expected thrusters whose limits hold 0")

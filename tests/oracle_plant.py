@@ -18,7 +18,9 @@ from scipy.special import j1
 from finlab.arrays import Array
 
 DENSITY = 1000.0
-LIMITS = ("amplitude_rad", "frequency_hz", "zero_direction_rad")
+"""Density of water [kg/m3]."""
+LIMIT_KEYS = ("amplitude_rad", "frequency_hz", "zero_direction_rad")
+"""Keys of a fin's limits in a layout file, in the order of its command."""
 NOMINAL = ((0.05, 0.6), (0.1, 2.1), (-math.pi, math.pi))
 """Limits of a fin, where a file gives none."""
 SERVO = {"amplitude_rate_rad_s": 1.0, "frequency_rate_hz_s": 3.0, "direction_rate_rad_s": 5.0}
@@ -28,9 +30,10 @@ FIN_DEFAULTS: Mapping[str, Mapping[str, float]] = {
     "lighthill": {"length": 0.2, "width": 0.1},
     "soft": {"k": 3.6, "p": 1.0, "x0": 1.3, "q": 5.0, "e": 0.0, "phi_e": 0.0, "d": 0.0},
 }
+"""Kind of fin model -> constants that a layout file may leave out."""
 
 
-class OwnActuator:
+class OracleActuator:
     """One actuator of a layout file: its set of forces, its watts, and its effectiveness.
 
     A force is a size along a direction of the actuator's own plane (angle [rad]); a thruster or a
@@ -56,6 +59,7 @@ class OwnActuator:
         """Wrench (6, 1 or 2) of 1 N along the own directions."""
 
     def _plane(self) -> tuple[Array, Array]:
+        """Directions (3,) of zero and of a quarter turn, in which the actuator pushes."""
         spec = self.spec
         if self.kind == "thruster":
             return np.array(spec["axis"], np.float64), np.zeros(3)
@@ -68,6 +72,7 @@ class OwnActuator:
         return zero, across
 
     def _column(self, direction: Array) -> Array:
+        """Wrench (6,) of a newton in a direction (3,)."""
         reaction = float(self.spec.get("torque_per_newton_m", 0.0))
         return np.concatenate(
             [direction, np.cross(self.position, direction) + reaction * direction]
@@ -109,6 +114,7 @@ class OwnActuator:
     # ---- fins
     # -----------------------------------------------------------------------------------------
     def _of(self, key: str) -> float:
+        """A constant of the fin's model."""
         return float(self.model.get(key, FIN_DEFAULTS[self.model["type"]][key]))
 
     def thrust(self, amplitude: ArrayLike, frequency: ArrayLike) -> Array:
@@ -270,7 +276,7 @@ class OwnActuator:
             change[turn] = (change[turn] + math.pi) % (2.0 * math.pi) - math.pi
         return float((np.abs(change) / (self.rates * period_s)).max() - 1.0)
 
-    def after(self, previous: Array, period_s: float) -> "OwnActuator":
+    def after(self, previous: Array, period_s: float) -> "OracleActuator":
         """The actuator with only the commands that may follow a previous one (3,) after a time
         [s]."""
         low, high = self.limits
@@ -285,7 +291,7 @@ class OwnActuator:
             if not whole:
                 near[turn] = previous[turn] - step[turn]
                 far[turn] = previous[turn] + step[turn]
-        return OwnActuator(self.spec, self.flow, (near, far))
+        return OracleActuator(self.spec, self.flow, (near, far))
 
     def draw(self, rng: np.random.Generator, share: float = 1.0, count: int = 1) -> Array:
         """Commands (count, 3), uniform in the limits, the size of the force up to a share of its
@@ -304,14 +310,14 @@ class OwnActuator:
         return low + rng.random((count, 3)) * (top - low)
 
 
-class OwnPlant:
+class OraclePlant:
     """All actuators of a layout file, in a flow: the velocity (6,) through the water, none by
     default."""
 
     def __init__(self, layout: Mapping[str, Any], flow: ArrayLike | None = None) -> None:
         self.layout = layout
         self.flow = flow
-        self.actuators = tuple(OwnActuator(spec, flow) for spec in layout["actuators"])
+        self.actuators = tuple(OracleActuator(spec, flow) for spec in layout["actuators"])
 
     @cached_property
     def effectiveness(self) -> Array:
@@ -344,10 +350,10 @@ class OwnPlant:
         rows = zip(self.actuators, previous, commands, strict=True)
         return max(each.rate_excess(before, now, period_s) for each, before, now in rows)
 
-    def after(self, previous: Array, period_s: float) -> "OwnPlant":
+    def after(self, previous: Array, period_s: float) -> "OraclePlant":
         """The plant with only the commands that may follow previous ones (n, 3) after a time
         [s]."""
-        other = OwnPlant(self.layout, self.flow)
+        other = OraclePlant(self.layout, self.flow)
         rows = zip(self.actuators, previous, strict=True)
         other.actuators = tuple(each.after(row, period_s) for each, row in rows)
         other.scales = self.scales
@@ -392,9 +398,10 @@ COMMAND_KEYS = {
     "azimuth": ("angle", "force"),
     "rudder": ("deflection",),
 }
+"""Kind of actuator -> names of its command's numbers, in their order."""
 
 
-def edge_forces(actuator: OwnActuator, count: int) -> Array:
+def edge_forces(actuator: OracleActuator, count: int) -> Array:
     """The outermost forces (K, 1 or 2) [N] in the own plane of an actuator: the corners of its
     hull."""
     low, high = actuator.limits

@@ -10,8 +10,10 @@ from finlab.fit.measurements import Measurements
 from finlab.layout import FinModelSpec
 from finlab.physics import FinLaw, make_law
 
-LOWER = np.array([0.05, 0.2, -np.pi])
-UPPER = np.array([0.6, 2.1, np.pi])
+COMMAND_MIN = np.array([0.05, 0.2, -np.pi])
+"""Least amplitude [rad], frequency [Hz] and zero direction [rad]."""
+COMMAND_MAX = np.array([0.6, 2.1, np.pi])
+"""Largest of the same."""
 
 
 def soft(**numbers: float) -> FinLaw:
@@ -21,7 +23,7 @@ def soft(**numbers: float) -> FinLaw:
 
 def commands(n: int, seed: int = 0) -> Array:
     """Commands all over the nominal limits (n, 3)."""
-    return LOWER + np.random.default_rng(seed).random((n, 3)) * (UPPER - LOWER)
+    return COMMAND_MIN + np.random.default_rng(seed).random((n, 3)) * (COMMAND_MAX - COMMAND_MIN)
 
 
 def measured(law: FinLaw, command: Array, noise: float = 0.05, seed: int = 1) -> Array:

@@ -30,7 +30,7 @@ FAULT_VERBS = {"weak": "Weaken", "torn": "Tear", "stuck": "Jam", "running": "Let
 """Kind of fault -> what undo calls the step that brings it about."""
 
 
-class Core:
+class BaseSession:
     """All of a session but changes of its layout. Undo is of the robot and its damage; wrench,
     method and policy stay as they are."""
 
