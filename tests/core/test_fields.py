@@ -33,16 +33,11 @@ for name in ("A", "bluerov2_heavy", "catamaran"):
     write_c(c_sources(layout, samples=4), folder / name)
 np.savez(folder / "commands.npz", fields=struct("fl_actuator").names, **commands)
 """
-<<<<<<< HEAD
-LAYOUTS = Path(finlab.__file__).parents[1] / "layouts"
-FLAGS = ["-std=c99", "-O0", "-ffp-contract=off", "-Wall", "-Wextra", "-Wno-cpp", "-Werror"]
-=======
 """A program that loads the changed core, and writes what it answers for three robots."""
 LAYOUT_FOLDER = Path(finlab.__file__).parents[1] / "layouts"
 """The shipped layouts."""
-C_FLAGS = ["-std=c99", "-O1", "-ffp-contract=off", "-Wall", "-Wextra", "-Wno-cpp", "-Werror"]
+C_FLAGS = ["-std=c99", "-O0", "-ffp-contract=off", "-Wall", "-Wextra", "-Wno-cpp", "-Werror"]
 """Options of the C compiler; warnings are errors."""
->>>>>>> main
 
 
 def copied(folder: Path) -> Path:
