@@ -28,6 +28,10 @@ AXES: tuple[Axis, ...] = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
 """The axes of a wrench, in order: forces [N] and torques [N m] along x forward, y left, z up."""
 UNITS = ("N", "N", "N", "N m", "N m", "N m")
 """Unit of each axis of a wrench."""
+MotionAxis = Literal["surge", "sway", "heave", "roll", "pitch", "yaw"]
+"""Name of one axis of motion."""
+MOTIONS: tuple[MotionAxis, ...] = ("surge", "sway", "heave", "roll", "pitch", "yaw")
+"""The axes of motion, in the order of a wrench: what a force or torque along each one moves."""
 CommandedAxes = Annotated[
     tuple[Axis, ...],
     Meta(min_length=1, max_length=6, description="axes of the wrench that the robot commands"),

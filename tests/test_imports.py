@@ -52,15 +52,14 @@ WINGS: dict[str, Levels] = {
 """What few of those who allocate need: the rooms of each wing. A wing may import the whole core.
 The fourth wing is `webapp`."""
 
-USES = {"research": {"swim"}, "logs": {"research"}}
-"""Which other wings a wing imports: experiments swim, and what is told of a log is a document of
-rows."""
+USES: dict[str, set[str]] = {"research": {"swim"}, "logs": set()}
+"""Which other wings a wing imports: experiments swim."""
 
 VERBS = {
     "cli/app_verb": {"app"},
     "cli/eval_verbs": {"research"},
     "cli/fit_robot": {"swim"},
-    "cli/log_verb": {"logs", "research"},
+    "cli/log_verb": {"logs"},
     "cli/simulate": {"swim", "research"},
     "cli/train_verbs": {"research"},
 }

@@ -1,6 +1,8 @@
 """What is said of an answer: two small tables and sentences for people, a JSON object for programs.
 
-`print(result)`, the command line, the app and a robot's program say it in these words.
+`print(result)`, the command line, the app and a robot's program say it in these words. The app has
+tables of its own (`webapp/markup/answer.py`): they follow each step of a slider, with bars, loads
+and limits in colour, and are too narrow for the words of a command.
 """
 
 from __future__ import annotations
@@ -19,8 +21,8 @@ from finlab.actuators.fin.fin_model import DOUBT, FinModelSpec, Limits
 from finlab.actuators.kinds import KINDS
 from finlab.actuators.law import FinLaw
 from finlab.arrays import NEARLY, Array
-from finlab.axes import AXES, axes_in
-from finlab.display import Block, Table
+from finlab.axes import AXES, MOTIONS, UNITS, axes_in
+from finlab.display import Block, Table, listed, three_digits
 from finlab.layout.layout import Layout
 from finlab.physics.plant import Plant
 
@@ -34,11 +36,18 @@ that this one cannot import it, not even for its type."""
 PLAIN_GAP = 0.01
 """Share by which the power may exceed its bound without a sentence."""
 
-NEARLY_ALL = 0.995
-"""Share of a wrench from which on it is printed as all of it."""
+PROVED_GAP = 1e-4
+"""Share by which the power may exceed its bound and count as proved least."""
+UNKNOWN_GAP = 9.0
+"""Share above the bound that says nothing of an answer, such as noise that pushes for nothing in a
+table."""
+LEAST_POWER = 1e-3
+"""Bound [W] that shares are taken of where it is smaller, or nothing."""
+SMALL_MISS = 0.05
+"""Share of the largest miss, each axis over its scale, up to which another axis is not named."""
 COLUMNS = ("actuator", "type", "command", "force [N]")
 """Columns of the table of actuators."""
-WRENCH_COLUMNS = ("", *(f"{axis} [{'N' if axis.startswith('F') else 'N m'}]" for axis in AXES))
+WRENCH_COLUMNS = ("", *(f"{axis} [{unit}]" for axis, unit in zip(AXES, UNITS, strict=True)))
 """Columns of the table of wrenches."""
 
 RESTLESS = 0.05
@@ -66,18 +75,42 @@ def remarks(result: Allocation) -> list[str]:
     if result.reachable or result.unknown_fins:
         # With fins that the method does not know, what is missing says nothing about the robot.
         return notes
-    limits = f"; {', '.join(result.binding)}" if result.binding else ""
-    return [f"not reached: {_missing_words(result)}{limits}", *notes]
+    causes = [*share_words(result), missing_words(result), *result.binding]
+    return [f"not reached: {'; '.join(causes)}", *notes]
 
 
-def _missing_words(result: Allocation) -> str:
-    """What is missing, in words: the share that is there, or where that is nearly all, the worst
-    axis."""
-    if result.share < NEARLY_ALL:
-        return f"{100 * result.share:.0f} % of the wrench is delivered"
-    worst = int(np.argmax(np.abs(result.unallocated / result.scale)))
-    unit = "N" if worst < 3 else "N m"
-    return f"{AXES[worst]} is off by {abs(result.unallocated[worst]):.3g} {unit}"
+def share_words(result: Allocation) -> list[str]:
+    """Returns how much of the target is delivered in its own direction, in words; nothing where
+    that is all of it, or less than nothing."""
+    share_percent = round(100.0 * result.share)
+    if not 0 <= share_percent < 100:
+        return []
+    return [f"{share_percent} % of the wrench is delivered"]
+
+
+def missing_words(result: Allocation) -> str:
+    """Returns what is left undone of a target, and what comes along unasked, axis by axis: `1.00 N
+    of heave is left undone; 2.00 N of sway comes along unasked`."""
+    if result.reachable:
+        return "nothing is left undone"
+    unallocated = result.unallocated
+    # Residual of each axis over its scale, |r_k| / sigma_k.
+    sizes = np.abs(unallocated / result.scale)
+    undone: list[str] = []
+    unasked: list[str] = []
+    for k in np.argsort(-sizes):
+        if sizes[k] < SMALL_MISS * sizes.max():
+            continue
+        amount = f"{three_digits(abs(unallocated[k]))} {UNITS[k]} of {MOTIONS[k]}"
+        is_undone = unallocated[k] * result.target[k] > 0.0
+        (undone if is_undone else unasked).append(amount)
+    phrases = []
+    if undone:
+        phrases.append(f"{listed(undone)} {'is' if len(undone) == 1 else 'are'} left undone")
+    if unasked:
+        verb = "comes" if len(unasked) == 1 else "come"
+        phrases.append(f"{listed(unasked)} {verb} along unasked")
+    return "; ".join(phrases)
 
 
 def allocation_blocks(result: Allocation) -> list[Block]:
@@ -128,7 +161,6 @@ def doubts(result: Allocation) -> tuple[str, ...]:
         least += calm_power
     if result.power <= (1.0 + PLAIN_GAP) * least:
         return sentences
-    gap = f"of its power, {100.0 * (1.0 - least / result.power):.0f} % may be more than needed"
     if result.layout.interaction is not None:
         cause = (
             "the bound is that of the actuators' laws for what they push; what the jets take is "
@@ -140,7 +172,35 @@ def doubts(result: Allocation) -> tuple[str, ...]:
             "where an actuator cannot rest, or has a wide arc, a dead band, drag or a measured "
             f"table{rates}, the least is not proved"
         )
-    return (*sentences, f"{gap}: {cause}")
+    return (*sentences, f"{_gap_words(_power_gap(result.power, least))}: {cause}")
+
+
+def _power_gap(power: float, least: float) -> float:
+    """How far a power lies above a bound on it, both [W], as a share of the bound."""
+    return (power - least) / max(least, LEAST_POWER)
+
+
+def _gap_words(gap: float) -> str:
+    """How far the power of an answer may be from the least, by such a share."""
+    if gap > UNKNOWN_GAP:
+        return "how far its power is from the least is not known"
+    gap_percent = f"{100 * gap:.2g}" if gap < 0.1 else f"{100 * gap:.0f}"
+    return f"its power is at most {gap_percent} % above the least"
+
+
+def is_proved_least(result: Allocation) -> bool:
+    """Returns whether no command that gives the same wrench takes less power, by the bound that the
+    method proves."""
+    return result.bound is not None and _power_gap(result.power, result.bound) <= PROVED_GAP
+
+
+def bound_words(result: Allocation) -> str:
+    """Returns how far the power of an answer may be from the least, by the bound that its method
+    proves; nothing where it proves none."""
+    if result.bound is None:
+        return ""
+    gap = _power_gap(result.power, result.bound)
+    return "its power is proved least" if gap <= PROVED_GAP else _gap_words(gap)
 
 
 def next_measurement(result: Allocation, plant: Plant) -> str:

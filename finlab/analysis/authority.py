@@ -2,22 +2,20 @@
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from finlab.arrays import Array
 from finlab.axes import AXES as WRENCH
-from finlab.axes import Axis
+from finlab.axes import MOTIONS, Axis, MotionAxis
 from finlab.errors import LayoutError
 from finlab.forces.force_sets import SCALE, ForceSets, force_sets
 from finlab.forces.reach import RANK_TOLERANCE, max_wrench_along_exactly, singular_values, weakest
 from finlab.layout import Layout
 
-MotionAxis = Literal["surge", "sway", "heave", "roll", "pitch", "yaw"]
-"""An axis of motion, in the order of a wrench."""
-AXES: tuple[MotionAxis, ...] = ("surge", "sway", "heave", "roll", "pitch", "yaw")
+AXES = MOTIONS
+"""Names of the axes in what is said of a layout."""
 NOTHING = 1e-4
 """Largest wrench [N, scaled] below which an axis counts as out of reach; the solver is exact to
 about 1e-5."""

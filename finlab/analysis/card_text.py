@@ -1,25 +1,105 @@
-"""Writes a score card as sentences and tables; `ScoreCard` shows itself by it."""
+"""A score card in words: its sentences, and the columns of its tables.
+
+A `ScoreCard` prints itself by this module, so `finlab layout show` does, and the app's panel
+(`webapp/markup/score_card.py`) shows the same sentences and columns.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
-from finlab.analysis.authority import AXES, Authority, Loss
-from finlab.display import Block, Table
+from finlab.analysis.authority import AXES, Authority, HeldAxes, Loss
+from finlab.axes import UNITS, MotionAxis
+from finlab.display import Block, Column, Table, percent, table_of, three_digits
 
 ScoreCard = Any
 """`finlab.analysis.ScoreCard`, which shows itself by what is here."""
-_UNITS = ("N", "N", "N", "N m", "N m", "N m")
-"""Units of a wrench."""
 SMALL_COMPONENT = 0.05
 """Components of the weakest direction below this size are left out."""
 
 
+class Remark(NamedTuple):
+    """A sentence about a layout."""
+
+    text: str
+    is_warning: bool = False
+    """Whether it says what the actuators cannot do; the app shows that in another colour."""
+
+
+class AxisRow(NamedTuple):
+    """What a card says of one axis that the robot commands."""
+
+    axis: MotionAxis
+    unit: str
+    """Of a wrench along it."""
+    largest: float
+    """Largest wrench along it [N or N m]."""
+    most_negative: float
+    """The same the other way, as a size [N or N m]."""
+    share_after_loss: float | None
+    """Least share of these that the loss of one actuator leaves; None where none can be lost."""
+    power: float | None
+    """Least power of `UNIT_WRENCH` along it [W]; None where that is out of reach."""
+
+
+LARGEST = Column(
+    "largest",
+    lambda row: range_words(row.largest, row.most_negative),
+    hint="the largest wrench along this axis with the other five at zero",
+)
+"""The one column of an axis that the app shows of two cards beside each other."""
+AXIS_COLUMNS = (
+    Column("axis", lambda row: row.axis, is_text=True),
+    Column("unit", lambda row: row.unit, is_text=True),
+    LARGEST,
+    Column(
+        "one lost",
+        lambda row: row.share_after_loss,
+        digits=percent,
+        hint="the least share of it that is left after the loss of one",
+    ),
+    Column("power at 1 N, 0.1 N m", lambda row: row.power, "W", hint="the least power for so much"),
+)
+"""Columns of the table of axes; a row is an `AxisRow`."""
+
+WITHOUT = Column("without", lambda loss: loss.actuator, is_text=True)
+WEAKEST_LEFT = Column("weakest", lambda loss: loss.weakest, "N")
+AXES_LOST = Column("loses", lambda loss: ", ".join(loss.lost) or "nothing", is_text=True)
+
+
+def _share_column(k: int, axis: MotionAxis) -> Column:
+    """Share of the largest wrench along axis k that is left after a loss."""
+    return Column(axis, lambda loss: loss.share_left[k], digits=percent)
+
+
+LOSS_COLUMNS = (
+    WITHOUT,
+    Column("rank", lambda loss: loss.rank, digits=str),
+    WEAKEST_LEFT,
+    *(_share_column(k, axis) for k, axis in enumerate(AXES)),
+    AXES_LOST,
+)
+"""Columns of the table of losses; a row is a `Loss`."""
+CARD_COLUMNS = (
+    Column("weakest direction", lambda card: card.authority.weakest, "N"),
+    Column(
+        "weakest after the worst loss",
+        lambda card: None if card.worst_loss is None else card.worst_loss.weakest,
+        "N",
+    ),
+)
+"""Figures of a whole robot; a row is a `ScoreCard`."""
+
+
 def card_blocks(card: ScoreCard) -> list[Block]:
     """Returns everything on a score card as sentences and tables."""
+    remarks = held_remarks(card.authority, card.counted)
+    lines = [remark.text for remark in remarks]
+    if card.lost:
+        lines.insert(1, f"Lost: {', '.join(card.lost)}.")
     blocks: list[Block] = [
-        "\n".join(_span_lines(card)),
-        _axis_table(card),
+        "\n".join(lines),
+        table_of(AXIS_COLUMNS, axis_rows(card)),
         _evenness(card.authority),
     ]
     if card.losses:
@@ -29,55 +109,81 @@ def card_blocks(card: ScoreCard) -> list[Block]:
     return blocks
 
 
-def _span_lines(card: ScoreCard) -> list[str]:
-    """Sentences on the axes that the actuators push at all, and alone, before any limit."""
-    authority = card.authority
-    verb = "pushes" if card.n_actuators == 1 else "push"
-    rank = f"{authority.rank} of {authority.counted} independent directions"
-    lines = [f"{card.counted} {verb} in {rank}."]
-    if card.lost:
-        lines.append("Lost: " + ", ".join(card.lost) + ".")
-    if authority.free:
-        lines.append("Not commanded, free: " + ", ".join(authority.free) + ".")
-    if authority.without_authority:
-        lines.append("Out of reach: " + ", ".join(authority.without_authority) + ".")
-    if authority.coupled:
-        lines.append("Only together with other axes: " + ", ".join(authority.coupled) + ".")
-    return lines
+def held_remarks(held: HeldAxes, counted: str) -> list[Remark]:
+    """Returns sentences on the axes along which actuators push, before any limit.
+
+    Args:
+        held: these axes.
+        counted: the actuators that work, by type, such as `8 thrusters`.
+    """
+    is_single = counted.startswith("1 ") and " and " not in counted
+    sentence = (
+        f"{counted} {'pushes' if is_single else 'push'} in {held.rank} of {held.counted} "
+        "independent directions"
+    )
+    if held.condition is not None:
+        sentence += f", condition number {three_digits(held.condition)}"
+    remarks = [Remark(f"{sentence}.")]
+    if held.free:
+        remarks.append(Remark(f"Not commanded, free: {', '.join(held.free)}."))
+    if held.without_authority:
+        axes = ", ".join(held.without_authority)
+        remarks.append(Remark(f"Out of reach: {axes}.", is_warning=True))
+    if held.coupled:
+        axes = ", ".join(held.coupled)
+        remarks.append(Remark(f"Only together with other axes: {axes}.", is_warning=True))
+    return remarks
 
 
-def _axis_table(card: ScoreCard) -> Table:
-    """The largest wrench along each commanded axis, and the power of a small one."""
+def axis_rows(card: ScoreCard) -> list[AxisRow]:
+    """Returns a row for each axis that the robot commands."""
     authority = card.authority
-    head = ("axis", "largest +", "largest -", "", "for", "power [W]")
     rows = []
     for k, axis in enumerate(AXES):
         if axis in authority.free:
             continue
-        cells = (
-            axis,
-            f"{authority.largest[k]:.3f}",
-            f"{authority.most_negative[k]:.3f}",
-            _UNITS[k],
-            f"{card.unit_wrench[k]:g} {_UNITS[k]}",
-            _number(card.unit_power[k]),
+        shares = []
+        for loss in card.losses:
+            if loss.share_left[k] is not None:
+                shares.append(loss.share_left[k])
+        row = AxisRow(
+            axis=axis,
+            unit=UNITS[k],
+            largest=authority.largest[k],
+            most_negative=authority.most_negative[k],
+            share_after_loss=min(shares, default=None),
+            power=card.unit_power[k],
         )
-        rows.append(cells)
-    return Table(head, rows, (True, *(False,) * 5))
+        rows.append(row)
+    return rows
+
+
+def range_words(positive: float, negative: float) -> str:
+    """Returns the largest wrench along an axis with either sign: `±2.32`, `+2.32 -1.10`, `none`.
+
+    Args:
+        positive: along the axis [N or N m].
+        negative: against it, as a size.
+    """
+    if positive == negative == 0.0:
+        return "none"
+    forward = three_digits(positive)
+    backward = three_digits(negative)
+    return f"±{forward}" if forward == backward else f"+{forward} -{backward}"
 
 
 def _evenness(authority: Authority) -> str:
-    """Sentences on the weakest direction, the condition and the singular values."""
+    """Sentences on the weakest direction and the singular values."""
     components = []
     for value, axis in zip(authority.weakest_direction, AXES, strict=True):
         if abs(value) > SMALL_COMPONENT:
             components.append((value, axis))
     components.sort(key=lambda component: -abs(component[0]))
     direction = ", ".join(f"{axis} {value:+.2f}" for value, axis in components)
-    values = " ".join(f"{value:.2f}" for value in authority.singular_values)
+    values = " ".join(three_digits(value) for value in authority.singular_values)
     return (
-        f"Weakest direction: {authority.weakest:.2f} N along {direction} (torques over 0.2 m).\n"
-        f"Condition {_number(authority.condition, 'infinite')}, singular values {values} N."
+        f"Weakest direction: {three_digits(authority.weakest)} N along {direction} (torques over "
+        f"0.2 m).\nSingular values {values} N."
     )
 
 
@@ -88,18 +194,10 @@ def _loss_table(card: ScoreCard) -> Table:
     title = (
         f"Share of the largest wrench that is left without one {actuator} (* the worst to lose):"
     )
-    head = ("without", "rank", "weakest [N]", *AXES, "lost")
-    rows = [_loss_row(loss, loss is card.worst_loss) for loss in card.losses]
-    return Table(head, rows, (True, *(False,) * 8, True), title)
+    worst = card.worst_loss
 
+    def name(loss: Loss) -> str:
+        return f"{loss.actuator} *" if loss is worst else loss.actuator
 
-def _loss_row(loss: Loss, is_worst: bool) -> tuple[str, ...]:
-    """A row of that table."""
-    name = f"{loss.actuator} *" if is_worst else loss.actuator
-    shares = ["-" if share is None else f"{100 * share:.0f} %" for share in loss.share_left]
-    return (name, f"{loss.rank}", f"{loss.weakest:.2f}", *shares, ", ".join(loss.lost) or "nothing")
-
-
-def _number(value: float | None, none: str = "-") -> str:
-    """A number with two decimals, or the text for None."""
-    return none if value is None else f"{value:.2f}"
+    starred = Column(WITHOUT.name, name, is_text=True)
+    return table_of((starred, *LOSS_COLUMNS[1:]), card.losses, title)

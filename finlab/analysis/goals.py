@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finlab.allocation import Allocator
-from finlab.analysis.authority import AXES, MotionAxis, authority, commanded_axes, named_axes
+from finlab.analysis.authority import AXES, authority, commanded_axes, named_axes
 from finlab.arrays import Array
 from finlab.axes import AXES as WRENCH_AXES
+from finlab.axes import MotionAxis
 from finlab.errors import LayoutError
 from finlab.forces.force_sets import ForceSets, shapes_of
 from finlab.forces.reach import weakest

@@ -14,13 +14,14 @@ from scipy.optimize import Bounds as Box
 from scipy.optimize import differential_evolution
 
 from finlab.allocation.question import check_flow
-from finlab.analysis.authority import MotionAxis, commanded_axes, named_axes
+from finlab.analysis.authority import commanded_axes, named_axes
 from finlab.analysis.climb import PENALTY, RADIUS_MIN, Climb, Rule, Rules
 from finlab.analysis.goals import MISSION, Goal, axes_to_raise, make_goal
 from finlab.analysis.moves import Bounds, Moves, mirror_pairs
 from finlab.analysis.score_card import ScoreCard, score_card
 from finlab.analysis.slopes import GoalPoint, MissionPower, SlopedGoal, WeakestDirection
 from finlab.arrays import Array
+from finlab.axes import MotionAxis
 from finlab.forces.force_sets import force_sets
 from finlab.layout import Layout
 

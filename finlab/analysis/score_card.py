@@ -9,18 +9,10 @@ from numpy.typing import ArrayLike
 
 from finlab.allocation import Allocator
 from finlab.allocation.question import check_flow
-from finlab.analysis.authority import (
-    AXES,
-    Authority,
-    HeldAxes,
-    Loss,
-    MotionAxis,
-    authority,
-    held_axes,
-    losses,
-)
+from finlab.analysis.authority import AXES, Authority, HeldAxes, Loss, authority, held_axes, losses
 from finlab.analysis.card_text import card_blocks
 from finlab.arrays import Array
+from finlab.axes import MotionAxis
 from finlab.display import html, text
 from finlab.display.pictures import ranges_picture
 from finlab.forces.force_sets import MAX_CUT, force_sets, wide_arcs
@@ -188,6 +180,8 @@ def _notes(layout: Layout, lost: Collection[str], flow: Array | None) -> tuple[s
 class QuickCheck(HeldAxes):
     """Axes along which the working actuators can push, and those that a loss costs."""
 
+    actuators: str
+    """The working actuators by type, such as `8 thrusters`."""
     lost: tuple[tuple[str, tuple[MotionAxis, ...]], ...]
     """Working actuators with the axes that the loss of each costs; those that cost none are left
     out."""
@@ -218,5 +212,7 @@ def quick_check(
         for name, after in zip(single_losses, after_losses, strict=True)
     }
     return QuickCheck(
-        **vars(present), lost=tuple((name, axes) for name, axes in costs.items() if axes)
+        **vars(present),
+        actuators=_counts_in_words(layout, set(lost)),
+        lost=tuple((name, axes) for name, axes in costs.items() if axes),
     )

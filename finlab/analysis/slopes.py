@@ -15,11 +15,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from finlab.allocation import Allocator
-from finlab.analysis.authority import MotionAxis, named_axes
+from finlab.analysis.authority import named_axes
 from finlab.analysis.goals import UNREACHED
 from finlab.analysis.moves import Moves
 from finlab.arrays import Array
 from finlab.axes import AXES as WRENCH
+from finlab.axes import MotionAxis
 from finlab.forces.force_sets import SCALE, ForceSets
 from finlab.forces.reach import RANK_TOLERANCE, max_wrench_along, singular_values
 from finlab.layout.effectiveness import moved_effectiveness

@@ -15,7 +15,7 @@ from finlab.errors import FinlabError, printable
 
 if TYPE_CHECKING:
     from finlab.analysis import Improvement
-    from finlab.analysis.authority import MotionAxis
+    from finlab.axes import MotionAxis
 
 REMARKS = ("finlab.swim.vehicle.righting:righting_words",)
 """Functions that return a remark on a valid layout, or None, as `module:function`: the wings add
@@ -184,18 +184,11 @@ def optimize(
 
 def _improvement_text(improvement: Improvement, output: Path) -> str:
     """Where the actuators went, the card after it, and where the layout was written."""
-    lines = [
-        f"{improvement.goal}: {improvement.value_before:.4g} -> {improvement.value_after:.4g}",
-        "",
-    ]
-    for name in improvement.moved:
-        actuator = improvement.layout.actuator(name)
-        position = "  ".join(f"{value:6.3f}" for value in actuator.position)
-        lines.append(f"{name:<16}  {position} m  {actuator.direction_words}")
-    lines += ["", str(improvement.card_after), ""]
-    lines.append(
-        f"{output}: written."
-        if improvement.improved
-        else f"{output}: written unchanged, nothing better was found."
-    )
-    return "\n".join(lines)
+    from finlab.analysis.card_text import card_blocks
+    from finlab.analysis.improvement_text import improvement_remarks, moved_table
+    from finlab.display import text
+
+    remarks = " ".join(remark.text for remark in improvement_remarks(improvement))
+    written = "written." if improvement.improved else "written unchanged."
+    moved = moved_table(improvement)
+    return text([remarks, moved, *card_blocks(improvement.card_after), f"{output}: {written}"])

@@ -47,7 +47,8 @@ def log(
     from finlab.files.worker import in_worker
     from finlab.layout import save_layout
     from finlab.log import judge, read_log
-    from finlab.log.judgement_text import judgement_text, timeline_picture
+    from finlab.log.judgement_text import judgement_text
+    from finlab.log.timeline_picture import timeline_picture
 
     shared_options.check_json_file(json)
     shared_options.check_json_file(output, "output")

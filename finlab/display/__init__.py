@@ -1,19 +1,93 @@
-"""Shows values: tables and sentences as plain text, and as HTML with a picture for notebooks.
+"""Shows values: numbers, columns, tables and sentences, as plain text and as HTML for notebooks.
 
-Layouts, score cards and answers make blocks of text and tables; `pictures` draws.
+Layouts, score cards, answers and judgements describe their tables by `Column`s, and so does the
+app, which shows the same columns in its own style (`webapp/markup/tables.py`). A notebook gets
+HTML with a picture, which `pictures` draws.
 """
 
 from __future__ import annotations
 
+import math
 from base64 import b64encode
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from html import escape
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from finlab.assets import install_command
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+NO_NUMBER = "-"
+"""What stands in place of a number that there is none of."""
+SMALLEST_PLAIN = 1e-3
+"""Size from which a number is written without an exponent."""
+LARGEST_PLAIN = 1e4
+"""Size up to which a number is written without an exponent."""
+LARGEST_WITH_DECIMALS = 999.5
+"""Size from which a number with three digits is rounded to a whole one of four."""
+
+
+def three_digits(value: float | None) -> str:
+    """Returns a number with three significant digits: `2.32`, `0.0410`, `12.5`, `3.10e-05`.
+
+    Args:
+        value: the number; None, NaN and infinities are `NO_NUMBER`.
+    """
+    if value is None or not math.isfinite(value):
+        return NO_NUMBER
+    if value != 0.0 and not SMALLEST_PLAIN <= abs(value) < LARGEST_PLAIN:
+        return f"{value:.2e}"
+    if abs(value) >= LARGEST_WITH_DECIMALS:
+        return f"{value:.0f}"
+    # With # zeros at the end stay, and so does the point after three digits before it.
+    return f"{value:#.3g}".rstrip(".")
+
+
+def percent(share: float | None) -> str:
+    """Returns a share as a percentage without decimals: `48 %`; None is `NO_NUMBER`."""
+    return NO_NUMBER if share is None else f"{100.0 * share:.0f} %"
+
+
+def listed(items: Sequence[str]) -> str:
+    """Returns `a`, `a and b`, `a, b and c`."""
+    if len(items) == 1:
+        return items[0]
+    return f"{', '.join(items[:-1])} and {items[-1]}"
+
+
+def as_sentence(words: str) -> str:
+    """Returns a remark of the library as a sentence: with a capital letter and a full stop."""
+    return f"{words[:1].upper()}{words[1:]}." if words else ""
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a table whose rows are items of one type."""
+
+    name: str
+    """What stands above it."""
+    value: Callable[[Any], Any]
+    """Item -> its text, or its number; None where it has none."""
+    unit: str = ""
+    """Of its numbers; none where they are words, shares, or counts."""
+    digits: Callable[[Any], str] = three_digits
+    """Number -> its text."""
+    is_text: bool = False
+    """Whether its cells are words, which stand at the left; numbers stand at the right."""
+    hint: str = ""
+    """What it says, where its name is too short for that; shown by the app beside a pointer."""
+
+    @property
+    def heading(self) -> str:
+        """The name with the unit in brackets."""
+        return f"{self.name} [{self.unit}]" if self.unit else self.name
+
+    def cell(self, item: Any) -> str:
+        """The text of its cell in the row of an item."""
+        value = self.value(item)
+        return value if isinstance(value, str) else self.digits(value)
 
 
 class Table(NamedTuple):
@@ -27,6 +101,15 @@ class Table(NamedTuple):
     """Whether each column holds words, which are aligned to the left; numbers are to the right."""
     title: str = ""
     """A line above the table."""
+
+
+def table_of(columns: Sequence[Column], items: Iterable[Any], title: str = "") -> Table:
+    """Returns a table with a row for each item."""
+    rows = []
+    for item in items:
+        rows.append([column.cell(item) for column in columns])
+    heads = [column.heading for column in columns]
+    return Table(heads, rows, [column.is_text for column in columns], title)
 
 
 Block = Table | str

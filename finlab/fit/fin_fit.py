@@ -18,6 +18,7 @@ from finlab.actuators.fin.fin_model import DOUBT, MAX_AMPLITUDE, MAX_FREQUENCY
 from finlab.actuators.fin.force_table_file import COLUMNS, DEVIATIONS, POWER_COLUMN, table_text
 from finlab.arrays import Array
 from finlab.axes import TURN
+from finlab.display import Column, percent
 from finlab.errors import DataError
 from finlab.fit.gaussian_process import Component
 from finlab.fit.measurements import MIN_SAMPLES, Measurements
@@ -205,10 +206,10 @@ def fit_fin(
         outliers = tuple(np.array(measurements.sources)[is_outlier].tolist())
         if outliers:
             shown = ", ".join(outliers[:5]) + (" ..." if len(outliers) > 5 else "")
-            notes.append(
-                f"{len(outliers)} of {len(is_outlier)} samples contradict the others and are left "
-                f"out: {shown}"
-            )
+            verbs = "contradict the others and are"
+            if len(outliers) == 1:
+                verbs = "contradicts the others and is"
+            notes.append(f"{len(outliers)} of {len(is_outlier)} samples {verbs} left out: {shown}")
             measurements = measurements.without(is_outlier)
         return _fit_components(measurements, outliers, tuple(notes), progress)
 
@@ -303,22 +304,43 @@ def check_table_path(path: str | os.PathLike[str]) -> None:
         raise DataError(f"{path}: a table is a CSV file, expected a name that ends in .csv")
 
 
+def _share(value: float) -> str:
+    """A share of the largest force, with one decimal: `3.1 %`."""
+    return f"{100.0 * value:.1f} %"
+
+
+FIGURES = (
+    Column("cross-validated error, of the largest force", lambda fit: fit.error(), digits=_share),
+    Column("noise of a sample, of the largest force", lambda fit: fit.noise(), digits=_share),
+    Column("unseen samples within the 95 % band", lambda fit: fit.coverage(), digits=percent),
+    Column("largest force", lambda fit: fit.largest, "N"),
+)
+"""Figures of a `FinFit`, which the command line and the app show."""
+
+
+def verdict(fit: FinFit) -> str:
+    """Returns whether the fit may be trusted, and if not, why."""
+    if fit.doubts:
+        return f"{DOUBT}: {'; '.join(fit.doubts)}"
+    return "may be trusted within what was measured"
+
+
+def reach_words(fit: FinFit) -> str:
+    """Returns how many samples it is of, and how far they reach."""
+    amplitude, frequency = fit.measurements.reach
+    return (
+        f"fitted to {len(fit.measurements)} samples, amplitudes up to {amplitude:.3g} rad, "
+        f"frequencies up to {frequency:.3g} Hz"
+    )
+
+
 def summary(fit: FinFit) -> tuple[str, ...]:
     """Returns how good the fit is, a line each; the first says why it should not be trusted, if
     so."""
-    amplitude, frequency = fit.measurements.reach
-    lines = []
-    if fit.doubts:
-        lines.append(f"{DOUBT}: {'; '.join(fit.doubts)}")
-    lines.append(
-        f"fitted to {len(fit.measurements)} samples, amplitudes up to {amplitude:.3g} rad, "
-        f"frequencies up to {frequency:.3g} Hz, forces up to {fit.largest:.3g} N"
-    )
-    lines.append(
-        f"cross-validated error {fit.error():.1%} of the largest force, noise of a sample "
-        f"{fit.noise():.1%}; {fit.coverage():.0%} of the samples lie in the 95 % band of the fit "
-        "to the others"
-    )
+    lines = [verdict(fit), reach_words(fit)]
+    for column in FIGURES:
+        unit = f" {column.unit}" if column.unit else ""
+        lines.append(f"{column.name}: {column.cell(fit)}{unit}")
     deflection_deg = float(np.degrees(fit.deflection))
     lines.append(f"thrust leans {deflection_deg:+.1f} deg off the zero direction")
     return (*lines, *fit.notes)

@@ -1,31 +1,24 @@
 """A layout as a table of its actuators, for terminals and notebooks: `print(layout)` shows it."""
 
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
-from finlab.display import Block, Table
+from finlab.display import Block, Column, table_of
 
 Layout = Any
 """`finlab.layout.Layout`, which prints itself by this module, so that this one cannot import it."""
 
 
-class Column(NamedTuple):
-    """A column of the table of actuators."""
-
-    title: str
-    """Its head, with the unit in brackets."""
-    cell: Callable[[Any], str]
-    """Actuator -> text of its cell."""
-    is_text: bool = False
-    """Whether its cells are words, which stand at the left; numbers stand at the right."""
+def _metres(value: float) -> str:
+    """A coordinate [m], to the millimetre."""
+    return f"{value:6.3f}"
 
 
 COLUMNS = (
     Column("actuator", lambda actuator: actuator.name, is_text=True),
     Column("type", lambda actuator: actuator.type, is_text=True),
-    Column("x [m]", lambda actuator: f"{actuator.position[0]:6.3f}"),
-    Column("y [m]", lambda actuator: f"{actuator.position[1]:6.3f}"),
-    Column("z [m]", lambda actuator: f"{actuator.position[2]:6.3f}"),
+    Column("x", lambda actuator: actuator.position[0], "m", _metres),
+    Column("y", lambda actuator: actuator.position[1], "m", _metres),
+    Column("z", lambda actuator: actuator.position[2], "m", _metres),
     Column("direction", lambda actuator: actuator.direction_words, is_text=True),
     Column("limits", lambda actuator: actuator.limits_words, is_text=True),
 )
@@ -33,11 +26,11 @@ COLUMNS = (
 
 
 def layout_blocks(layout: Layout) -> list[Block]:
-    """Returns blocks of text that show a layout: its name and description, and a table."""
-    head = [column.title for column in COLUMNS]
-    rows = []
-    for actuator in layout.actuators:
-        rows.append([column.cell(actuator) for column in COLUMNS])
-    is_text = [column.is_text for column in COLUMNS]
+    """Returns a layout in words, and a table of its actuators.
+
+    The app's list of actuators (`webapp/panels/actuator_list.py`) is narrower and has columns of
+    its own: directions as an azimuth and a rise in degrees, and no limits, which stand in the
+    inspector.
+    """
     title = f"{layout.name}: {layout.description}" if layout.description else layout.name
-    return [title, Table(head, rows, is_text)]
+    return [title, table_of(COLUMNS, layout.actuators)]

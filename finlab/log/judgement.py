@@ -7,14 +7,15 @@ from typing import Any
 import numpy as np
 from msgspec import to_builtins
 
-from finlab.analysis.authority import AXES as MOTIONS
 from finlab.arrays import Array
-from finlab.axes import AXES, UNITS
+from finlab.axes import AXES, MOTIONS, UNITS
+from finlab.display import three_digits
 from finlab.layout import Layout
 from finlab.layout.save import layout_to_dict
 from finlab.log.replay import Replay
-from finlab.research.evaluation.document import format_digits
 
+DEMANDED_SHARE = 1e-3
+"""Share of the largest impulse above which that of an axis counts as demanded."""
 HELD_SHARE = 0.02
 """Share of what was missing along an axis that a replay which holds it may miss."""
 
@@ -106,6 +107,12 @@ class Judgement:
         return self.stopped[0] if len(self.stopped) == 1 else None
 
     @property
+    def demanded_axes(self) -> tuple[int, ...]:
+        """Indices of the axes that were asked for in earnest."""
+        least = DEMANDED_SHARE * max(self.asked)
+        return tuple(k for k in range(len(AXES)) if self.asked[k] > least)
+
+    @property
     def held_by(self) -> Replay | None:
         """Replay on the robot as it is, or else on the improved one, that holds the axis, with
         least missing, then least power; None where none does, or nothing was lost."""
@@ -127,19 +134,20 @@ class Judgement:
     @property
     def sentence(self) -> str:
         """The judgement in one sentence."""
-        seconds = format_digits(self.seconds)
+        seconds = three_digits(self.seconds)
         if self.axis is None:
             return f"No axis was lost in {seconds} s: no actuator at a limit cut a demand."
         i = AXES.index(self.axis)
+        lost_seconds = three_digits(self.lost_s[i])
+        plural = "s" if self.n_spells > 1 else ""
         longest = max(self.spells, key=lambda spell: spell.end - spell.start)
         worst = max(self.spells, key=lambda spell: spell.missing[i])
         why = f", with {', '.join(worst.limits[:4])}" if worst.limits else ""
-        lost_s = format_digits(self.lost_s[i])
         return (
-            f"{MOTIONS[i].capitalize()} ({self.axis}) was lost for {lost_s} s of "
-            f"{seconds} s, in {self.n_spells} spell{'s' * (self.n_spells > 1)}, the "
-            f"longest from {longest.start:.1f} to {longest.end:.1f} s: {amount(self.missing, i)} "
-            f"of {amount(self.asked, i)} were missing{why}; {self._remedy(i)}."
+            f"{MOTIONS[i].capitalize()} ({self.axis}) was lost for {lost_seconds} s of {seconds} "
+            f"s, in {self.n_spells} spell{plural}, the longest from {longest.start:.1f} to "
+            f"{longest.end:.1f} s: {amount(self.missing, i)} of {amount(self.asked, i)} were "
+            f"missing{why}; {self._remedy(i)}."
         )
 
     def _remedy(self, i: int) -> str:
@@ -176,4 +184,4 @@ class Judgement:
 
 def amount(impulse: Sequence[float] | Array, axis: int) -> str:
     """Returns the component of an impulse (6,) along an axis, with its unit."""
-    return f"{format_digits(impulse[axis])} {UNITS[axis]} s"
+    return f"{three_digits(impulse[axis])} {UNITS[axis]} s"

@@ -175,7 +175,7 @@ def test_reach_draws_sets_and_compares_layouts(page: Any) -> None:
     page.tab("Reach")
     page.choose("Draw the set of", "forces")
     page.visible("/robot/attainable/now")
-    page.until(lambda: "axes independent" in page.text(".score"))
+    page.until(lambda: "independent directions" in page.text(".score"))
     whole = page.vertices("/robot/attainable/now")
     card = page.text(".score")
     page.key("n")

@@ -33,9 +33,7 @@ def test_numbers_and_arrows_follow_the_target(page: Any) -> None:
     )
     page.choose("Out of reach", "direction")
     page.until(
-        lambda: (
-            page.session.state.policy == "direction" and "% of what is asked" in page.text(".said")
-        )
+        lambda: page.session.state.policy == "direction" and "% of the wrench" in page.text(".said")
     )
     assert page.problems == []
 

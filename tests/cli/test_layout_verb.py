@@ -81,12 +81,12 @@ def test_show_has_a_row_for_each_actuator(
 @pytest.mark.parametrize(
     ("argv", "words"),
     [
-        (["A"], ["4 fins push in 6 of 6 independent directions."]),
+        (["A"], ["4 fins push in 6 of 6 independent directions"]),
         (["no_yaw"], ["Not commanded, free: yaw."]),
-        (["torpedo"], ["1 thruster and 4 rudders push in 1 of 3 independent directions.",
+        (["torpedo"], ["1 thruster and 4 rudders push in 1 of 3 independent directions",
                        "At rest rudder_top, rudder_bottom, elevator_left, elevator_right give nothing"]),
         (["torpedo", "--flow", "1.5", *"00000"], ["push in 3 of 3 independent directions"]),
-        (["D", "--lost", "back"], ["2 fins push in 4 of 6 independent directions.", "Lost: back.",
+        (["D", "--lost", "back"], ["2 fins push in 4 of 6 independent directions", "Lost: back.",
                                      "Out of reach: sway", "Weakest direction: 0.00 N",
                                      "Share of the largest wrench that is left without one fin"]),
     ],
@@ -137,7 +137,7 @@ def test_optimize_writes_a_better_layout(
     ]
     assert main(arguments) == 0
     out, err = capsys.readouterr()
-    assert "weakest_direction: 11.54 -> " in out
+    assert "Weakest direction: 11.5 N before, " in out
     assert out.endswith(f"{output}: written.\n")
     assert err == ""  # no progress bar outside of a terminal
     assert load_layout(output).names == load_layout("layouts/A.yaml").names
@@ -152,7 +152,7 @@ def test_optimize_within_reach(tmp_path: Path, capsys: pytest.CaptureFixture[str
     arguments = ["--fins", "front_right", "--rounds", "1", "--seed", "2", "--no-mirror"]
     assert main(["layout", "optimize", "A", *arguments, *box, *mission, "-o", str(output)]) == 0
     told = capsys.readouterr().out
-    assert told.startswith("mission_power: ") and "\nfront_right " in told
+    assert told.startswith("Power for a mission: ") and "\nfront_right " in told
     moved = np.subtract(load_layout(output).fins[0].position, load_layout("A").fins[0].position)
     assert np.abs(moved).max() <= 0.03 + 1e-9
 

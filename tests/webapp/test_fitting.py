@@ -81,8 +81,8 @@ def test_a_noisy_file_becomes_the_fins_model_and_undo_takes_it_off(
     found = fitting.answer
     assert found is not None and found.fit is not None and found.upload.content == b""
     card = fit_card(found)
-    assert "May be trusted" in card and "1 sample contradicts the others: cell.csv line 7." in card
-    assert "of 69 samples" in card
+    assert "May be trusted" in card and "1 of 70 samples contradicts the others" in card
+    assert "cell.csv line 7." in card and "Fitted to 69 samples" in card
     answer = Allocator(opened.session.state.layout).allocate([0.5, 0, 0.2, 0, 0, 0.05])
     assert answer.err_norm < 1e-6
     fitting.put_on_all()

@@ -17,7 +17,7 @@ from webapp.session import Session
 from webapp.session.looking import SearchRequest
 from webapp.session.state import State
 from webapp.tasks.analysing import Analysis, AnalysisQuestion, analyse
-from webapp.tasks.improving import Improver, Room
+from webapp.tasks.improving import Clearance, Improver
 from webapp.tasks.slot import Pool, Slot
 
 NO_YAW = load_layout(shipped_layouts()["no_yaw"])
@@ -104,8 +104,8 @@ def test_what_is_proposed_can_be_built(worker: Pool) -> None:
     )  # it points out of the stern
     stuck = inside.replace_actuator("tail", position=(-0.15, 0.0, 0.0))
     assert any("tail beats inside" in text for text in warnings(stuck))
-    room = Room(stuck, 0.02)
-    assert room.broken(stuck.position[None], stuck.frames[None])[0] > 0.0
+    clearance = Clearance(stuck, 0.02)
+    assert clearance.violation(stuck.position[None], stuck.frames[None])[0] > 0.0
     improver = Improver(context_of(worker))
     request = SearchRequest().with_move_range((0.15, 0.05, 0.05, 60.0))
     improver.start(State(stuck), request)
@@ -114,7 +114,7 @@ def test_what_is_proposed_can_be_built(worker: Pool) -> None:
     assert found is not None and found.improved
     layout = found.layout
     assert warnings(layout) == ()
-    assert room.broken(layout.position[None], layout.frames[None])[0] == 0.0
+    assert clearance.violation(layout.position[None], layout.frames[None])[0] == 0.0
     assert [set(pair) for pair in mirror_pairs(layout)] == [
         set(pair) for pair in mirror_pairs(stuck)
     ]
@@ -147,7 +147,7 @@ def test_any_robot_is_improved_without_what_is_lost(robot: str, lost: int, worke
     assert found is not None, improver.error
     assert found.layout.names == layout.names and not set(found.moved) & set(state.lost)
     assert found.layout.actuators[:lost] == layout.actuators[:lost]
-    room = Room(layout.without(state.lost), 0.02)
+    clearance = Clearance(layout.without(state.lost), 0.02)
     left = found.layout.without(state.lost)
-    assert room.broken(left.position[None], left.frames[None])[0] == 0.0
+    assert clearance.violation(left.position[None], left.frames[None])[0] == 0.0
     assert mirror_pairs(left) == mirror_pairs(layout.without(state.lost))

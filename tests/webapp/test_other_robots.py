@@ -81,7 +81,7 @@ def test_every_task_shows_the_robot(
     )
     assert all(name in told for name in layout.names) and "cannot be shown" not in told
     assert "Start lets this robot swim" in told and "finlab allocate`" not in told
-    assert "weakest direction" in told and "axes independent" in told, (
+    assert "weakest direction" in told and "independent directions" in told, (
         "reach and score are of any robot"
     )
     nodes = tab.nodes()

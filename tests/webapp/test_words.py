@@ -3,6 +3,7 @@
 import ast
 import re
 from dataclasses import replace
+from html import unescape
 from itertools import chain
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,10 +14,13 @@ import pytest
 
 import finlab
 from finlab.allocation import Allocation, Allocator
+from finlab.allocation.report import bound_words, missing_words
 from finlab.analysis import score_card
+from finlab.analysis.card_text import AXIS_COLUMNS, axis_rows, held_remarks
 from finlab.analysis.score_card import quick_check
 from finlab.assets import shipped_layouts
-from finlab.axes import AXES
+from finlab.axes import AXES, MOTIONS
+from finlab.display import NO_NUMBER
 from finlab.errors import LayoutError
 from finlab.layout import FinModelSpec, Uncertainty, load_layout
 from finlab.research.networks.learned_method import LearnedMethod
@@ -28,8 +32,6 @@ from webapp.markup.verdict import (
     WORKING,
     Verdict,
     answer_sentence,
-    bound_sentence,
-    missing_sentence,
     verdict_of,
     verdict_sentence,
 )
@@ -40,7 +42,7 @@ from webapp.panels.status import corner
 from webapp.scene.wrench_nodes import ARROWS, LENGTH, NEWTONS, fitting
 from webapp.session import Session, files
 from webapp.session.lessons import TOUR
-from webapp.session.state import AXIS_WORDS, State
+from webapp.session.state import State
 from webapp.session.targets import PRESETS, axis_reach, full_thrust
 from webapp.tasks.analysing import AnalysisQuestion, analyse
 from webapp.tasks.comparing import Run
@@ -60,21 +62,21 @@ def test_reachable_and_not() -> None:
     allocator = Allocator(layout, StandIn)
     easy = allocator.allocate(PRESETS["Turn"])
     assert easy.reachable and verdict_sentence(easy, True) == "Exact"
-    assert missing_sentence(easy) == "Nothing is left undone."
+    assert missing_words(easy) == "nothing is left undone"
     hard = allocator.allocate([0, 0, 60, 0, 0, 0])
     assert not hard.reachable
     assert verdict_sentence(hard, False) == "Out of reach, closest"
     state = State(layout, target=(0.0, 0.0, 60.0, 0.0, 0.0, 0.0), method="sqp")
     assert not Solver().reply(state).in_reach
-    assert "N of heave is left undone" in missing_sentence(hard)
+    assert "N of heave is left undone" in missing_words(hard)
     told = {"reachable": False, "scale": np.ones(6), "target": np.array([0.0, 0.0, 5.0, 0, 0, 0])}
     beside: Any = SimpleNamespace(unallocated=np.array([0.0, -2.0, 1.0, 0, 0, 0]), **told)
     assert (
-        missing_sentence(beside)
-        == "1.00 N of heave is left undone; 2.00 N of sway comes along unasked."
+        missing_words(beside)
+        == "1.00 N of heave is left undone; 2.00 N of sway comes along unasked"
     )
     beside.unallocated = np.array([0.0, -2.0, -1.0, 0, 0, 0])  # more heave than asked
-    assert missing_sentence(beside) == "2.00 N of sway and 1.00 N of heave come along unasked."
+    assert missing_words(beside) == "2.00 N of sway and 1.00 N of heave come along unasked"
 
 
 @pytest.mark.parametrize("share", [0.0, 0.5, 0.93, 0.985, 0.999, 1.0, 1.02, 1.5])
@@ -94,7 +96,7 @@ def test_all_that_is_said_of_an_answer_agrees(share: float, target: tuple[float,
     assert "100 %" not in said + verdict
     if verdict != "Exact":
         axis = int(np.argmax(np.abs((wrench - target) / answer.scale)))
-        assert AXIS_WORDS[axis] in said
+        assert MOTIONS[axis] in said
 
 
 def test_no_verdict_stands_beside_a_new_question() -> None:
@@ -116,7 +118,7 @@ def test_how_far_the_watts_may_be_from_the_least_is_told() -> None:
     dearer = replace(answer)
     vars(dearer)["bound"] = answer.power / 1.25
     assert "at most 25 % above the least" in answer_sentence(state, dearer, False)
-    assert bound_sentence(Allocator(layout, StandIn).allocate(PRESETS["Turn"])) == ""
+    assert bound_words(Allocator(layout, StandIn).allocate(PRESETS["Turn"])) == ""
 
 
 def test_what_is_exact_by_an_uncertain_model_says_so() -> None:
@@ -225,7 +227,7 @@ def test_cards_say_what_a_layout_can_do() -> None:
         "any layout may stand beside"
     )
     table = score_table(ucat, found.card, None)
-    assert "6 of 6" in table and table.count("without") == 3
+    assert "6 of 6" in table and table.count("swatch") == 3
     both = score_table(ucat, score_card(ucat), score_card(blind))
     assert "before" in both and "▲" in both and "none" in both
     single = ucat.without(ucat.names[1:])
@@ -233,6 +235,19 @@ def test_cards_say_what_a_layout_can_do() -> None:
     assert re.search(r"worst loss \[N\]</td><td>–</td><td>[\d.]+</td><td></td>", beside)
     card = check_card(quick_check(blind), True, ("<b>",))
     assert "yaw" in card and "&lt;b&gt;" in card
+
+
+@pytest.mark.parametrize("name", ["A", "D", "no_yaw", "turtle_hybrid"])
+def test_the_panel_shows_what_the_command_line_prints(name: str) -> None:
+    layout = load_layout(shipped_layouts()[name])
+    card = score_card(layout)
+    panel = unescape(score_table(layout, card, None)).replace("−", "-")
+    for remark in held_remarks(card.authority, card.counted):
+        assert remark.text in panel and remark.text in str(card)
+    for axis_row in axis_rows(card):
+        for column in AXIS_COLUMNS[2:]:
+            cell = column.cell(axis_row)
+            assert cell in str(card) and (cell in panel or cell == NO_NUMBER)
 
 
 def test_no_option_of_a_command_is_named_where_the_page_has_a_control() -> None:

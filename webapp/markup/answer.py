@@ -1,7 +1,9 @@
 """Markup of an answer: six bars of the wrench, and the table of commands, a row per actuator.
 
-The panel of the wrench (`panels/wrench_tab.py`) shows both. They are written at every step of a
-slider, so rows are joined as plain strings of ours, which need no escaping, in few calls.
+The panel of the wrench (`panels/wrench_tab.py`) shows both. The command line has tables of its own
+for them (`finlab/allocation/report.py`), with words in place of bars, loads and colours. These are
+written at every step of a slider, so rows are joined as plain strings of ours, which need no
+escaping, in few calls.
 """
 
 import math
@@ -13,11 +15,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
-from finlab.axes import AXES
+from finlab.axes import AXES, MOTIONS
 from finlab.layout import Actuator, Fin, Layout
 from finlab.layout.damage import NO_DAMAGE, Damage
 from webapp.markup.words import damage_words, html, saturated
-from webapp.session.state import AXIS_WORDS
 from webapp.theme import DEAD, css, fin_color, ink
 
 FIN_HEADER = Markup(
@@ -120,7 +121,7 @@ def _bar_row(axis: int, demanded: float | None, delivered: float | None, scale: 
     if demanded is not None and delivered is not None and is_missing:
         bars.append((delivered, demanded, 8, "missing"))
     markup = [
-        f"<span>{AXIS_WORDS[axis]} <span class='dim'>{AXES[axis]}</span></span>"
+        f"<span>{MOTIONS[axis]} <span class='dim'>{AXES[axis]}</span></span>"
         f"<div class='track'>{MIDDLE}"
     ]
     for start, end, top, color in bars:

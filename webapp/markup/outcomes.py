@@ -4,22 +4,19 @@ first.
 `panels/swim_tab.py` and `panels/status.py` show the swim, `panels/actuator_model.py` the fit.
 """
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
-from webapp.markup.words import fins_words, html, row, three_digits, unlearned_sentence
+from finlab.display import as_sentence
+from webapp.markup.tables import cell_text
+from webapp.markup.words import fins_words, html, row, unlearned_sentence
 from webapp.tasks.fitting import FitResult
 from webapp.tasks.swimmer import Moment, Swimmer
 from webapp.tasks.swimming import Swimming
 
 if TYPE_CHECKING:  # scipy takes its time, and comes with it
     from finlab.fit.fin_fit import FinFit
-
-MOST_NAMED = 8
-"""Samples without a place in the fit that are named; more are an ellipsis, so that the card stays
-short."""
 
 
 def pace_words(swimming: Swimming) -> str:
@@ -122,42 +119,21 @@ def fit_card(result: FitResult) -> str:
         text = html(sentence, name, result.upload.actuator.name)
         return html("<div class='fl said'>{}</div>", text)
     if isinstance(fit, ThrusterFit):
-        lines = [html("<div class='said'>{}</div>", _sentence(line)) for line in summary(fit)]
+        lines = [html("<div class='said'>{}</div>", as_sentence(line)) for line in summary(fit)]
         return html("<div class='fl'>{}</div>", lines)
     return _fin_fit_card(fit)
 
 
 def _fin_fit_card(fit: "FinFit") -> str:
-    """A verdict, figures of the fit, samples that were left out, and notes on the file."""
-    if fit.doubts:
-        verdict = html("<b class='missing'>Not to be trusted: {}.</b>", "; ".join(fit.doubts))
-    else:
-        verdict = Markup("<b class='given'>May be trusted within what was measured.</b>")
-    rows = [
-        row("cross-validated error, of the largest force", f"{100.0 * fit.error():.1f} %"),
-        row("noise of a sample, of the largest force", f"{100.0 * fit.noise():.1f} %"),
-        row("unseen samples within the 95 % band", f"{100.0 * fit.coverage():.0f} %"),
-        row(f"largest force of {len(fit.measurements)} samples", f"{three_digits(fit.largest)} N"),
-    ]
-    markup = [html("<div class='said'>{}</div><table>{}</table>", verdict, rows)]
-    markup.append(html("<div class='said'>{}</div>", _outliers_sentence(fit.outliers)))
-    for note in fit.measurements.notes:
-        markup.append(html("<div class='said dim'>{}</div>", _sentence(note)))
+    """A verdict, figures of the fit, and notes on the file and on samples that were left out."""
+    from finlab.fit.fin_fit import FIGURES, reach_words, verdict  # scipy comes with it
+
+    style = "missing" if fit.doubts else "given"
+    heading = html("<b class='{}'>{}</b>", style, as_sentence(verdict(fit)))
+    rows = []
+    for column in FIGURES:
+        rows.append(row(column.heading, cell_text(column, fit)))
+    markup = [html("<div class='said'>{}</div><table>{}</table>", heading, rows)]
+    for note in (reach_words(fit), *fit.notes):
+        markup.append(html("<div class='said dim'>{}</div>", as_sentence(note)))
     return html("<div class='fl'>{}</div>", markup)
-
-
-def _outliers_sentence(outliers: Sequence[str]) -> str:
-    """Which samples contradict the others, so that the fit leaves them out."""
-    count = len(outliers)
-    if count == 0:
-        return "No sample was left out."
-    names = ", ".join(outliers[:MOST_NAMED])
-    if count > MOST_NAMED:
-        names += " …"
-    verb = "sample contradicts" if count == 1 else "samples contradict"
-    return f"{count} {verb} the others: {names}."
-
-
-def _sentence(note: str) -> str:
-    """A note of the library with a capital letter and a full stop."""
-    return f"{note[:1].upper() + note[1:]}."

@@ -1,30 +1,36 @@
 """Markup of a layout's score card, and of the quick checks below the layout's editor.
 
+Sentences and columns are those of `finlab/analysis/card_text.py`, which the command line prints.
 `panels/limits_tab.py` shows the card, `panels/cards.py` the checks.
 """
 
-from collections.abc import Callable
+from collections.abc import Sequence
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 from markupsafe import Markup
 
-from finlab.analysis import AXES, Authority, ScoreCard
+from finlab.analysis import ScoreCard
+from finlab.analysis.card_text import (
+    AXES_LOST,
+    AXIS_COLUMNS,
+    CARD_COLUMNS,
+    WEAKEST_LEFT,
+    WITHOUT,
+    Remark,
+    axis_rows,
+    held_remarks,
+)
 from finlab.analysis.score_card import QuickCheck
+from finlab.display import Column
 from finlab.layout import Layout
 from finlab.swim.hull import hull_of
 from webapp.markup.answer import swatch
-from webapp.markup.words import html, in_app, listed, row, three_digits
+from webapp.markup.tables import cell_text, head_row
+from webapp.markup.words import DASH, html, in_app, row
 from webapp.scene.actuator_shapes import SPAN
-from webapp.session.state import AXIS_UNITS
 
-FIGURES: dict[str, Callable[[ScoreCard], float | None]] = {
-    "weakest direction [N]": lambda card: card.authority.weakest,
-    "weakest after the worst loss [N]": lambda card: (
-        card.worst_loss.weakest if card.worst_loss else None
-    ),
-}
-"""Words -> figure of a whole robot; None where it has none, as the worst loss of a single fin."""
 SAME = 1e-3
 """Relative difference of two figures up to which they count as equal."""
 TIP = 0.05
@@ -32,7 +38,7 @@ TIP = 0.05
 
 
 def score_table(layout: Layout, card: ScoreCard, old_card: ScoreCard | None) -> str:
-    """The score card as tables: figures of the whole robot, of each axis, and of each loss.
+    """A score card as tables: figures of the whole robot, of each axis, and of each loss.
 
     Args:
         layout: the robot.
@@ -45,21 +51,13 @@ def score_table(layout: Layout, card: ScoreCard, old_card: ScoreCard | None) -> 
     return html("<div class='fl score'>{}</div>", markup)
 
 
-def rank_sentence(authority: Authority | QuickCheck) -> str:
-    """Rank, conditioning and what is missing, in words."""
-    text = html("<b>{} of {}</b> axes independent", authority.rank, authority.counted)
-    if authority.condition is not None:
-        text += f", condition number {three_digits(authority.condition)}"
-    text += "."
-    if authority.free:
-        text += html(" Free, not commanded: {}.", listed(authority.free))
-    if authority.without_authority:
-        missing = listed(authority.without_authority)
-        text += html(" <span class='missing'>It cannot {}.</span>", missing)
-    if authority.coupled:
-        coupled = listed(authority.coupled).capitalize()
-        text += html(" <span class='missing'>{} only together with others.</span>", coupled)
-    return text
+def remarks_markup(remarks: Sequence[Remark]) -> str:
+    """Sentences one after the other; warnings stand out."""
+    sentences = []
+    for remark in remarks:
+        template = "<span class='missing'>{}</span> " if remark.is_warning else "{} "
+        sentences.append(html(template, remark.text))
+    return html("{}", sentences)
 
 
 def _cards(card: ScoreCard, old_card: ScoreCard | None) -> list[ScoreCard]:
@@ -68,32 +66,30 @@ def _cards(card: ScoreCard, old_card: ScoreCard | None) -> list[ScoreCard]:
 
 
 def _summary(card: ScoreCard, old_card: ScoreCard | None) -> str:
-    """The rank in a sentence, and a table of the figures of the whole robot."""
+    """Sentences on the rank, and a table of the figures of the whole robot."""
     cards = _cards(card, old_card)
     head = ""
     if old_card is not None:
         ranks = [f"{each.authority.rank} of {each.authority.counted}" for each in cards]
         head = html(
             "<tr><th></th><th>before</th><th>now</th><th></th></tr>{}",
-            row("axes independent", *ranks, ""),
+            row("independent directions", *ranks, ""),
         )
-    rows = []
-    for words, figure in FIGURES.items():
-        rows.append(_figure_row(words, [figure(each) for each in cards]))
-    return html(
-        "<div class='said'>{}</div><table>{}{}</table>", rank_sentence(card.authority), head, rows
-    )
+    sentences = remarks_markup(held_remarks(card.authority, card.counted))
+    rows = [_figure_row(column, cards) for column in CARD_COLUMNS]
+    return html("<div class='said'>{}</div><table>{}{}</table>", sentences, head, rows)
 
 
-def _figure_row(words: str, values: list[float | None]) -> str:
+def _figure_row(column: Column, cards: list[ScoreCard]) -> str:
     """A row of one card, or of two and a sign that says which is better; nothing where neither has
-    the figure."""
-    if not any(value is not None for value in values):
+    the figure, as the worst loss of a single fin."""
+    values = [column.value(card) for card in cards]
+    if all(value is None for value in values):
         return ""
-    cells: list[object] = [three_digits(value) for value in values]
-    if len(values) > 1:
-        cells.append(_trend(values[0], values[-1]))
-    return row(words, *cells)
+    texts: list[object] = [cell_text(column, card) for card in cards]
+    if len(cards) > 1:
+        texts.append(_trend(values[0], values[-1]))
+    return row(column.heading, *texts)
 
 
 def _trend(old: float | None, new: float | None) -> str:
@@ -108,57 +104,44 @@ def _trend(old: float | None, new: float | None) -> str:
 
 
 def _axes(card: ScoreCard, old_card: ScoreCard | None) -> str:
-    """What each commanded axis gives at most, before and after the worst loss, and what it
-    costs."""
-    authorities = [each.authority for each in _cards(card, old_card)]
+    """A row for each commanded axis; its largest wrench is that of both cards."""
+    name, unit, largest, *others = AXIS_COLUMNS
+    rows_by_card = [
+        {each.axis: each for each in axis_rows(each)} for each in _cards(card, old_card)
+    ]
     rows = []
-    for k, word in enumerate(AXES):
-        if word in card.authority.free:
-            continue
-        shares = []
-        for loss in card.losses:
-            share = loss.share_left[k]
-            if share is not None:
-                shares.append(share)
-        power = card.unit_power[k]
-        rows.append(
-            row(
-                html("{} <span class='dim'>{}</span>", word, AXIS_UNITS[k]),
-                *[_range_words(each.largest[k], each.most_negative[k]) for each in authorities],
-                f"{100 * min(shares):.0f} %" if shares else "–",
-                "–" if power is None else three_digits(power),
-            )
-        )
-    columns = [""] if old_card is None else ["before", "now"]
-    head = html(
-        "<tr><th>largest on its own</th>{}"
-        "<th title='after the worst loss of one'>one lost</th>"
-        "<th title='least power for so much'>W at 1 N, 0.1 N m</th></tr>",
-        [html("<th>{}</th>", word) for word in columns],
-    )
-    return html("<table>{}{}</table>", head, rows)
-
-
-def _range_words(positive: float, negative: float) -> str:
-    """What an axis gives at most with either sign; one number where both have the same digits."""
-    if positive == negative == 0.0:
-        return Markup("<span class='missing'>none</span>")
-    forward = three_digits(positive)
-    backward = three_digits(negative)
-    return f"±{forward}" if forward == backward else f"+{forward} −{backward}"
+    for axis_row in axis_rows(card):
+        ranges = []
+        for rows_of_card in rows_by_card:
+            # An axis that was free before has no row on that card.
+            axis_before = rows_of_card.get(axis_row.axis)
+            ranges.append(DASH if axis_before is None else cell_text(largest, axis_before))
+        # The panel has no room for a column of units: they stand beside the names.
+        words = html("{} <span class='dim'>{}</span>", name.cell(axis_row), unit.cell(axis_row))
+        figures = [cell_text(column, axis_row) for column in others]
+        rows.append(row(words, *ranges, *figures))
+    range_heads: list[Column] = [largest]
+    if old_card is not None:
+        range_heads = [replace(largest, name="before"), replace(largest, name="now")]
+    axis_head = Column("on its own", name.value, is_text=True)
+    heads = head_row([axis_head, *range_heads, *others])
+    return html("<table>{}{}</table>", heads, rows)
 
 
 def _losses(layout: Layout, card: ScoreCard) -> str:
-    """A row for each actuator: what is left without it."""
+    """A row for each actuator: what is left without it. The shares of all axes, which the command
+    line prints, have no room here; the table of axes has the least of them."""
     if not card.losses:
         return ""
+    columns = (WEAKEST_LEFT, AXES_LOST)
     rows = []
     for loss in card.losses:
-        cost = html("<span class='missing'>loses {}</span>", listed(loss.lost)) if loss.lost else ""
-        name = html("without {}{}", swatch(layout.index(loss.actuator)), loss.actuator)
-        weakest = f"{three_digits(loss.weakest)} N"
-        rows.append(row(name, weakest, html("<div class='words'>{}</div>", cost)))
-    return html("<table><tr><th>one lost</th><th>weakest</th><th></th></tr>{}</table>", rows)
+        style = "missing" if loss.lost else "dim"
+        name = html("{}{}", swatch(layout.index(loss.actuator)), loss.actuator)
+        template = "<tr><td>{}</td><td>{}</td><td class='words {}'>{}</td></tr>"
+        texts = [cell_text(column, loss) for column in columns]
+        rows.append(html(template, name, texts[0], style, texts[1]))
+    return html("<table>{}{}</table>", head_row((WITHOUT, *columns)), rows)
 
 
 def check_card(quick: QuickCheck, has_several: bool, warnings: tuple[str, ...]) -> str:
@@ -170,15 +153,14 @@ def check_card(quick: QuickCheck, has_several: bool, warnings: tuple[str, ...]) 
         warnings: sentences about fins in the way.
     """
     texts = [html("<div class='missing'>{}</div>", text) for text in warnings]
-    costs = "No single failure costs an axis." if has_several else ""
+    remarks = held_remarks(quick, quick.actuators)
     if quick.lost:
-        lost = "; ".join([f"{name}: {', '.join(axes)}" for name, axes in quick.lost])
-        costs = html("<span class='missing'>A failure costs axes: {}.</span>", lost)
+        costs = "; ".join([f"{name}: {', '.join(axes)}" for name, axes in quick.lost])
+        remarks.append(Remark(f"A failure costs axes: {costs}.", is_warning=True))
+    elif has_several:
+        remarks.append(Remark("No single failure costs an axis."))
     return html(
-        "<div class='fl check'>{}<div class='said'>{} {}</div></div>",
-        texts,
-        rank_sentence(quick),
-        costs,
+        "<div class='fl check'>{}<div class='said'>{}</div></div>", texts, remarks_markup(remarks)
     )
 
 

@@ -6,28 +6,19 @@ The corner of the view (`panels/status.py`) shows the word, the panel of the wre
 
 from enum import Enum
 
-import numpy as np
 from markupsafe import Markup
 
 from finlab.allocation.allocation import Allocation
+from finlab.allocation.report import bound_words, missing_words, share_words
+from finlab.display import as_sentence
 from finlab.physics.objective import REACHED
-from webapp.markup.words import authority_sentence, in_app, listed, three_digits, unlearned_sentence
-from webapp.session.state import AXIS_UNITS, AXIS_WORDS, State
+from webapp.markup.words import authority_sentence, in_app, unlearned_sentence
+from webapp.session.state import State
 from webapp.session.targets import axis_reach
 from webapp.theme import DELIVERED, MISSING, NEARLY, UNLEARNED, Rgb
 
 WORKING = "Working …"
 """What stands in place of a verdict while the present question has no answer."""
-SPOKEN = 0.05
-"""Share of the largest miss, each axis over its scale, from which another axis is spoken of,
-too."""
-UNKNOWN_GAP = 9.0
-"""Share above the bound that says nothing of an answer, such as noise that pushes for nothing in a
-table."""
-PROVED = 1e-4
-"""Share of its watts that an answer may lie above the bound and count as proved least."""
-LEAST_WATTS = 1e-3
-"""Bound [W] that shares are taken of where it is smaller, or nothing."""
 AT_REST = "(flow)"
 """How a note ends that the panel beside the speed tells in its own words."""
 
@@ -77,52 +68,6 @@ def verdict_sentence(allocation: Allocation, in_reach: bool) -> str:
     return f"{verdict.value}, {allocation.policy.kind}"
 
 
-def missing_sentence(allocation: Allocation) -> str:
-    """One sentence on what is left undone, and on what comes along unasked, axis by axis."""
-    if allocation.reachable:
-        return "Nothing is left undone."
-    unallocated = allocation.unallocated
-    size = np.abs(unallocated / allocation.scale)
-    undone: list[str] = []
-    unasked: list[str] = []
-    for k in np.argsort(-size):
-        if size[k] < SPOKEN * size.max():
-            continue
-        is_undone = unallocated[k] * allocation.target[k] > 0.0
-        (undone if is_undone else unasked).append(_amount(unallocated[k], k))
-    phrases = []
-    if undone:
-        phrases.append(f"{listed(undone)} {'is' if len(undone) == 1 else 'are'} left undone")
-    if unasked:
-        verb = "comes" if len(unasked) == 1 else "come"
-        phrases.append(f"{listed(unasked)} {verb} along unasked")
-    return f"{'; '.join(phrases)}."
-
-
-def _gap(allocation: Allocation, bound: float) -> float:
-    """How far its watts lie above a bound [W], as a share of that."""
-    return (allocation.power - bound) / max(bound, LEAST_WATTS)
-
-
-def is_proved(allocation: Allocation) -> bool:
-    """Whether the watts of an answer are proved to be least."""
-    return allocation.bound is not None and _gap(allocation, allocation.bound) <= PROVED
-
-
-def bound_sentence(allocation: Allocation) -> str:
-    """How far an answer may be from the least watts, by the bound that its method proves; else
-    nothing."""
-    if allocation.bound is None:
-        return ""
-    gap = _gap(allocation, allocation.bound)
-    if gap <= PROVED:
-        return "Its watts are proved least."
-    if gap > UNKNOWN_GAP:
-        return "How far its watts are from the least is not known."
-    percent = f"{100 * gap:.2g}" if gap < 0.1 else f"{100 * gap:.0f}"
-    return f"Its watts are at most {percent} % above the least."
-
-
 def answer_sentence(
     state: State, allocation: Allocation | None, busy: bool, searching: bool = False
 ) -> Markup:
@@ -138,13 +83,12 @@ def answer_sentence(
     if allocation is not None and not busy:
         if allocation.unknown_fins:
             sentences.append(_warning("; ".join(allocation.notes) + "."))
-        sentences.append(missing_sentence(allocation))
+        sentences.append(as_sentence(missing_words(allocation)))
         if not allocation.reachable and not allocation.unknown_fins:
             sentences.append(_remarks_sentence(allocation, searching))
         elif allocation.reachable and not searching:
-            sentences.append(bound_sentence(allocation))
-            if doubt := allocation.measure_next:
-                sentences.append(f"{doubt[0].upper()}{doubt[1:]}.")
+            sentences.append(as_sentence(bound_words(allocation)))
+            sentences.append(as_sentence(allocation.measure_next))
     elif busy:
         sentences.append(WORKING)
     blind = authority_sentence(
@@ -157,19 +101,11 @@ def answer_sentence(
 
 def _remarks_sentence(allocation: Allocation, searching: bool) -> str:
     """How much is delivered, what binds, and what the method notes unless it is `searching`."""
-    percent = round(100 * allocation.share)
-    remarks = []
-    if 0 <= percent < 100:
-        remarks.append(f"{percent} % of what is asked is delivered")
-    remarks += allocation.binding
+    remarks = [*share_words(allocation), *allocation.binding]
     if not searching:
         remarks += allocation.notes
-    sentence = "; ".join([remark for remark in remarks if not remark.endswith(AT_REST)])
-    return in_app(f"{sentence[0].upper()}{sentence[1:]}.") if sentence else ""
-
-
-def _amount(value: float, axis: int) -> str:
-    return f"{three_digits(abs(value))} {AXIS_UNITS[axis]} of {AXIS_WORDS[axis]}"
+    words = "; ".join([remark for remark in remarks if not remark.endswith(AT_REST)])
+    return in_app(as_sentence(words))
 
 
 def _warning(text: str) -> Markup:

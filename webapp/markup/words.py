@@ -14,15 +14,17 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
+import finlab.display
 from finlab.actuators.kinds import free_angles
 from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
+from finlab.axes import MOTIONS
+from finlab.display import NO_NUMBER, as_sentence, listed
 from finlab.layout import Layout
 from finlab.layout.damage import NO_DAMAGE, Damage
 from finlab.swim.vehicle.fossen import complete_body
 from finlab.swim.vehicle.righting import righting_words
 from finlab.swim.vehicle.vehicle import Vehicle
-from webapp.session.state import AXIS_WORDS
 
 SAFE = (Markup, int, float, np.float64)
 """Types of values that `html` takes as they are: none of them can hold a sign of markup."""
@@ -82,6 +84,8 @@ def button_colors(name: str, colors: Sequence[tuple[str, str]]) -> str:
     return html("<style>{}</style>{}", rules, marker(name))
 
 
+DASH = "–"
+"""What stands in place of a number that there is none of."""
 SPEED = "Speed through the water [m/s]"
 """Label of the control that tells how the robot moves."""
 CONVERT = "finlab layout convert"
@@ -117,13 +121,6 @@ AT_LIMIT = 0.995
 """Share of the upper limit from which a command counts as saturated."""
 
 
-def listed(items: Sequence[str]) -> str:
-    """`a`, `a and b`, `a, b and c`."""
-    if len(items) == 1:
-        return items[0]
-    return f"{', '.join(items[:-1])} and {items[-1]}"
-
-
 def fins_words(numbers: Sequence[int], layout: Layout | None = None) -> str:
     """`fin 2`, `fins 1 and 3`: fins, or actuators of a layout with others, by their places from 0
     in it."""
@@ -135,7 +132,7 @@ def small(value: float) -> str:
     """A number that is small when all is well: `3.10e−05`, and `16.2` where it is not."""
     if 0.1 <= abs(value) < 1e4:
         return three_digits(value)
-    return f"{value:.2e}".replace("-", "−") if math.isfinite(value) else "–"
+    return f"{value:.2e}".replace("-", "−") if math.isfinite(value) else DASH
 
 
 def error_digits(value: float) -> str:
@@ -149,14 +146,10 @@ def degrees(angle: float) -> str:
 
 
 def three_digits(value: float | None) -> str:
-    """Three significant digits: `2.32`, `0.0410`, `12.5`; small and large ones as `small` has
-    them."""
-    if value is None or not math.isfinite(value):
-        return "–"
-    if value != 0 and not 1e-3 <= abs(value) < 1e4:
-        return small(value)
-    digits = math.floor(math.log10(float(f"{abs(value):.2e}"))) if value else 0
-    return f"{value:.{max(2 - digits, 0)}f}".replace("-", "−")
+    """Three significant digits, as the library writes them, with a real minus sign; a dash where
+    there is no number."""
+    text = finlab.display.three_digits(value)
+    return DASH if text == NO_NUMBER else text.replace("-", "−")
 
 
 def source_words(sources: Sequence[str]) -> str:
@@ -213,7 +206,7 @@ def authority_sentence(layout: Layout, lost: tuple[str, ...], reach: Array) -> s
     is_blind = reach < 1e-6
     if not is_blind.any():
         return None
-    blind = [AXIS_WORDS[k] for k in range(6) if is_blind[k]]
+    blind = [MOTIONS[k] for k in range(6) if is_blind[k]]
     subject = "This"
     if lost:
         subject = f"Without {fins_words([layout.index(name) for name in lost], layout)} this"
@@ -222,8 +215,8 @@ def authority_sentence(layout: Layout, lost: tuple[str, ...], reach: Array) -> s
 
 def righting_sentences(layout: Layout) -> tuple[str, ...]:
     """What there is to say of a robot that nothing rights; nothing where a moment does."""
-    sentence = righting_words(layout)
-    return () if sentence is None else (f"{sentence[0].upper()}{sentence[1:]}.",)
+    words = righting_words(layout)
+    return () if words is None else (as_sentence(words),)
 
 
 def trim_sentence(layout: Layout, reach: Array) -> str | None:
@@ -237,14 +230,12 @@ def trim_sentence(layout: Layout, reach: Array) -> str | None:
         return None
     motion = "rises" if lift > 0.0 else "sinks"
     direction = "down" if lift > 0.0 else "up"
-    sentence = f"By its mass and buoyancy this robot {motion} with {three_digits(abs(lift))} N"
+    clause = f"By its mass and buoyancy this robot {motion} with {three_digits(abs(lift))} N"
     limit = f"{three_digits(heave_reach)} N" if heave_reach >= 1e-6 else "nothing"
     if abs(lift) < heave_reach:
-        return (
-            f"{sentence}; of the {limit} that its working fins can push {direction}, that is most."
-        )
+        return f"{clause}; of the {limit} that its working fins can push {direction}, that is most."
     return (
-        f"{sentence}, and its working fins can push {direction} with {limit} at most: it cannot "
+        f"{clause}, and its working fins can push {direction} with {limit} at most: it cannot "
         "keep its depth."
     )
 

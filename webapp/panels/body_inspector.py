@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from functools import partial
 from math import isfinite, nan
-from typing import Any
+from typing import Any, NamedTuple
 
 from finlab.layout import Body, Layout
 from finlab.swim.hull import contradicts, displaced, lift_of
@@ -11,61 +11,99 @@ from finlab.swim.vehicle.fossen import GRAVITY
 from webapp.markup.words import html, three_digits
 from webapp.page import Page
 
-KNOWN = {
+WORDS = {
     "mass_kg": "mass",
     "inertia_kgm2": "inertia",
     "added_mass": "added mass",
     "linear_damping": "linear damping",
     "quadratic_damping": "quadratic damping",
 }
+"""Field of `Body` that a swim needs -> its words."""
+NEUTRAL_SHARE = 5e-4
+"""Share of the mass by which a body that counts as neutral may be lighter or heavier."""
+
+
+class NumberBox(NamedTuple):
+    """The box of a field of `Body` that is one number."""
+
+    label: str
+    step: float
+    """Between two values of its arrows."""
+    hint: str
+
+
+class VectorBoxes(NamedTuple):
+    """Three boxes for three numbers of a field of `Body`."""
+
+    label: str
+    first: int
+    """Index of the first of these numbers in the field."""
+    hint: str
+
+
 NUMBERS = {
-    "mass_kg": ("Mass [kg]", 0.5, "From the hull: of the water that it displaces."),
-    "buoyancy_n": ("Buoyancy [N]", 1.0, "As much as the robot weighs where nothing is said."),
+    "mass_kg": NumberBox("Mass [kg]", 0.5, "From the hull: of the water that it displaces."),
+    "buoyancy_n": NumberBox(
+        "Buoyancy [N]", 1.0, "As much as the robot weighs where nothing is said."
+    ),
 }
-PARTS: dict[str, tuple[tuple[str, int, str], ...]] = {
+"""Field of `Body` -> its box."""
+VECTORS: dict[str, tuple[VectorBoxes, ...]] = {
     "inertia_kgm2": (
-        ("Inertia [kg m²]", 0, "About x, y, z. From the hull: a solid of one density."),
+        VectorBoxes("Inertia [kg m²]", 0, "About x, y, z. From the hull: a solid of one density."),
     ),
     "added_mass": (
-        ("Added mass [kg]", 0, "Along x, y, z. From the hull: its ellipsoid after Lamb, art. 114."),
-        ("turning [kg m²]", 3, "About x, y, z. From the hull: its ellipsoid after Lamb, art. 115."),
+        VectorBoxes(
+            "Added mass [kg]",
+            0,
+            "Along x, y, z. From the hull: its ellipsoid after Lamb, art. 114.",
+        ),
+        VectorBoxes(
+            "turning [kg m²]",
+            3,
+            "About x, y, z. From the hull: its ellipsoid after Lamb, art. 115.",
+        ),
     ),
     "linear_damping": (
-        ("Drag ∝ v [N s/m]", 0, "Along x, y, z. From the hull: Blasius' friction at 0.2 m/s."),
-        ("turning [N m s]", 3, "About x, y, z. From the hull: by the same friction."),
+        VectorBoxes(
+            "Drag ∝ v [N s/m]", 0, "Along x, y, z. From the hull: Blasius' friction at 0.2 m/s."
+        ),
+        VectorBoxes("turning [N m s]", 3, "About x, y, z. From the hull: by the same friction."),
     ),
     "quadratic_damping": (
-        (
+        VectorBoxes(
             "Drag ∝ v² [N s²/m²]",
             0,
             "Along x, y, z. From the hull: ½ ρ A 0.44 d/l, Hoerner's blunt bodies.",
         ),
-        (
+        VectorBoxes(
             "turning [N m s²]",
             3,
             "About x, y, z. From the hull: strips in cross-flow but for the round core.",
         ),
     ),
     "center_of_buoyancy_m": (
-        ("Buoyancy at [m]", 0, "Its centre, from that of gravity; above it, it rights the robot."),
+        VectorBoxes(
+            "Buoyancy at [m]", 0, "Its centre, from that of gravity; above it, it rights the robot."
+        ),
     ),
 }
-"""Fields of `Body` with several numbers: their rows of three, the first number of each, what they
-are."""
+"""Field of `Body` that is 3 or 6 numbers -> its boxes, three numbers each."""
 
 
 def add_body(page: Page) -> None:
-    """Widgets about the robot."""
+    """Widgets about the robot as a whole."""
     session = page.session
     gui = page.gui
 
     def put_in(key: str, first: int, values: tuple[Any, ...]) -> None:
-        full = list(_whole(_body(session.state.layout), key))
-        full[first : first + 3] = values
-        known = [value for value in full if isfinite(value)]
-        # They are typed box by box; of inertias none may be zero.
-        rest = max(known, default=0.0) if key == "inertia_kgm2" else 0.0
-        session.set_dynamics(key, tuple(value if isfinite(value) else rest for value in full))
+        """Three typed numbers into a field of `Body`, from an index on; NaN is an empty box."""
+        numbers = list(_numbers(_body(session.state.layout), key))
+        numbers[first : first + 3] = values
+        typed = [value for value in numbers if isfinite(value)]
+        # Boxes are typed one by one. An empty one counts as zero, but no inertia may be zero.
+        default = max(typed, default=0.0) if key == "inertia_kgm2" else 0.0
+        session.set_dynamics(key, tuple(value if isfinite(value) else default for value in numbers))
 
     def forget() -> None:
         text = (
@@ -74,60 +112,76 @@ def add_body(page: Page) -> None:
         )
         page.ask("Forget the body?", text, {"Forget": session.forget_dynamics})
 
-    def one(key: str) -> Callable[[Layout], float]:
-        return lambda layout: (
-            nan if getattr(_body(layout), key) is None else getattr(_body(layout), key)
-        )
-
-    def three(key: str, first: int) -> Callable[[Layout], tuple[float, ...]]:
-        return lambda layout: _whole(_body(layout), key)[first : first + 3]
-
-    page.add_html(_facts)
+    page.add_html(_hull_card)
     page.bind(gui.add_text("Name", ""), session.rename_robot, lambda layout: layout.name)
     text = gui.add_text("About", "", multiline=True)
     page.bind(text, session.describe_robot, lambda layout: layout.description)
-    acts = {"Estimate": session.estimate, "Forget": forget}
+    actions = {"Estimate": session.estimate, "Forget": forget}
     page.add_buttons(
         "From the hull",
-        acts,
+        actions,
         hint="Of the bare hull: fins, wires and ports come on top; each box says how.",
     )
-    for key, (label, step, hint) in NUMBERS.items():
-        box = gui.add_number(label, 0.0, step=step, hint=hint)
-        page.bind_number(box, partial(session.set_dynamics, key), one(key))
-    for key, rows in PARTS.items():
-        for label, first, hint in rows:
-            boxes = gui.add_vector3(label, (0.0, 0.0, 0.0), step=0.1, hint=hint)
-            page.bind_number(boxes, partial(put_in, key, first), three(key, first))
+    for key, number_box in NUMBERS.items():
+        box = gui.add_number(number_box.label, 0.0, step=number_box.step, hint=number_box.hint)
+        page.bind_number(box, partial(session.set_dynamics, key), _number_of(key))
+    for key, rows in VECTORS.items():
+        for row in rows:
+            boxes = gui.add_vector3(row.label, (0.0, 0.0, 0.0), step=0.1, hint=row.hint)
+            page.bind_number(boxes, partial(put_in, key, row.first), _vector_of(key, row.first))
 
 
 def _body(layout: Layout) -> Body:
+    """The body of a layout; an empty one where the layout has none."""
     return layout.body or Body()
 
 
-def _whole(body: Body, key: str) -> tuple[float, ...]:
-    known: tuple[float, ...] | None = getattr(body, key)
-    return known or (nan,) * 3 * len(PARTS[key])
+def _number_of(key: str) -> Callable[[Layout], float]:
+    """A function from a layout to a field of its body that is one number; NaN where it has none."""
+
+    def number(layout: Layout) -> float:
+        value: float | None = getattr(_body(layout), key)
+        return nan if value is None else value
+
+    return number
 
 
-def _facts(layout: Layout) -> str:
-    """The hull in figures, and what a swim would miss."""
+def _vector_of(key: str, first: int) -> Callable[[Layout], tuple[float, ...]]:
+    """A function from a layout to three numbers of a field of its body, from an index on."""
+
+    def vector(layout: Layout) -> tuple[float, ...]:
+        return _numbers(_body(layout), key)[first : first + 3]
+
+    return vector
+
+
+def _numbers(body: Body, key: str) -> tuple[float, ...]:
+    """All numbers of a field of a body; NaN where it has none."""
+    numbers: tuple[float, ...] | None = getattr(body, key)
+    return numbers or (nan,) * 3 * len(VECTORS[key])
+
+
+def _hull_card(layout: Layout) -> str:
+    """How much water the hull encloses, whether that fits the body, and what a swim would lack."""
     body = _body(layout)
-    water = displaced(layout)
-    lines = [f"The hull encloses {three_digits(water)} kg of water."]
+    water_kg = displaced(layout)
+    sentences = [f"The hull encloses {three_digits(water_kg)} kg of water."]
     if body.mass_kg is not None:
-        lift = lift_of(body)
-        over = lift / GRAVITY - body.mass_kg
+        lift_kg = lift_of(body) / GRAVITY
         if contradicts(layout):
-            reason = "it is flooded in part" if lift < GRAVITY * water else "other parts lift, too"
-            sentence = f" The body's buoyancy is that of {three_digits(lift / GRAVITY)} kg"
-            lines[0] += f"{sentence}: {reason}, or estimate anew."
-        rises = f"{'rises' if over > 0 else 'sinks'} with {three_digits(abs(over))} kg"
-        lines.append(
-            "By mass and buoyancy below it "
-            f"{'is neutral' if abs(over) < 5e-4 * body.mass_kg else rises}."
-        )
-    missing = [word for key, word in KNOWN.items() if getattr(body, key) is None]
+            is_less = lift_of(body) < GRAVITY * water_kg
+            reason = "it is flooded in part" if is_less else "other parts lift, too"
+            sentences.append(
+                f"The body's buoyancy is that of {three_digits(lift_kg)} kg: {reason}, or estimate "
+                "anew."
+            )
+        excess_kg = lift_kg - body.mass_kg
+        motion = "is neutral"
+        if abs(excess_kg) >= NEUTRAL_SHARE * body.mass_kg:
+            verb = "rises" if excess_kg > 0 else "sinks"
+            motion = f"{verb} with {three_digits(abs(excess_kg))} kg"
+        sentences.append(f"By mass and buoyancy below it {motion}.")
+    missing = [words for key, words in WORDS.items() if getattr(body, key) is None]
     if missing:
-        lines.append(f"Not said: {', '.join(missing)}.")
-    return html("<div class='fl head'><div class='dim'>{}</div></div>", " ".join(lines))
+        sentences.append(f"Not said: {', '.join(missing)}.")
+    return html("<div class='fl head'><div class='dim'>{}</div></div>", " ".join(sentences))

@@ -1,4 +1,5 @@
-"""The bar above all, cards beside and over the view, and what else is nothing but markup."""
+"""The bar at the top (file, history, tasks, method, help), and cards that are markup alone: checks
+of a layout, the camera's buttons, a tour's or lesson's text."""
 
 from collections.abc import Callable
 from functools import partial
@@ -30,84 +31,8 @@ SWITCHES = {
 """Field of `Display`, label and hint of each switch."""
 
 
-def card(written: Callable[..., str]) -> Callable[[Page], object]:
-    """A panel of what `written` makes of the facts."""
-    return lambda page: page.add_html(written)
-
-
-def robot_name(layout: Layout, saved: Layout) -> str:
-    """The robot's name, and whether it has been changed since it was opened or saved."""
-    changed = "" if layout == saved else Markup("<span class='dim'>edited</span>")
-    return html(
-        "<div class='fl-robot' title='{}'><h1>{}</h1>{}</div>", layout.name, layout.name, changed
-    )
-
-
-def tasks(task: str) -> str:
-    """What is being done: one of four tasks."""
-    buttons = [
-        button(name, "task", name, Markup("aria-current=page") * (name == task)) for name in TASKS
-    ]
-    return html("<nav class='fl-tasks' aria-label='Tasks'>{}</nav>", buttons)
-
-
-def check(able: Layout, lost: tuple[str, ...], layout: Layout, flow: Flow | None) -> str:
-    """What can be said of a layout at once: its axes, what a failure costs, what looks like a
-    mistake."""
-    remarks = (*warnings(layout), *righting_sentences(layout))
-    return check_card(quick_check(able, lost, flow), layout.n - len(lost) > 1, remarks)
-
-
-def camera() -> str:
-    """Sides to look from, and framing."""
-    looks = [
-        button(name, "look", name, html("title='{}'", key)) for key, name in enumerate(CAMERAS, 1)
-    ]
-    looks.append(
-        button("Frame", "frame", "", Markup("title='what is selected fills the view (F)'"))
-    )
-    looks.append(button("Picture", "picture", "", Markup("title='save the view as it is (PNG)'")))
-    return html("<div class='fl fl-camera'>{}</div>", looks)
-
-
-def guide_card(stop: Stop | None, solved: bool) -> str:
-    """Title and text, and an exercise with praise once that is done; nothing outside of tour and
-    lessons."""
-    if stop is None:
-        return ""
-    course = TOUR if stop in TOUR else LESSONS
-    place = course.index(stop) + 1
-    last = len(course)
-    kind = "tour"
-    title = f"{place} of {last} · {stop.title}"
-    markup = [html("<p>{}</p>", stop.text)]
-    if stop.exercise:
-        kind = f"fl-lesson {'done' if solved else 'open'}"
-        title = f"Lesson {title}"
-        exercise = "<p class='exercise'><span class='mark'>{}</span>{}</p>"
-        markup.append(html(exercise, "✓" if solved else "○", stop.exercise))
-        if solved:
-            markup.append(html("<p role='status'>{}</p>", stop.praise))
-    primary = Markup("class='primary'") * (solved or not stop.exercise)
-    ways = [button("Back", "back")] if place > 1 else []
-    ways.append(button("Finish" if place == last else "Next", "on", attributes=primary))
-    ways += [] if place == last else [button("Close", "end")]
-    text = "<div class='fl fl-tour {}'><b>{}</b>{}<div class='row'>{}</div></div>"
-    return html(text, kind, title, markup, ways)
-
-
-def add_switches(page: Page) -> None:
-    """All of them."""
-    for key, (label, hint) in SWITCHES.items():
-        box = page.gui.add_checkbox(label, False, hint=hint)
-        page.bind(
-            box,
-            partial(page.session.set_display, key),
-            lambda display, key=key: getattr(display, key),
-        )
-
-
 DESIGNS = ",".join((*LAYOUTS, ".zip", *FOREIGN))
+"""Suffixes of the files that are opened as designs."""
 METHOD_WORDS = {
     "dual": "least watts, exact, any actuator",
     "mdn": "least effort, a network proposes, made exact",
@@ -121,12 +46,109 @@ METHOD_WORDS = {
     "fixed_frequency": "U-CAT's own law, one frequency",
     "ipopt": "a general solver, slow",
 }
+"""Name of each method -> what is said of it in the list of methods."""
 COMMANDS = html(
     "<button title='all commands and their keys (Ctrl+K)' onclick='{}'>Commands</button>",
     "document.documentElement.dispatchEvent(new KeyboardEvent("
     '"keydown", { key: "k", code: "KeyK", ctrlKey: true, bubbles: true }))',
 )
 """A button that opens the list of commands, as Ctrl+K does."""
+
+
+def card(markup: Callable[..., str]) -> Callable[[Page], object]:
+    """Returns what builds a panel of markup alone.
+
+    Args:
+        markup: a function of the facts of a page, which are its arguments by name.
+    """
+    return lambda page: page.add_html(markup)
+
+
+def robot_name(layout: Layout, saved: Layout) -> str:
+    """The robot's name, and whether it has been changed since it was opened or saved."""
+    remark = "" if layout == saved else Markup("<span class='dim'>edited</span>")
+    template = "<div class='fl-robot' title='{}'><h1>{}</h1>{}</div>"
+    return html(template, layout.name, layout.name, remark)
+
+
+def tasks(task: str) -> str:
+    """A button for each task; the present one is marked."""
+    buttons = []
+    for name in TASKS:
+        attributes = Markup("aria-current=page") if name == task else Markup()
+        buttons.append(button(name, "task", name, attributes))
+    return html("<nav class='fl-tasks' aria-label='Tasks'>{}</nav>", buttons)
+
+
+def check(able: Layout, lost: tuple[str, ...], layout: Layout, flow: Flow | None) -> str:
+    """The quick check of a layout: its axes, what a failure costs, and what looks like a mistake.
+
+    Args:
+        able: the layout with the limits that damage has left.
+        lost: names of its lost actuators.
+        layout: the layout itself.
+        flow: velocity (6,) relative to the water [m/s, rad/s]; None at rest.
+    """
+    remarks = (*warnings(layout), *righting_sentences(layout))
+    return check_card(quick_check(able, lost, flow), layout.n - len(lost) > 1, remarks)
+
+
+def camera() -> str:
+    """Buttons of the camera: directions to look from, framing, and a picture."""
+    buttons = []
+    for key, name in enumerate(CAMERAS, start=1):
+        buttons.append(button(name, "look", name, html("title='{}'", key)))
+    frame_hint = Markup("title='what is selected fills the view (F)'")
+    buttons.append(button("Frame", "frame", "", frame_hint))
+    picture_hint = Markup("title='save the view as it is (PNG)'")
+    buttons.append(button("Picture", "picture", "", picture_hint))
+    return html("<div class='fl fl-camera'>{}</div>", buttons)
+
+
+def guide_card(stop: Stop | None, solved: bool) -> str:
+    """The card of a stop of the tour or a lesson: its title, its text, and its exercise, with
+    praise once that is solved.
+
+    Args:
+        stop: the present stop; None outside of tour and lessons, where there is no card.
+        solved: whether its exercise is solved.
+    """
+    if stop is None:
+        return ""
+    course = TOUR if stop in TOUR else LESSONS
+    number = course.index(stop) + 1
+    is_last = number == len(course)
+    style = "tour"
+    title = f"{number} of {len(course)} · {stop.title}"
+    markup = [html("<p>{}</p>", stop.text)]
+    if stop.exercise:
+        style = f"fl-lesson {'done' if solved else 'open'}"
+        title = f"Lesson {title}"
+        exercise = "<p class='exercise'><span class='mark'>{}</span>{}</p>"
+        markup.append(html(exercise, "✓" if solved else "○", stop.exercise))
+        if solved:
+            markup.append(html("<p role='status'>{}</p>", stop.praise))
+    buttons = []
+    if number > 1:
+        buttons.append(button("Back", "back"))
+    is_primary = solved or not stop.exercise
+    attributes = Markup("class='primary'") if is_primary else Markup()
+    buttons.append(button("Finish" if is_last else "Next", "on", attributes=attributes))
+    if not is_last:
+        buttons.append(button("Close", "end"))
+    template = "<div class='fl fl-tour {}'><b>{}</b>{}<div class='row'>{}</div></div>"
+    return html(template, style, title, markup, buttons)
+
+
+def add_switches(page: Page) -> None:
+    """The switches of what the view shows."""
+    for key, (label, hint) in SWITCHES.items():
+        box = page.gui.add_checkbox(label, False, hint=hint)
+        page.bind(
+            box,
+            partial(page.session.set_display, key),
+            lambda display, key=key: getattr(display, key),
+        )
 
 
 def add_file(page: Page) -> None:
@@ -138,30 +160,31 @@ def add_file(page: Page) -> None:
     )
     page.opening.add(DESIGNS, designs.open)
     hint = f"{KINDS[0].upper()}{KINDS[1:]}. Files can be dropped on the page as well."
-    opens = page.add_upload("Open", page.opening.open, icon=viser.Icon.FOLDER_OPEN, hint=hint)
-    # By the time that this is written, the panels below have said what can be opened.
-    page.board.show(opens, mime_type=lambda: page.opening.suffixes)
-    save = "The layout's file; with measured fins or an imported hull a ZIP with theirs."
-    page.add_button("Save", designs.save, icon=viser.Icon.DEVICE_FLOPPY, hint=save)
-    share = f"A link that carries the whole design, up to {MAX_LINK:,} characters."
-    page.add_button("Share", designs.share, icon=viser.Icon.LINK, hint=share)
+    upload = page.add_upload("Open", page.opening.open, icon=viser.Icon.FOLDER_OPEN, hint=hint)
+    # When this is called, the other panels have added the suffixes that they open.
+    page.board.show(upload, mime_type=lambda: page.opening.suffixes)
+    hint = "The layout's file; with measured fins or an imported hull a ZIP with theirs."
+    page.add_button("Save", designs.save, icon=viser.Icon.DEVICE_FLOPPY, hint=hint)
+    hint = f"A link that carries the whole design, up to {MAX_LINK:,} characters."
+    page.add_button("Share", designs.share, icon=viser.Icon.LINK, hint=hint)
 
 
 def add_history(page: Page) -> None:
-    """Undo and redo, by name."""
+    """Buttons that undo and redo, with the name of the step."""
     session = page.session
-    icon = viser.Icon
     add_html(page.gui, marker("fl-history"))
-    back = page.add_button("Undo", session.undo, icon=icon.ARROW_BACK_UP, hint="Ctrl+Z")
-    page.board.show(back, label=lambda undo: f"Undo: {undo}" if undo else "Undo")
-    forth = page.add_button(
-        "Redo", session.redo, icon=icon.ARROW_FORWARD_UP, hint="Ctrl+Y or Ctrl+Shift+Z"
+    undo_button = page.add_button(
+        "Undo", session.undo, icon=viser.Icon.ARROW_BACK_UP, hint="Ctrl+Z"
     )
-    page.board.show(forth, label=lambda redo: f"Redo: {redo}" if redo else "Redo")
+    page.board.show(undo_button, label=lambda undo: f"Undo: {undo}" if undo else "Undo")
+    redo_button = page.add_button(
+        "Redo", session.redo, icon=viser.Icon.ARROW_FORWARD_UP, hint="Ctrl+Y or Ctrl+Shift+Z"
+    )
+    page.board.show(redo_button, label=lambda redo: f"Redo: {redo}" if redo else "Redo")
 
 
 def add_answering(page: Page) -> None:
-    """Who answers, what is kept least, and where help is found."""
+    """The method, what it keeps least, and the menus of help."""
     session = page.session
     gui = page.gui
     hint = (
@@ -174,35 +197,39 @@ def add_answering(page: Page) -> None:
     add_html(gui, marker("fl-method"))
     methods = gui.add_dropdown("Method", tuple(METHODS))
     page.board.show(methods, options=_options)
-    named = {_option(name): name for name in METHODS}
-    page.bind(
-        methods, lambda option: session.set_setting("method", named.get(option, option)), _option
-    )
+    method_of_option = {_option(name): name for name in METHODS}
+
+    def set_method(option: str) -> None:
+        session.set_setting("method", method_of_option.get(option, option))
+
+    page.bind(methods, set_method, _option)
     add_html(gui, html("<div class='fl-help'>{}{}{}</div>", _menu(LESSONS), _menu(TOUR), COMMANDS))
 
 
 def _options(layout: Layout) -> tuple[str, ...]:
+    """Entries of the methods that fit a layout."""
     return tuple(_option(name) for name in METHODS if method_class(name).fits(layout))
 
 
 def _option(method: str) -> str:
+    """The entry of a method."""
     return f"{method}: {METHOD_WORDS[method]}"
 
 
 def _menu(course: tuple[Stop, ...]) -> str:
     """A button that opens a list of the lessons, or of the tour's stops."""
-    words = {
-        LESSONS: ("Lessons", "Each has a task"),
-        TOUR: ("Tour", f"The app in {len(TOUR)} stops"),
-    }
-    word, hint = words[course]
-    hide = html("popovertarget='fl-{}' popovertargetaction='hide'", word)
-    items = [
-        button(f"{k}. {stop.title}", "stop", stop.name, hide) for k, stop in enumerate(course, 1)
-    ]
-    menu = (
+    name = "Lessons"
+    hint = "Each has a task"
+    if course is TOUR:
+        name = "Tour"
+        hint = f"The app in {len(TOUR)} stops"
+    hide = html("popovertarget='fl-{}' popovertargetaction='hide'", name)
+    items = []
+    for number, stop in enumerate(course, start=1):
+        items.append(button(f"{number}. {stop.title}", "stop", stop.name, hide))
+    template = (
         "<button popovertarget='fl-{}'>{}</button><div popover id='fl-{}' class='fl "
         "fl-menu'><b>{}</b>"
         "<p>{}. Your own work comes back when you close them.</p>{}</div>"
     )
-    return html(menu, word, word, word, word, hint, items)
+    return html(template, name, name, name, name, hint, items)

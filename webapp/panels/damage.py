@@ -1,7 +1,7 @@
 """Damage of actuators: a button for each one that may be lost, and sliders of partial faults.
 
-The faults are a section of the left column (`panels/places.py`); the tabs of the wrench, of limits
-and of swims have rows of buttons.
+The faults are a section of the left column (`panels/arrangement.py`); the tabs of the wrench, of
+limits and of swims have rows of buttons.
 """
 
 import math

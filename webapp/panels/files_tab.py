@@ -1,12 +1,12 @@
-"""Designs that are shipped, and files that are made of this one: what each is for, and what takes
-it."""
+"""Two panels about designs: the shipped ones (task Design), and the files that can be made of this
+one, each with a command that reads it (task Export)."""
 
 import math
 import shlex
 
 import viser
 
-from finlab.layout import Layout
+from finlab.layout import Damage, Layout
 from webapp.handles import add_html
 from webapp.markup.words import html, marker
 from webapp.page import Page
@@ -35,68 +35,60 @@ def add_files(page: Page) -> None:
 
 
 def _bundle(state: State) -> str:
+    """What the bundle is for."""
     file = file_stem(state.layout.name) + BUNDLE
-    about = (
+    purpose = (
         "for the robot: its actuators' physics, method, README and checksums. Test it there first"
     )
-    return _about(file, about, shlex.join(["finlab-runtime", "check", file]))
+    return _file_card(file, purpose, shlex.join(["finlab-runtime", "check", file]))
 
 
 def _graph(state: State) -> str:
+    """What the graph is for."""
     file = file_stem(state.layout.name) + GRAPH
-    about = (
+    purpose = (
         "the graph of actuators that the networks see: nodes, features, edges, for networkx and "
         "learners"
     )
-    return _about(file, about, shlex.join(["finlab", "layout", "show", file]))
+    return _file_card(file, purpose, shlex.join(["finlab", "layout", "show", file]))
 
 
 def _design(state: State) -> str:
-    about = "the design: for this app, and for commands at the desk"
+    """What the design's own file is for."""
+    purpose = "the design: for this app, and for commands at the desk"
     if has_files(state.layout):
-        about += ", unpacked. The same question, of the bundle"
+        purpose += ", unpacked. The same question, of the bundle"
     else:
-        about += ". The same question there"
-    return _about(design_name(state.layout), about, command_line(state))
+        purpose += ". The same question there"
+    return _file_card(design_name(state.layout), purpose, command_line(state))
 
 
-def _about(file: str, about: str, command: str) -> str:
-    """What a file is for, and a line that a click takes to the clipboard, where the browser lets
-    it."""
+def _file_card(file: str, purpose: str, command: str) -> str:
+    """The purpose of a file, and a command that reads it.
+
+    A click copies the command to the clipboard, where the browser allows that.
+    """
     copy = "navigator.clipboard?.writeText(this.innerText); this.previousSibling.dataset.done = 1"
     return html(
         "<div class='fl'><div class='said copy'><b>{}</b> <span class='dim'>is {}:</span></div>"
         '<pre class="command" title="click to copy" onclick="{}">{}</pre></div>',
         file,
-        about,
+        purpose,
         copy,
         command,
     )
 
 
 def command_line(state: State) -> str:
-    """The same question for `finlab allocate`, of a file that this page makes."""
+    """Returns the question of a state as a command, `finlab allocate`, of a file that this page
+    makes."""
     layout = state.layout
     file = file_stem(layout.name) + BUNDLE if has_files(layout) else design_name(layout)
     words = ["finlab", "allocate", file, "--wrench"]
-    words += [f"{value:g}" for value in state.target]
-    damage = state.damage
-    for name in damage.lost:
-        words += ["--lost", name]
-    for kind, shares in (("weak", damage.weak), ("torn", damage.torn)):
-        for name, share in shares.items():
-            words += [f"--{kind}", f"{name}={share:g}"]
-    for name, held in damage.stuck.items():
-        turns = layout.actuator(name).KIND.sticks_at_angle
-        words += ["--stuck", f"{name}={math.degrees(held) if turns else held:g}"]
-    for name, command in damage.running.items():
-        actuator = layout.actuator(name)
-        numbers = list(command)
-        if actuator.KIND.sticks_at_angle:
-            numbers[actuator.KIND.stuck_number] = math.degrees(numbers[actuator.KIND.stuck_number])
-        words += ["--running", f"{name}=" + ",".join(f"{number:g}" for number in numbers)]
+    words += [f"{component:g}" for component in state.target]
+    words += _damage_options(layout, state.damage)
     if state.flow is not None:
-        words += ["--flow", *(f"{value:g}" for value in state.flow)]
+        words += ["--flow", *(f"{component:g}" for component in state.flow)]
     if state.method != "dual":
         words += ["--method", state.method]
     if state.policy != "closest":
@@ -104,34 +96,61 @@ def command_line(state: State) -> str:
     return shlex.join(words)
 
 
+def _damage_options(layout: Layout, damage: Damage) -> list[str]:
+    """The options of `finlab allocate` for a damage; its angles are in degrees there."""
+    words = []
+    for name in damage.lost:
+        words += ["--lost", name]
+    for name, share in damage.weak.items():
+        words += ["--weak", f"{name}={share:g}"]
+    for name, share in damage.torn.items():
+        words += ["--torn", f"{name}={share:g}"]
+    for name, stuck_at in damage.stuck.items():
+        is_angle = layout.actuator(name).KIND.sticks_at_angle
+        words += ["--stuck", f"{name}={math.degrees(stuck_at) if is_angle else stuck_at:g}"]
+    for name, command in damage.running.items():
+        kind = layout.actuator(name).KIND
+        numbers = list(command)
+        if kind.sticks_at_angle:
+            numbers[kind.stuck_number] = math.degrees(numbers[kind.stuck_number])
+        words += ["--running", f"{name}=" + ",".join(f"{number:g}" for number in numbers)]
+    return words
+
+
 def add_designs(page: Page) -> None:
-    """The list of shipped designs, and what is said of this one."""
+    """The list of shipped designs, and the description of the present one."""
 
     def open_layout(name: str) -> None:
         if name in shipped():
             page.session.open_layout(shipped()[name])
 
+    def entry(layout: Layout, saved: Layout) -> str:
+        return shipped_name(layout) or _own_entry(layout, saved)
+
     layouts = page.gui.add_dropdown(
         "Layout", tuple(shipped()), hint="Shipped layouts to start from."
     )
-    page.board.show(layouts, options=_options)
-    page.bind(
-        layouts, open_layout, lambda layout, saved: shipped_name(layout) or _own(layout, saved)
-    )
-    page.add_html(_described)
+    page.board.show(layouts, options=_entries)
+    page.bind(layouts, open_layout, entry)
+    page.add_html(_description)
 
 
-def _own(layout: Layout, saved: Layout) -> str:
+def _own_entry(layout: Layout, saved: Layout) -> str:
+    """The entry of a layout that is not shipped."""
     return f"{layout.name}, {'yours' if layout == saved else 'edited'}"
 
 
-def _options(layout: Layout, saved: Layout) -> tuple[str, ...]:
-    return tuple(shipped()) if shipped_name(layout) else (*shipped(), _own(layout, saved))
+def _entries(layout: Layout, saved: Layout) -> tuple[str, ...]:
+    """The shipped layouts, and the present one where it is another."""
+    names = tuple(shipped())
+    return names if shipped_name(layout) else (*names, _own_entry(layout, saved))
 
 
-def _described(layout: Layout) -> str:
-    first = layout.description.strip().split("\n")[0]
-    known = {shipped_layout.description for shipped_layout in shipped().values()}
-    if shipped_name(layout) is None and layout.description in known:  # which is about another robot
-        first = f"Made from {layout.name}, and changed."
-    return html("<div class='fl dim said'>{}</div>", first)
+def _description(layout: Layout) -> str:
+    """The first line of the layout's description."""
+    first_line = layout.description.strip().split("\n")[0]
+    shipped_descriptions = {other.description for other in shipped().values()}
+    if shipped_name(layout) is None and layout.description in shipped_descriptions:
+        # It describes the robot that this one was made from.
+        first_line = f"Made from {layout.name}, and changed."
+    return html("<div class='fl dim said'>{}</div>", first_line)

@@ -1,9 +1,8 @@
 """The frame: a bar above, a list at the left, an inspector at the right, a drawer below, by task.
 
-Every region is a folder of viser's that a style takes out of its panel and puts into its place
-(`markup/frame.css`); which of them are there, and which sections in them, is one more style
-element, written here. So widgets that were seen once stay mounted, and a change of task is one
-message.
+Every region is a folder of viser's, which a style sheet (`markup/frame.css`) moves to its position.
+Which regions and panels are visible is one more style element, written here: so widgets that were
+visible once stay mounted, and a change of task is one message.
 """
 
 import json
@@ -18,7 +17,20 @@ from finlab.physics import plant_of
 from webapp.handles import add_html, button, set_properties
 from webapp.markup.words import html, marker
 from webapp.page import Page
-from webapp.panels import places
+from webapp.panels.arrangement import (
+    DRAWER,
+    LEFT,
+    LOG,
+    NEEDS_ACTUATORS,
+    NEEDS_FLOW,
+    NEEDS_GUIDE,
+    NEEDS_ROBOT,
+    PANELS,
+    REGIONS,
+    RIGHT,
+    SIMULATE,
+    Panel,
+)
 from webapp.panels.commands import add_page_commands
 from webapp.panels.log_tab import plot_rows
 from webapp.panels.status import add_corner
@@ -31,68 +43,90 @@ from webapp.viser_internals import run_file, run_script
 if TYPE_CHECKING:
     from finlab.log import Judgement
 
-_VARIABLES = (
+VARIABLES = (
     f":root {{ --fl-asked: {css(ASKED)}; --fl-delivered: {css(DELIVERED)}; --fl-missing: "
     f"{css(MISSING)}; --fl-near: {css(NEARLY)}; --fl-reach: {css(REACH)}; }} "
     f"[data-mantine-color-scheme=dark] {{ --fl-reach: {css(REACH_DARK)}; }}"
 )
+"""The colours of the theme as variables of CSS."""
+STYLE_SHEETS = ("style.css", "frame.css")
+"""Files of `webapp/markup` that style the page."""
 STYLE = html(
     "<style>{}{}</style>",
-    _VARIABLES,
-    (
-        Markup(files("webapp.markup").joinpath(name).read_text("utf-8"))
-        for name in ("style.css", "frame.css")
-    ),
+    VARIABLES,
+    [Markup(files("webapp.markup").joinpath(name).read_text("utf-8")) for name in STYLE_SHEETS],
 )
-LOW = ":root { --tall: 92px; }"
-USUAL = ":root {{ --fl-usual: {}px; }}"
-ROW_PX, HEAD_PX = 138, 68
-"""Height of a row of plots over time, and of what is in the drawer beside them [px]."""
+"""The style element of all pages."""
+LOW_DRAWER = ":root { --tall: 92px; }"
+"""Style of a drawer for plots over time that has none yet."""
+USUAL_DRAWER = ":root {{ --fl-usual: {}px; }}"
+"""Style of a drawer of a height [px], unless its user has dragged it."""
+ROW_PX = 138
+"""Height of a row of plots over time [px]."""
+HEAD_PX = 68
+"""Height of what is in the drawer beside the plots [px]."""
 FOLDER = ".mantine-Paper-root[data-fl~={}]"
+"""Selector of a folder by the name of its marker."""
 
 
 class Section:
-    """A panel in its place, built when it is met first; it gives way to a sentence when it cannot
-    be shown: no old figure stands under a new name."""
+    """A panel on the page, whose widgets are shown when it is visible for the first time.
 
-    def __init__(self, page: Page, place: places.Place, index: int) -> None:
-        self.place = place
+    Where they cannot be written, a sentence replaces them, so that no old figure stands under a new
+    name.
+    """
+
+    def __init__(self, page: Page, panel: Panel, index: int) -> None:
+        """Builds a panel, the one of an index in `PANELS`, into the present folder of a page."""
+        self.panel = panel
         self.name = f"at-{index}"
         self._session = page.session
-        self._met = False
+        self._was_visible = False
         gui = page.gui
         self.group = page.board.group(self._fail)
-        with gui.add_folder(place.title, expand_by_default=not place.folded) as self.whole:
-            add_html(gui, marker(f"fl-section fl-{self.name} {place.title}"))
-            self._sentence = gui.add_html("", visible=False)
-            with gui.add_folder(None, visible=False) as self._folder:
-                place.make(page)
+        with gui.add_folder(panel.title, expand_by_default=not panel.is_folded) as self.whole:
+            add_html(gui, marker(f"fl-section fl-{self.name} {panel.title}"))
+            self._error_sentence = gui.add_html("", visible=False)
+            with gui.add_folder(None, visible=False) as self._widgets:
+                panel.build(page)
 
-    def arrange(self, task: str, drawer: str | None, about: tuple[str, ...]) -> bool:
-        """Whether it belongs to what is being done."""
-        place = self.place
-        opened = place.region != places.DRAWER or place.title == drawer
-        is_visible = task in place.tasks and place.about in about and opened
+    def set_visible(self, task: str, drawer: str | None, met_needs: tuple[str, ...]) -> bool:
+        """Shows or hides it.
+
+        Args:
+            task: the present task.
+            drawer: the open tab of the drawer; None while it is folded.
+            met_needs: which of `NEEDS_*` are met; the empty one always is.
+
+        Returns:
+            Whether it is visible.
+        """
+        panel = self.panel
+        is_open = panel.region != DRAWER or panel.title == drawer
+        is_visible = task in panel.tasks and panel.need in met_needs and is_open
         self.group.is_visible = is_visible
         if is_visible:
-            self._met = True
-            self._say("")
+            self._was_visible = True
+            self._show_error("")
         return is_visible
 
     def _fail(self, error: Exception | None) -> None:
+        """Shows why the panel cannot be written; None where it can."""
         name = self._session.state.layout.name
         template = "<div class='fl missing'>This cannot be shown of {}: {}</div>"
-        self._say("" if error is None else html(template, name, str(error)))
+        self._show_error("" if error is None else html(template, name, str(error)))
 
-    def _say(self, text: str) -> None:
-        set_properties(self._sentence, content=text, visible=bool(text))
-        set_properties(self._folder, visible=self._met and not text)
+    def _show_error(self, text: str) -> None:
+        """A sentence in place of the widgets; the widgets where it is empty."""
+        set_properties(self._error_sentence, content=text, visible=bool(text))
+        set_properties(self._widgets, visible=self._was_visible and not text)
 
 
 class Frame:
     """All regions of one page with their sections."""
 
     def __init__(self, page: Page) -> None:
+        """Builds all panels into a page."""
         self._page = page
         gui = page.gui
         gui.main_panel.dock_right()
@@ -101,27 +135,22 @@ class Frame:
         run_file(gui, "habits.js")
         add_html(gui, html("{}{}", STYLE, marker("fl-chrome")))
         page.board.group()
-        self._shown = gui.add_html("")
+        self._visibility = gui.add_html("")
         page.board.act(self._arrange)
-        page.board.act(self._guard)
-        title = "document.title = {};"
-        page.board.act(
-            lambda layout: run_script(gui, title.format(json.dumps(layout.name + " · finlab")))
-        )
+        page.board.act(self._guard_reload)
+        page.board.act(self._set_title)
         self._listen()
         self.sections: list[Section] = []
         add_corner(page)
-        for region in places.REGIONS:
+        for region in REGIONS:
             with gui.add_folder(region):
                 add_html(gui, marker(f"fl-region fl-{region}"))
-                if region == places.DRAWER:
+                if region == DRAWER:
                     page.board.group()
-                    page.add_html(_strip)
-                self.sections += [
-                    Section(page, place, index)
-                    for index, place in enumerate(places.PLACES)
-                    if place.region == region
-                ]
+                    page.add_html(_tab_strip)
+                for index, panel in enumerate(PANELS):
+                    if panel.region == region:
+                        self.sections.append(Section(page, panel, index))
         run_file(gui, "frames.js")
 
     def _arrange(
@@ -134,46 +163,51 @@ class Frame:
         layout: Layout,
         judgement: "Judgement | None",
     ) -> None:
-        """Write which regions and sections are there; the drawer is low until there are plots in
-        it."""
-        about = ("", "robot" if selected is None else "actuators", *["guide"] * (stop is not None))
-        about += ("flow",) * plant_of(layout).feels_flow
-        there = [section for section in self.sections if section.arrange(desk.task, drawer, about)]
-        regions = {section.place.region for section in there}
-        gone = [FOLDER.format(section.name) for section in self.sections if section not in there]
-        gone += [
-            FOLDER.format(region) for region in (places.LEFT, places.RIGHT) if region not in regions
-        ]
+        """Writes the style that says which regions and sections are visible."""
+        needs = ["", NEEDS_ROBOT if selected is None else NEEDS_ACTUATORS]
+        if stop is not None:
+            needs.append(NEEDS_GUIDE)
+        if plant_of(layout).feels_flow:
+            needs.append(NEEDS_FLOW)
+        visible_regions = set()
+        hidden = []
+        for section in self.sections:
+            if section.set_visible(desk.task, drawer, tuple(needs)):
+                visible_regions.add(section.panel.region)
+            else:
+                hidden.append(FOLDER.format(section.name))
+        for region in (LEFT, RIGHT):
+            if region not in visible_regions:
+                hidden.append(FOLDER.format(region))
         has_drawer = bool(DRAWERS[desk.task])
         if not has_drawer:
-            gone.append(FOLDER.format(places.DRAWER))
-        counts = {
-            "left": places.LEFT in regions,
-            "right": places.RIGHT in regions,
+            hidden.append(FOLDER.format(DRAWER))
+        flags = {
+            "left": LEFT in visible_regions,
+            "right": RIGHT in visible_regions,
             "drawer": has_drawer,
             "open": drawer is not None,
             "guide": stop is not None,
-            "log": desk.task == places.LOG,
+            "log": desk.task == LOG,
         }
-        variables = Markup().join(f"--has-{name}: {int(there)};" for name, there in counts.items())
-        swum = 2 * (swimmer is not None)
-        rows = 0 if judgement is None else plot_rows(judgement)
-        rows = {places.SIMULATE: swum, places.LOG: rows}.get(desk.task, 0)
-        is_timeline = drawer in (*DRAWERS[places.SIMULATE], DRAWERS[places.LOG][0])
-        low = desk.task in (places.SIMULATE, places.LOG) and not rows
-        height = LOW if low else USUAL.format(HEAD_PX + ROW_PX * rows) if is_timeline else ""
-        hidden = Markup(f"{', '.join(gone)} {{ display: none !important; }}")
-        set_properties(
-            self._shown,
-            content=html("<style>:root {{ {} }} {} {}</style>", variables, Markup(height), hidden),
-        )
+        variables = Markup().join(f"--has-{name}: {int(flag)};" for name, flag in flags.items())
+        height = Markup(_drawer_height(desk.task, drawer, swimmer is not None, judgement))
+        hiding = Markup(f"{', '.join(hidden)} {{ display: none !important; }}")
+        style = html("<style>:root {{ {} }} {} {}</style>", variables, height, hiding)
+        set_properties(self._visibility, content=style)
 
-    def _guard(self, swims: bool, fit_progress: str | None, improving: bool) -> None:
-        """A reload asks first while there is something that it would drop."""
+    def _guard_reload(self, swims: bool, fit_progress: str | None, improving: bool) -> None:
+        """Lets the browser ask before a reload while there is something that it would drop."""
         drops = str(swims or fit_progress is not None or improving).lower()
         run_script(self._page.gui, f"window.finlabDrops = {drops};")
 
+    def _set_title(self, layout: Layout) -> None:
+        """Writes the robot's name into the title of the browser's tab."""
+        title = json.dumps(f"{layout.name} · finlab")
+        run_script(self._page.gui, f"document.title = {title};")
+
     def _listen(self) -> None:
+        """Connects the buttons of the page's own markup, by their kinds, with what they do."""
         session = self._page.session
         robot = self._page.scenery.robot
         acts: dict[str, Callable[[str, str], object]] = {
@@ -193,13 +227,31 @@ class Frame:
             self._page.presses.on(kind, act)
 
 
-def _strip(desk: Desk, drawer: str | None, layout: Layout) -> str:
+def _drawer_height(
+    task: str, drawer: str | None, swims: bool, judgement: "Judgement | None"
+) -> str:
+    """The style of the drawer's height: low until there are plots in it, then as high as these."""
+    rows = 0
+    if task == SIMULATE and swims:
+        rows = 2
+    elif task == LOG and judgement is not None:
+        rows = plot_rows(judgement)
+    if task in (SIMULATE, LOG) and rows == 0:
+        return LOW_DRAWER
+    is_timeline = drawer in (*DRAWERS[SIMULATE], DRAWERS[LOG][0])
+    return USUAL_DRAWER.format(HEAD_PX + ROW_PX * rows) if is_timeline else ""
+
+
+def _tab_strip(desk: Desk, drawer: str | None, layout: Layout) -> str:
     """The upper edge of the drawer: its tabs, and the button that folds it."""
-    folded = drawer is None
-    names = [name for name in DRAWERS[desk.task] if name != CANDIDATES or layout.is_of_fins]
-    pressed = ((name, html("aria-pressed='{}'", str(name == drawer).lower())) for name in names)
-    tabs = [button(name, "drawer", name, attribute) for name, attribute in pressed]
-    word = "Open the drawer" if folded else "Fold the drawer"
-    attributes = html("class='fold' aria-label='{}' title='{}'", word, word)
-    tabs.append(button("▴" if folded else "▾", "fold", "", attributes))
-    return html("<nav class='fl-strip' aria-label='Drawer'>{}</nav>", tabs)
+    buttons = []
+    for name in DRAWERS[desk.task]:
+        if name == CANDIDATES and not layout.is_of_fins:
+            continue
+        is_pressed = str(name == drawer).lower()
+        buttons.append(button(name, "drawer", name, html("aria-pressed='{}'", is_pressed)))
+    is_folded = drawer is None
+    words = "Open the drawer" if is_folded else "Fold the drawer"
+    attributes = html("class='fold' aria-label='{}' title='{}'", words, words)
+    buttons.append(button("▴" if is_folded else "▾", "fold", "", attributes))
+    return html("<nav class='fl-strip' aria-label='Drawer'>{}</nav>", buttons)

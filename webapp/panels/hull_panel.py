@@ -1,5 +1,5 @@
 """The panel of the hull: a shape with a size, or a mesh file that is imported and turned. A section
-of the task Design, see `panels/places.py`."""
+of the task Design, see `panels/arrangement.py`."""
 
 from dataclasses import replace
 from functools import partial

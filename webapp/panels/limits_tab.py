@@ -7,14 +7,14 @@ from typing import Any
 import viser
 from markupsafe import Markup
 
-from finlab.analysis import AXES, Improvement, Progress
-from finlab.analysis.goals import MISSION, UNREACHED
+from finlab.analysis import Improvement, Progress
+from finlab.analysis.improvement_text import goal_value, improvement_remarks
 from webapp.handles import add_html
-from webapp.markup.score_card import score_table
-from webapp.markup.words import fins_words, html, listed, marker, three_digits
+from webapp.markup.score_card import remarks_markup, score_table
+from webapp.markup.words import fins_words, html, marker, three_digits
 from webapp.page import Page
 from webapp.panels.damage import add_fin_buttons
-from webapp.session.looking import DRAWN, GOAL_UNITS, GOAL_WORDS, MOVE_RANGE, SearchRequest
+from webapp.session.looking import DRAWN, GOALS_BY_WORDS, MOVE_RANGE, SearchRequest
 from webapp.tasks.analysing import Analysis
 
 
@@ -66,7 +66,7 @@ def add_improving(page: Page) -> None:
         if result is not None:
             session.accept_layout(result.layout)
 
-    goals = gui.add_dropdown("Goal", tuple(GOAL_WORDS), hint="What to raise.")
+    goals = gui.add_dropdown("Goal", tuple(GOALS_BY_WORDS), hint="What to raise.")
     page.bind(goals, partial(change, SearchRequest.with_goal), lambda draft: draft.goal)
     add_fin_buttons(
         page,
@@ -123,45 +123,27 @@ def _searched(
     improvement_error: str | None,
     draft: SearchRequest,
 ) -> str:
+    """What a search has found, or how far it is."""
     text = "Searching …" if improving else ""
     if improvement_error is not None:
         text = html("<div class='missing'>{}</div>", improvement_error)
     elif improvement is not None:
         text = _before_and_after(improvement)
     elif progress is not None:
-        unit = GOAL_UNITS[draft.goal]
-        best, old = (three_digits(abs(v)) + unit for v in (progress.best, progress.before))
-        text = html("Best so far <b>{}</b>, {} before, round {}.", best, old, progress.round)
+        goal = GOALS_BY_WORDS[draft.goal]
+        best = goal_value(goal, progress.best)
+        before = goal_value(goal, progress.before)
+        text = html("Best so far <b>{}</b>, {} before, round {}.", best, before, progress.round)
     return html("<div class='fl'>{}</div>", text)
 
 
 def _before_and_after(result: Improvement) -> str:
+    """What was found, in sentences, and the score cards before and after; the view shows where the
+    actuators went, which the command line prints as a table."""
+    sentences = remarks_markup(improvement_remarks(result))
     if not result.improved:
-        return "Nothing better was found within reach."
-    old, new = (three_digits(abs(v)) for v in (result.value_before, result.value_after))
-    goal = next(words for words, name in GOAL_WORDS.items() if name == result.goal)
-    stopped = " The search was stopped early." if result.cancelled else ""
-    unit = GOAL_UNITS[goal]
-    some = result.goal != "mission_power" and len(result.axes) < len(AXES)
-    of = f" of {listed(result.axes)}, with anything on the others" if some else ""
-    heading = html(
-        "<b>{}{}: {}{} before, {}{} after.</b>{}",
-        goal.capitalize(),
-        of,
-        old,
-        unit,
-        new,
-        unit,
-        stopped,
-    )
-    if result.goal == "mission_power" and -result.value_before * len(MISSION) >= UNREACHED:
-        heading += f" A wrench out of reach counts with {UNREACHED:g} W or more."
-    then = result.card_after.authority.alone
-    lost = [axis for axis in result.card_before.authority.alone if axis not in then]
-    if lost:
-        heading += html(" <span class='missing'>It no longer pushes {} alone.</span>", listed(lost))
-    moved = fins_words(
-        [result.layout.index(name) for name in result.moved], result.layout
-    ).capitalize()
+        return sentences
+    indices = [result.layout.index(name) for name in result.moved]
+    moved = fins_words(indices, result.layout).capitalize()
     table = score_table(result.layout, result.card_after, result.card_before)
-    return html("{} {} moved; the view shows them as shadows.{}", heading, moved, table)
+    return html("{} {} moved; the view shows them as shadows.{}", sentences, moved, table)

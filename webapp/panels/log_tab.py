@@ -1,6 +1,8 @@
 """A log: what the robot could not, when, and what would have held it; each moment can be put on the
 robot."""
 
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -8,18 +10,28 @@ import numpy as np
 import viser
 from markupsafe import Markup
 
-from finlab.analysis import AXES as MOTIONS
-from finlab.axes import AXES
+from finlab.axes import MOTIONS, UNITS
+from finlab.log.judgement_text import (
+    IMPULSE_COLUMNS,
+    REPLAY_COSTS,
+    REPLAY_NAMES,
+    SPELL_COLUMNS,
+    ImpulseRow,
+    impulse_rows,
+    judged_axis,
+    missing_column,
+)
 from webapp.handles import add_html, placed, press, set_properties
 from webapp.markup.plot import cost_axis, exact_axis, over_time
-from webapp.markup.words import html, in_app, marker, row, three_digits
+from webapp.markup.tables import cell_text, cells, head_row
+from webapp.markup.words import html, in_app, marker
 from webapp.page import Page
-from webapp.session.state import AXIS_UNITS
 from webapp.tasks.log_reading import SUFFIXES
 from webapp.theme import ASKED, DELIVERED, fin_color
 
 if TYPE_CHECKING:
     from finlab.log import Judgement
+    from finlab.log.judgement import Spell
 
 PLOTS_A_ROW = 4
 """Plots that stand beside each other in a window of usual width."""
@@ -28,8 +40,6 @@ INVITATION = (
     "is told when and on which axis the robot could not, and what would have held it."
 )
 """What the tab says while there is no log."""
-ASKED_SHARE = 1e-3
-"""Share of the largest impulse above which that of an axis counts as demanded, and is plotted."""
 
 
 def add_log(page: Page) -> None:
@@ -112,65 +122,47 @@ def add_losses(page: Page) -> None:
 
 
 def _losses(judgement: "Judgement | None", log_moment: float | None) -> str:
-    """Impulses of each axis, and the spells in which something was lost; that of the moment on the
+    """Impulses of each axis, and spells in which something was lost; that of the moment on the
     robot is marked."""
     if judgement is None:
         return html(
             "<div class='fl dim'>{}</div>", "What was lost on each axis, and when, is listed here."
         )
     tables = []
-    impulses = _impulse_rows(judgement)
+    impulses = impulse_rows(judgement)
     if impulses:
-        head = Markup("<tr><th>impulse</th><th>asked</th><th>missing</th><th>lost [s]</th></tr>")
-        tables.append(html("<table>{}{}</table>", head, impulses))
-    spells = _spell_rows(judgement, log_moment)
-    if spells:
-        head = Markup(
-            "<tr><th>when [s]</th><th class='words'>lost</th><th class='words'>at a limit</th></tr>"
-        )
-        tables.append(html("<table>{}{}</table>", head, spells))
+        tables.append(_impulse_table(impulses))
+    if judgement.spells:
+        tables.append(_spell_table(judgement.spells, log_moment))
     return html("<div class='fl'>{}</div>", tables)
 
 
-def _impulse_rows(judgement: "Judgement") -> list[str]:
-    """What each axis was asked for, what was missing of that [N s, N m s], and for how long [s]."""
+def _impulse_table(impulses: list[ImpulseRow]) -> str:
+    """What each axis was asked for, what was missing of that, and for how long. The panel has no
+    room for a column of units: they stand beside the names."""
+    name, _unit, *figures = IMPULSE_COLUMNS
     rows = []
-    for k, (motion, unit) in enumerate(zip(MOTIONS, AXIS_UNITS, strict=True)):
-        asked = judgement.asked[k]
-        if asked > 0.0:
-            impulse = three_digits(asked), three_digits(judgement.missing[k])
-            name = html("{} <span class='dim'>{} s</span>", motion, unit)
-            rows.append(row(name, *impulse, three_digits(judgement.lost_s[k])))
-    return rows
+    for impulse in impulses:
+        words = html("{} <span class='dim'>{}</span>", impulse.motion, impulse.unit)
+        rows.append(html("<tr><td>{}</td>{}</tr>", words, cells(figures, impulse)))
+    return html("<table>{}{}</table>", head_row((name, *figures)), rows)
 
 
-def _spell_rows(judgement: "Judgement", log_moment: float | None) -> list[str]:
+def _spell_table(spells: Sequence["Spell"], log_moment: float | None) -> str:
     """A row for each time in which something was lost, which can be pressed."""
-    template = (
-        "<tr class='pick {}' tabindex='0' {}>"
-        "<td>{:.1f} … {:.1f}</td>"
-        "<td class='words'>{}</td>"
-        "<td class='words dim'>{}</td></tr>"
-    )
     rows = []
-    for k, spell in enumerate(judgement.spells):
+    for k, spell in enumerate(spells):
         is_chosen = log_moment is not None and spell.start <= log_moment <= spell.end
         style = "chosen" if is_chosen else ""
-        axes = ", ".join(spell.axes)
-        limits = ", ".join(spell.limits)
         target = press("spell", str(k))
-        rows.append(html(template, style, target, spell.start, spell.end, axes, limits))
-    return rows
-
-
-def _asked_axes(judgement: "Judgement") -> list[int]:
-    """Axes that were asked for in earnest."""
-    return np.flatnonzero(np.array(judgement.asked) > ASKED_SHARE * max(judgement.asked)).tolist()
+        template = "<tr class='pick {}' tabindex='0' {}>{}</tr>"
+        rows.append(html(template, style, target, cells(SPELL_COLUMNS, spell)))
+    return html("<table>{}{}</table>", head_row(SPELL_COLUMNS), rows)
 
 
 def plot_rows(judgement: "Judgement") -> int:
     """Rows that the plots of a log take, in a window of usual width."""
-    return 1 if len(_asked_axes(judgement)) < PLOTS_A_ROW else 2
+    return 1 if len(judgement.demanded_axes) < PLOTS_A_ROW else 2
 
 
 def log_plots(judgement: "Judgement | None", log_moment: float | None) -> str:
@@ -190,9 +182,9 @@ def log_plots(judgement: "Judgement | None", log_moment: float | None) -> str:
     times: Any = np.append(timeline.time, timeline.time[-1] + step)
     across = exact_axis("time [s]", times)
     plots = []
-    for k in _asked_axes(judgement):
+    for k in judgement.demanded_axes:
         curves = [timeline.demand[:, k], timeline.given[:, k]]
-        up = cost_axis(f"{MOTIONS[k]} [{AXIS_UNITS[k]}]", np.append((-1e-3, 1e-3), curves), 4)
+        up = cost_axis(f"{MOTIONS[k]} [{UNITS[k]}]", np.append((-1e-3, 1e-3), curves), 4)
         colors = (ASKED, DELIVERED)
         words = ("asked", "given")
         plots.append(over_time(across, timeline.time, up, curves, colors, words, log_moment))
@@ -211,28 +203,18 @@ def replays_table(judgement: "Judgement | None") -> str:
             "<div class='fl dim'>{}</div>",
             "Other methods and policies are asked the log's demands here.",
         )
-    # The axis that was lost; where none was, the one that was asked for most.
-    axis = AXES.index(judgement.axis) if judgement.axis else int(np.argmax(judgement.asked))
-    template = (
-        "<tr><td>{}</td><td class='words'>{}</td><td class='{}'>{}</td><td>{}</td><td>{}</td></tr>"
-    )
+    # The drawer has room for one axis.
+    axis = judged_axis(judgement)
+    missing = replace(missing_column(axis), name=f"{MOTIONS[axis]} missing")
+    columns = (*REPLAY_NAMES, missing, *REPLAY_COSTS)
     rows = []
     for replay in judgement.replays:
-        robot = replay.robot if replay.lost is None else f"without {replay.lost}"
         style = "given" if replay == judgement.held_by else ""
-        missing = three_digits(replay.missing[axis])
-        watts = three_digits(replay.watts)
-        saturated = three_digits(replay.saturated_s)
-        rows.append(html(template, robot, replay.name, style, missing, watts, saturated))
-    head = html(
-        "<tr><th>robot</th>"
-        "<th class='words'>method</th>"
-        "<th>{} missing [{} s]</th>"
-        "<th>power [W]</th>"
-        "<th>short [s]</th></tr>",
-        MOTIONS[axis],
-        AXIS_UNITS[axis],
-    )
+        template = "<tr>{}<td class='{}'>{}</td>{}</tr>"
+        names = cells(REPLAY_NAMES, replay)
+        costs = cells(REPLAY_COSTS, replay)
+        rows.append(html(template, names, style, cell_text(missing, replay), costs))
+    head = head_row(columns)
     legend = Markup(
         "<div class='said'><span class='given'>Green</span>: holds what was lost, at least "
         "power.</div>"

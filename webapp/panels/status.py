@@ -1,4 +1,5 @@
-"""Overlays of the 3D view: the status line and the legend."""
+"""The lower left corner of the 3D view: the status line of an answer or a swim, and the legend of
+what is drawn."""
 
 from functools import lru_cache
 
@@ -6,7 +7,7 @@ import numpy as np
 from markupsafe import Markup
 
 from finlab.allocation.allocation import Allocation
-from finlab.axes import AXES
+from finlab.axes import AXES, UNITS
 from finlab.physics.objective import REACHED
 from webapp.handles import set_properties
 from webapp.markup.verdict import COLORS, WORKING, verdict_of, verdict_sentence
@@ -15,7 +16,7 @@ from webapp.page import Page
 from webapp.scene.stage import arrow_size
 from webapp.scene.wrench_nodes import Scale, set_scale
 from webapp.session.looking import Display
-from webapp.session.state import AXIS_UNITS, LEAST, State
+from webapp.session.state import LEAST, State
 from webapp.tasks.analysing import Analysis
 from webapp.tasks.solver import Modes
 from webapp.tasks.swimmer import ERROR, Moment, Swimmer
@@ -23,21 +24,26 @@ from webapp.theme import ASKED, DEAD, DELIVERED, REACH, TAKEN, WATER, css
 
 LONG = 24
 """Characters of a verdict above which it takes a line of its own in a small view."""
-ARROWS = (("asked", 0.65), ("delivered", 1.0), ("missing", 1.0))
+ARROWS = {"asked": 0.65, "delivered": 1.0, "missing": 1.0}
+"""Arrows of the legend by name -> their opacity."""
+SLOWEST_WATER = 5e-4
+"""Speed of the water from which it is in the legend of a swim [m/s]."""
+FEW_MS = 10.0
+"""Time of an answer up to which it has two digits [ms]; no measurement repeats to a third one."""
 
 
 def add_corner(page: Page) -> None:
-    """Both, in a corner of the view."""
+    """Adds status line and legend to a page; both disappear where they cannot be written."""
 
     def fail(error: Exception | None) -> None:
         if error is not None:
             set_properties(content, content="")
 
     page.board.group(fail)
-    content = page.add_html(_written)
+    content = page.add_html(_corner_of_facts)
 
 
-def _written(
+def _corner_of_facts(
     swimmer: Swimmer | None,
     moment: Moment | None,
     pace: str,
@@ -55,43 +61,48 @@ def _written(
     mode: int,
     task: str,
 ) -> str:
+    """The corner as the facts of a page have it, which are the arguments by name."""
     if swimmer is not None and moment is not None:
         return swim_corner(swimmer, moment, pace, scale.newtons)
     size = arrow_size(state.layout)
-    set_keys = set_rows(analysis if display.drawn != "none" and task == "Design" else None, size)
-    refined = "" if step is None or shown_allocation is best else f"Step {step} of {modes.steps}"
-    way = (
-        modes.visible[mode] if shown_allocation is not best and mode < len(modes.visible) else None
-    )
-    if way is not None and way.mode.err_norm > REACHED:
-        refined = way.name.capitalize()
-    words = legend(*scale, size, set_keys) + JETS * (state.layout.interaction is not None)
-    badge = "" if way is None else way.badge
-    return corner(
-        state,
-        words,
-        shown_allocation,
-        busy,
-        error,
-        shown_allocation is best,
-        in_reach,
-        refined,
-        badge,
-    )
+    has_sets = display.drawn != "none" and task == "Design"
+    keys = legend(*scale, size, set_rows(analysis if has_sets else None, size))
+    if state.layout.interaction is not None:
+        keys += JETS
+    is_best = shown_allocation is best
+    refined = ""
+    badge = ""
+    if not is_best:
+        if step is not None:
+            refined = f"Step {step} of {modes.steps}"
+        if mode < len(modes.visible):
+            shown_mode = modes.visible[mode]
+            badge = shown_mode.badge
+            if shown_mode.mode.err_norm > REACHED:
+                refined = shown_mode.name.capitalize()
+    return corner(state, keys, shown_allocation, busy, error, is_best, in_reach, refined, badge)
 
 
 @lru_cache(maxsize=32)
-def legend(newtons: float, torque: float, size: float, also: str) -> str:
-    """Arrows, scales ([N] of an arrow of 0.1 m, [N m] of such a ring, where `size` is 1), and more
-    rows."""
+def legend(newtons: float, torque: float, size: float, more_rows: str) -> str:
+    """Keys of the arrows, and scales of arrows and rings.
+
+    Args:
+        newtons: force of an arrow of 0.1 m where `size` is 1 [N].
+        torque: torque of such a ring [N m].
+        size: factor of the length of arrows on this robot.
+        more_rows: markup of further keys.
+    """
     # By name, so that the dark theme can lighten them.
-    rows = [_key(_arrow(f"var(--fl-{word})", alpha), word) for word, alpha in ARROWS]
+    rows = []
+    for name, opacity in ARROWS.items():
+        rows.append(_key(_arrow(f"var(--fl-{name})", opacity), name))
     ring = f"{0.1 * size:g} m = {torque:g} N m"
     scales = "<div class='dim scales'><span>{}</span><span><i>radius </i>{}</span></div>"
     return html(
         "<div class='fl-legend'>{}{}</div>{}",
         rows,
-        also,
+        more_rows,
         html(scales, _length(newtons, size), ring),
     )
 
@@ -120,21 +131,23 @@ def set_rows(analysis: Analysis | None, size: float) -> str:
 
 
 def _key(sign: str, words: str) -> str:
-    """A row of the legend, which stays together where rows stand beside each other."""
+    """A row of the legend: a sign and what it means."""
     return html("<div class='key'>{}<span>{}</span></div>", sign, words)
 
 
 def _patch(color: str) -> str:
+    """The sign of a surface."""
     box = "<svg width='44' height='12'><rect x='8' width='28' height='12' rx='3' fill='{}'/></svg>"
     return html(box, color)
 
 
 def _arrow(color: str, opacity: float) -> str:
-    way = (
+    """The sign of an arrow."""
+    picture = (
         "<svg width='44' height='10' opacity='{}' fill='{}'><path d='M0 3H32V0L44 5L32 "
         "10V7H0Z'/></svg>"
     )
-    return html(way, opacity, color)
+    return html(picture, opacity, color)
 
 
 JETS = html(
@@ -158,9 +171,19 @@ def corner(
     refined: str = "",
     badge: str = "",
 ) -> str:
-    """Legend and status line in the lower left corner of the page; `least` where the answer itself
-    is shown, not another way to do the same, whose `badge` says where that comes from; `refined` is
-    the step of its refinement, nothing at its end."""
+    """Legend and status line of an answer.
+
+    Args:
+        state: the present state.
+        legend: markup of the legend.
+        allocation: what is on the robot, if any.
+        busy: whether it is of an earlier question.
+        error: why there is no answer; None where there is one.
+        least: whether it is the answer itself, not another mode of it.
+        in_reach: whether any command of what works gives the target.
+        refined: the step of the refinement of that mode; empty at its end.
+        badge: where that mode comes from.
+    """
     count = state.layout.n
     fins = f"{count - len(state.lost)} of {count} {parts_word(state.layout)}"
     markup = [html("<span class='aside'>{}</span>", fins)]
@@ -179,10 +202,11 @@ def corner(
 def _figures(
     allocation: Allocation, least: bool, in_reach: bool, refined: str, badge: str
 ) -> list[str]:
+    """Error, power, effort, method and verdict of an answer; arguments as for `corner`."""
     color = DEAD if refined else COLORS[verdict_of(allocation, in_reach)]
     sentence = refined or verdict_sentence(allocation, in_reach)
     pill = "pill long" if len(sentence) > LONG else "pill"
-    missing = zip(AXES, allocation.unallocated.tolist(), AXIS_UNITS, strict=True)
+    missing = zip(AXES, allocation.unallocated.tolist(), UNITS, strict=True)
     rest = ", ".join([f"{axis} {value:+.2g} {unit}" for axis, value, unit in missing]).replace(
         "-", "−"
     )
@@ -200,7 +224,7 @@ def _figures(
         costs.append(html(cost, label, word, three_digits(value), unit))
     method = allocation.method
     ms = allocation.solve_ms
-    time = f"{ms:.2g}" if ms < 10.0 else f"{ms:.0f}"  # no measurement repeats to a third digit
+    time = f"{ms:.2g}" if ms < FEW_MS else f"{ms:.0f}"
     who = html("<span class='dim'>{}</span> {} ms", method, time) if least else badge or "network"
     return [
         html(
@@ -216,12 +240,21 @@ def _figures(
 
 
 def swim_corner(swimmer: Swimmer, moment: Moment, pace: str, newtons: float) -> str:
-    """The same while a robot swims."""
+    """Legend and status line of a swim.
+
+    Args:
+        swimmer: the robot that swims.
+        moment: the moment that the page shows.
+        pace: how fast it goes, in words.
+        newtons: force of an arrow of 0.1 m [N].
+    """
     line = "<svg width='44' height='10'><path d='M0 5H44' stroke='{}' stroke-width='3.5'/></svg>"
-    named = (("the path", ASKED), (f"{swimmer.method}, {swimmer.about}", DELIVERED))
-    trails = [_key(html(line, css(color)), word) for word, color in named]
+    trails = [
+        _key(html(line, css(ASKED)), "the path"),
+        _key(html(line, css(DELIVERED)), f"{swimmer.method}, {swimmer.about}"),
+    ]
     speed = float(np.linalg.norm(moment.flow))
-    if speed >= 5e-4:
+    if speed >= SLOWEST_WATER:
         trails.append(_key(_arrow(css(WATER), 0.9), f"water, {speed:.3f} m/s"))
     alive = len(swimmer.fins) - len(moment.lost)
     off = f"{float(moment.record[-1, ERROR]):.3f}" if len(moment.record) else "–"
@@ -237,11 +270,12 @@ def swim_corner(swimmer: Swimmer, moment: Moment, pace: str, newtons: float) -> 
         "<div class='dim scales'><span>{}</span></div>",
         _length(newtons, arrow_size(swimmer.layout)),
     )
-    jets = JETS * (swimmer.layout.interaction is not None)
+    jets = "" if swimmer.layout.interaction is None else JETS
     return _cards(html("<div class='fl-legend'>{}</div>{}{}", trails, scale, jets), markup)
 
 
 def _cards(legend: str, status: list[str]) -> str:
+    """The two cards of the corner."""
     return html(
         "<div class='fl-corner'><div class='fl fl-card fl-legend-card'>{}</div>"
         "<div class='fl fl-card fl-status'>{}</div></div>",

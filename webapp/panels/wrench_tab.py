@@ -1,6 +1,8 @@
 """The question and its answer: the target wrench, bars, losses, commands, and what jets
 change."""
 
+import operator
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -10,20 +12,39 @@ from markupsafe import Markup
 
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.policy import POLICY_NAMES
-from finlab.axes import AXES
+from finlab.allocation.report import missing_words
+from finlab.axes import AXES, MOTIONS, UNITS
+from finlab.display import listed
 from finlab.forces.reach import Ranges
 from finlab.layout import Layout
 from webapp.handles import add_html, placed, press
 from webapp.markup.answer import bars_of, fin_table
 from webapp.markup.reach import reach_style
-from webapp.markup.verdict import answer_sentence, missing_sentence
-from webapp.markup.words import SPEED, error_digits, html, listed, marker, row, three_digits
-from webapp.memoized import Memoized
+from webapp.markup.verdict import answer_sentence
+from webapp.markup.words import SPEED, error_digits, html, marker, row, three_digits
 from webapp.page import Page
 from webapp.panels.damage import add_fin_buttons
-from webapp.session.state import AXIS_UNITS, AXIS_WORDS, MAX_SPEED, Flow, State
+from webapp.session.state import MAX_SPEED, Flow, State
 from webapp.session.targets import PRESETS, axis_reach, full_thrust, slider_end
 from webapp.tasks.solver import JetComparison
+
+
+class Memoized:
+    """A function whose last result is kept while its arguments are the same objects: a page asks
+    for the same markup whenever it is written."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        """Wraps a function that has not been called yet."""
+        self._function = function
+        self._arguments: tuple[Any, ...] | None = None
+        self._result: Any = None
+
+    def __call__(self, *arguments: Any) -> Any:
+        """The result for these arguments, from the last call where they are the same objects."""
+        if self._arguments is None or not all(map(operator.is_, arguments, self._arguments)):
+            self._result = self._function(*arguments)
+            self._arguments = arguments
+        return self._result
 
 
 def add_commands(page: Page) -> None:
@@ -95,7 +116,7 @@ def add_target(page: Page) -> None:
             if able.commanded[k]:
                 slider.hint = _hint(k, ranges.low[k], axis_reaches[k])
             else:
-                slider.hint = AXIS_WORDS[k].capitalize()
+                slider.hint = MOTIONS[k].capitalize()
         hinted = hints
 
     page.add_html(mark)
@@ -117,8 +138,8 @@ def add_speed(page: Page) -> None:
 def _add_slider(page: Page, axis: int) -> viser.GuiSliderHandle[float]:
     session = page.session
     step = 0.01 if axis < 3 else 0.001
-    label = f"{AXES[axis]} [{AXIS_UNITS[axis]}]"
-    hint = AXIS_WORDS[axis].capitalize()
+    label = f"{AXES[axis]} [{UNITS[axis]}]"
+    hint = MOTIONS[axis].capitalize()
     page.add_html(lambda layout: _switch(axis, bool(layout.commanded[axis])))
     slider = page.gui.add_slider(label, -10.0, 10.0, step, 0.0, hint=hint, marks=())
     page.board.show(slider, disabled=lambda layout: not layout.commanded[axis])
@@ -159,8 +180,8 @@ def _ranges_error(ranges_error: str | None) -> str:
 
 
 def _hint(axis: int, low: float, reach: float) -> str:
-    word = AXIS_WORDS[axis].capitalize()
-    unit = AXIS_UNITS[axis]
+    word = MOTIONS[axis].capitalize()
+    unit = UNITS[axis]
     at_most = f"±{three_digits(reach)} {unit} if nothing else is asked to stay"
     if not np.isfinite(low):
         return f"{word}: the other five are out of reach as they are; {at_most}."
@@ -213,6 +234,5 @@ def jets_table(jet_comparison: JetComparison | None) -> str:
         row("error", error_digits(with_jets.err_norm), error_digits(without_jets.err_norm)),
         row("power [W]", three_digits(with_jets.power), three_digits(without_jets.power)),
     ]
-    sentence = missing_sentence(without_jets)
-    words = "<div class='fl'><table>{}{}</table><div class='said'>Without: {}</div></div>"
-    return html(words, JETS_HEADER, rows, sentence[0].lower() + sentence[1:])
+    template = "<div class='fl'><table>{}{}</table><div class='said'>Without: {}.</div></div>"
+    return html(template, JETS_HEADER, rows, missing_words(without_jets))

@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import Any
 
 from finlab.analysis import Bounds
+from finlab.analysis.improvement_text import GOAL_WORDS
 from finlab.analysis.moves import azimuth, is_mirrored
 from finlab.errors import FinlabError
 from finlab.forces.attainable import WrenchHalf
@@ -72,16 +73,8 @@ class Display:
         return replace(self, **{key: value})
 
 
-GOAL_WORDS = {
-    "weakest direction": "weakest_direction",
-    "power for a mission": "mission_power",
-    "worst single failure": "worst_single_failure",
-}
-"""What may be improved, in words, and the name that the search knows."""
-GOAL_UNITS = {
-    words: " W" if name == "mission_power" else " N" for words, name in GOAL_WORDS.items()
-}
-"""Units of what may be improved, with a space before them."""
+GOALS_BY_WORDS = {words: name for name, words in GOAL_WORDS.items()}
+"""What may be improved, in words -> the name that the search knows."""
 MoveRange = tuple[float, float, float, float]
 """How far an actuator may go along x, y and z [m] and turn [deg], either way."""
 MOVE_RANGE: MoveRange = (0.05, 0.05, 0.05, 180.0)
@@ -92,8 +85,8 @@ MOVE_RANGE: MoveRange = (0.05, 0.05, 0.05, 180.0)
 class SearchRequest:
     """What the user has asked for so far; it may name actuators that are gone by now."""
 
-    goal: str = next(iter(GOAL_WORDS))
-    """Key of `GOAL_WORDS`."""
+    goal: str = next(iter(GOALS_BY_WORDS))
+    """Key of `GOALS_BY_WORDS`."""
     fixed: tuple[str, ...] = ()
     """Names of actuators that stay where they are."""
     move_range: MoveRange = MOVE_RANGE
@@ -101,7 +94,7 @@ class SearchRequest:
 
     def with_goal(self, goal: Any) -> "SearchRequest":
         """Another goal."""
-        return replace(self, goal=one_of(goal, "goal", GOAL_WORDS))
+        return replace(self, goal=one_of(goal, "goal", GOALS_BY_WORDS))
 
     def with_fixed_toggled(self, name: str) -> "SearchRequest":
         """An actuator fixed, or free to move again."""

@@ -11,16 +11,13 @@ from typing import Any
 from finlab.actuators.fin.fin_model import MAX_AMPLITUDE, MAX_FREQUENCY
 from finlab.allocation.methods import METHODS, method_class
 from finlab.allocation.policy import POLICY_NAMES
-from finlab.axes import AXES
+from finlab.axes import AXES, UNITS
 from finlab.errors import FinlabError
 from finlab.layout import Actuator, Fin, Layout
 from finlab.layout.damage import NO_DAMAGE, Damage
 from finlab.physics import plant_of
 from finlab.research.mdn.method import MdnSettings
 from finlab.research.paper.pipeline import PaperSettings
-
-AXIS_WORDS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
-AXIS_UNITS = ("N", "N", "N", "N m", "N m", "N m")
 
 Links = tuple[tuple[str, str], ...]
 """Mirror pairs by name; an actuator is in at most one of them."""
@@ -90,7 +87,7 @@ class State:
     def with_target(self, axis: int, value: Any) -> "State":
         """One component of the target changed."""
         target = list(self.target)
-        target[axis] = number(value, f"{AXES[axis]} [{AXIS_UNITS[axis]}]", -MAX_TARGET, MAX_TARGET)
+        target[axis] = number(value, f"{AXES[axis]} [{UNITS[axis]}]", -MAX_TARGET, MAX_TARGET)
         fx, fy, fz, tx, ty, tz = target
         return replace(self, target=(fx, fy, fz, tx, ty, tz))
 

@@ -15,6 +15,7 @@ TRIES = 3
 network, and on a busy machine any may have to wait."""
 
 Answer = Allocation | str
+"""The answer of a method, or why it has none."""
 
 
 class Run(NamedTuple):
@@ -72,10 +73,12 @@ class Comparison(Slot[State, Allocation]):
         return came
 
     def _next(self, state: State) -> None:
+        """Asks the next method about a state, where one is left."""
         if self.run.running:
             self.ask(replace(state, method=self.run.methods[len(self.run.answers)]))
 
 
 def _quickest(solver: Solver, state: State) -> Allocation:
+    """The quickest of `TRIES` answers to a state."""
     answers = [solver.solve(state) for _ in range(TRIES)]
     return min(answers, key=lambda answer: answer.solve_ms)

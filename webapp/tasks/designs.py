@@ -30,12 +30,15 @@ KINDS = (
     "a design (YAML, JSON, ZIP), a robot of others (URDF, SDF, PX4, ArduSub, a matrix), "
     "measurements of a fin (CSV), a hull (STL, OBJ, GLB, PLY), or a log (ULG, BIN, MCAP, DB3, BAG)"
 )
+"""The kinds of files that the page opens, for hints and errors."""
 SHARED = (
     "The link carries the whole design and the wrench that is asked for. Whoever opens it gets a "
     "copy, on a finlab of their own."
 )
+"""What is said beside a link."""
 
 Take = Callable[[str, bytes], object]
+"""Takes a file that was opened: its name and its content."""
 
 
 class Designs:
@@ -81,6 +84,7 @@ class Designs:
         self._deferred.make(ready, partial(self._take, wrench), "open")
 
     def _take(self, wrench: str | None, opened: Opened) -> None:
+        """Puts a design on the page, with the wrench of its link, and says what to know of it."""
         self._session.open_layout(opened.layout, lost=opened.lost)
         if wrench is not None:
             text = f"{opened.layout.name} is a copy; whoever shared it does not see what you change"
@@ -149,9 +153,11 @@ class Designs:
         self._export(f"{name}.npz", log.npz)
 
     def _export(self, name: str, make: Callable[[], bytes]) -> None:
+        """Sends a file of a name to the browser, once its content is made on a thread."""
         self._deferred.make(make, partial(self._download, name), name)
 
     def _download(self, name: str, content: bytes) -> None:
+        """Sends a file to the browser."""
         self._client.send_file_download(name, content, save_immediately=True)
         self._notify("Saved", f"{name}, among the downloads of this browser", calm=True)
 

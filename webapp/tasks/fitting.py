@@ -32,12 +32,13 @@ class Upload:
 
     actuator: Actuator
     name: str
+    """Of the file."""
     content: bytes
 
 
 @dataclass(frozen=True, eq=False)
 class FitResult:
-    """What came of it."""
+    """The model that an upload became."""
 
     upload: Upload
     """What it was made of; without its content."""
@@ -114,6 +115,7 @@ class Fitting(Slot[Upload, FitResult]):
         return came
 
     def _put_on(self, fit_result: FitResult) -> None:
+        """Gives the actuator of an upload its model. FinlabError: it has changed since."""
         upload = fit_result.upload
         session = self._session
         name = upload.actuator.name
@@ -125,18 +127,28 @@ class Fitting(Slot[Upload, FitResult]):
 
 
 def fit_upload(upload: Upload, work: Work[Upload]) -> FitResult:
-    """What a file is worth for its actuator. FinlabError: it cannot be read or fitted, or nobody
-    waits."""
-    done = Upload(upload.actuator, upload.name, b"")
+    """Returns the model that a file becomes.
+
+    Args:
+        upload: the file and its actuator.
+        work: takes reports, and ends a fit where it is cancelled.
+
+    Raises:
+        FinlabError: the file cannot be read or fitted, or the fit was cancelled.
+    """
+    # The result is kept, and the file may be large.
+    without_content = Upload(upload.actuator, upload.name, b"")
     with as_file(upload.name, upload.content) as path:
         if not isinstance(upload.actuator, Fin):
-            return _bench(path, done)
+            return _bench_fit(path, without_content)
         if in_worker(_is_table, path):
-            return FitResult(done, {"model": stored_table(upload.content, table_folder())})
-        return _measured(path, done, work)
+            return FitResult(
+                without_content, {"model": stored_table(upload.content, table_folder())}
+            )
+        return _fin_fit(path, without_content, work)
 
 
-def _measured(path: Path, done: Upload, work: Work[Upload]) -> FitResult:
+def _fin_fit(path: Path, upload: Upload, work: Work[Upload]) -> FitResult:
     """A fin by noisy measurements; a fit whose result is not waited for ends before its next
     step."""
     from finlab.fit.fin_fit import fin_csv, fit_fin
@@ -150,7 +162,7 @@ def _measured(path: Path, done: Upload, work: Work[Upload]) -> FitResult:
     fit = fit_fin(in_worker(read_measurements, [path]), progress=tell)
     tell("writing the table")
     model = stored_table(fin_csv(fit).encode(), table_folder())
-    return FitResult(done, {"model": model}, fit)
+    return FitResult(upload, {"model": model}, fit)
 
 
 def short_name(name: str) -> str:
@@ -172,27 +184,28 @@ def as_file(name: str, content: bytes) -> Iterator[Path]:
 
 
 def _model(actuator: Actuator) -> object:
+    """The model of an actuator; None where its kind has none."""
     return getattr(actuator, "model", None)
 
 
-def _bench(path: Path, done: Upload) -> FitResult:
+def _bench_fit(path: Path, upload: Upload) -> FitResult:
     """A thruster, fixed or turning, by its bench table, or by a finished one."""
     from finlab.fit.thruster_bench import read_bench
     from finlab.fit.thruster_fit import fit_thruster
 
-    def within(table: PowerTable) -> dict[str, Any]:
+    def fields_of(table: PowerTable) -> dict[str, Any]:
+        """The model, and the limits of force that its table has."""
         least = table.rows[0][1]
-        most = table.rows[-1][1]
-        return {
-            "model": table,
-            "force": (max(least, 0.0) if done.actuator.KIND.sticks_at_angle else least, most),
-        }
+        if upload.actuator.KIND.sticks_at_angle:
+            # One that turns points the other way in place of a force below 0.
+            least = max(least, 0.0)
+        return {"model": table, "force": (least, table.rows[-1][1])}
 
     with suppress(LayoutError):
-        return FitResult(done, within(in_worker(PowerTable.read, path)))
+        return FitResult(upload, fields_of(in_worker(PowerTable.read, path)))
     fit = fit_thruster(in_worker(read_bench, [path]))
     more = {"dead_band": fit.dead_band, "torque_per_newton": fit.torque_per_newton}
-    return FitResult(done, {**within(fit.table), **more, "uncertainty": None}, fit)
+    return FitResult(upload, {**fields_of(fit.table), **more, "uncertainty": None}, fit)
 
 
 def _is_table(path: Path) -> bool:

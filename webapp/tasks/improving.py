@@ -1,4 +1,4 @@
-"""A search for a better layout that can be watched, stopped, and taken or left."""
+"""A search for a better layout: it reports its best so far, and can be stopped at any time."""
 
 import math
 import time
@@ -13,69 +13,90 @@ from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.swim.hull import hull_of
 from webapp.scene.actuator_shapes import CHORD, ROOT, SPAN
-from webapp.session.looking import GOAL_WORDS, SearchRequest
+from webapp.session.looking import GOALS_BY_WORDS, SearchRequest
 from webapp.session.state import State
 from webapp.tasks.context import Context
 from webapp.tasks.slot import Slot, Work
 
-ALONG = np.linspace(ROOT, ROOT + SPAN, 4)
-"""Places along a fin's shaft, from where its blade begins to where it ends [m]."""
-PROPELLER = 0.05
+BLADE_POINTS = np.linspace(ROOT, ROOT + SPAN, 4)
+"""Distances along a fin's shaft of points of its blade, from its root to its tip [m]."""
+PROPELLER_RADIUS = 0.05
 """Radius of what is kept free about any other actuator [m]."""
-INSIDE = 0.02
-"""How far a place inside the hull counts as wrong [m]."""
-APART_M = 0.02
-"""Least distance between what two actuators sweep."""
-GRID = 0.001, math.radians(1.0)
-"""What is proposed is round: steps of places [m] and angles [rad]."""
-REST_S = 0.3
-"""How long the view rests between two looks at the best layout so far [s]."""
+INSIDE_COST = 0.02
+"""Violation for each point inside the hull [m]."""
+MIN_GAP = 0.02
+"""Least distance between what two actuators sweep [m]."""
+POSITION_GRID = 0.001
+"""Step of the positions that are proposed, which are round [m]."""
+ANGLE_GRID = math.radians(1.0)
+"""Step of the angles that are proposed [rad]."""
+REPORT_PERIOD_S = 0.3
+"""Least time between two reports of the best layout so far [s]."""
 
 
-class Room:
-    """What a layout's actuators have to keep when they are moved."""
+class Clearance:
+    """The distances from the hull and from each other that a layout's actuators keep in a
+    search."""
 
-    def __init__(self, layout: Layout, apart: float) -> None:
-        """Blades, and what stands outside of the layout's hull now, stay outside; what two
-        actuators sweep is `apart` [m]; what is closer already, or overlaps, need not part, but
-        comes no closer."""
+    def __init__(self, layout: Layout, min_gap: float) -> None:
+        """Takes the rules from a layout at the start of a search.
+
+        Blades stay outside of the hull, and so does what is outside of it at the start. What two
+        actuators sweep stays `min_gap` apart; where it is closer at the start, or overlaps, it
+        comes no closer.
+
+        Args:
+            layout: the layout, whose hull it is.
+            min_gap: least distance between what two actuators sweep [m].
+        """
         self._hull = hull_of(layout).coarse()
-        fins = layout.is_fin
-        self._along = np.where(fins[:, None], ALONG, 0.0)
-        self._radius = np.where(fins, CHORD, PROPELLER)
-        here = layout.position[None], layout.frames[None]
-        self._outside = (fins[:, None] | ~self._hull.contains(self._places(*here)))[0]
-        self._needed = np.minimum(self.gaps(*here)[0], apart)
+        is_fin = layout.is_fin
+        self._distances = np.where(is_fin[:, None], BLADE_POINTS, 0.0)
+        self._radius = np.where(is_fin, CHORD, PROPELLER_RADIUS)
+        position = layout.position[None]
+        frames = layout.frames[None]
+        is_inside = self._hull.contains(self._points(position, frames))
+        self._stays_outside = (is_fin[:, None] | ~is_inside)[0]
+        self._required_gaps = np.minimum(self.gaps(position, frames)[0], min_gap)
 
-    def broken(self, position: Array, frames: Array) -> Array:
-        """How far positions (P, n, 3) [m] and own axes (P, n, 3, 3) break the rules (P,) [m]."""
-        inside = (self._outside & self._hull.contains(self._places(position, frames))).sum(
-            axis=(-1, -2)
-        )
-        close = np.maximum(self._needed - self.gaps(position, frames) - 1e-9, 0.0).sum(axis=-1)
-        return np.asarray(INSIDE * inside + close)
+    def violation(self, position: Array, frames: Array) -> Array:
+        """Returns how far P variants break the rules (P,) [m].
+
+        Args:
+            position: of their actuators (P, n, 3) [m].
+            frames: own axes of their actuators (P, n, 3, 3).
+        """
+        is_inside = self._hull.contains(self._points(position, frames))
+        n_inside = (self._stays_outside & is_inside).sum(axis=(-1, -2))
+        shortfall = np.maximum(self._required_gaps - self.gaps(position, frames) - 1e-9, 0.0)
+        return np.asarray(INSIDE_COST * n_inside + shortfall.sum(axis=-1))
 
     def gaps(self, position: Array, frames: Array) -> Array:
-        """Distances (P, pairs) [m] between what actuators sweep; negative where that overlaps."""
-        places = self._places(position, frames)
+        """Returns distances (P, pairs) [m] between what actuators sweep, negative where that
+        overlaps; arguments as for `violation`."""
+        points = self._points(position, frames)
         first, second = np.triu_indices(position.shape[1], k=1)
-        between = np.linalg.norm(places[:, first, :, None] - places[:, second, None], axis=-1)
-        return np.asarray(between.min(axis=(-1, -2)) - self._radius[first] - self._radius[second])
+        # Distances of all points of one actuator from all of the other (P, pairs, 4, 4).
+        distances = np.linalg.norm(points[:, first, :, None] - points[:, second, None], axis=-1)
+        nearest = distances.min(axis=(-1, -2))
+        return np.asarray(nearest - self._radius[first] - self._radius[second])
 
-    def _places(self, position: Array, frames: Array) -> Array:
-        """Places along the shafts (P, n, 4, 3) [m]."""
-        return np.asarray(position[..., None, :] + self._along[..., None] * frames[..., None, 0, :])
+    def _points(self, position: Array, frames: Array) -> Array:
+        """Points along the shafts (P, n, 4, 3) [m]."""
+        shafts = frames[..., None, 0, :]
+        return np.asarray(position[..., None, :] + self._distances[..., None] * shafts)
 
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """One search."""
+    """The question of a search."""
 
     state: State
-    """Where it begins; what is lost stays where it is."""
+    """The state at its start; lost actuators do not move."""
     goal: str
-    """What to raise, as `optimize_layout` calls it."""
+    """Name of the goal, as `optimize_layout` has it."""
     bounds: Mapping[str, Bounds]
+    """Name of each actuator that may move -> its bounds."""
 
 
 class Improver(Slot[Search, Improvement]):
@@ -93,39 +114,51 @@ class Improver(Slot[Search, Improvement]):
         return None if progress is None else progress.layout
 
     def start(self, state: State, request: SearchRequest) -> None:
-        """Search from a layout for places of what works; mirror pairs stay mirror pairs.
-        FinlabError: a search is running, nothing works, or nothing may move."""
+        """Starts a search that moves the working actuators of a state; mirror pairs stay so.
+
+        Args:
+            state: the state at its start.
+            request: the goal, the actuators that may not move, and how far the others may.
+
+        Raises:
+            FinlabError: a search is running, no actuator works, or none may move.
+        """
         if self.busy:
             raise FinlabError("a search is running already; cancel it first")
         bounds = request.bounds(state.layout.without(state.lost))
         self.forget()
-        self.ask(Search(state, GOAL_WORDS[request.goal], bounds))
+        self.ask(Search(state, GOALS_BY_WORDS[request.goal], bounds))
 
 
 def improve(search: Search, work: Work[Search]) -> Improvement:
-    """The best layout that is found until the work is cancelled, or all rounds are done."""
-    layout = search.state.layout
+    """Returns the best layout of a search, with its lost actuators.
+
+    Args:
+        search: the question.
+        work: takes reports, and ends the search where it is cancelled.
+    """
     state = search.state
-    left = layout.without(state.lost)
-    rests = time.monotonic()
+    working = state.layout.without(state.lost)
+    next_report_s = time.monotonic()
 
     def report(progress: Progress) -> None:
-        nonlocal rests
-        if time.monotonic() >= rests:
+        nonlocal next_report_s
+        if time.monotonic() >= next_report_s:
             work.report(progress)
-            rests = time.monotonic() + REST_S
+            next_report_s = time.monotonic() + REPORT_PERIOD_S
 
     improvement = optimize_layout(
-        left,
+        working,
         tuple(search.bounds),
         search.bounds,
         search.goal,
-        rule=Room(left, APART_M).broken,
-        grid=GRID,
+        rule=Clearance(working, MIN_GAP).violation,
+        grid=(POSITION_GRID, ANGLE_GRID),
         flow=state.flow,
         progress=report,
         cancelled=work.cancelled.is_set,
     )
+    layout = state.layout
     for actuator in improvement.layout.actuators:
         layout = layout.with_actuator(actuator)
     return replace(improvement, layout=layout)

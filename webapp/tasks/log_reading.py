@@ -17,6 +17,7 @@ if TYPE_CHECKING:  # who opens no log needs none of it
     from finlab.log import Judgement
 
 SUFFIXES = ".ulg,.bin,.mcap,.db3,.bag"
+"""Suffixes of logs, as a browser expects them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,6 +25,7 @@ class LogFile:
     """A log that the browser sent."""
 
     name: str
+    """Of the file."""
     content: bytes
     robot: Layout | None
     """By whose laws it is judged; None for what its own parameters say."""

@@ -4,9 +4,9 @@ of both."""
 import numpy as np
 
 from finlab.allocation.allocation import Allocation
+from finlab.allocation.report import is_proved_least
 from finlab.analysis.null_space import NullSpace
 from finlab.arrays import Array
-from webapp.markup.verdict import is_proved
 from webapp.session.targets import full_thrust
 from webapp.tasks.modes import Mode, mode_signature
 from webapp.tasks.solver import Modes, NamedMode, NullSpaceDirections
@@ -36,7 +36,7 @@ def null_space_modes(answer: Allocation, shifts: tuple[float, ...]) -> Modes:
     count = min(len(space.basis), MOST)
     shift = np.zeros(len(space.basis))
     shift[: len(shifts[:count])] = shifts[:count]
-    is_least = is_proved(answer)
+    is_least = is_proved_least(answer)
     name = "least watts" if is_least else "the answer"
     badge = "optimum" if is_least else answer.method
     modes = [_mode(answer, answer.command, name, badge)]

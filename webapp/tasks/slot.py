@@ -12,13 +12,14 @@ from concurrent.futures import Future
 from dataclasses import dataclass, field
 from functools import partial
 from queue import SimpleQueue
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 from finlab.errors import FinlabError
 
 Question = TypeVar("Question")
 Answer = TypeVar("Answer")
 Job = tuple["Future[Any]", Callable[[], Any]]
+"""What a thread has to do: the future of its result, and the function that makes that."""
 
 
 class Pool:
@@ -263,6 +264,7 @@ class Slot(Generic[Question, Answer]):
         self.question = self.answered = self.answer = self.error = None
 
     def _begin(self) -> None:
+        """Gives the newest question to a thread."""
         assert self.question is not None
         self._rest = None
         ring = partial(self._bell.ring_from_thread, self)
@@ -274,6 +276,7 @@ class Slot(Generic[Question, Answer]):
         self.progress = self._stage
 
     def _cancel(self) -> None:
+        """Gives up the work that is under way."""
         work = self._work
         self._work = None
         self.progress = None
@@ -281,6 +284,24 @@ class Slot(Generic[Question, Answer]):
             work.cancelled.set()
             if work.future is not None:
                 work.future.cancel()
+
+
+class DeferredWork(NamedTuple):
+    """Work that waits for others of its kind."""
+
+    work: Callable[[], Any]
+    """Takes time; called on a thread."""
+    use: Callable[[Any], object]
+    """Uses its result; called on the loop."""
+
+
+class BegunWork(NamedTuple):
+    """Work that a thread does."""
+
+    future: "Future[Any]"
+    """Of its result."""
+    use: Callable[[Any], object]
+    """Uses the result; called on the loop."""
 
 
 class Deferred:
@@ -291,23 +312,23 @@ class Deferred:
         self._pool = pool
         self._bell = bell
         self._do = do
-        self._begun: dict[Hashable, tuple[Future[Any], Callable[[Any], object]]] = {}
-        self._next: dict[Hashable, tuple[Callable[[], Any], Callable[[Any], object]]] = {}
+        self._begun: dict[Hashable, BegunWork] = {}
+        self._next: dict[Hashable, DeferredWork] = {}
 
     def make(
         self, work: Callable[[], Answer], use: Callable[[Answer], object], kind: Hashable
     ) -> None:
         """Do what takes time on a thread, and use what it gives on the loop. What waits for one of
         its `kind` to end gives way to a newer one."""
-        self._next[kind] = work, use
+        self._next[kind] = DeferredWork(work, use)
         self._begin(kind)
 
     def attend(self) -> bool:
         """Use what has come, and begin what waited for it."""
-        done = [kind for kind, (future, _) in self._begun.items() if future.done()]
+        done = [kind for kind, begun in self._begun.items() if begun.future.done()]
         for kind in done:
-            future, use = self._begun.pop(kind)
-            self._do(partial(_use, future, use))
+            begun = self._begun.pop(kind)
+            self._do(partial(_use, begun))
             self._begin(kind)
         return bool(done)
 
@@ -317,13 +338,15 @@ class Deferred:
         self._begun.clear()
 
     def _begin(self, kind: Hashable) -> None:
+        """Starts what waits of a kind, unless a thread is at work of that kind."""
         if kind in self._begun or kind not in self._next:
             return
-        work, use = self._next.pop(kind)
-        future = self._pool.submit(work)
-        self._begun[kind] = future, use
+        deferred = self._next.pop(kind)
+        future = self._pool.submit(deferred.work)
+        self._begun[kind] = BegunWork(future, deferred.use)
         future.add_done_callback(partial(self._bell.ring_from_thread, self))
 
 
-def _use(future: "Future[Answer]", use: Callable[[Answer], object]) -> None:
-    use(future.result())
+def _use(begun: BegunWork) -> None:
+    """Uses the result of work that is done, or raises what it raised."""
+    begun.use(begun.future.result())

@@ -14,13 +14,13 @@ from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import MethodChoice, choose_method
 from finlab.allocation.policy import POLICY_NAMES, Policy
+from finlab.allocation.report import is_proved_least
 from finlab.allocation.solution import Candidates
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.physics import plant_of
 from finlab.research.networks.checkpoint import network_features, resolve_checkpoint
 from finlab.research.paper.network import NetworkConfig
-from webapp.markup.verdict import is_proved
 from webapp.markup.words import ANSWER_SOURCE, fins_words
 from webapp.session.state import DRAWING, State, one_of
 from webapp.tasks.modes import Mode, find_modes, force_sizes, mode_signature, same_signature
@@ -81,6 +81,7 @@ class Modes:
 
 
 NO_MODES = Modes((), 0)
+"""The modes of an answer that has none."""
 
 
 def modes_of(
@@ -129,14 +130,17 @@ def _resting_words(mode: Mode) -> str:
 
 
 Load = Callable[..., MethodChoice]
-KEPT = 24
-"""Allocators that are kept: to make one takes as long as a hundred answers."""
+"""Loads a method by its name, as `choose_method` does."""
+MAX_ALLOCATORS = 24
+"""Most allocators in the cache: to make one takes as long as a hundred answers."""
 ALTERNATIVE_ERROR = 1e-4
 """Normalized error up to which another answer is an alternative."""
 SHIPPED = NetworkConfig.shipped
+"""Name of the shipped network of method `paper`."""
 POLICIES: dict[str, Policy] = {kind: Policy(kind) for kind in POLICY_NAMES}
+"""Name of each policy that the page offers -> the policy."""
 RUNS = "runs"
-"""Folder in the one where the app was started, whose folders are looked at."""
+"""Folder with the checkpoints of trainings, in the one where the app was started."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,6 +148,7 @@ class Reply:
     """An answer and what belongs to it."""
 
     state: State
+    """The question."""
     answer: Allocation
     in_reach: bool
     """Whether any command of the working fins gives what is asked."""
@@ -174,7 +179,7 @@ class Solver:
         """The network that method `paper` begins with."""
 
     @cached_property
-    def aside(self) -> "Solver":
+    def for_other_thread(self) -> "Solver":
         """Another solver with the same checkpoint, for another thread."""
         return Solver(self._checkpoint, self._load)
 
@@ -186,7 +191,11 @@ class Solver:
         if self._checkpoint is not None:
             folders.append(resolve_checkpoint(self._checkpoint))
         names = [SHIPPED, *map(str, folders[1:])]
-        return {n: folder for n, folder in zip(names, folders, strict=True) if _is_papers(folder)}
+        networks = {}
+        for name, folder in zip(names, folders, strict=True):
+            if _is_papers(folder):
+                networks[name] = folder
+        return networks
 
     def allocator(self, state: State) -> Allocator:
         """The allocator for a state's robot, method and settings, one of the last few or made now;
@@ -204,7 +213,7 @@ class Solver:
                 settings = replace(settings, **{"temperature": temperature})
             allocator = Allocator.of_choice(layout, replace(choice, settings=settings))
         self._made[key] = allocator  # the newest is last
-        while len(self._made) > KEPT:
+        while len(self._made) > MAX_ALLOCATORS:
             self._made.pop(next(iter(self._made)))
         return allocator
 
@@ -271,7 +280,7 @@ class Solver:
             own = Candidates(
                 answer.command[None], answer.wrench[None], error, *costs, (ANSWER_SOURCE,)
             )
-            badge = "optimum" if is_proved(answer) else state.method
+            badge = "optimum" if is_proved_least(answer) else state.method
         ways = self.allocator(replace(state, method="mdn")).refinement(answer)
         return modes_of(answer, own.followed_by(ways[-1].exact(ALTERNATIVE_ERROR)), badge, ways)
 
@@ -287,6 +296,7 @@ class Solver:
 
 
 def _is_papers(folder: Path) -> bool:
+    """Whether a folder holds a network of method `paper`."""
     try:
         return network_features(folder) == NetworkConfig.features
     except FinlabError:  # a folder of something else is no choice

@@ -18,12 +18,21 @@ POINTS = 300
 NOW = 10
 """Periods of which the present power is the mean: it jumps with every beat."""
 
-TIME, ERROR, DEPTH_ERROR, POWER = range(4)
-"""Columns of a record: time [s], distance from where it should be [m], that of the depth [m],
-driving power of all fins with motor losses [W]."""
-SURGE, PLACE, FORCES = 4, 6, 9
-"""First columns of the asked and delivered surge (2) [N], the position (3) [m], and of the force of
-each fin (n) [N]; then comes the probability of each fin being broken (n)."""
+TIME = 0
+"""Column of a record: time [s]."""
+ERROR = 1
+"""Column of a record: distance from the reference [m]."""
+DEPTH_ERROR = 2
+"""Column of a record: distance from the depth of the reference [m]."""
+POWER = 3
+"""Column of a record: driving power of all fins with motor losses [W]."""
+SURGE = 4
+"""First of two columns of a record: surge force, asked and delivered [N]."""
+PLACE = 6
+"""First of three columns of a record: position [m]."""
+FORCES = 9
+"""First of n columns of a record: force of each fin [N]; after them come n probabilities that a fin
+is broken."""
 
 
 class Figures(NamedTuple):
@@ -81,10 +90,15 @@ class Moment(NamedTuple):
 
 def row_of(tick: Tick) -> Array:
     """The row of a tick in a record."""
-    off = tick.position - tick.reference
-    power = float(tick.driving_power.sum())
-    surge = tick.asked[0], tick.delivered[0]
-    head = (tick.time, float(np.linalg.norm(off)), abs(float(off[2])), power, *surge)
+    deviation = tick.position - tick.reference
+    head = (
+        tick.time,
+        float(np.linalg.norm(deviation)),
+        abs(float(deviation[2])),
+        float(tick.driving_power.sum()),
+        tick.asked[0],
+        tick.delivered[0],
+    )
     force = np.linalg.norm(tick.force, axis=1)
     return np.concatenate([head, tick.position, force, tick.fault_probability])
 

@@ -31,8 +31,8 @@ class Stretch:
 
     n_steps: int
     swimmer: Swimmer
-    acts: tuple[Callable[[Swimmer], None], ...] = ()
-    """What is done to the robot before them."""
+    actions: tuple[Callable[[Swimmer], None], ...] = ()
+    """What is done to the robot before them, such as a loss."""
 
 
 class Swimming(Slot["Plan | Stretch", "Swimmer | tuple[int, Moment]"]):
@@ -40,15 +40,15 @@ class Swimming(Slot["Plan | Stretch", "Swimmer | tuple[int, Moment]"]):
 
     def __init__(self, context: Context) -> None:
         # An allocator of its own, for it is used on the thread that swims.
-        swim = partial(swum, context.solver.aside)
-        super().__init__(context.pools.swims, context.bell, swim)
+        solve = partial(swim_on, context.solver.for_other_thread)
+        super().__init__(context.pools.swims, context.bell, solve)
         self.swimmer: Swimmer | None = None
         """The robot; None while it is being made."""
         self.active = False
         """Whether there is a swim, running or not."""
         self.running = False
         self.pace = Pace()
-        self._acts: list[Callable[[Swimmer], None]] = []
+        self._actions: list[Callable[[Swimmer], None]] = []
 
     @property
     def done(self) -> bool:
@@ -78,7 +78,7 @@ class Swimming(Slot["Plan | Stretch", "Swimmer | tuple[int, Moment]"]):
             done, self.swimmer.visible_moment = self.answer
             self.pace.paid(done * self.swimmer.period_s, self.time)
             self.running = self.running and not self.done
-            if self._acts and not self.running:
+            if self._actions and not self.running:
                 self._submit(0)
         else:
             error = self.error
@@ -92,7 +92,7 @@ class Swimming(Slot["Plan | Stretch", "Swimmer | tuple[int, Moment]"]):
         self.swimmer = None
         self.running = False
         self.active = False
-        self._acts.clear()
+        self._actions.clear()
         self.pace.start_anew()
 
     def set_running(self, running: bool) -> None:
@@ -114,7 +114,7 @@ class Swimming(Slot["Plan | Stretch", "Swimmer | tuple[int, Moment]"]):
         if not broken and len(lost) + 1 >= len(self.swimmer.fins):
             raise FinlabError(f"{name} is the last fin that works; mend another one first")
         kind: FaultKind = "whole" if broken else "lost"
-        self._acts.append(lambda swimmer: swimmer.swim.fail(name, kind, announced=announced))
+        self._actions.append(lambda swimmer: swimmer.swim.fail(name, kind, announced=announced))
         if not self.running:
             self._submit(0)
 
@@ -134,12 +134,12 @@ class Swimming(Slot["Plan | Stretch", "Swimmer | tuple[int, Moment]"]):
 
     def _submit(self, n_steps: int) -> None:
         if self.swimmer is not None and not self.busy:
-            acts = tuple(self._acts)
-            self._acts = []
-            self.ask(Stretch(n_steps, self.swimmer, acts))
+            actions = tuple(self._actions)
+            self._actions = []
+            self.ask(Stretch(n_steps, self.swimmer, actions))
 
 
-def swum(solver: Solver, question: "Plan | Stretch") -> "Swimmer | tuple[int, Moment]":
+def swim_on(solver: Solver, question: "Plan | Stretch") -> "Swimmer | tuple[int, Moment]":
     """A robot at its start; or some steps of one, as many as the others can wait for, and its
     moment then."""
     if isinstance(question, Plan):
@@ -148,8 +148,8 @@ def swum(solver: Solver, question: "Plan | Stretch") -> "Swimmer | tuple[int, Mo
     end = time.monotonic() + BUDGET_S
     done = 0
     swimmer = question.swimmer
-    for act in question.acts:
-        act(swimmer)
+    for action in question.actions:
+        action(swimmer)
     while done < question.n_steps and not swimmer.swim.done:
         swimmer.step()
         done += 1

@@ -41,7 +41,9 @@ def format_digits(value: float, digits: int = 3) -> str:
         return "0"
     if not math.isfinite(value):
         return "–"
-    decimals = max(0, digits - 1 - math.floor(math.log10(abs(value))))
+    # Rounded first: 9.996 is 10.0, not 10.00.
+    rounded = float(f"{abs(value):.{digits - 1}e}")
+    decimals = max(0, digits - 1 - math.floor(math.log10(rounded)))
     return f"{value:.{decimals}f}" if decimals <= MAX_DECIMALS else f"{value:.2e}"
 
 
@@ -70,7 +72,11 @@ FORMATS: dict[str, Callable[[Any], str]] = {
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a table: which key of its rows it shows, under which title, and how."""
+    """A column of a table: which key of its rows it shows, under which title, and how.
+
+    Rows of experiments come from JSON files as well as from a run, so that a column names a key
+    and a format, where one of `finlab.display` has functions of a typed item.
+    """
 
     key: str
     """Key of the rows whose values it shows."""
