@@ -85,7 +85,7 @@ def header(name: str, layout: dict[str, Any], seed: int) -> str:
     plant = OraclePlant(layout)
     has_no_gaps = not any(actuator.kind == "fin" for actuator in plant.actuators)
     rng = np.random.default_rng(seed)
-    block = thinned(Compiled.of(load(layout)).robot.block)
+    block = thinned(Compiled.of(load(layout)).block)
     plant.scales = head_of(block)[
         "wrench_scale"
     ].copy()  # both measure a miss by the same wrench scale

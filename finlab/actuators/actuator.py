@@ -116,6 +116,8 @@ class CommandNumber:
         aims: whether it is an angle that turns the force and leaves its size, so that a full turn
             has no ends.
         lags: whether it follows with the time constant; the first number does where none says so.
+        wraps: whether it is an angle that may be proposed full turns beyond its limits and is then
+            brought back by these, in a narrow arc, too; one that aims is in a full turn anyway.
     """
 
     name: str
@@ -124,6 +126,7 @@ class CommandNumber:
     rate: str | None = None
     aims: bool = False
     lags: bool = False
+    wraps: bool = False
 
     @property
     def label(self) -> str:

@@ -128,6 +128,15 @@ def free_angles(actuators: Sequence[Actuator]) -> NDArray[np.bool_]:
     return is_angle
 
 
+def wrapping_angles(actuators: Sequence[Actuator]) -> NDArray[np.bool_]:
+    """Returns which numbers of the commands (n, 3) are angles that wrap whatever their limits."""
+    wraps = np.zeros((len(actuators), 3), dtype=np.bool_)
+    for i, actuator in enumerate(actuators):
+        for k, number in enumerate(actuator.KIND.numbers):
+            wraps[i, k] = number.wraps
+    return wraps
+
+
 def import_kinds(module: str) -> None:
     """Imports a module that `FINLAB_KINDS` names, which adds its kinds.
 

@@ -14,10 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from finlab.allocation import methods
 from finlab.allocation.allocation import Allocation, BatchAllocation, chunks
-from finlab.allocation.method import Checkpoint, Method, Networks
+from finlab.allocation.method import Checkpoint, Method, MethodQuestion, Networks
 from finlab.allocation.policy import CLOSEST, Policy, PolicyName, as_policy
 from finlab.allocation.question import (
-    CheckedQuestion,
     LazyFigures,
     RobotState,
     check_flow,
@@ -243,13 +242,12 @@ class Allocator:
             DataError: a fin's force table cannot be read.
         """
         wrench_asked = check_target(wrench)
-        question = self._question(damage_of(damage, lost), policy, flow, seed, free)
-        state = question.state
+        state, question = self._question(damage_of(damage, lost), policy, flow, seed, free)
         method = state.method
         multipliers: Array | None = None
         reference_of_method: Array | None = None
         if isinstance(previous, Allocation):
-            if method.begins_at_multipliers and previous.multipliers is not None:
+            if "multipliers" in method.reads and previous.multipliers is not None:
                 multipliers = previous.multipliers
             previous = previous.command
         command_previous = None if previous is None else check_previous(previous, state.layout)
@@ -259,17 +257,20 @@ class Allocator:
         if reference is not None:
             wrenches_expected = check_reference(reference)
             target = method.in_time(target, wrenches_expected)
-            if method.looks_ahead:
+            if "reference" in method.reads:
                 reference_of_method = state.with_free_axes(wrenches_expected, 0.0)
-        targets = state.with_free_axes(target, 0.0)[None]
-        solution = question.solve(
-            targets, command_previous, multipliers=multipliers, reference=reference_of_method
+        question = question._replace(
+            targets=state.with_free_axes(target, 0.0)[None],
+            previous=command_previous,
+            multipliers=multipliers,
+            reference=reference_of_method,
         )
+        solution = state.solve(question)
         solve_ms = (time.perf_counter() - start) * 1e3
 
         target_shown = state.with_free_axes(target, np.nan).copy()
         return Allocation.of(
-            **self._common_fields(question, target_shown, wrench_asked, solution),
+            **self._common_fields(state, question, target_shown, wrench_asked, solution),
             command=state.among_all(solution.command)[0].copy(),
             solve_ms=solve_ms,
             settings=vars(self.settings).copy(),
@@ -332,21 +333,24 @@ class Allocator:
             DataError: a fin's force table cannot be read.
         """
         wrenches_asked = check_wrenches(wrenches)
-        question = self._question(damage_of(damage, lost), policy, flow, seed, free)
-        state = question.state
+        state, question = self._question(damage_of(damage, lost), policy, flow, seed, free)
         start = time.perf_counter()
 
         def parts() -> Iterator[tuple[Rows, Solution]]:
             for rows in chunks(len(wrenches_asked)):
-                targets = state.with_free_axes(wrenches_asked[rows], 0.0)
-                yield rows, question.solve(targets, offset=rows.start)
+                # The seed is shifted, so that a target gets the same answer in any batch.
+                part = question._replace(
+                    targets=state.with_free_axes(wrenches_asked[rows], 0.0),
+                    seed=question.seed + rows.start,
+                )
+                yield rows, state.solve(part)
 
         solution = joined(parts(), len(wrenches_asked), state.works)
         targets_shown = state.with_free_axes(wrenches_asked, np.nan)
         elapsed_ms = (time.perf_counter() - start) * 1e3
         count = len(targets_shown)
         return BatchAllocation.of(
-            **self._common_fields(question, targets_shown, wrenches_asked, solution),
+            **self._common_fields(state, question, targets_shown, wrenches_asked, solution),
             command=solution.command,
             solve_ms=np.broadcast_to(elapsed_ms / max(count, 1), count),
             wrench_expected=solution.wrench,
@@ -359,22 +363,32 @@ class Allocator:
         flow: ArrayLike | None,
         seed: int,
         free: Sequence[str] = (),
-    ) -> CheckedQuestion:
-        """Checks the arguments of a question, and prepares the robot in the state they name."""
+    ) -> tuple[RobotState, MethodQuestion]:
+        """Checks the arguments of a question, and prepares the robot in the state they name.
+
+        Returns:
+            The robot in that state, and the question to its method, but for the wrenches.
+        """
         checked_policy = as_policy(policy)
         check_seed(seed)
         checked_flow = check_flow(flow)
         state = self._state(damage, free)
         state.method.check_policy(checked_policy)
-        return CheckedQuestion(state, checked_policy, checked_flow, int(seed))
+        return state, state.question(checked_policy, checked_flow, int(seed))
 
     def _common_fields(
-        self, question: CheckedQuestion, target: Array, wrenches: Array, solution: Solution
+        self,
+        state: RobotState,
+        question: MethodQuestion,
+        target: Array,
+        wrenches: Array,
+        solution: Solution,
     ) -> dict[str, Any]:
         """Fields that answers to one target and to many share.
 
         Args:
-            question: all but the wrenches.
+            state: of the robot that was asked.
+            question: to its method.
             target: what was answered (6,) or (N, 6), NaN along free axes.
             wrenches: what was asked, of the same shape.
             solution: of the method.
@@ -382,7 +396,6 @@ class Allocator:
         Returns:
             Values by the names of the fields.
         """
-        state = question.state
         return dict(
             layout=state.layout,
             damage=state.damage,
@@ -394,7 +407,7 @@ class Allocator:
             flow=question.flow,
             seed=question.seed,
             unknown_fins=state.method.unknown_fins,
-            answered=LazyFigures(question, wrenches, solution),
+            answered=LazyFigures(state, question.flow, wrenches, solution),
         )
 
     def _state_of(self, result: Allocation) -> RobotState:
@@ -423,7 +436,7 @@ class Allocator:
     def _make_state(self, damage: Damage, free: NDArray[np.bool_] | None = None) -> RobotState:
         """Prepares the robot with a damage, asked for all axes but some (6,).
 
-        A method that takes losses with the question is that of the state without any: a loss, or a
+        A method that reads losses from the question is that of the state without any: a loss, or a
         free axis, prepares nothing.
         """
         damaged = damage.applied_to(self._layout)
@@ -431,7 +444,7 @@ class Allocator:
         choice = self._choice
         commanded = self._layout.commanded if free is None else self._layout.commanded & ~free
         free_axes = None if commanded.all() else ~commanded
-        if choice.kind.takes_losses and (damage.lost or free is not None):
+        if "losses" in choice.kind.reads and (damage.lost or free is not None):
             without_loss = self._state(replace(damage, lost=()))
             return RobotState(
                 damaged, damage, works, without_loss.method, without_loss.plant, free_axes

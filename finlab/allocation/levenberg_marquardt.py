@@ -2,7 +2,7 @@
 limits (Eq. 11).
 
 The last stage of a search: it works in commands, not forces, and with the actuators' own laws, so
-it removes the error that compiled tables leave. The baselines use it for all.
+it removes the error that the core's tables leave (`exact_commands`). The baselines use it for all.
 """
 
 from dataclasses import dataclass, replace
@@ -12,21 +12,21 @@ from typing import TYPE_CHECKING, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.arrays import NOTHING, AnyArray, Array, solve_or_nan
+from finlab.arrays import CLOSE, NEARLY, NOTHING, ROUNDS, AnyArray, Array, solve_or_nan
 from finlab.axes import feasible
+from finlab.core.calls import CoreAnswer
 from finlab.physics.plant import Plant
 
 if TYPE_CHECKING:
     from finlab.allocation.rates import CommandBox
 
+EXACT = 1e-8
+"""Normalized error up to which commands need no further step."""
 RIDGE = (1e-9, 1e-14)
 """Regularization of the 6 x 6 systems: absolute, and relative to their trace. Without the latter
 those of strong fins on long levers are singular to rounding."""
 FIRST_DAMPING = 1e-6
 """Damping of the first step: nearly that of Newton, for starts are near."""
-FIN_DIRECTION = np.array([False, False, True])
-"""Which number of a fin's command is an angle. It wraps in a narrow arc, too, as proposals of
-networks may lie a turn away; a thruster has nothing there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,9 +46,11 @@ class CommandProblem:
     """Angles (n, 3) that are brought near to the middle of their limits by full turns."""
     no_limits: NDArray[np.bool_]
     """Those of them (n, 3) that all angles may follow: at +-pi they are at no limit."""
-    error_scale: Array | None = None
-    """What wrenches (6,) are divided by [N, N m], the wrench scale or the `asked_scale` of a
-    method, where actuators act on each other; None where they do not."""
+    error_scale: Array
+    """What wrenches (6,) are divided by [N, N m]: the wrench scale, or the `asked_scale` of a
+    method."""
+    box: "CommandBox | None" = None
+    """What may follow the command of the tick before; None outside of ticks."""
     works: NDArray[np.bool_] | None = None
     """Which actuators (n,) give a force; None where all do."""
     counts: NDArray[np.bool_] | None = None
@@ -71,9 +73,9 @@ class CommandProblem:
             effectiveness=plant.effectiveness / error_scale,
             lower=plant.lower,
             upper=plant.upper,
-            wraps=plant.turns | FIN_DIRECTION,
+            wraps=plant.wraps,
             no_limits=plant.turns,
-            error_scale=None if plant.interaction is None else error_scale,
+            error_scale=error_scale,
         )
 
     def restricted(self, works: NDArray[np.bool_] | None, counts: NDArray[np.bool_] | None) -> Self:
@@ -96,7 +98,7 @@ class CommandProblem:
     def in_tick(self, box: "CommandBox") -> Self:
         """Returns the problem within what may follow the command of the tick before."""
         no_limits = box.any_angle & self.no_limits
-        return replace(self, lower=box.lower, upper=box.upper, no_limits=no_limits)
+        return replace(self, lower=box.lower, upper=box.upper, no_limits=no_limits, box=box)
 
     @cached_property
     def width(self) -> AnyArray:
@@ -119,7 +121,7 @@ class CommandProblem:
         """Returns the normalized wrenches (R, 6) of forces (R, n, 3) [N]."""
         effectiveness = self.effectiveness.reshape(-1, 6)
         wrench: AnyArray = force.reshape(len(force), len(effectiveness)).dot(effectiveness)
-        if self.error_scale is None:
+        if self.plant.interaction is None:
             return wrench
         offset = self.plant.offset(self._of_working(force)) / self.error_scale
         return wrench + self._in_counted_axes(offset)
@@ -128,7 +130,7 @@ class CommandProblem:
         """Returns the normalized wrenches (R, 6) of commands (R, n, 3), and their derivatives J
         (R, n, 3, 6) by the commands."""
         force, force_jacobian = self.plant.force_and_jacobian(command)
-        if self.error_scale is None:
+        if self.plant.interaction is None:
             return self.wrench_of(force), np.matmul(force_jacobian, self.effectiveness)
         offset, effectiveness = self.plant.effect(self._of_working(force))
         offset = offset / self.error_scale
@@ -148,9 +150,90 @@ class CommandProblem:
         """Wrenches (..., 6), 0 along the axes that do not count."""
         return wrench if self.counts is None else np.where(self.counts, wrench, 0.0)
 
+    def missing(self, command: AnyArray, wanted: AnyArray) -> AnyArray:
+        """Returns what normalized wrenches (R, 6) of commands (R, n, 3) miss of those that are
+        wanted (R, 6), with the sign of the excess; 0 along axes that do not count."""
+        missing: AnyArray = self.wrench(command) - wanted
+        return missing if self.counts is None else np.where(self.counts, missing, 0.0)
+
+    def error(self, command: AnyArray, wanted: AnyArray) -> AnyArray:
+        """Returns the normalized errors (R,) of commands (R, n, 3), given the normalized wrenches
+        (R, 6) that are wanted."""
+        return norms(self.missing(command, wanted))
+
     def feasible(self, command: AnyArray) -> AnyArray:
         """Returns commands (..., n, 3) inside the limits, angles wrapped first."""
         return feasible(command, self.lower, self.upper, self.wraps)
+
+
+def norms(vectors: AnyArray) -> AnyArray:
+    """Returns the Euclidean norms (R,) of vectors (R, 6)."""
+    return np.asarray(np.sqrt(np.einsum("ni,ni->n", vectors, vectors)))
+
+
+def exact_commands(problem: CommandProblem, answer: CoreAnswer) -> Array:
+    """Makes commands exact by the plant: steps by the laws where the core's grids leave an error
+    (Eq. 11).
+
+    Args:
+        problem: the robot under the conditions of the question.
+        answer: of the core; its commands are overwritten.
+
+    Returns:
+        Commands (N, n, 3) that give the wrenches served, within the limits and rates; or as near to
+        them as they come.
+    """
+    command = answer.command
+    wanted = answer.wrench_served / problem.error_scale
+    missing = problem.missing(command, wanted)
+    all_missing = missing.ravel()
+    if all_missing.dot(all_missing) <= EXACT**2:
+        return command
+    # Where the core's grids say what the laws say, it has done all that steps can do.
+    error = norms(missing)
+    off_by_grids = error > answer.error + EXACT
+    off_within_reach = answer.is_attainable & (error > NEARLY)
+    rough = np.flatnonzero(off_by_grids | off_within_reach)
+    if not len(rough):
+        return command
+    refined = refine(problem, wanted[rough], command[rough], ROUNDS, EXACT)
+    command[rough] = refined.command
+    if problem.box is not None:
+        return problem.box.clip_feasible(command, problem.plant)
+    unmet = (refined.error > NEARLY) & answer.is_attainable[rough]
+    for row in rough[unmet].tolist():
+        # Such as idle fins in line, or a least force: no small change of these commands helps.
+        starts = _starts_around(problem, command[row])
+        other = cheapest_exact(problem, wanted[row], starts)
+        command[row] = command[row] if other is None else other
+    return problem.plant.rested(command)
+
+
+def cheapest_exact(problem: CommandProblem, wanted: Array, starts: Array) -> Array | None:
+    """Finds the cheapest command that gives a wrench, of those to which steps lead.
+
+    Args:
+        problem: the robot.
+        wanted: normalized wrench (6,).
+        starts: commands (R, n, 3) where the steps begin.
+
+    Returns:
+        The command (n, 3); None where no steps lead to one.
+    """
+    refined = refine(problem, wanted[None], starts, 2 * ROUNDS, EXACT)
+    exact = refined.command[refined.error <= NEARLY]
+    if len(exact) == 0:
+        return None
+    power = problem.plant.power(exact).sum(axis=-1)
+    return np.asarray(exact[power.argmin()])
+
+
+def _starts_around(problem: CommandProblem, command: Array) -> Array:
+    """Commands (R, n, 3) around one (n, 3), from near to as far as the limits are apart."""
+    rng = np.random.default_rng(0)
+    change = rng.uniform(-1.0, 1.0, (2 * ROUNDS, *command.shape))
+    reach = np.geomspace(10.0 * CLOSE, 1.0, len(change))[:, None, None]
+    return np.asarray(command + reach * change * problem.width)
 
 
 class RefinedCommands(NamedTuple):

@@ -29,6 +29,13 @@ if TYPE_CHECKING:
 
 Takes = Literal["any actuator", "fins", "horizontal fins", "thrusters"]
 """What a method's robot may have."""
+Reads = Literal["policy", "losses", "multipliers", "reference"]
+"""What `Method.solve` may read of a question, beside targets, the command before, flow and seed.
+
+`policy`: more than the least plain error may be asked for. `losses`: `lost` actuators and `free`
+axes; a method that does not read them is made for a robot without them. `multipliers`: those of an
+earlier answer, to begin there. `reference`: wrenches of the next ticks.
+"""
 
 
 class Networks(Protocol):
@@ -64,14 +71,14 @@ class MethodQuestion(NamedTuple):
     seed: int = 0
     """Makes the answer repeatable."""
     lost: NDArray[np.bool_] | None = None
-    """Which actuators (n,) do not work, for methods that take losses; None where all do."""
+    """Which actuators (n,) do not work, for methods that read losses; None where all do."""
     free: NDArray[np.bool_] | None = None
-    """Which axes (6,) may take any wrench, for methods that take losses; None for none."""
+    """Which axes (6,) may take any wrench, for methods that read losses; None for none."""
     multipliers: Array | None = None
     """Multipliers (6,) [W/N, W/(N m)] of an earlier answer, for a single target and methods that
-    begin there; None for their own."""
+    read them; None for their own."""
     reference: Array | None = None
-    """Wrenches (K, 6) of the next ticks [N, N m], for methods that look ahead; None where they are
+    """Wrenches (K, 6) of the next ticks [N, N m], for methods that read them; None where they are
     not known."""
 
 
@@ -85,17 +92,11 @@ class Method(ABC):
     """What can be set."""
     policy_under_way: ClassVar[PolicyName] = "closest"
     """What a control loop asks for by default where a wrench is out of reach."""
-    every_policy: ClassVar[bool] = True
-    """Whether more than the least plain error may be asked for."""
     takes: ClassVar[Takes] = "any actuator"
     """What the robot may have."""
-    takes_losses: ClassVar[bool] = False
-    """Whether `solve` reads `lost` actuators and `free` axes, rather than being made for a robot
-    without them."""
-    begins_at_multipliers: ClassVar[bool] = False
-    """Whether `solve` reads the `multipliers` of an earlier answer, to begin there."""
-    looks_ahead: ClassVar[bool] = False
-    """Whether `solve` reads the `reference` of the next ticks."""
+    reads: ClassVar[frozenset[Reads]] = frozenset({"policy"})
+    """What `solve` reads of a question that not every method does: of policies, losses, multipliers
+    and a reference. What is not named here, it is not given."""
     needs_networks: ClassVar[bool] = False
     """Whether it is made with trained networks, of a checkpoint."""
     networks: Networks | None
@@ -188,8 +189,7 @@ class Method(ABC):
         """Solves for the targets of a question.
 
         Args:
-            question: whose policy `check_policy` accepts; what the facts of the class say that it
-                does not read, it leaves alone.
+            question: whose policy `check_policy` accepts; with what the method `reads`.
 
         Returns:
             Commands (N, n, 3) within the limits, and what else the method has to tell.
@@ -242,7 +242,7 @@ class Method(ABC):
 
     def check_policy(self, policy: Policy) -> None:
         """Raise an `AllocationError` at a policy that the method does not know."""
-        if not (self.every_policy or policy.is_plain):
+        if not ("policy" in self.reads or policy.is_plain):
             raise AllocationError(
                 f"policy: method {self.name!r} minimizes the plain error and knows nothing else; "
                 "use method 'dual', or policy 'closest' without axis weights"
@@ -300,7 +300,7 @@ class Method(ABC):
 class LeastErrorMethod(Method):
     """A method that keeps the plain error least, whatever else is asked for."""
 
-    every_policy = False
+    reads: ClassVar[frozenset[Reads]] = frozenset()
     takes: ClassVar[Takes] = "fins"
 
     @abstractmethod

@@ -1,8 +1,8 @@
-"""One question to an allocator: the state of the robot, what is asked of it, the answer to it, and
-the checks of all arguments.
+"""One question to an allocator: the state of the robot, which asks its method, what a result
+computes later, and the checks of all arguments.
 
-`Allocator` makes a `RobotState` for each damage and set of free axes, a `CheckedQuestion` for each
-call, and `LazyFigures` for each result, which compute from it what is first read later.
+`Allocator` makes a `RobotState` for each damage and set of free axes, and `LazyFigures` for each
+result, which compute from state and solution what is first read later.
 The checks return their argument in the form in which methods take it, or raise an error that says
 what was got and what was expected. They stand here and in no file of their own since `finlab
 allocate` is to load few files.
@@ -36,6 +36,9 @@ MAX_WRENCH = 1e6
 MAX_FLOW = 100.0
 """Largest magnitude of a component of the flow [m/s, rad/s]; beyond it something is wrong
 upstream."""
+
+_NO_TARGETS = np.empty((0, 6))
+"""Stands for the wrenches of a question that has none yet."""
 
 MAX_SIZE_IN_PYTHON = 100
 """Arrays of up to so many numbers are measured by Python's own functions, which is quicker than
@@ -99,7 +102,7 @@ class RobotState:
         """The robot of the m actuators that work alone."""
         return without_lost(self.layout, self.damage)
 
-    @property
+    @cached_property
     def lost(self) -> NDArray[np.bool_] | None:
         """Mask (n,) of the actuators that are lost; None where none is."""
         return ~self.works if self.damage.lost else None
@@ -121,82 +124,55 @@ class RobotState:
         """
         return wrench if self.free is None else np.where(self.free, value, wrench)
 
+    def question(self, policy: Policy, flow: Array | None, seed: int) -> MethodQuestion:
+        """Returns a question to the method, but for its wrenches: with the losses and free axes
+        where the method reads these, else it is made for the actuators that work alone.
 
-class CheckedQuestion(NamedTuple):
-    """A question but for its wrenches, all of whose arguments were checked."""
+        Args:
+            policy: what to give for a wrench out of reach.
+            flow: velocity (6,) of the body relative to the water [m/s, rad/s]; None at rest.
+            seed: makes the answer repeatable.
+        """
+        reads_losses = "losses" in self.method.reads
+        return MethodQuestion(
+            _NO_TARGETS,
+            policy=policy,
+            flow=flow,
+            seed=seed,
+            lost=self.lost if reads_losses else None,
+            free=self.free if reads_losses else None,
+        )
 
-    state: RobotState
-    """Of the robot that is asked."""
-    policy: Policy
-    """What to give for a wrench out of reach."""
-    flow: Array | None
-    """Velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at rest."""
-    seed: int
-    """Makes the answer repeatable."""
-
-    def solve(
-        self,
-        targets: Array,
-        previous: Array | None = None,
-        offset: int = 0,
-        multipliers: Array | None = None,
-        reference: Array | None = None,
-    ) -> Solution:
+    def solve(self, question: MethodQuestion) -> Solution:
         """Asks the method.
 
         Args:
-            targets: desired wrenches (N, 6) [N, N m], 0 along free axes.
-            previous: command (n, 3) of the tick before; None outside of ticks.
-            offset: index of the first target among all of the question, which shifts the seed, so
-                that a target gets the same answer in any batch.
-            multipliers: lambda (6,) [W/N, W/(N m)] of an earlier answer, for a single target.
-            reference: wrenches (K, 6) of the next ticks [N, N m], 0 along free axes.
+            question: with its wrenches; its `previous` is that of all n actuators.
 
         Returns:
             The method's solution. In a tick its commands lie within the limits and rates of the
             drives; outside of ticks actuators that have nothing to do are at rest.
         """
-        method = self.state.method
-        question = self._for_method(targets, previous, offset, multipliers, reference)
-        solution = method.solve(question)
-        if question.previous is None:
+        method = self.method
+        previous = question.previous
+        if previous is None:
+            solution = method.solve(question)
             return solution._replace(command=method.plant.rested(solution.command))
-        box = method.rates.box(question.previous)
+        if "losses" not in method.reads:
+            previous = previous[self.works]
+            question = question._replace(previous=previous)
+        solution = method.solve(question)
+        box = method.rates.box(previous)
         return solution._replace(command=box.clip_feasible(solution.command, method.plant))
-
-    def _for_method(
-        self,
-        targets: Array,
-        previous: Array | None,
-        offset: int,
-        multipliers: Array | None,
-        reference: Array | None,
-    ) -> MethodQuestion:
-        """The question as the method takes it: of all n actuators with the lost ones and the free
-        axes, or of the m that work alone; arguments as of `solve`."""
-        state = self.state
-        takes_losses = state.method.takes_losses
-        if previous is not None and not takes_losses:
-            previous = previous[state.works]
-        return MethodQuestion(
-            targets,
-            policy=self.policy,
-            previous=previous,
-            flow=self.flow,
-            seed=self.seed + offset,
-            lost=state.lost if takes_losses else None,
-            free=state.free if takes_losses else None,
-            multipliers=multipliers,
-            reference=reference,
-        )
 
 
 class LazyFigures(NamedTuple):
-    """The figures that a result computes when they are first read, from a question and its
-    answer."""
+    """The figures that a result computes when they are first read."""
 
-    question: CheckedQuestion
-    """All but the wrenches."""
+    state: RobotState
+    """Of the robot that was asked."""
+    flow: Array | None
+    """Velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at rest."""
     wrenches: Array
     """Desired wrenches as they came, (6,) or (N, 6) [N, N m]."""
     solution: Solution
@@ -206,18 +182,16 @@ class LazyFigures(NamedTuple):
     def plant(self) -> Plant:
         """Judge of commands: the laws of all actuators, lost ones included, in the question's
         flow."""
-        return self.question.state.plant.at(self.question.flow)
+        return self.state.plant.at(self.flow)
 
     def notes(self) -> tuple[str, ...]:
         """Returns sentences about the robot and the method, not about single answers."""
-        state = self.question.state
+        state = self.state
         asked = self.wrenches
         if state.free is not None:
             # What was asked of an axis that the layout does not command stays: a note tells of it.
             asked = np.where(state.free & state.layout.commanded, 0.0, asked)
-        return answer_notes(
-            state.healthy, state.method, self.question.flow, asked, self.solution.notes
-        )
+        return answer_notes(state.healthy, state.method, self.flow, asked, self.solution.notes)
 
     def candidates(self) -> Candidates | None:
         """Returns the refined candidates of all n actuators; None where the method has none."""
@@ -243,10 +217,9 @@ class LazyFigures(NamedTuple):
         if make is None:
             return None
         candidates = make()
-        state = self.question.state
-        if not candidates or not state.damage.lost:
+        if not candidates or not self.state.damage.lost:
             return candidates
-        return replace(candidates, command=state.among_all(candidates.command))
+        return replace(candidates, command=self.state.among_all(candidates.command))
 
 
 def check_layout(layout: object) -> None:

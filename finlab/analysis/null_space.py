@@ -45,20 +45,19 @@ class NullSpace:
         self._plant = plant_of(layout).at(answer.flow).counting(counts)
         compiled = Compiled(layout, self._plant, answer.scale).at(self._plant.inflow(None))
         self._compiled = compiled
-        robot = compiled.robot
         self._command = answer.command[self._works]
         self._problem = CommandProblem.of(self._plant, answer.scale)
         self._wrench = self._problem.wrench(self._command[None])
         self._force = compiled.forces_along(self._plant.force(self._command))
-        self._force_max = np.abs(robot.ends).max(axis=1)
+        self._force_max = np.abs(compiled.ends).max(axis=1)
         moves: NDArray[np.bool_] = np.repeat(
-            np.ptp(robot.ends, axis=1, keepdims=True) > 0.0, 2, axis=1
+            np.ptp(compiled.ends, axis=1, keepdims=True) > 0.0, 2, axis=1
         )
-        moves[robot.is_line, 1] = False
-        columns = (robot.effectiveness / answer.scale)[moves]
+        moves[compiled.is_line, 1] = False
+        columns = (compiled.effectiveness / answer.scale)[moves]
         moves[moves] = np.abs(columns).max(axis=1) > 0.0
         basis = _sparse(
-            null_space((robot.effectiveness / answer.scale)[moves].T, rcond=EXACT_TOLERANCE)
+            null_space((compiled.effectiveness / answer.scale)[moves].T, rcond=EXACT_TOLERANCE)
         )
         self.basis: Array = np.zeros((basis.shape[1], *moves.shape))
         """Directions (k, n, 2) of the null space by the forces of the n working actuators along
@@ -143,7 +142,7 @@ class NullSpace:
 
     def _start_commands(self, shift: Array) -> Array:
         """Commands (R, n, 3) for shifts (R, k) by the tables of the core, before they are exact."""
-        return self._compiled.robot.core.commands(self._forces(shift), self._command)
+        return self._compiled.core.commands(self._forces(shift), self._command)
 
     def _has_commands(self, shift: Array) -> NDArray[np.bool_]:
         """Whether all actuators have commands for shifts (R, k)."""
@@ -151,7 +150,7 @@ class NullSpace:
         command = self._start_commands(shift)
         force_of_command = self._compiled.forces_along(self._plant.force(command))
         counts = np.where(
-            self._compiled.robot.is_line[:, None], [1.0, 0.0], 1.0
+            self._compiled.is_line[:, None], [1.0, 0.0], 1.0
         )  # drag comes with the lift
         error = np.linalg.norm((force_of_command - force) * counts, axis=-1)
         return np.asarray((error <= FORCE_TOLERANCE * self._force_max).all(axis=1))

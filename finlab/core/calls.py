@@ -6,9 +6,8 @@ commands that give their forces. The structs are those of finlab/core/fl_fields.
 
 import ctypes
 from collections.abc import Sequence
-from functools import lru_cache
 from threading import Lock
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,45 +85,22 @@ NOMINAL = Conditions()
 """Outside of ticks, nothing lost, no axis free."""
 
 
-class PolicyFields(Protocol):
-    """A `finlab.allocation.Policy`, as far as the core has to know it."""
-
-    def __hash__(self) -> int:
-        """Policies are values: equal ones have one record."""
-        ...
-
-    @property
-    def kind(self) -> str:
-        """Name of the policy: "closest" is FL_CLOSEST in C, and so on."""
-        ...
-
-    @property
-    def axis_weights(self) -> tuple[float, ...]:
-        """Weights (6,) of the axes, for `closest`."""
-        ...
-
-    @property
-    def groups(self) -> Sequence[NDArray[np.bool_]]:
-        """Masks (6,) of the groups of axes in order, for `priority`."""
-        ...
-
-
-@lru_cache(maxsize=64)
-def policy_record(policy: PolicyFields) -> Record:
-    """Returns a policy as the core reads it.
+def policy_record(
+    kind: str, axis_weights: Sequence[float], groups: Sequence[NDArray[np.bool_]]
+) -> Record:
+    """Returns a policy as the core reads it, an `fl_policy` (1,).
 
     Args:
-        policy: kind, weights and groups of axes.
-
-    Returns:
-        One `fl_policy` (1,). Who hands its address to the core keeps the record alive.
+        kind: name of the policy: "closest" is FL_CLOSEST in C, and so on.
+        axis_weights: weights (6,) of the axes, for `closest`.
+        groups: masks (6,) of the groups of axes in order, for `priority`.
     """
-    weights = np.array(policy.axis_weights)
+    weights = np.array(axis_weights)
     record = np.zeros(1, struct("fl_policy"))
-    record["policy"] = constant(f"FL_{policy.kind.upper()}")
-    record["group_count"] = len(policy.groups)
+    record["policy"] = constant(f"FL_{kind.upper()}")
+    record["group_count"] = len(groups)
     record["axis_weight"] = weights / weights.max()
-    for index, axes in enumerate(policy.groups):
+    for index, axes in enumerate(groups):
         record["group"][:, index] = axes
     return record
 
@@ -154,6 +130,7 @@ class QuestionRecord:
         self._angles_wanted_pointer = record["angles_wanted"]
 
         self._policy: Record | None = None
+        """At which the question points, so that it lives as long."""
         self._multipliers = np.zeros(6)
         self._previous = np.zeros((count, 3))
         self._lost = np.zeros(count, np.uint8)
@@ -170,18 +147,19 @@ class QuestionRecord:
         self._wrench[0] = wrench
 
     def write(
-        self, policy: PolicyFields | None, multipliers: Array | None, conditions: Conditions
+        self, policy: Record | None, multipliers: Array | None, conditions: Conditions
     ) -> None:
         """Writes all but the wrench.
 
         Args:
-            policy: what to give out of reach; None for nothing else than what is asked.
+            policy: of `policy_record`, what to give out of reach; None for nothing else
+                than what is asked.
             multipliers: lambda (6,) [W/N, W/(N m)] at which Newton's method begins; None for its
                 own.
             conditions: what holds.
         """
-        self._policy = None if policy is None else policy_record(policy)
-        self._policy_pointer[0] = 0 if self._policy is None else self._policy.ctypes.data
+        self._policy = policy
+        self._policy_pointer[0] = 0 if policy is None else policy.ctypes.data
         self._multipliers_pointer[0] = 0
         if multipliers is not None:
             self._multipliers[:] = multipliers
@@ -287,7 +265,7 @@ class Core:
     def answer_one(
         self,
         wrench: Array,
-        policy: PolicyFields | None,
+        policy: Record | None,
         multipliers: Array | None = None,
         conditions: Conditions = NOMINAL,
     ) -> CoreAnswer:
@@ -295,7 +273,8 @@ class Core:
 
         Args:
             wrench: desired (6,) [N, N m].
-            policy: what to give out of reach; None for nothing else than the wrench.
+            policy: of `policy_record`, what to give out of reach; None for nothing else
+                than the wrench.
             multipliers: lambda (6,) [W/N, W/(N m)] at which Newton's method begins; None for its
                 own.
             conditions: what holds of the robot.
@@ -319,13 +298,14 @@ class Core:
             return self._answer.read()
 
     def answer_many(
-        self, wrenches: Array, policy: PolicyFields | None, conditions: Conditions = NOMINAL
+        self, wrenches: Array, policy: Record | None, conditions: Conditions = NOMINAL
     ) -> CoreAnswer:
         """Answers many wrenches, one after the other in C.
 
         Args:
             wrenches: desired (N, 6) [N, N m].
-            policy: what to give out of reach; None for nothing else than the wrenches.
+            policy: of `policy_record`, what to give out of reach; None for nothing else
+                than the wrenches.
             conditions: what holds of the robot.
 
         Returns:

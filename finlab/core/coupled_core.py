@@ -20,7 +20,6 @@ from finlab.core.calls import (
     AnswerRecord,
     Conditions,
     CoreAnswer,
-    PolicyFields,
     QuestionRecord,
     prepared_work,
     raise_refusal,
@@ -137,7 +136,7 @@ class CoupledCore:
         wrench: Array,
         force: Array | None,
         most_iterations: int,
-        policy: PolicyFields | None = None,
+        policy: Record | None = None,
         multipliers: Array | None = None,
         conditions: Conditions = NOMINAL,
         penalty_least: float = 0.0,
@@ -151,7 +150,8 @@ class CoupledCore:
                 the command before.
             most_iterations: how many outer iterations; 0 for the nearest forces that give the
                 wrench.
-            policy: what to give out of reach; None for nothing else than the wrench.
+            policy: of `policy_record`, what to give out of reach; None for nothing else
+                than the wrench.
             multipliers: lambda (6,) [W/N, W/(N m)] at which the first iteration begins.
             conditions: what holds of the robot.
             penalty_least: what an error as large as the wrench scale counts at least [W].

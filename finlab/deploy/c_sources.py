@@ -71,7 +71,7 @@ def c_sources(
         )
     water = check_flow(flow)
     method = Dual(layout, DualSettings(), wrench_scale_of(layout), None).at(water)
-    block = method.compiled.robot.block
+    block = method.compiled.block
     thin = thinned(block)
     folder = Path(core.__path__[0])
     files = [*folder.glob("*.h"), *folder.glob("src/*.[ch]")]
@@ -316,8 +316,9 @@ def _self_test(layout: Layout, method: Dual, count: int) -> str:
         tick = allocator.allocate(0.5 * wrench, flow=flow).command if reach < 0.9 else None
         answer = allocator.allocate(reach * wrench, policy=policy, previous=tick, flow=flow)
         delivered = answer.wrench * layout.commanded
-        core_command = method.forces(reach * wrench[None], Policy(policy)).command
-        if tick is None and method.error(core_command, delivered[None])[0] > MAX_CORE_ERROR:
+        core_command = method.compiled.forces(reach * wrench[None], Policy(policy)).command
+        core_error = method.problem.error(core_command, delivered[None] / method.scale)[0]
+        if tick is None and core_error > MAX_CORE_ERROR:
             continue
         error, previous = (0.0, "0") if tick is None else (answer.err_norm, f"previous_{k}")
         if tick is not None:

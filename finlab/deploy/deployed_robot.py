@@ -223,7 +223,8 @@ def extremes(robot: DeployedRobot) -> Finding:
     layout = robot.layout
     unanswered = []
     n = 0
-    kinds = POLICY_NAMES if method_class(robot.allocator.method).every_policy else POLICY_NAMES[:1]
+    reads_policy = "policy" in method_class(robot.allocator.method).reads
+    kinds = POLICY_NAMES if reads_policy else POLICY_NAMES[:1]
     alive = [name for name in layout.names if name not in robot.lost]
     for lost in [(), *([name] for name in alive if len(alive) > 1)]:
         for policy, i in product(kinds, np.flatnonzero(layout.commanded)):

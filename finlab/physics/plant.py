@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from finlab.actuators.fin.fin_laws import make_law
-from finlab.actuators.kinds import free_angles, laws_of
+from finlab.actuators.kinds import free_angles, laws_of, wrapping_angles
 from finlab.actuators.law import ActuatorLaw, Blade
 from finlab.arrays import Array
 from finlab.axes import feasible, is_full_turn
@@ -47,6 +47,9 @@ class Plant:
         """Ranges of the limits (n, 3)."""
         self.turns: NDArray[np.bool_] = free_angles(layout.actuators) & is_full_turn(self.width)
         """Commands (n, 3) that are angles without limits: they wrap."""
+        self.wraps: NDArray[np.bool_] = self.turns | wrapping_angles(layout.actuators)
+        """Commands (n, 3) that are brought near to their limits by full turns: these, and others
+        whose kind says so."""
         self.full_turn = self.turns[:, 2]
         """Fins (n,) whose zero direction wraps."""
         self.effectiveness: Array = own_effectiveness(layout)

@@ -7,15 +7,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finlab.actuators.azimuth import Azimuth, AzimuthGroup, AzimuthLaw
+from finlab.actuators.azimuth import Azimuth, AzimuthLaw
 from finlab.actuators.fin.fin import Fin
 from finlab.actuators.kinds import groups_of
-from finlab.actuators.response import Group, Line
+from finlab.actuators.response import Line
 from finlab.actuators.rudder import Rudder, RudderGroup, RudderLaw
 from finlab.actuators.thrust_model import PowerLaw, PowerTable
-from finlab.actuators.thruster import Thruster, ThrusterGroup, ThrusterLaw
+from finlab.actuators.thruster import Thruster, ThrusterLaw
 from finlab.allocation.dual.compiled import Compiled
-from finlab.allocation.dual.robot import CommandLimits, DualRobot
 from finlab.arrays import Array
 from finlab.layout.effectiveness import own_effectiveness
 from finlab.layout.layout import Layout
@@ -65,36 +64,33 @@ def effectiveness_of(actuators: Sequence[Any]) -> Array:
     return own_effectiveness(Layout("robot", tuple(actuators)))
 
 
-def random_multipliers(group: Group, top: float) -> Array:
+def random_multipliers(top: float) -> Array:
     """Multipliers (6, 40) of the wrench, with a standard deviation of `top` [W/N, W/(N m)]."""
     return np.random.default_rng(0).normal(0.0, top, (6, 40))
 
 
-def prepared(group: Group, wrench: Array, low: Array, high: Array) -> DualRobot:
-    """A robot of the actuators of a group alone, with commands (m, 3) between limits."""
-    free = np.zeros(low.shape, bool)
-    free[:, 0] = [form.kind == "pod" for form in group.forms]
-    turns = free & (high - low >= 2.0 * np.pi - 1e-9)
-    limits = CommandLimits(low, high, np.full(low.shape, np.inf), turns)
-    return DualRobot(group.responses, group.forms, limits, wrench, np.ones(6))
+def compiled_of(actuators: Sequence[Any], inflow: Array | None = None) -> Compiled:
+    """A robot of these m actuators alone, which meet the water with velocities (m, 3)."""
+    layout = Layout("robot", tuple(actuators))
+    return Compiled(layout, Plant(layout), np.ones(6)).at(inflow)
 
 
-def answer(robot: DualRobot, price: Array) -> tuple[Array, float]:
+def answer(robot: Compiled, price: Array) -> tuple[Array, float]:
     """Forces (m, 2) at multipliers (6,) of the wrench, and what they are worth less their power."""
     spanned = robot.basis.T @ (robot.axis_scale * price)
     lambda_reduced = np.pad(spanned, (0, 6 - len(spanned)))
-    force, dual_value = dual_function(robot.block, np.zeros(6), lambda_reduced)
+    force, dual_value = dual_function(robot.block, robot.wrench_offset, lambda_reduced)
     return force, -dual_value
 
 
-def check(
-    group: Group, law: Any, wrench: Array, low: Array, high: Array, inflow: Array | None = None
-) -> None:
+def check(actuators: Sequence[Any], law: Any) -> None:
     """No command is worth more at random multipliers (6, N) than the answer, and its own command
     gives it."""
-    multipliers = random_multipliers(group, 5.0)
-    m = len(group.responses)
-    robot = prepared(group, wrench, low, high)
+    wrench = effectiveness_of(actuators)
+    low, high = (np.array([getattr(part, end) for part in actuators]) for end in ("lower", "upper"))
+    multipliers = random_multipliers(5.0)
+    m = len(actuators)
+    robot = compiled_of(actuators)
     force = np.array([answer(robot, price)[0] for price in multipliers.T])
     command = robot.core.commands(force)
     assert (command >= low).all() and (command <= high).all()
@@ -111,26 +107,18 @@ def check(
 
 def test_thrusters_answer_with_what_is_worth_most() -> None:
     for part in THRUSTERS:
-        wrench = effectiveness_of([part])
-        group = ThrusterGroup([part], wrench)
-        check(group, ThrusterLaw([part]), wrench, np.array([part.lower]), np.array([part.upper]))
+        check([part], ThrusterLaw([part]))
 
 
 def test_thrusters_of_one_model_answer_together() -> None:
     parts = [THRUSTERS[i] for i in (0, 1, 2)]
-    wrench = effectiveness_of(parts)
-    group = ThrusterGroup(parts, wrench)
-    low, high = (np.array([getattr(part, end) for part in parts]) for end in ("lower", "upper"))
-    check(group, ThrusterLaw(parts), wrench, low, high)
-    ends = prepared(group, wrench, low, high).ends
-    np.testing.assert_allclose(ends, [[-39, 51], [0, 5], [0, 8]], rtol=1e-12)
+    check(parts, ThrusterLaw(parts))
+    np.testing.assert_allclose(compiled_of(parts).ends, [[-39, 51], [0, 5], [0, 8]], rtol=1e-12)
 
 
 def test_azimuths_answer_with_what_is_worth_most() -> None:
     for part in AZIMUTHS:
-        wrench = effectiveness_of([part])
-        group = AzimuthGroup([part], wrench)
-        check(group, AzimuthLaw([part]), wrench, np.array([part.lower]), np.array([part.upper]))
+        check([part], AzimuthLaw([part]))
 
 
 @pytest.mark.parametrize(
@@ -145,7 +133,7 @@ def test_rudders_answer_with_a_lift_that_their_deflections_give(
     group = RudderGroup(RUDDERS, wrench).at(inflow)
     law = RudderLaw(RUDDERS)
     low, high = (np.array([getattr(part, end) for part in RUDDERS]) for end in ("lower", "upper"))
-    robot = prepared(group, wrench, low, high)
+    robot = compiled_of(RUDDERS, inflow)
     met = law.flow_at(inflow, inflow.shape)
     across = np.stack([0.0 * met.course, -np.sin(met.course), np.cos(met.course)], axis=-1)
     for fraction in (0.0, 0.3, 1.0):
@@ -166,10 +154,8 @@ def test_rudders_answer_with_a_lift_that_their_deflections_give(
 def test_a_rudder_answers_a_price_with_the_lift_whose_drag_it_pays() -> None:
     part = RUDDERS[0]
     inflow = np.array([[0.0, 1.5, 0.1]])
-    wrench = effectiveness_of([part])
     law = RudderLaw([part])
-    group = RudderGroup([part], wrench).at(inflow)
-    robot = prepared(group, wrench, *(np.array([end]) for end in (part.lower, part.upper)))
+    robot = compiled_of([part], inflow)
     price = np.linspace(-3.0, 3.0, 31)
     rows = np.linalg.pinv(
         robot.effectiveness[0]
@@ -188,8 +174,7 @@ def test_a_price_of_drag_counts_in_the_answer_of_a_rudder() -> None:
     wrench = effectiveness_of([part])
     law = RudderLaw([part])
     multipliers = np.array([2.0, 3.0, 0.0, 0.0, 0.0, 0.5])
-    group = RudderGroup([part], wrench).at(inflow)
-    robot = prepared(group, wrench, *(np.array([end]) for end in (part.lower, part.upper)))
+    robot = compiled_of([part], inflow)
     command = robot.core.commands(answer(robot, multipliers)[0][None])
     tried = np.linspace(-0.5, 0.5, 4001)[:, None, None] * [1.0, 0.0, 0.0]
     found, best = (
@@ -208,9 +193,7 @@ def test_a_rudder_at_rest_offers_nothing() -> None:
 
 
 def test_an_azimuth_keeps_its_angle_where_no_force_is_asked_for() -> None:
-    group = AzimuthGroup(AZIMUTHS, effectiveness_of(AZIMUTHS))
-    low, high = (np.array([getattr(part, end) for part in AZIMUTHS]) for end in ("lower", "upper"))
-    core = prepared(group, effectiveness_of(AZIMUTHS), low, high).core
+    core = compiled_of(AZIMUTHS).core
     rest = np.zeros((1, 3, 2))
     before = np.array([[3.0, 5.0, 0.0], [0.9, 0.0, 0.0], [1.2, 2.0, 0.0]])
     for previous, angles in (
@@ -229,5 +212,5 @@ def test_every_actuator_of_a_mixed_robot_is_in_one_group() -> None:
     assert sorted(np.concatenate([places for places, _ in groups])) == list(range(robot.n))
     assert [len(group.responses) == len(group.forms) == len(places) for places, group in groups]
     plant = Plant(robot)
-    command = Compiled(robot, plant, np.ones(6)).robot.core.commands(np.zeros((2, robot.n, 2)))
+    command = Compiled(robot, plant, np.ones(6)).core.commands(np.zeros((2, robot.n, 2)))
     np.testing.assert_array_equal(plant.feasible(command), command)

@@ -164,7 +164,7 @@ def questions(
         command[lost] = np.nan
         return command
 
-    policies = POLICIES if method_class(method).every_policy else POLICIES[:1]
+    policies = POLICIES if "policy" in method_class(method).reads else POLICIES[:1]
     for number, policy in enumerate(policies):
         arguments: dict[str, Any] = {"policy": policy, "damage": damage}
         for reach in REACHES:

@@ -353,8 +353,8 @@ def question_of(wrench: Array, fields: dict[str, Any]) -> tuple[Record, list[Any
 def in_the_core(layout: Layout, flow: Array | None = None) -> Robot:
     """A robot of the default method, in a flow."""
     method = Allocator(layout)._whole.method.at(flow)  # type: ignore[attr-defined]
-    dual_robot = method.compiled.robot
-    return Robot(layout, method.plant, dual_robot.block.copy(), dual_robot.axes)
+    compiled = method.compiled
+    return Robot(layout, method.plant, compiled.block.copy(), compiled.axes)
 
 
 def pods_either_way(seed: int) -> Layout:

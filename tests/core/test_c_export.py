@@ -177,9 +177,7 @@ def test_on_a_cortex_m7_in_its_memory(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["A", "fish", "torpedo", "bluerov2", "octo"])
 def test_tables_of_a_law_are_small_and_say_the_same(name: str) -> None:
     method = AllocatorCache().method(load_layout(name))
-    robot = (
-        method.at(np.array(SPEED)).compiled.robot if name == "torpedo" else method.compiled.robot
-    )
+    robot = method.at(np.array(SPEED)).compiled if name == "torpedo" else method.compiled
     thin = thinned(robot.block)
     assert (
         max(sum(len(table.numbers) for table in row.values()) for row in tables_of(thin)) * 4

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from finlab.allocation import Policy
-from finlab.allocation.dual.compiled import Compiled
+from finlab.allocation.dual.compiled import Compiled, core_policy
+from finlab.allocation.policy import CLOSEST
 from finlab.core.calls import Conditions, Core, error_text
 from finlab.core.fields import constant, head_of, struct
 from finlab.core.library import library
@@ -20,7 +21,7 @@ from tests.random_robots import KINDS, bluerov2_heavy, load, random_plant, rando
 
 def core_of_layout(layout: Layout) -> Core:
     """The core of a robot, as the default method makes it."""
-    return Compiled.of(layout).robot.core
+    return Compiled.of(layout).core
 
 
 @pytest.fixture(scope="module")
@@ -86,7 +87,7 @@ def test_one_and_many_are_the_same(kind: str) -> None:
     plant = random_plant(kind, 1, 3)
     targets = np.array([within(plant, np.random.default_rng([3, k])) for k in range(6)])
     targets[::2] *= 3.0
-    policy = Policy("direction")
+    policy = core_policy(Policy("direction"))
     many = core.answer_many(targets, policy)
     for row, target in enumerate(targets):
         single = core.answer_one(target, policy)
@@ -112,8 +113,9 @@ def test_one_and_many_say_which_searches_were_truncated() -> None:
 
 def test_threads_share_one_robot(heavy: Core) -> None:
     targets = np.random.default_rng(0).normal(0.0, 20.0, (2000, 6))
+    closest = core_policy(CLOSEST)
     with ThreadPoolExecutor(4) as pool:
         shared = list(
-            pool.map(lambda target: heavy.answer_one(target, Policy()).wrench_served[0], targets)
+            pool.map(lambda target: heavy.answer_one(target, closest).wrench_served[0], targets)
         )
-    np.testing.assert_array_equal(shared, heavy.answer_many(targets, Policy()).wrench_served)
+    np.testing.assert_array_equal(shared, heavy.answer_many(targets, closest).wrench_served)

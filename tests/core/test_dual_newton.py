@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from finlab.allocation import Policy
+from finlab.allocation.dual.compiled import core_policy
 from finlab.arrays import Array
-from finlab.core.calls import policy_record
 from tests.core.internal_functions import (
     ROBOTS,
     Robot,
@@ -96,7 +96,7 @@ def newton_steps(name: str) -> NewtonSteps:
         for wrench in wrenches(robot, number, 1.0, 8):
             within_reach += int(robot.answer(wrench)["newton_steps"])
         for kind in ("closest", "direction", "priority"):
-            record = policy_record(Policy(kind))
+            record = core_policy(Policy(kind))
             for wrench in wrenches(robot, number, 3.0, 4):
                 answer = robot.answer(wrench, policy=record.ctypes.data)
                 beyond_reach += int(answer["newton_steps"])

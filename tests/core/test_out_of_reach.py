@@ -8,8 +8,8 @@ import pytest
 from scipy.optimize import linprog, lsq_linear
 
 from finlab.allocation import Policy
+from finlab.allocation.dual.compiled import core_policy
 from finlab.arrays import Array
-from finlab.core.calls import policy_record
 from finlab.layout.load import parse_layout
 from tests.core.internal_functions import Robot, in_the_core
 from tests.core.test_actuator_response import forces_of
@@ -33,7 +33,7 @@ def targets(robot: Robot, number: int) -> Array:
 
 def served(robot: Robot, wrench: Array, policy: str) -> Array:
     """Wrench (6,) that a policy serves."""
-    record = policy_record(Policy(policy))
+    record = core_policy(Policy(policy))
     return np.asarray(robot.answer(wrench, policy=record.ctypes.data)["wrench_served"])
 
 

@@ -44,7 +44,7 @@ def demo_files(robots: tuple[str, ...] = ROBOTS) -> dict[str, bytes]:
 def _robot(layout: Layout) -> tuple[dict[str, Any], bytes]:
     """What the page shows of a robot, and its block."""
     scale = wrench_scale_of(layout)
-    robot = Dual(layout, DualSettings(), scale, None).compiled.robot
+    robot = Dual(layout, DualSettings(), scale, None).compiled
     most = np.abs(axis_ranges(layout, np.zeros(6))).max(axis=0) * layout.commanded
     most[most < 1e-6 * scale] = 0.0
     hull = complete_body(layout).hull

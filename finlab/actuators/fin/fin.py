@@ -165,7 +165,7 @@ class Fin(Actuator):
         numbers=(
             CommandNumber(name="A", unit="rad"),
             CommandNumber(name="f", unit="Hz"),
-            CommandNumber(name="phi", unit="rad", aims=True),
+            CommandNumber(name="phi", unit="rad", aims=True, wraps=True),
         ),
         axes=("shaft", "zero"),
         pushes_along=("zero", ACROSS),

@@ -65,8 +65,7 @@ class PseudoInverse:
         """
         self.plant = plant
         compiled = Compiled(plant.layout, plant, error_scale).at(plant.inflow(None))
-        robot = compiled.robot
-        self._core = robot.core
+        self._core = compiled.core
         self.groups = compiled.groups
         """What the actuators can do, by kind."""
         indices = [
@@ -76,14 +75,14 @@ class PseudoInverse:
         ]
         self.group_indices = sorted(indices)
         """Of each actuator, in the order of the layout."""
-        self.responses: list[Response] = robot.responses
+        self.responses: list[Response] = compiled.responses
         """What each offers."""
         self.is_fixed, wrench_of_fixed = fixed_actuators_of(plant)
         """Which actuators (n,) have one command alone; forces asked of them count for nothing."""
         self.wrench_offset = compiled.wrench_offset + wrench_of_fixed
         """Wrench (6,) [N, N m] of forces of 0, such as the drag of foils, and of what is fixed."""
-        is_second_of_line = robot.is_line[:, None] & [False, True]
-        effectiveness = robot.effectiveness * ~is_second_of_line[..., None]
+        is_second_of_line = compiled.is_line[:, None] & [False, True]
+        effectiveness = compiled.effectiveness * ~is_second_of_line[..., None]
         effectiveness[self.is_fixed] = 0.0
         self.effectiveness: Array = effectiveness.reshape(-1, 6).T
         """Wrench (6, 2 n) per newton along each actuator's directions."""

@@ -9,7 +9,7 @@ wanted now, the next tick wants half of what then remains.
 
 import numpy as np
 
-from finlab.allocation.dual.prepared import PreparedDual
+from finlab.allocation.dual.compiled import Compiled
 from finlab.allocation.policy import CLOSEST
 from finlab.arrays import Array
 from finlab.axes import TURN
@@ -25,11 +25,15 @@ CALM_FACTOR = 10.0
 """Factor of what turning costs: to stand at another angle than is wanted is that much dearer."""
 
 
-def conditions_ahead(method: PreparedDual, reference: Array, conditions: Conditions) -> Conditions:
+def conditions_ahead(
+    compiled: Compiled, turn_rates: Array, period_s: float, reference: Array, conditions: Conditions
+) -> Conditions:
     """Returns what holds, with the angles near which pods are to stand.
 
     Args:
-        method: of the robot.
+        compiled: the robot.
+        turn_rates: (n,) [rad/s] at which pods turn, NaN of actuators that stay out of this.
+        period_s: time between ticks [s].
         reference: wrenches (K, 6) of the next ticks [N, N m], at least one.
         conditions: what holds, in a tick.
 
@@ -40,14 +44,14 @@ def conditions_ahead(method: PreparedDual, reference: Array, conditions: Conditi
     assert conditions.command_previous is not None
     last = min(len(reference), MAX_TICKS_AHEAD)
     ticks = last + 1
-    then = method.forces(
+    then = compiled.forces(
         reference[last - 1 : last], CLOSEST, None, conditions._replace(ticks=ticks)
     )
     angle_previous = conditions.command_previous[:, 0]
     turn = then.command[0, :, 0] - angle_previous
     turn = (turn + np.pi) % TURN - np.pi
-    largest_turn = ticks * method.period_s * method.layout.rates[:, 0]
+    largest_turn = ticks * period_s * turn_rates
     ignored_turn = IGNORED_SHARE * largest_turn
     wanted_turn = np.sign(turn) * np.maximum(np.abs(turn) - ignored_turn, 0.0)
-    angles_wanted = np.where(method.turning_pods, angle_previous + SHARE_NOW * wanted_turn, np.nan)
+    angles_wanted = angle_previous + SHARE_NOW * wanted_turn
     return conditions._replace(angles_wanted=angles_wanted, calm=CALM_FACTOR * conditions.calm)

@@ -1,30 +1,38 @@
-"""A layout compiled for the dual: the responses of its actuators, as the core reads them, and the
-bound that their conjugates prove.
+"""A layout compiled for the dual: the responses of its actuators, the block of numbers that the
+core reads, and the bound that the conjugates prove.
 
 Method `dual` compiles a robot once and in each flow. Other methods and the null space use the same
 for the commands that give forces.
 """
 
 from copy import copy
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finlab.actuators.kinds import groups_of
-from finlab.actuators.response import Group, Line, Plane, with_square
-from finlab.allocation.dual.robot import CommandLimits, DualRobot
+from finlab.actuators.response import Form, Group, Line, Plane, Response, power_of, with_square
+from finlab.allocation.dual.block import BlockContents, block_of
+from finlab.allocation.policy import Policy
 from finlab.allocation.settings import USUAL_PERIOD_S
-from finlab.arrays import ROUNDING, Array
-from finlab.core.calls import NOMINAL, Conditions, Conjugates
+from finlab.arrays import NOTHING, ROUNDING, Array
+from finlab.core.calls import NOMINAL, Conditions, Conjugates, Core, CoreAnswer, policy_record
+from finlab.core.fields import Record
 from finlab.layout.layout import Layout
 from finlab.physics.objective import wrench_scale_of
 from finlab.physics.plant import Plant, plant_of
 
+_NO_FORCE = 1e-12
+"""Added to largest forces [N], so that nothing is divided by 0."""
+_LEAST_POSITIVE = 1e-300
+"""Stands for 0 where a number is divided by."""
+
 
 class Compiled:
-    """The n actuators of one robot in one flow, ready for multipliers."""
+    """The n actuators of one robot in one flow, as the core reads them: forces along one or two
+    directions of each, ready for multipliers."""
 
     def __init__(
         self,
@@ -52,11 +60,11 @@ class Compiled:
         """How many actuators there are."""
         self.miss_cost = miss_cost
         """As it was given; None where it costs nothing."""
-        self._actuators = layout.actuators
+        self._layout = layout
         self._wrench_scale = wrench_scale
-        max_change = layout.rates * period_s
-        self._limits = CommandLimits(layout.lower, layout.upper, max_change, plant.turns)
-        self._effectiveness = plant.effectiveness
+        self._max_change = layout.rates * period_s
+        self._is_free_angle: NDArray[np.bool_] = np.any(plant.turns, axis=1)
+        self._own_effectiveness = plant.effectiveness
         self._counts = plant.counts.astype(np.float64)
         self.groups = groups_of(layout.actuators, plant.effectiveness)
         """Actuators by kind: indices, and the group of their responses."""
@@ -86,36 +94,108 @@ class Compiled:
         return cls(layout, plant_of(layout).counting(layout.commanded), wrench_scale_of(layout))
 
     def _compile(self) -> None:
-        """Makes the robot of the core from the responses of all groups."""
+        """Prepares the robot for the core, from the responses of all groups."""
         responses: list[Any] = [None] * self.count
         forms: list[Any] = [None] * self.count
         self.uncertainty_cost = np.zeros(self.count)
         """What a squared force costs beside its power (n,) [W/N^2]."""
         for indices, group in self.groups:
             for i, response, form in zip(indices, group.responses, group.forms, strict=True):
-                if self.miss_cost is not None:
-                    squared_effectiveness = response.effectiveness**2
-                    cost = (squared_effectiveness @ self.miss_cost[i]).sum()
-                    self.uncertainty_cost[i] = cost
-                cost = float(self.uncertainty_cost[i])
-                # Of a foil the core adds the cost itself, since the drag has a price of its own.
-                drags = isinstance(response, Line) and response.drag is not None
-                dearer = with_square(response, cost) if cost and not drags else response
-                responses[i] = dearer
+                self.uncertainty_cost[i] = self._uncertainty_cost(i, response)
+                responses[i] = _with_cost(response, float(self.uncertainty_cost[i]))
                 forms[i] = form
+        self.responses: list[Response] = responses
+        """What each actuator offers for prices."""
         self.wrench_offset = self.wrench_offset_of(np.ones(self.count, bool))
         """Wrench (6,) [N, N m] at forces of 0, such as the drag of foils without lift."""
-        self.robot = DualRobot(
-            responses,
-            forms,
-            self._limits,
-            self._effectiveness,
-            self._wrench_scale,
-            self.wrench_offset,
-            self.uncertainty_cost,
-            self._counts,
+        self.ends = np.array([response.ends for response in self.responses])
+        """Least and largest forces (n, 2) [N], of planes below 0 in reverse."""
+        self.is_line = np.array([isinstance(response, Line) for response in self.responses])
+        """Which have one direction (n,)."""
+        self.is_pod = np.array([form.kind == "pod" for form in forms])
+        """Which push at an angle of their own (n,)."""
+        flow_speed = np.array([_flow_speed(response) for response in self.responses])
+        self._largest_force = self._largest_forces(flow_speed)
+        self.row_force_max = self._largest_force + _NO_FORCE
+        """Largest force (n, 2) [N] along each direction, never 0."""
+        self.effectiveness = np.array([response.rows for response in self.responses])
+        """Wrench (n, 2, 6) per newton along each direction."""
+        self.axes = np.array([_axes_of(form) for form in forms])
+        """Axes (n, 3, 3) of the laws' forces in the actuators' own ones."""
+        self.axis_scale = self._largest_wrench()
+        """Size (6,) of what the robot can push along each axis [N, N m]; 1 where it cannot. Scaled
+        wrenches are wrenches over it."""
+        self.basis = self.span(np.ones(self.count, bool), np.ones(6, bool))
+        """Directions (6, r) of scaled wrenches that the actuators span, orthonormal."""
+        contents = BlockContents(
+            responses=self.responses,
+            forms=forms,
+            command_min=self._layout.lower,
+            command_max=self._layout.upper,
+            max_change=self._max_change,
+            is_free_angle=self._is_free_angle,
+            force_range=self.ends,
+            row_force_max=self.row_force_max,
+            flow_speed=flow_speed,
+            uncertainty_cost=self.uncertainty_cost,
+            effectiveness=self.effectiveness,
+            effectiveness_of_laws=self.axes @ self._own_effectiveness,
+            wrench_scale=self._wrench_scale,
+            wrench_offset=self.wrench_offset,
+            is_commanded=self._counts,
+            axis_scale=self.axis_scale,
+            basis=self.basis,
         )
-        """The robot as the core reads it."""
+        self.block = block_of(contents)
+        """The numbers that the core reads; see finlab/core/fl_fields.h."""
+        self.core = Core(self.block, self.count)
+        """The robot in the core."""
+
+    def _uncertainty_cost(self, i: int, response: Response) -> float:
+        """What a squared force of actuator i costs beside its power [W/N^2]."""
+        if self.miss_cost is None:
+            return 0.0
+        squared_effectiveness = response.effectiveness**2
+        return float((squared_effectiveness @ self.miss_cost[i]).sum())
+
+    def _largest_forces(self, flow_speed: Array) -> Array:
+        """Largest forces (n, 2) [N] along both directions; the second one of a foil is its drag,
+        which costs the power `flow_speed` (n,) [m/s] per newton."""
+        largest = np.abs(self.ends).max(axis=1)
+        second = largest.copy()
+        for i in np.flatnonzero(self.is_line):
+            second[i] = _drag(self.responses[i], flow_speed[i], largest[i])
+        return np.stack([largest, second], axis=1)
+
+    def _largest_wrench(self) -> Array:
+        """Size (6,) of what the robot can push along each axis [N, N m]; 1 where it cannot."""
+        columns = (self.effectiveness * self._largest_force[..., None]).reshape(-1, 6)
+        size = np.sqrt((columns**2).sum(axis=0))
+        largest = max(size.max(), _LEAST_POSITIVE)
+        return np.where(size > NOTHING * largest, size, 1.0)
+
+    def span(self, works: NDArray[np.bool_], counts: NDArray[np.bool_]) -> Array:
+        """Finds what some actuators span in some axes.
+
+        Args:
+            works: which actuators (n,) work.
+            counts: which axes (6,) count.
+
+        Returns:
+            Directions (6, r) of scaled wrenches that these actuators drive, orthonormal.
+        """
+        scaled = self.effectiveness * self._largest_force[..., None] / self.axis_scale
+        is_driven = works[:, None, None] & counts
+        columns = np.where(is_driven, scaled, 0.0).reshape(-1, 6).T
+        left, singular_values, _ = np.linalg.svd(columns, full_matrices=False)
+        least = NOTHING * max(singular_values[0], _LEAST_POSITIVE)
+        return np.asarray(left[:, singular_values > least])
+
+    @property
+    def largest_power(self) -> float:
+        """Power [W] of all actuators at the dearer ends of their sets."""
+        pairs = zip(self.responses, self.ends, strict=True)
+        return float(sum(power_of(each, ends).max() for each, ends in pairs))
 
     def wrench_offset_of(self, works: NDArray[np.bool_]) -> Array:
         """Returns the wrench (6,) [N, N m] at forces of 0 of the actuators that work (n,)."""
@@ -148,12 +228,36 @@ class Compiled:
         other._compile()
         return other
 
+    def forces(
+        self,
+        targets: Array,
+        policy: Policy | None,
+        multipliers: Array | None = None,
+        conditions: Conditions = NOMINAL,
+    ) -> CoreAnswer:
+        """Asks the core for forces of least power, by the laws alone (Eq. 1).
+
+        Args:
+            targets: desired wrenches (N, 6) [N, N m].
+            policy: what to give out of reach; None for nothing else than the targets.
+            multipliers: lambda (6,) [W/N, W/(N m)] at which Newton's method begins, for a single
+                target; None for its own.
+            conditions: what holds of the robot.
+
+        Returns:
+            Forces, multipliers and commands, by the core's tables.
+        """
+        record = None if policy is None else core_policy(policy)
+        if len(targets) == 1:
+            return self.core.answer_one(targets[0], record, multipliers, conditions)
+        return self.core.answer_many(targets, record, conditions)
+
     @cached_property
     def _directions(self) -> Array:
         """Directions (n, 2, 3) of each actuator's forces in its own axes."""
         directions = np.zeros((self.count, 2, 6))
         own_axes = np.broadcast_to(np.eye(3, 6), (self.count, 3, 6))
-        for indices, group in groups_of(self._actuators, own_axes):
+        for indices, group in groups_of(self._layout.actuators, own_axes):
             for i, response in zip(indices, group.responses, strict=True):
                 directions[i] = response.rows
         return directions[..., :3]
@@ -188,6 +292,40 @@ class Compiled:
             [by_tables.force_min[0, indices], by_tables.force_max[0, indices]], axis=-1
         )
         return group.radial_conjugate_bound(price, price_reverse, force_limits)
+
+
+def _with_cost(response: Response, cost: float) -> Response:
+    """The response of an actuator whose squared force costs so much more [W/N^2]. That of a foil
+    stays: the core adds the cost itself, since the drag has a price of its own."""
+    has_drag = isinstance(response, Line) and response.drag is not None
+    return response if has_drag or not cost else with_square(response, cost)
+
+
+def _flow_speed(response: Response) -> float:
+    """Power per newton of drag [m/s] of a foil; 0 of all else."""
+    if isinstance(response, Line) and response.drag is not None:
+        return response.flow_speed
+    return 0.0
+
+
+def _drag(response: Response, flow_speed: float, force: float) -> float:
+    """Drag [N], beyond that at rest, of a foil's lift; 0 of all else."""
+    if flow_speed == 0.0:
+        return 0.0
+    power = power_of(response, np.array(force))
+    power_at_rest = response.table.power_at_least
+    return float((power - power_at_rest) / flow_speed)
+
+
+def _axes_of(form: Form) -> Array:
+    """Axes (3, 3) of a law's forces in the actuator's own ones."""
+    return np.eye(3) if form.axes is None else form.axes
+
+
+@lru_cache(maxsize=64)
+def core_policy(policy: Policy) -> Record:
+    """Returns a policy as the core reads it; equal ones have one record."""
+    return policy_record(policy.kind, policy.axis_weights, policy.groups)
 
 
 def _shares_tables(group: Group) -> bool:
@@ -242,7 +380,7 @@ def power_bound(
     Returns:
         Power (N,) [W] that no answer undercuts which gives these wrenches under the conditions.
     """
-    by_tables = compiled.robot.core.conjugates(multipliers, conditions)
+    by_tables = compiled.core.conjugates(multipliers, conditions)
     conjugate = by_tables.conjugate.copy()
     for index, (indices, group) in enumerate(compiled.groups):
         along_price = compiled.conjugates_by_laws(index, by_tables)

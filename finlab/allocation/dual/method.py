@@ -15,21 +15,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.dual.compiled import Compiled, miss_cost_of, power_bound
-from finlab.allocation.levenberg_marquardt import CommandProblem, refine
+from finlab.allocation.levenberg_marquardt import CommandProblem, exact_commands, norms
 from finlab.allocation.method import Method, MethodQuestion
 from finlab.allocation.policy import CLOSEST, Policy
 from finlab.allocation.settings import Settings, number
 from finlab.allocation.solution import Solution
-from finlab.arrays import CLOSE, NEARLY, NOTHING, ROUNDING, ROUNDS, Array
+from finlab.arrays import CLOSE, NEARLY, NOTHING, ROUNDING, Array
 from finlab.axes import axes_in
-from finlab.core.calls import NOMINAL, Conditions, CoreAnswer
+from finlab.core.calls import NOMINAL, Conditions
 from finlab.layout.effectiveness import wrench_of_forces
 
 if TYPE_CHECKING:
     from finlab.core.coupled_core import CoupledCore
 
-EXACT = 1e-8
-"""Normalized error up to which commands need no further step."""
 MAX_BASES = 32
 """States of losses and free axes of which the basis of what is driven is kept."""
 TABLE_ERROR = 10.0 * CLOSE
@@ -73,9 +71,7 @@ class Dual(Method):
     # A smaller wrench in the same direction still turns a robot to where it should go; the nearest
     # one may only push it on.
     policy_under_way = "direction"
-    begins_at_multipliers = True
-    takes_losses = True
-    looks_ahead = True
+    reads = frozenset({"policy", "losses", "multipliers", "reference"})
     settings_class = DualSettings
     settings: DualSettings
 
@@ -132,21 +128,24 @@ class Dual(Method):
         if reference is not None and len(reference) and method.turns_ahead and previous is not None:
             from finlab.allocation.dual.ahead import conditions_ahead
 
-            conditions = conditions_ahead(method, reference, conditions)
+            conditions = conditions_ahead(
+                method.compiled, method.turn_rates, method.period_s, reference, conditions
+            )
         return method.solve_under(
             conditions, question.targets, question.policy, question.multipliers
         )
 
     @cached_property
-    def turning_pods(self) -> NDArray[np.bool_]:
-        """Which actuators (n,) are pods whose turning costs."""
-        is_pod = self.compiled.robot.is_pod
-        return np.asarray(is_pod & np.isfinite(self.layout.rates[:, 0]))
+    def turn_rates(self) -> Array:
+        """Rates (n,) [rad/s] at which pods turn whose turning costs; NaN of other actuators."""
+        turn_rate = self.layout.rates[:, 0]
+        turning_costs = self.compiled.is_pod & np.isfinite(turn_rate)
+        return np.where(turning_costs, turn_rate, np.nan)
 
     @property
     def turns_ahead(self) -> bool:
         """Whether wrenches to come tell where pods are to turn."""
-        return self.settings.calm > 0.0 and bool(self.turning_pods.any())
+        return self.settings.calm > 0.0 and bool(np.isfinite(self.turn_rates).any())
 
     def in_time(self, target: Array, reference: Array) -> Array:
         """Returns which wrench is answered; see `Method.in_time`."""
@@ -173,24 +172,44 @@ class Dual(Method):
             Commands, with the lower bound of their power.
         """
         if self.plant.interaction is not None:
-            from finlab.allocation.dual.outer_iterations import solve_outer
-
-            return solve_outer(self, targets, policy, conditions, multipliers)
-        answer = self.forces(targets, policy, multipliers, conditions)
+            return self._solve_coupled(conditions, targets, policy, multipliers)
+        answer = self.compiled.forces(targets, policy, multipliers, conditions)
+        problem = self.problem_under(conditions)
+        command = exact_commands(problem, answer)
         # A search of bytes takes a third of the time of numpy's `all`, and every tick pays for it.
         all_reachable = 0 not in answer.is_attainable.tobytes()
-        unreachable = [] if all_reachable else np.flatnonzero(~answer.is_attainable).tolist()
         wrench_served = targets if all_reachable else answer.wrench_served
         notes = {_TRUNCATED} if answer.is_truncated else set()
-        command = self.exact(answer, conditions)
-        if policy.kind == "direction":
-            from finlab.allocation.dual.ray import keep_on_rays
+        if not all_reachable:
+            if policy.kind == "direction":
+                from finlab.allocation.dual.ray import keep_on_rays
 
-            notes |= keep_on_rays(self, targets, unreachable, answer, command, conditions)
-        if unreachable:
-            notes |= self.undriven_notes(targets[unreachable], conditions)
+                notes |= keep_on_rays(self.compiled, problem, conditions, targets, answer, command)
+            notes |= self.undriven_notes(targets[~answer.is_attainable], conditions)
         return self.solution(
             command, wrench_served, answer.multipliers, answer.gap_power_bound, notes, conditions
+        )
+
+    def _solve_coupled(
+        self, conditions: Conditions, targets: Array, policy: Policy, multipliers: Array | None
+    ) -> Solution:
+        """Solves as `solve_under`, for a robot whose actuators act on each other."""
+        from finlab.allocation.dual.outer_iterations import outer_answers
+
+        problem = self.problem_under(conditions)
+        answer = outer_answers(
+            self.coupled, self.compiled, problem, targets, policy, conditions, multipliers
+        )
+        notes: set[str] = set()
+        for target in targets[~answer.is_attainable]:
+            notes |= self.undriven_notes(target[None], conditions)
+        return self.solution(
+            answer.command,
+            answer.wrench_served,
+            answer.multipliers,
+            answer.gap_power_bound,
+            notes,
+            conditions,
         )
 
     def solution(
@@ -267,30 +286,18 @@ class Dual(Method):
             return problem
         return problem.in_tick(self.rates.box(conditions.command_previous))
 
-    def cheapest_exact(
-        self, problem: CommandProblem, wrench_normalized: Array, starts: Array
-    ) -> Array | None:
-        """The cheapest command (n, 3) that gives a normalized wrench (6,), of those to which steps
-        from starts (R, n, 3) lead; None where none does."""
-        refined = refine(problem, wrench_normalized[None], starts, 2 * ROUNDS, EXACT)
-        exact = refined.command[refined.error <= NEARLY]
-        if len(exact) == 0:
-            return None
-        power = self.plant.power(exact).sum(axis=-1)
-        return np.asarray(exact[power.argmin()])
-
     def _basis_under(self, conditions: Conditions) -> Array:
         """Directions (6, r) of scaled wrenches that the actuators drive, orthonormal."""
-        robot = self.compiled.robot
+        compiled = self.compiled
         if conditions.lost is None and conditions.free is None:
-            return robot.basis
+            return compiled.basis
         works = np.ones(self.layout.n, bool) if conditions.lost is None else ~conditions.lost
         counts = np.ones(6, bool) if conditions.free is None else ~conditions.free
         key = works.tobytes() + counts.tobytes()
         if key not in self._bases:
             while len(self._bases) >= MAX_BASES:
                 self._bases.pop(next(iter(self._bases)), None)
-            self._bases[key] = robot.span(works, counts)
+            self._bases[key] = compiled.span(works, counts)
         return self._bases[key]
 
     def undriven_notes(self, targets: Array, conditions: Conditions) -> set[str]:
@@ -303,9 +310,8 @@ class Dual(Method):
         Returns:
             One sentence, or none.
         """
-        robot = self.compiled.robot
         basis = self._basis_under(conditions)
-        scaled = targets / robot.axis_scale
+        scaled = targets / self.compiled.axis_scale
         if conditions.free is not None:
             scaled = np.where(conditions.free, 0.0, scaled)
         outside_span = np.abs(scaled - (scaled @ basis) @ basis.T)
@@ -325,7 +331,7 @@ class Dual(Method):
 
     def _driven(self, conditions: Conditions) -> NDArray[np.bool_]:
         """Which axes (6,) of the wrench some actuator gives, whatever it gives along others."""
-        effectiveness = np.abs(self.compiled.robot.effectiveness)
+        effectiveness = np.abs(self.compiled.effectiveness)
         if conditions.lost is not None:
             effectiveness = effectiveness[~conditions.lost]
         size = effectiveness.max(axis=(0, 1))
@@ -372,7 +378,7 @@ class Dual(Method):
 
         bound = self._bound_by_laws(wrench, multipliers, conditions)
         if not self._reads_tables:
-            is_served = _norms((wrench - wrench_served) / self.scale) <= NEARLY
+            is_served = norms((wrench - wrench_served) / self.scale) <= NEARLY
             with_gaps = np.maximum(bound, self._bound_of_gaps(gap_power_bound, power))
             bound = np.where(is_served, with_gaps, bound)
         elif works.all():
@@ -406,7 +412,7 @@ class Dual(Method):
     @cached_property
     def _least_table_error(self) -> float:
         """By how much [W] tables may be off at the least forces."""
-        return NEARLY * self.compiled.robot.largest_power
+        return NEARLY * self.compiled.largest_power
 
     def _bound_of_measured_tables(
         self, wrench: Array, multipliers: Array, command: Array, conditions: Conditions
@@ -427,96 +433,3 @@ class Dual(Method):
     def _reads_tables(self) -> bool:
         """Whether an actuator's law is a measured table."""
         return any(actuator.reads for actuator in self.layout.actuators)
-
-    def forces(
-        self,
-        targets: Array,
-        policy: Policy | None,
-        multipliers: Array | None = None,
-        conditions: Conditions = NOMINAL,
-    ) -> CoreAnswer:
-        """Asks the core for forces of least power, by the laws alone (Eq. 1).
-
-        Args:
-            targets: desired wrenches (N, 6) [N, N m].
-            policy: what to give out of reach; None for nothing else than the targets.
-            multipliers: lambda (6,) [W/N, W/(N m)] at which Newton's method begins, for a single
-                target; None for its own.
-            conditions: what holds of the robot.
-
-        Returns:
-            Forces, multipliers and commands, by the core's tables.
-        """
-        core = self.compiled.robot.core
-        if len(targets) == 1:
-            return core.answer_one(targets[0], policy, multipliers, conditions)
-        return core.answer_many(targets, policy, conditions)
-
-    def exact(self, answer: CoreAnswer, conditions: Conditions = NOMINAL) -> Array:
-        """Makes commands exact by the plant: steps by the laws where the core's grids leave an
-        error (Eq. 11).
-
-        Args:
-            answer: of the core; its commands are overwritten.
-            conditions: what holds of the robot.
-
-        Returns:
-            Commands (N, n, 3) that give the wrenches served, within the limits and rates; or as
-            near to them as they come.
-        """
-        command = answer.command
-        wanted = answer.wrench_served / self.scale
-        problem = self.problem_under(conditions)
-        missing = problem.wrench(command) - wanted
-        if problem.counts is not None:
-            missing = np.where(problem.counts, missing, 0.0)
-        all_missing = missing.ravel()
-        if all_missing.dot(all_missing) <= EXACT**2:
-            return command
-        # Where the core's grids say what the laws say, it has done all that steps can do.
-        error = _norms(missing)
-        off_by_grids = error > answer.error + EXACT
-        off_within_reach = answer.is_attainable & (error > NEARLY)
-        rough = np.flatnonzero(off_by_grids | off_within_reach)
-        if not len(rough):
-            return command
-        refined = refine(problem, wanted[rough], command[rough], ROUNDS, EXACT)
-        command[rough] = refined.command
-        if conditions.command_previous is not None:
-            box = self.rates.box(conditions.command_previous)
-            return box.clip_feasible(command, self.plant)
-        unmet = (refined.error > NEARLY) & answer.is_attainable[rough]
-        for row in rough[unmet].tolist():
-            # Such as idle fins in line, or a least force: no small change of these commands helps.
-            starts = self._starts_around(command[row])
-            other = self.cheapest_exact(problem, wanted[row], starts)
-            command[row] = command[row] if other is None else other
-        return self.plant.rested(command)
-
-    def _starts_around(self, command: Array) -> Array:
-        """Commands (R, n, 3) around one (n, 3), from near to as far as the limits are apart."""
-        rng = np.random.default_rng(0)
-        change = rng.uniform(-1.0, 1.0, (2 * ROUNDS, *command.shape))
-        reach = np.geomspace(10.0 * CLOSE, 1.0, len(change))[:, None, None]
-        return np.asarray(command + reach * change * self.problem.width)
-
-    def error(self, command: Array, wrench: Array, conditions: Conditions = NOMINAL) -> Array:
-        """Returns how far what commands give is from wrenches, over the wrench scale.
-
-        Args:
-            command: (N, n, 3).
-            wrench: (N, 6) [N, N m].
-            conditions: which actuators work, and which axes count.
-
-        Returns:
-            (N,).
-        """
-        missing = self.problem_under(conditions).wrench(command) - wrench / self.scale
-        if conditions.free is not None:
-            missing = np.where(conditions.free, 0.0, missing)
-        return _norms(missing)
-
-
-def _norms(vectors: Array) -> Array:
-    """Euclidean norms (N,) of vectors (N, 6)."""
-    return np.asarray(np.sqrt(np.einsum("ni,ni->n", vectors, vectors)))

@@ -15,13 +15,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.dual.compiled import Compiled
-from finlab.allocation.dual.prepared import PreparedDual
-from finlab.allocation.levenberg_marquardt import refine
+from finlab.allocation.dual.compiled import Compiled, core_policy
+from finlab.allocation.levenberg_marquardt import CommandProblem, exact_commands, refine
 from finlab.allocation.policy import Policy
-from finlab.allocation.solution import Solution
 from finlab.arrays import CLOSE, NEARLY, ROUNDS, Array
-from finlab.core.calls import Conditions
+from finlab.core.calls import Conditions, CoreAnswer
 from finlab.core.coupled_core import CoupledCore, OuterResult, WrenchOffset
 from finlab.physics.plant import Plant
 
@@ -58,11 +56,10 @@ def coupled_core(plant: Plant, compiled: Compiled) -> CoupledCore:
     """
     interaction = plant.interaction
     assert interaction is not None
-    robot = compiled.robot
     return CoupledCore(
-        robot.block,
+        compiled.block,
         WrenchOffset(
-            frames=robot.axes @ plant.layout.frames,
+            frames=compiled.axes @ plant.layout.frames,
             counts=plant.counts,
             inflow=plant.met_by_all(None),
             core_constants=interaction.core_constants,
@@ -71,53 +68,74 @@ def coupled_core(plant: Plant, compiled: Compiled) -> CoupledCore:
     )
 
 
-def solve_outer(
-    method: PreparedDual,
+def outer_answers(
+    coupled: CoupledCore,
+    compiled: Compiled,
+    problem: CommandProblem,
     targets: Array,
     policy: Policy,
     conditions: Conditions,
     multipliers: Array | None,
-) -> Solution:
-    """Solves for targets, one after the other, by outer iterations.
+) -> CoreAnswer:
+    """Answers targets, one after the other, by outer iterations.
 
     Args:
-        method: `dual` for the robot, in its flow.
+        coupled: the robot in the core, with what its actuators do to each other.
+        compiled: the same by its laws alone.
+        problem: of steps on its commands, under the conditions.
         targets: desired wrenches (N, 6) [N, N m], at least one.
         policy: what to give out of reach.
         conditions: what holds of the robot.
         multipliers: lambda (6,) [W/N, W/(N m)] at which Newton's method begins; None for its own.
 
     Returns:
-        Commands, with the lower bound of their power by the laws alone.
+        Answers of the last iterations, with commands that are exact by the laws. A target is
+        attainable where its command gives it; nothing is proved of gaps.
     """
-    commands: list[Array] = []
-    wrenches: list[Array] = []
-    multipliers_found: list[Array] = []
-    notes: set[str] = set()
-    for target in targets:
-        answer = _best_of_starts(method, target, policy, conditions, multipliers).answer
-        assert answer is not None  # all starts that are kept were followed by iterations
-        command = method.exact(answer, conditions)
-        wrench_served = answer.wrench_served
-        if policy.kind == "direction" and not answer.is_attainable.all():
-            command, wrench_served = _on_the_ray(method, target[None], command, conditions)
-        if method.error(command, target[None], conditions)[0] > NEARLY:
-            notes |= method.undriven_notes(target[None], conditions)
-        commands.append(command)
-        wrenches.append(wrench_served)
-        multipliers_found.append(answer.multipliers)
-    return method.solution(
-        np.concatenate(commands),
-        np.concatenate(wrenches),
-        np.concatenate(multipliers_found),
-        np.zeros(len(targets)),
-        notes,
-        conditions,
+    answers = [
+        _outer_answer(coupled, compiled, problem, target, policy, conditions, multipliers)
+        for target in targets
+    ]
+    return CoreAnswer(
+        force=np.concatenate([answer.force for answer in answers]),
+        multipliers=np.concatenate([answer.multipliers for answer in answers]),
+        wrench_served=np.concatenate([answer.wrench_served for answer in answers]),
+        gap_power_bound=np.zeros(len(targets)),
+        is_attainable=np.concatenate([answer.is_attainable for answer in answers]),
+        command=np.concatenate([answer.command for answer in answers]),
+        error=np.concatenate([answer.error for answer in answers]),
+        is_truncated=any(answer.is_truncated for answer in answers),
+    )
+
+
+def _outer_answer(
+    coupled: CoupledCore,
+    compiled: Compiled,
+    problem: CommandProblem,
+    target: Array,
+    policy: Policy,
+    conditions: Conditions,
+    multipliers: Array | None,
+) -> CoreAnswer:
+    """The answer to one target (6,); arguments as of `outer_answers`."""
+    answer = _best_of_starts(
+        coupled, compiled, problem, target, policy, conditions, multipliers
+    ).answer
+    assert answer is not None  # all starts that are kept were followed by iterations
+    command = exact_commands(problem, answer)
+    wrench_served = answer.wrench_served
+    if policy.kind == "direction" and not answer.is_attainable.all():
+        command, wrench_served = _on_the_ray(problem, target[None], command)
+    error = problem.error(command, target[None] / problem.error_scale)
+    return answer._replace(
+        command=command, wrench_served=wrench_served, is_attainable=error <= NEARLY
     )
 
 
 def _best_of_starts(
-    method: PreparedDual,
+    coupled: CoupledCore,
+    compiled: Compiled,
+    problem: CommandProblem,
     target: Array,
     policy: Policy,
     conditions: Conditions,
@@ -125,10 +143,10 @@ def _best_of_starts(
 ) -> OuterResult:
     """What outer iterations come to for one target (6,): in a tick from the command before, else
     from the forces by the laws alone and, where the whole model takes more power, from others."""
-    coupled = method.coupled
+    record = core_policy(policy)
     if conditions.command_previous is not None:
-        return coupled.iterate(target, None, ITERATIONS_IN_TICK, policy, multipliers, conditions)
-    by_laws = method.forces(target[None], policy, multipliers, conditions)
+        return coupled.iterate(target, None, ITERATIONS_IN_TICK, record, multipliers, conditions)
+    by_laws = compiled.core.answer_one(target, record, multipliers, conditions)
     force_by_laws = by_laws.force[0]
     multipliers_by_laws = by_laws.multipliers[0]
     steps_left = MAX_WORK / len(force_by_laws)
@@ -136,7 +154,7 @@ def _best_of_starts(
         target,
         force_by_laws,
         ROUNDS,
-        policy,
+        record,
         multipliers_by_laws,
         conditions,
         most_steps=steps_left,
@@ -161,7 +179,7 @@ def _best_of_starts(
                 target,
                 tried[k].force,
                 ROUNDS,
-                policy,
+                record,
                 multipliers_by_laws,
                 conditions,
                 most_steps=steps_left,
@@ -171,7 +189,7 @@ def _best_of_starts(
         return best.power < (1.0 - CHEAPER) * power_before
 
     works = slice(None) if conditions.lost is None else ~conditions.lost
-    power_by_laws = float(method.plant.power(by_laws.command)[:, works].sum())
+    power_by_laws = float(problem.plant.power(by_laws.command)[:, works].sum())
     if best.power <= (1.0 + CHEAPER) * power_by_laws:
         return best
     one_reversed = 1.0 - 2.0 * np.eye(len(force_by_laws))[..., None]
@@ -179,7 +197,7 @@ def _best_of_starts(
         is_cheaper = follow_cheapest(one_reversed * best.force, REVERSED_FOLLOWED)
         if not is_cheaper:
             break
-    rotated = _rotated_starts(force_by_laws, method.compiled.robot.is_line).all()
+    rotated = _rotated_starts(force_by_laws, compiled.is_line).all()
     follow_cheapest(rotated, ROTATED_FOLLOWED)
     return best
 
@@ -190,23 +208,19 @@ def _is_better(one: OuterResult, other: OuterResult) -> bool:
     return nearer > NEARLY or (nearer >= -NEARLY and one.power < other.power)
 
 
-def _on_the_ray(
-    method: PreparedDual, target: Array, command: Array, conditions: Conditions
-) -> tuple[Array, Array]:
+def _on_the_ray(problem: CommandProblem, target: Array, command: Array) -> tuple[Array, Array]:
     """Finds the largest share of a target that steps on the commands come to (Eq. 14), by
     bisection.
 
     Args:
-        method: `dual` for the robot, in its flow.
+        problem: of steps on the commands, under the conditions of the question.
         target: desired wrench (1, 6) [N, N m].
         command: (1, n, 3) where the steps begin.
-        conditions: what holds of the robot.
 
     Returns:
         The command (1, n, 3), and the wrench (1, 6) [N, N m] on the ray that it gives.
     """
-    target_normalized = target / method.scale
-    problem = method.problem_under(conditions)
+    target_normalized = target / problem.error_scale
     along = float((problem.wrench(command) * target_normalized).sum())
     ray_share = along / max((target_normalized * target_normalized).sum(), 1e-300)
     low = 0.0
@@ -222,9 +236,8 @@ def _on_the_ray(
             high = tried
         if high - low <= CLOSE * high:
             break
-    if conditions.command_previous is not None:
-        box = method.rates.box(conditions.command_previous)
-        best = box.clip_feasible(best, method.plant)
+    if problem.box is not None:
+        best = problem.box.clip_feasible(best, problem.plant)
     return best, low * target
 
 

@@ -4,12 +4,12 @@ these differ from the core's tables (Eq. 14).
 Method `dual` asks for it, of targets out of reach alone.
 """
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from finlab.allocation.dual.prepared import PreparedDual
+from finlab.allocation.dual.compiled import Compiled
+from finlab.allocation.levenberg_marquardt import CommandProblem, cheapest_exact, exact_commands
 from finlab.arrays import NEARLY, ROUNDS, Array
 from finlab.core.calls import Conditions, CoreAnswer
 
@@ -33,36 +33,36 @@ class RowAnswer(NamedTuple):
 
 
 def keep_on_rays(
-    method: PreparedDual,
+    compiled: Compiled,
+    problem: CommandProblem,
+    conditions: Conditions,
     targets: Array,
-    rows: Sequence[int],
     answer: CoreAnswer,
     command: Array,
-    conditions: Conditions,
 ) -> set[str]:
     """Overwrites answers that are off the rays of their targets by others that are on them.
 
     Args:
-        method: in the flow of the robot.
+        compiled: the robot, in its flow.
+        problem: of steps on its commands, under the conditions.
+        conditions: what holds of the robot.
         targets: desired wrenches (N, 6) [N, N m], along which the answers are to lie.
-        rows: of the targets that are out of reach.
         answer: of the core, to all targets; what it served, its multipliers and its bounds of gaps
             are overwritten.
         command: (N, n, 3), overwritten, too.
-        conditions: what holds of the robot.
 
     Returns:
         The note where no share of a target can be given; else none.
     """
     notes = set()
-    for row in rows:
+    for row in np.flatnonzero(~answer.is_attainable):
         first = RowAnswer(
             command[row],
             answer.wrench_served[row],
             answer.multipliers[row],
             float(answer.gap_power_bound[row]),
         )
-        on_ray = _on_ray(method, targets[row], first, conditions)
+        on_ray = _on_ray(compiled, problem, conditions, targets[row], first)
         if on_ray is None:
             notes.add(NONE_ALONE)
             continue
@@ -74,16 +74,21 @@ def keep_on_rays(
 
 
 def _on_ray(
-    method: PreparedDual, target: Array, first: RowAnswer, conditions: Conditions
+    compiled: Compiled,
+    problem: CommandProblem,
+    conditions: Conditions,
+    target: Array,
+    first: RowAnswer,
 ) -> RowAnswer | None:
     """The answer to a target (6,) with the largest share of it that the laws give, found by
     bisection below the share of a first answer; that itself where it is on the ray already; None
     where no share can be given."""
-    ray = target / method.scale
+    scale = problem.error_scale
+    ray = target / scale
     size_squared = max(float(ray @ ray), _LEAST_SQUARE)
-    along_ray = float(first.wrench_served / method.scale @ ray)
-    error = method.error(first.command[None], first.wrench_served[None], conditions)[0]
-    off_ray = first.wrench_served / method.scale - along_ray / size_squared * ray
+    along_ray = float(first.wrench_served / scale @ ray)
+    error = problem.error(first.command[None], first.wrench_served[None] / scale)[0]
+    off_ray = first.wrench_served / scale - along_ray / size_squared * ray
     if error <= NEARLY and np.abs(off_ray).max() <= NEARLY:
         return first
     if conditions.command_previous is not None:
@@ -95,9 +100,9 @@ def _on_ray(
     while high > low + NEARLY * size_squared:
         middle = 0.5 * (low + high)
         tried = middle / size_squared * target[None]
-        answer = method.forces(tried, None, None, conditions)
-        command = method.exact(answer, conditions)
-        if method.error(command, tried, conditions)[0] > NEARLY:
+        answer = compiled.forces(tried, None, None, conditions)
+        command = exact_commands(problem, answer)
+        if problem.error(command, tried / scale)[0] > NEARLY:
             high = middle
             continue
         low = middle
@@ -106,18 +111,18 @@ def _on_ray(
         )
     if best is not None:
         return best
-    cancelling = _cancelling_command(method, conditions)
+    cancelling = _cancelling_command(problem)
     if cancelling is None:
         return None
     return RowAnswer(cancelling, np.zeros(6), np.zeros(6), 0.0)
 
 
-def _cancelling_command(method: PreparedDual, conditions: Conditions) -> Array | None:
+def _cancelling_command(problem: CommandProblem) -> Array | None:
     """A command (n, 3) of actuators that cannot rest whose least forces, nearly, cancel; None
     without any."""
-    lower = method.layout.lower
-    width = method.layout.upper - lower
+    lower = problem.plant.lower
+    width = problem.plant.upper - lower
     share = np.random.default_rng(0).random((ROUNDS, *lower.shape))
     share[..., :-1] **= 4  # most of them near the least forces
     starts = lower + share * width
-    return method.cheapest_exact(method.problem_under(conditions), np.zeros(6), starts)
+    return cheapest_exact(problem, np.zeros(6), starts)

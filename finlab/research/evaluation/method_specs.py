@@ -22,7 +22,7 @@ import numpy as np
 
 from finlab.allocation import methods
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.method import Method, MethodQuestion
+from finlab.allocation.method import Method, MethodQuestion, Reads
 from finlab.allocation.solution import Solution
 from finlab.errors import AllocationError, DataError
 from finlab.layout import Layout
@@ -171,7 +171,7 @@ def own_method(name: str) -> type[Method]:
 class _FunctionMethod(Method):
     """A user's function as a method; `own_method` makes a class of it for each function."""
 
-    every_policy = False
+    reads: ClassVar[frozenset[Reads]] = frozenset()
     function: ClassVar[Callable[..., Any]]
     """The user's function, from targets to commands."""
     parameters: ClassVar[tuple[str, ...]]

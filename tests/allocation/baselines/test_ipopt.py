@@ -248,5 +248,5 @@ def test_power_is_measured_by_that_of_all_actuators_at_full_load(kind: str) -> N
     layout = load(random_robot(kind, 1, 7))
     flow = random_flow(kind, 1, 7)
     program = AllocatorCache("ipopt").method(layout).at(flow)._program
-    most = AllocatorCache().method(layout).at(flow).compiled.robot.largest_power
+    most = AllocatorCache().method(layout).at(flow).compiled.largest_power
     assert sum(part.full_power for part in program._actuators) == pytest.approx(most, rel=0.02)

@@ -10,6 +10,7 @@ import pytest
 from scipy.optimize import minimize
 
 from finlab.allocation import Allocator
+from finlab.allocation.dual.compiled import Compiled, core_policy
 from finlab.allocation.dual.outer_iterations import (
     JET_ROTATION,
     RANDOM_STARTS,
@@ -17,11 +18,11 @@ from finlab.allocation.dual.outer_iterations import (
     _best_of_starts,
     _rotated_starts,
 )
-from finlab.allocation.dual.prepared import PreparedDual
+from finlab.allocation.levenberg_marquardt import CommandProblem
 from finlab.allocation.policy import CLOSEST
 from finlab.arrays import ROUNDS, Array
 from finlab.core.calls import NOMINAL
-from finlab.core.coupled_core import OuterResult
+from finlab.core.coupled_core import CoupledCore, OuterResult
 from finlab.interaction.jets import Jets
 from finlab.layout import Layout, load_layout
 from finlab.layout.load import parse_layout
@@ -142,9 +143,15 @@ def test_iterations_settle_in_few_steps_at_the_conditions_of_a_minimum() -> None
         plant = Plant(layout)
         dual = Allocator(layout)._whole.method
         for target in 0.6 * plant.wrench(plant.sample(rng, (3,))):
-            laws = dual.forces(target[None], CLOSEST, None, NOMINAL)
+            laws = dual.compiled.forces(target[None], CLOSEST, None, NOMINAL)
             ended = dual.coupled.iterate(
-                target, laws.force[0], ROUNDS, CLOSEST, laws.multipliers[0], NOMINAL, most_steps=1e6
+                target,
+                laws.force[0],
+                ROUNDS,
+                core_policy(CLOSEST),
+                laws.multipliers[0],
+                NOMINAL,
+                most_steps=1e6,
             )
             steps += ended.steps
     assert steps <= MOST_STEPS
@@ -154,8 +161,8 @@ def test_forces_without_an_iteration_come_with_no_answer_of_the_dual() -> None:
     layout = replace(parse_layout(bluerov2_heavy()), interaction=Jets())
     dual = Allocator(layout)._whole.method
     target = 0.5 * dual.scale
-    laws = dual.forces(target[None], CLOSEST, None, NOMINAL)
-    iterated = dual.coupled.iterate(target, laws.force[0], ROUNDS, CLOSEST)
+    laws = dual.compiled.forces(target[None], CLOSEST, None, NOMINAL)
+    iterated = dual.coupled.iterate(target, laws.force[0], ROUNDS, core_policy(CLOSEST))
     assert iterated.answer is not None and iterated.answer.command.shape == (1, layout.n, 3)
     only_steps = dual.coupled.iterate(target, laws.force[0], 0)
     assert only_steps.answer is None
@@ -181,12 +188,20 @@ def test_starts_that_make_nothing_cheaper_are_reversed_in_one_round_alone() -> N
     laws = SimpleNamespace(
         force=np.ones((1, n, 2)), multipliers=np.zeros((1, 6)), command=np.zeros((1, n, 3))
     )
-    method = SimpleNamespace(
-        coupled=coupled,
-        forces=lambda *_: laws,
-        plant=SimpleNamespace(power=lambda command: np.full(command.shape[:-1], 1.0 / n)),
-        compiled=SimpleNamespace(robot=SimpleNamespace(is_line=np.zeros(n, bool))),
+    compiled = SimpleNamespace(
+        core=SimpleNamespace(answer_one=lambda *_: laws), is_line=np.zeros(n, bool)
     )
-    _best_of_starts(cast("PreparedDual", method), np.zeros(6), CLOSEST, NOMINAL, None)
+    problem = SimpleNamespace(
+        plant=SimpleNamespace(power=lambda command: np.full(command.shape[:-1], 1.0 / n))
+    )
+    _best_of_starts(
+        cast("CoupledCore", coupled),
+        cast("Compiled", compiled),
+        cast("CommandProblem", problem),
+        np.zeros(6),
+        CLOSEST,
+        NOMINAL,
+        None,
+    )
     rotated = len(WALSH) + 1 + RANDOM_STARTS
     assert coupled.starts_without_iteration == n + rotated

@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from finlab.actuators.response import Form, Line, RadialTable, price_grid
+from finlab.actuators.thrust_model import PowerLaw
+from finlab.actuators.thruster import Thruster
 from finlab.allocation import Allocator, Policy
 from finlab.allocation.baselines.autopilots import PX4_ORDER
-from finlab.allocation.dual.robot import CommandLimits, DualRobot
+from finlab.allocation.dual.compiled import Compiled
 from finlab.axes import AXES
-from finlab.layout import load_layout
+from finlab.layout import Layout, load_layout
 from finlab.research.evaluation.experiments.thrusters import _draws, misses_more, missing_by_group
 from tests.core.internal_functions import dual_function
 from tests.oracle_optima import conic_optimum, farthest, least_known, least_miss, lower_bound
@@ -99,23 +100,13 @@ def test_least_miss_of_a_heavy() -> None:
     assert least_miss(HEAVY, wrench) == pytest.approx(np.sqrt(2.0 * ends.cost), rel=1e-5)
 
 
-def _table(watts: float, most: float) -> RadialTable:
-    """Power `watts` F^1.5 up to a largest force [N]."""
-    top = 1.5 * watts * np.sqrt(most)
-    return RadialTable.of_forces(top, np.minimum((price_grid(top) / (1.5 * watts)) ** 2, most), 0.0)
-
-
 def test_costly_reverse_is_within_reach() -> None:
-    lines = [Line(np.eye(6)[i], _table(1.0, 10.0), _table(5.0, 10.0)) for i in range(3)]
-    limits = CommandLimits(
-        lower=np.array([[-10.0, 0.0, 0.0]] * 3),
-        upper=np.array([[10.0, 0.0, 0.0]] * 3),
-        max_change=np.full((3, 3), np.inf),
-        turns=np.zeros((3, 3), bool),
-    )
-    own = np.zeros((3, 3, 6))
-    own[:, 0] = np.eye(6)[:3]
-    robot = DualRobot(lines, [Form("thruster")] * 3, limits, own, np.ones(6))
+    model = PowerLaw(1.0, 5.0)
+    thrusters = [
+        Thruster(name, (0.0, 0.0, 0.0), axis, (-10.0, 10.0), model)
+        for name, axis in (("x", (1.0, 0.0, 0.0)), ("y", (0.0, 1.0, 0.0)), ("z", (0.0, 0.0, 1.0)))
+    ]
+    robot = Compiled.of(Layout("three", tuple(thrusters)))
     wrench = np.array([-9.0, -9.0, -9.0, 0.0, 0.0, 0.0])
     answer = robot.core.answer_one(wrench, None)
     lambda_reduced = np.append(

@@ -9,7 +9,7 @@ from scipy.optimize import minimize_scalar
 
 from finlab.actuators.thrust_model import PowerLaw
 from finlab.allocation import Allocator
-from finlab.allocation.dual.robot import POINTS, _usual_price, gauge_numbers
+from finlab.allocation.dual.block import POINTS, _usual_price, gauge_numbers
 from finlab.arrays import Array
 from finlab.core.fields import actuators_of
 from finlab.layout import Azimuth, Layout, load_layout
@@ -52,7 +52,7 @@ def test_the_support_function_of_a_gauge_and_its_derivative() -> None:
 
 
 def test_the_largest_power_is_that_of_all_thrusters_at_their_dearer_end() -> None:
-    robot = AllocatorCache().method(load(bluerov2_heavy())).compiled.robot
+    robot = AllocatorCache().method(load(bluerov2_heavy())).compiled
     dearer = max(
         T200["forward"] * T200_FORCE[1] ** 1.5, T200["reverse"] * abs(T200_FORCE[0]) ** 1.5
     )
@@ -61,7 +61,7 @@ def test_the_largest_power_is_that_of_all_thrusters_at_their_dearer_end() -> Non
 
 def test_the_usual_price_of_a_thruster_is_that_of_its_dearer_end() -> None:
     """P = c F^1.5 has the price dP/dF = 1.5 c sqrt(F)."""
-    response = AllocatorCache().method(load(bluerov2_heavy())).compiled.robot.responses[0]
+    response = AllocatorCache().method(load(bluerov2_heavy())).compiled.responses[0]
     ahead = 1.5 * T200["forward"] * math.sqrt(T200_FORCE[1])
     astern = 1.5 * T200["reverse"] * math.sqrt(-T200_FORCE[0])
     assert _usual_price(response) == pytest.approx(max(ahead, astern), rel=0.02)
@@ -82,7 +82,7 @@ def test_a_pod_is_searched_in_reverse_only_where_that_brings_anything(
 ) -> None:
     model = PowerLaw(0.3, reverse)
     pod = Azimuth("pod", (0.3, 0, 0), (0, 0, 1), (1, 0, 0), ends, model, (-half, half))
-    actuator = actuators_of(AllocatorCache().method(Layout("one", (pod,))).compiled.robot.block)[0]
+    actuator = actuators_of(AllocatorCache().method(Layout("one", (pod,))).compiled.block)[0]
     assert actuator["force_min"] == pytest.approx(ends[0])
     assert actuator["force_min_needed"] == (actuator["force_min"] if is_needed else 0.0)
 
