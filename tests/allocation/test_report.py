@@ -90,6 +90,7 @@ def test_what_binds_and_notes_stand_beside_what_is_missing() -> None:
         (None, 0.0, []),
         (100.0, 0.0, []),
         (99.5, 0.0, []),
+        (99.5, 20.0, []),
         (80.0, 0.0, [20.0]),
         (80.0, 20.0, [20.0]),  # all of it goes into less turning
         (70.0, 20.0, [20.0, 10.0]),
