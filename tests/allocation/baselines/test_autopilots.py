@@ -168,9 +168,7 @@ def test_a_setpoint_of_px4_turns_and_pushes_in_its_frame() -> None:
 
 def test_px4_takes_the_stronger_way_of_each_thruster_for_its_full_strength() -> None:
     ends = [(-50.0, 20.0), (-20.0, 50.0), (-30.0, 30.0), (0.0, 40.0)] * 2
-    uneven = [
-        replace(part, force=force) for part, force in zip(HEAVY.actuators, ends, strict=True)
-    ]
+    uneven = [replace(part, force=force) for part, force in zip(HEAVY.actuators, ends, strict=True)]
     method = px4(replace(HEAVY, actuators=tuple(uneven)))
     np.testing.assert_allclose(method._largest, np.abs(ends).max(axis=1))
     np.testing.assert_allclose(method._low * method._largest, np.array(ends)[:, 0])
@@ -214,9 +212,7 @@ def test_each_group_of_ardusub_is_scaled_down_until_all_its_thrusters_fit(
 ) -> None:
     """By the one that exceeds its own limits most, on the side on which it pushes."""
     ends = [(-20.0, 50.0), (-50.0, 20.0), (-30.0, 45.0), (-45.0, 30.0)] * 2
-    uneven = [
-        replace(part, force=force) for part, force in zip(HEAVY.actuators, ends, strict=True)
-    ]
+    uneven = [replace(part, force=force) for part, force in zip(HEAVY.actuators, ends, strict=True)]
     layout = replace(HEAVY, actuators=tuple(uneven))
     low, high = np.array(ends).T
     allocator = Allocator(layout, "ardusub")
