@@ -158,15 +158,10 @@ def test_commands_that_may_cancel_begin_near_the_least_forces_at_any_angle() -> 
 
 
 def test_fins_that_cannot_rest_cancel_each_other() -> None:
-    found = 0
-    for number in range(3):
-        allocator = Allocator(parse_layout(random_robot("holes", number, 71)))
-        method = allocator._whole.method
-        command = _cancelling_command(method, NOMINAL)
-        if command is None:
-            continue
-        found += 1
-        wrench = method.plant.wrench(command) / method.scale
-        assert np.linalg.norm(wrench[method.plant.counts]) <= 2.0 * NEARLY
-        assert (command >= method.layout.lower).all() and (command <= method.layout.upper).all()
-    assert found
+    allocator = Allocator(parse_layout(random_robot("holes", 1, 71)))
+    method = allocator._whole.method
+    command = _cancelling_command(method, NOMINAL)
+    assert command is not None
+    wrench = method.plant.wrench(command) / method.scale
+    assert np.linalg.norm(wrench[method.plant.counts]) <= 2.0 * NEARLY
+    assert (command >= method.layout.lower).all() and (command <= method.layout.upper).all()
