@@ -12,6 +12,7 @@ from tests.core.internal_functions import (
     EITHER_WAY,
     Robot,
     Set,
+    Work,
     at,
     functions,
     in_the_core,
@@ -24,9 +25,9 @@ SLACK = 1e-6
 """Share of the largest force by which ends of sets may differ."""
 
 
-def has(robot: Robot, i: int, limits: Set, force: Array) -> bool:
-    """Whether a set has a force (2,) by its definition: sizes in an arc, some in reverse, none in a
-    band."""
+def has(robot: Robot, i: int, limits: Set, force: Array, arc_slack: float = 1e-6) -> bool:
+    """Whether a set has a force (2,) by its definition: sizes in an arc, to some rounding [rad],
+    some in reverse, none in a band."""
     actuator = robot.actuators[i]
     slack = SLACK * float(actuator["row_force_max"][0])
     if not robot.is_plane(i):
@@ -45,7 +46,7 @@ def has(robot: Robot, i: int, limits: Set, force: Array) -> bool:
         if (
             high > 0.0
             and low - slack <= radius <= high + slack
-            and abs(angle_error) <= limits.sector_half_angle + 1e-6
+            and abs(angle_error) <= limits.sector_half_angle + arc_slack
         ):
             return True
     return False
@@ -250,3 +251,51 @@ def test_the_largest_force_is_that_of_all_actuators_along_their_rows(name: str) 
         force = rng.normal(size=(robot.n, 2))
         size = np.where(planes, np.hypot(*force.T), np.abs(force[:, 0]))
         assert largest(at(robot.block), at(force)) == pytest.approx(size.max())
+
+
+def gap_of(robot: Robot, i: int, limits: Set, force: Array) -> float:
+    """How far a force (2,) that comes of no multipliers is in a gap of a set."""
+    work = robot.work()
+    Work.from_buffer(work).set[i] = limits
+    gap = functions().fl_gap_of
+    gap.restype = ctypes.c_double
+    largest = ctypes.c_double(float(robot.actuators[i]["row_force_max"][0]))
+    return float(gap(at(robot.block), work, i, at(force), largest, None))
+
+
+@pytest.mark.parametrize("name", ["thrusters", "wide arcs", "holes", "all", EITHER_WAY])
+def test_forces_in_a_gap_are_those_of_the_hull_that_the_set_has_not(name: str) -> None:
+    rng = np.random.default_rng(5)
+    judged = {True: 0, False: 0}
+    for number in range(2):
+        robot = robot_of(name, number)
+        for i in range(robot.n):
+            own = robot.actuators[i]
+            if own["flow_speed"] > 0.0:
+                continue
+            most = float(own["row_force_max"][0])
+            limits = robot.whole_set(i)
+            force, _ = forces_of(robot, i, limits)
+            tried = [*cuts_of(robot, i, limits, rng), *force[rng.integers(len(force), size=12)]]
+            for one in tried:
+                if not robot.is_plane(i) and limits.force_min == limits.force_max:
+                    continue
+                held = in_a_band(robot, i, one)
+                inside = has(robot, i, limits, one)
+                size = math.hypot(*one)
+                if (
+                    0.0 < limits.force_min <= 1e-3 * most
+                    or abs(size - limits.force_min) < 1e-3 * most
+                ):
+                    continue  # a least force this small is no hole
+                if own["gauge_table"] > 0.0 and size < 1.2 * limits.force_min:
+                    continue
+                is_in_gap = held or not inside
+                off = math.remainder(math.atan2(one[1], one[0]) - limits.sector_center, 2 * math.pi)
+                near_end = abs(abs(off) - limits.sector_half_angle) < 1e-2
+                if robot.is_plane(i) and (near_end or limits.sector_half_angle <= 0.2):
+                    continue  # of a narrow arc the chord counts as the arc
+                assert (gap_of(robot, i, limits, np.ascontiguousarray(one)) > 0.0) == is_in_gap
+                judged[is_in_gap] += 1
+    assert judged[False] > 10
+    assert judged[True] > 3 or name in ("wide arcs", "all")
