@@ -299,3 +299,40 @@ def test_forces_in_a_gap_are_those_of_the_hull_that_the_set_has_not(name: str) -
                 judged[is_in_gap] += 1
     assert judged[False] > 10
     assert judged[True] > 3 or name in ("wide arcs", "all")
+
+
+def test_a_foil_is_cut_at_a_lift_and_lies_on_the_nearer_half() -> None:
+    rng = np.random.default_rng(8)
+    robot = robot_of("rudders")
+    foils = np.flatnonzero(robot.actuators["flow_speed"] > 0.0).tolist()
+    for i in foils:
+        limits = robot.whole_set(i)
+        middle = 0.5 * (limits.force_min + limits.force_max)
+        for share in rng.uniform(0.05, 0.95, 8):
+            lift = limits.force_min + share * (limits.force_max - limits.force_min)
+            drag = float(robot.actuators[i]["row_force_max"][1])
+            cut = np.array([lift, drag])
+            below, above = (narrowed(robot, i, limits, cut, side) for side in (-1, 1))
+            assert (below.force_min, below.force_max) == (limits.force_min, lift)
+            assert (above.force_min, above.force_max) == (lift, limits.force_max)
+            for part in (below, above):
+                costs_hold(robot, i, part)
+            side = functions().fl_nearer_side(at(robot.block), i, ctypes.byref(limits), at(cut))
+            assert side == (1 if lift >= middle else -1)
+            # Drag above that of the lift is a gap.
+            own_drag = robot.drag(i, lift)
+            on_curve = np.array([lift, own_drag])
+            assert gap_of(robot, i, limits, on_curve) == 0.0
+            beyond = np.array([lift, own_drag + 0.01 * drag])
+            assert gap_of(robot, i, limits, beyond) == pytest.approx(0.01)
+
+
+def test_a_line_in_its_dead_band_is_in_a_gap_unless_it_is_fixed_there() -> None:
+    robot = robot_of("thrusters")
+    (banded, *_) = np.flatnonzero(robot.actuators["dead_band"] > 0.0).tolist()
+    limits = robot.whole_set(banded)
+    force = np.array([0.5 * robot.actuators[banded]["dead_band"], 0.0])
+    assert gap_of(robot, banded, limits, force) == 1.0
+    assert gap_of(robot, banded, limits, -force) == 1.0
+    limits.force_min = limits.force_max = force[0]
+    assert gap_of(robot, banded, limits, force) == 0.0
