@@ -1,5 +1,5 @@
 """The search for least power where sets have gaps: beside all forces of robots whose forces for a
-wrench leave one number free."""
+wrench leave one number free, or two."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -14,6 +14,7 @@ from finlab.core.fields import Record
 from finlab.layout import Layout, Thruster
 from finlab.layout.load import parse_layout
 from tests.core.parts import Robot, in_the_core, pods_either_way
+from tests.core.test_dual_newton import looked_at
 from tests.core.test_set_gaps import has
 from tests.mixed_robots import random_robot
 
@@ -26,11 +27,11 @@ ARC_SLACK = 2e-4
 PLANAR = ("Fx", "Fy", "Tz")
 
 
-def four_thrusters(seed: int) -> Layout:
+def some_thrusters(count: int, seed: int) -> Layout:
     """Thrusters of a robot in a plane, each with a dead band."""
-    rng = np.random.default_rng([1, seed])
+    rng = np.random.default_rng([count, seed])
     parts = []
-    for k in range(4):
+    for k in range(count):
         angle = rng.uniform(-np.pi, np.pi)
         most = rng.uniform(20.0, 40.0)
         parts.append(
@@ -43,7 +44,7 @@ def four_thrusters(seed: int) -> Layout:
                 dead_band=rng.uniform(0.05, 0.25) * most,
             )
         )
-    return Layout("four", tuple(parts), axes=PLANAR)
+    return Layout("some", tuple(parts), axes=PLANAR)
 
 
 def two_pods(seed: int) -> Layout:
@@ -64,7 +65,7 @@ def two_of(kind: str, seed: int) -> Layout:
 
 
 LAYOUTS = {
-    "thrusters": four_thrusters,
+    "thrusters": lambda seed: some_thrusters(4, seed),
     "pods": two_pods,
     "wide arcs": lambda seed: two_of("wide arcs", seed),
     "holes": lambda seed: two_of("holes", seed),
@@ -140,8 +141,8 @@ def all_forces(robot: Robot, force: Array) -> Array:
     return made
 
 
-def cases_of(name: str) -> Iterator[tuple[Robot, Array, Record]]:
-    """Robots, forces (n, 2) that they can give, and the answers to their wrenches."""
+def cases_of(name: str) -> Iterator[tuple[Robot, Array, Array, Record]]:
+    """Robots, forces (n, 2) that they can give, their wrenches (6,), and the answers to these."""
     for seed in range(3):
         robot = in_the_core(LAYOUTS[name](seed))
         if np.linalg.matrix_rank(columns_of(robot), tol=1e-6) != 3:
@@ -159,13 +160,14 @@ def cases_of(name: str) -> Iterator[tuple[Robot, Array, Record]]:
                 continue
             reduced = np.einsum("nr,nrj->j", force, robot.actuators["effectiveness_reduced"])
             wrench = robot.head["basis"] @ reduced * robot.head["axis_scale"]
-            yield robot, force, robot.answer(wrench + robot.head["wrench_offset"])
+            wrench += robot.head["wrench_offset"]
+            yield robot, force, wrench, robot.answer(wrench)
 
 
 @pytest.mark.parametrize("name", LAYOUTS)
 def test_the_least_power_of_all_forces_is_found_and_proved(name: str) -> None:
     cases = 0
-    for robot, known, answer in cases_of(name):
+    for robot, known, wrench, answer in cases_of(name):
         found = answer["force"][: robot.n]
         assert answer["is_attainable"]
         # The forces give the wrench, and the sets have them.
@@ -179,9 +181,71 @@ def test_the_least_power_of_all_forces_is_found_and_proved(name: str) -> None:
         least = min(power[is_given].min(initial=np.inf), known_power[0])
         assert own_power <= least * (1.0 + NEAR)
         if not answer["is_truncated"]:
-            # What gaps are proved to need is no more than any forces take, and nearly as much.
-            bound = float(answer["gap_power_bound"])
-            assert bound <= own_power * (1.0 + 1e-6)
-            assert bound == 0.0 or bound >= own_power * (1.0 - 2e-3)
+            # What gaps are proved to need is no more than any forces take; that, or the dual at
+            # the answer's multipliers, is nearly as much.
+            gap_bound = float(answer["gap_power_bound"])
+            dual, _ = looked_at(robot, wrench, answer["lambda_reduced"].copy())
+            assert max(gap_bound, dual) <= own_power * (1.0 + 1e-6)
+            assert max(gap_bound, dual) >= own_power * (1.0 - 2e-3)
         cases += 1
     assert cases >= 3
+
+
+def forces_of_five(robot: Robot, force: Array) -> Array:
+    """Forces (K, 5) of thrusters that give the same wrench as some (5,): dense, and along all lines
+    and at all points where one or two of them rest or are at the edge of their dead bands."""
+    free = null_space(columns_of(robot), rcond=1e-9)
+    band = robot.actuators["dead_band"]
+    edges = [(i, edge * band[i]) for i in range(5) for edge in (-1.0, 0.0, 1.0)]
+    span = np.linspace(-2.0, 2.0, 121) * robot.actuators["row_force_max"].max()
+    shares = [np.stack(np.meshgrid(span, span), axis=-1).reshape(-1, 2)]
+    for k, (i, edge) in enumerate(edges):
+        across = free[i] / (free[i] @ free[i])
+        along = np.array([-free[i, 1], free[i, 0]]) / np.linalg.norm(free[i])
+        shares.append(
+            (edge - force[i]) * across + np.linspace(-1, 1, 801)[:, None] * span[-1] * along
+        )
+        for j, other in edges[k + 1 :]:
+            if i != j:
+                both = np.linalg.solve(free[[i, j]], [edge - force[i], other - force[j]])
+                shares.append(both[None])
+    made = force + np.concatenate(shares) @ free.T
+    made[np.abs(made) < 1e-9 * span[-1]] = 0.0
+    return np.asarray(made)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_of_five_thrusters_near_their_dead_bands_the_cheapest_choice_is_found(seed: int) -> None:
+    layout = some_thrusters(5, seed)
+    robot = in_the_core(layout)
+    own = robot.actuators
+    rng = np.random.default_rng([3, seed])
+    law = [actuator.model for actuator in layout.actuators]  # type: ignore[attr-defined]
+    # Forces along the rows have the sign of their commands.
+    ahead = np.array([one.forward for one in law])
+    reverse = np.array([one.reverse for one in law])
+    searched = 0
+    for _ in range(8):
+        share = rng.uniform(1.0, 1.6, 5) * rng.choice([-1.0, 0.0, 1.0], 5)
+        force = np.clip(share * own["dead_band"], own["force_min"], own["force_max"])
+        reduced = force @ own["effectiveness_reduced"][:, 0]
+        wrench = robot.head["basis"] @ reduced * robot.head["axis_scale"]
+        answer = robot.answer(wrench)
+        found = answer["force"][:5, 0]
+        np.testing.assert_allclose(columns_of(robot) @ (found - force), 0.0, atol=1e-7)
+        tried = forces_of_five(robot, force)
+        size = np.abs(tried)
+        is_given = (tried >= own["force_min"] - 1e-9) & (tried <= own["force_max"] + 1e-9)
+        is_given &= (size == 0.0) | (size >= own["dead_band"] * (1.0 - 1e-9))
+        signed = own["command_sign"] * tried
+        power = (np.where(signed > 0.0, ahead, reverse) * size**1.5).sum(axis=1)
+        least = power[is_given.all(axis=1)].min()
+        own_power = sum(robot.power(i, float(one)) for i, one in enumerate(found))
+        assert own_power <= least * (1.0 + NEAR)
+        assert not answer["is_truncated"]
+        gap_bound = float(answer["gap_power_bound"])
+        dual, _ = looked_at(robot, wrench, answer["lambda_reduced"].copy())
+        assert max(gap_bound, dual) <= min(own_power, least) * (1.0 + NEAR)
+        assert max(gap_bound, dual) >= own_power * (1.0 - 2e-3)
+        searched += dual < own_power * (1.0 - 2e-3)
+    assert searched > 2
