@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finlab.allocation import Allocator, question
+from finlab.allocation import Allocator, Policy, question
 from finlab.errors import AllocationError, CommandError
 from finlab.layout import Damage, Fin, Layout, Limits
 
@@ -214,3 +214,10 @@ def test_of_a_previous_command_infinity_is_refused_and_nan_is_not(n: int) -> Non
         question.check_previous(command, layout)
     with pytest.raises(CommandError, match="previous: expected a command of shape"):
         question.check_previous(np.ones((n - 1, 3)), layout)
+
+
+def test_a_target_s_seed_is_that_of_its_place_among_all() -> None:
+    checked = question.CheckedQuestion(state_of(Damage()), Policy(), None, 7)
+    for offset in (0, 3):
+        asked = checked._for_method(np.zeros((1, 6)), None, offset, None, None)
+        assert asked.seed == 7 + offset
