@@ -85,7 +85,7 @@ def test_a_weight_of_an_axis_is_at_most_one(axis: int) -> None:
 
 
 @pytest.mark.parametrize("name", ["thrusters", "azimuths", "fins", "fins any shaft"])
-def test_prices_are_what_one_more_unit_of_the_wrench_costs(name: str) -> None:
+def test_multipliers_are_what_one_more_unit_of_the_wrench_costs(name: str) -> None:
     """The derivatives of the least power by the wrench, along what the robot drives."""
     for number in range(2):
         robot = robot_of(name, number)
@@ -99,8 +99,10 @@ def test_prices_are_what_one_more_unit_of_the_wrench_costs(name: str) -> None:
         for direction in basis.T:
             step = 1e-4 * scale * direction * np.linalg.norm(wrench / scale)
             ahead, back = (dual_value(robot, wrench + change) for change in (step, -step))
-            assert answer["prices"] @ step == pytest.approx(
-                (ahead - back) / 2.0, rel=0.02, abs=1e-3 * np.abs(answer["prices"] * step).sum()
+            assert answer["multipliers"] @ step == pytest.approx(
+                (ahead - back) / 2.0,
+                rel=0.02,
+                abs=1e-3 * np.abs(answer["multipliers"] * step).sum(),
             )
 
 

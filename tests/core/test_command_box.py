@@ -3,7 +3,6 @@ bands."""
 
 import ctypes
 import math
-from typing import Any
 
 import numpy as np
 import pytest
@@ -31,10 +30,10 @@ FORCES = {THRUSTER: 0, POD: 1}
 """Which one is a force."""
 
 
-def of_actuator(function: str, robot: Robot, i: int, *more: Any) -> int:
-    """What a function says of an actuator."""
+def is_in_dead_band(robot: Robot, i: int, command: Array) -> bool:
+    """Whether a command of an actuator gives no force."""
     place = ctypes.c_void_p(robot.actuators[i : i + 1].ctypes.data)
-    return int(getattr(functions(), function)(place, *more))
+    return bool(functions().fl_is_in_dead_band(place, at(command)))
 
 
 def padded(command: Array) -> Array:
@@ -42,15 +41,6 @@ def padded(command: Array) -> Array:
     made = np.zeros((MOST, 3))
     made[: len(command)] = command
     return made
-
-
-@pytest.mark.parametrize("name", ROBOTS)
-def test_each_kind_knows_its_angle_and_its_force(name: str) -> None:
-    robot = robot_of(name)
-    for i in range(robot.n):
-        kind = int(robot.actuators[i]["command_kind"])
-        assert of_actuator("fl_angle_number", robot, i) == ANGLES.get(kind, -1)
-        assert of_actuator("fl_force_number", robot, i) == FORCES.get(kind, -1)
 
 
 @pytest.mark.parametrize("angle", [-1, 0, 2])
@@ -104,8 +94,7 @@ def test_a_command_within_the_dead_band_gives_no_force(name: str) -> None:
             ):
                 command = np.full(3, 7.0 * band)
                 command[k] = share * band
-                said = of_actuator("fl_is_in_dead_band", robot, i, at(command))
-                assert bool(said) == is_inside
+                assert is_in_dead_band(robot, i, command) == is_inside
                 judged += 1
     assert judged
 

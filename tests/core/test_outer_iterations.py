@@ -87,7 +87,7 @@ class Coupled:
         """What iterations come to from the forces by the laws alone."""
         begin = self.method.forces(wrench[None], CLOSEST, None, conditions)
         return self.core.iterate(
-            wrench, begin.force[0], most, CLOSEST, begin.lam[0], conditions, **more
+            wrench, begin.force[0], most, CLOSEST, begin.multipliers[0], conditions, **more
         )
 
 
@@ -171,7 +171,9 @@ def test_the_gradient_of_the_power_is_that_of_multipliers_on_the_whole_model(
         assert np.linalg.norm(left) <= 0.03 * np.linalg.norm(gradient[free])
         # And they are the answer's own, which weigh an error more than its worth.
         np.testing.assert_allclose(
-            result.answer.lam[0] * robot.scale, multipliers, atol=0.05 * np.abs(multipliers).max()
+            result.answer.multipliers[0] * robot.scale,
+            multipliers,
+            atol=0.05 * np.abs(multipliers).max(),
         )
         assert result.penalty >= 1.9 * np.linalg.norm(multipliers)
 
@@ -221,7 +223,7 @@ def test_in_a_tick_commands_stay_within_the_rates_and_come_to_the_wrench(name: s
     previous = robot.plant.feasible(first.answer.command[0])
     near = 1.01 * wrench
     result = robot.core.iterate(
-        near, None, 2, CLOSEST, first.answer.lam[0], Conditions(previous, calm=2.0)
+        near, None, 2, CLOSEST, first.answer.multipliers[0], Conditions(previous, calm=2.0)
     )
     assert result.answer is not None
     command = result.answer.command[0]

@@ -233,7 +233,7 @@ def test_each_group_of_ardusub_is_scaled_down_until_all_its_thrusters_fit(
 
 
 def test_a_setpoint_of_ardusub_asks_for_the_mean_of_both_ways_of_all_thrusters() -> None:
-    method = ArduSub(HEAVY, ArduSub.settings_class(), yardstick(HEAVY))
+    method = ArduSub(HEAVY, ArduSub.settings_class(), wrench_scale_of(HEAVY))
     full = np.mean([0.5 * (part.force[1] - part.force[0]) for part in HEAVY.actuators])
     wrench_of_column = method.plant.effectiveness[:, 0].T @ (full * method.factors)
     for column, axis in enumerate([3, 4, 5, 2, 0, 1]):

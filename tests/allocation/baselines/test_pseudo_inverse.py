@@ -14,7 +14,7 @@ from finlab.arrays import Array
 from finlab.layout import Azimuth, Fin, Layout, Limits, Thruster
 from finlab.layout.load import parse_layout
 from finlab.physics import plant_of
-from finlab.physics.objective import yardstick
+from finlab.physics.objective import wrench_scale_of
 from tests.mixed_robots import random_flow, random_robot
 
 ROBOTS = ("thrusters", "azimuths", "fins", "fins uneven", "wide arcs", "rudders", "mixed")
@@ -25,7 +25,7 @@ def inverse_of(name: str, number: int = 1) -> PseudoInverse:
     """The pseudo-inverse of a random robot of a kind, in its flow."""
     layout = parse_layout(random_robot(name, number, 71))
     plant = plant_of(layout).at(random_flow(name, number, 71))
-    return PseudoInverse(plant, 0.1 * yardstick(layout))
+    return PseudoInverse(plant, 0.1 * wrench_scale_of(layout))
 
 
 @pytest.mark.parametrize("name", ROBOTS)
@@ -51,7 +51,7 @@ def test_forces_give_the_wrench_and_are_the_least_of_all_that_do(name: str) -> N
     )
     force = inverse.force(targets).reshape(5, -1)
     given = inverse.wrench_offset + force @ inverse.effectiveness.T
-    scale = yardstick(inverse.plant.layout)
+    scale = wrench_scale_of(inverse.plant.layout)
     np.testing.assert_allclose(given / scale, targets / scale, atol=1e-9)
     _, size, directions = np.linalg.svd(inverse.effectiveness * columns)
     idle = directions[int((size > 1e-9 * size[0]).sum()) :]
@@ -65,7 +65,7 @@ def test_a_force_outside_of_its_arc_is_projected_on_the_nearer_end(half_angle: f
     model = PowerLaw(1.0)
     pod = Azimuth("pod", ORIGIN, (0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 40.0), model, arc)
     layout = Layout("pod", (pod,), axes=("Fx", "Fy"))
-    inverse = PseudoInverse(plant_of(layout), yardstick(layout))
+    inverse = PseudoInverse(plant_of(layout), wrench_scale_of(layout))
     rng = np.random.default_rng(3)
     for _ in range(40):
         angle = rng.uniform(-math.pi, math.pi)
@@ -85,7 +85,7 @@ def test_what_is_fixed_is_made_up_for() -> None:
     layout = load_layout("bluerov2_heavy")
     hangs = replace(layout.actuators[0], force=(10.0, 10.0), hangs=True)
     fixed = replace(layout, actuators=(hangs, *layout.actuators[1:]))
-    inverse = PseudoInverse(plant_of(fixed), yardstick(layout))
+    inverse = PseudoInverse(plant_of(fixed), wrench_scale_of(layout))
     np.testing.assert_array_equal(inverse.is_fixed, np.arange(layout.n) == 0)
     rest = plant_of(fixed).lower.copy()
     np.testing.assert_allclose(
@@ -157,5 +157,5 @@ def test_a_thruster_of_one_way_alone_counts_its_own_way() -> None:
             Thruster("both", ORIGIN, (0.0, 1.0, 0.0), (-50.0, 20.0), PowerLaw(1.0, 1.0)),
         ),
     )
-    inverse = PseudoInverse(plant_of(layout), yardstick(layout))
+    inverse = PseudoInverse(plant_of(layout), wrench_scale_of(layout))
     np.testing.assert_allclose(inverse.largest, [30.0, 50.0])

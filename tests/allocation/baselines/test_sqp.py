@@ -11,7 +11,7 @@ from finlab.allocation.baselines.sqp import cheapest_program
 from finlab.arrays import Array
 from finlab.layout import Fin, Layout, Limits, load_layout
 from finlab.physics import Plant, plant_of
-from finlab.physics.objective import cost_meter, yardstick
+from finlab.physics.objective import cost_meter, wrench_scale_of
 
 
 def some_fins() -> Layout:
@@ -47,7 +47,7 @@ def program(plant: Plant, scale: Array) -> Any:
 def test_it_begins_at_its_start_and_ends_within_the_limits(
     plant: Plant, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    scale = yardstick(plant.layout)
+    scale = wrench_scale_of(plant.layout)
     start = plant.sample(np.random.default_rng(1), ())
     asked = Asked()
     monkeypatch.setattr(sqp, "minimize", asked)
@@ -66,7 +66,7 @@ def test_it_begins_at_its_start_and_ends_within_the_limits(
 def test_its_gradients_are_those_of_differences(
     plant: Plant, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    scale = yardstick(plant.layout)
+    scale = wrench_scale_of(plant.layout)
     rng = np.random.default_rng(2)
     start = plant.sample(rng, ())
     target = rng.normal(size=6)
@@ -95,7 +95,7 @@ def test_its_gradients_are_those_of_differences(
 @pytest.mark.parametrize("name", ["bluerov2_heavy", "A"])
 def test_a_linear_map_is_the_tangent_at_the_middle_of_the_limits(name: str) -> None:
     plant = plant_of(load_layout(name))
-    scale = 0.1 * yardstick(plant.layout)
+    scale = 0.1 * wrench_scale_of(plant.layout)
     linear = LinearMap(plant, scale)
     np.testing.assert_allclose(linear.reference, 0.5 * (plant.lower + plant.upper))
     np.testing.assert_allclose(linear.wrench, plant.wrench(linear.reference))

@@ -124,8 +124,8 @@ def test_a_bound_of_many_takes_the_better_of_its_own_multipliers_and_none(heavy:
     rng = np.random.default_rng(4)
     lam = 1e3 * rng.normal(size=(4, 6))
     answered = heavy.solve(MethodQuestion(wrench))
-    assert answered.prices is not None
-    lam[1] = answered.prices[1]
+    assert answered.multipliers is not None
+    lam[1] = answered.multipliers[1]
     bound = heavy._bound_by_laws(wrench, lam, NOMINAL)
     alone = power_bound(heavy.compiled, wrench, lam)
     assert bound.shape == (4,)

@@ -245,7 +245,7 @@ def test_steps_of_all_starts_together_bound_how_many_are_followed(
     steps = share * MAX_WORK / n
     coupled = _CountedIterations(steps)
     laws = SimpleNamespace(
-        force=np.ones((1, n, 2)), lam=np.zeros((1, 6)), command=np.zeros((1, n, 3))
+        force=np.ones((1, n, 2)), multipliers=np.zeros((1, 6)), command=np.zeros((1, n, 3))
     )
     method = SimpleNamespace(
         coupled=coupled,

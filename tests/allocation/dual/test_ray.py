@@ -41,7 +41,9 @@ class StandIn:
     def forces(self, targets: Array, *_: Any) -> Any:
         """An answer whose multipliers and bound say which target it is for."""
         return SimpleNamespace(
-            wrench_served=targets, lam=2.0 * targets, gap_power_bound=np.abs(targets).sum(axis=1)
+            wrench_served=targets,
+            multipliers=2.0 * targets,
+            gap_power_bound=np.abs(targets).sum(axis=1),
         )
 
     def exact(self, answer: Any, _: Any) -> Array:
@@ -73,7 +75,7 @@ def kept(
     targets = np.stack([0.1 * TARGET, TARGET])
     answer = SimpleNamespace(
         wrench_served=np.stack([targets[0], served]),
-        lam=np.ones((2, 6)),
+        multipliers=np.ones((2, 6)),
         gap_power_bound=np.array([3.0, 4.0]),
     )
     commands = np.stack([targets[0], served]).reshape(2, 2, 3)
@@ -84,7 +86,7 @@ def kept(
     )
     # The first one was within reach, and stays as it was.
     np.testing.assert_array_equal(commands[0].ravel(), targets[0])
-    np.testing.assert_array_equal(answer.lam[0], np.ones(6))
+    np.testing.assert_array_equal(answer.multipliers[0], np.ones(6))
     assert answer.gap_power_bound[0] == 3.0
     return answer, commands, notes
 
@@ -97,7 +99,7 @@ def test_the_largest_share_by_the_laws_is_found_below_that_of_the_core(reach: fl
     on_ray = share * TARGET
     np.testing.assert_allclose(answer.wrench_served[1], on_ray, rtol=1e-9)
     np.testing.assert_allclose(commands[1].ravel(), on_ray, rtol=1e-9)
-    np.testing.assert_allclose(answer.lam[1], 2.0 * on_ray, rtol=1e-9)
+    np.testing.assert_allclose(answer.multipliers[1], 2.0 * on_ray, rtol=1e-9)
     assert answer.gap_power_bound[1] == pytest.approx(np.abs(on_ray).sum())
     assert not notes
 
@@ -126,7 +128,7 @@ def test_what_is_off_the_ray_along_any_axis_is_brought_onto_it(axis: int, sign: 
 def test_in_a_tick_what_the_rates_leave_stays() -> None:
     method = StandIn(0.1)
     answer = SimpleNamespace(
-        wrench_served=0.6 * TARGET[None], lam=np.ones((1, 6)), gap_power_bound=np.ones(1)
+        wrench_served=0.6 * TARGET[None], multipliers=np.ones((1, 6)), gap_power_bound=np.ones(1)
     )
     commands = answer.wrench_served.reshape(1, 2, 3).copy()
     in_tick = NOMINAL._replace(command_previous=np.zeros((2, 3)))
@@ -141,7 +143,7 @@ def test_where_no_share_can_be_given_least_forces_cancel_or_it_is_told() -> None
     off = 0.6 * TARGET + SCALE
     answer, commands, notes = kept(StandIn(-1.0, nothing), off)
     np.testing.assert_array_equal(commands[1], nothing)
-    assert not answer.wrench_served[1].any() and not answer.lam[1].any() and not notes
+    assert not answer.wrench_served[1].any() and not answer.multipliers[1].any() and not notes
     assert answer.gap_power_bound[1] == 0.0
     answer, commands, notes = kept(StandIn(-1.0), off)
     np.testing.assert_array_equal(answer.wrench_served[1], off)
