@@ -284,7 +284,7 @@ def test_wrenches_and_derivatives_are_those_of_the_plant(restricted: bool, coupl
         works[1] = False
         counts[[2, 4]] = False
         problem = problem.restricted(works, counts)
-    command = draw(problem, 3, 4)
+    command = random_commands(problem, 3, 4)
     wrench, jacobian = problem.wrench_and_jacobian(command)
     np.testing.assert_allclose(wrench, problem.wrench(command), atol=1e-12)
     known = plant.wrench(np.where(works[:, None], command, np.nan)) / scale

@@ -10,7 +10,7 @@ from finlab.allocation.rates import Rates
 from finlab.arrays import Array
 from finlab.layout import Azimuth, Layout, Thruster, load_layout
 from finlab.physics import plant_of
-from tests.mixed_robots import load, random_robot
+from tests.random_robots import load, random_robot
 
 TURN = 2.0 * math.pi
 NAMES = ("penta", "restricted", "catamaran", "azimuths", "mixed")

@@ -10,10 +10,19 @@ import pytest
 from finlab.actuators.rudder import Rudder
 from finlab.allocation import Policy
 from finlab.arrays import Array
-from finlab.core.calls import _policy_record
+from finlab.core.calls import policy_record
 from finlab.core.fields import constant, struct
 from finlab.layout import Layout
-from tests.core.parts import ROBOTS, Robot, at, functions, in_the_core, question_of, robot_of
+from tests.core.internal_functions import (
+    ROBOTS,
+    Robot,
+    at,
+    functions,
+    in_the_core,
+    prepared_work,
+    question_of,
+    robot_of,
+)
 
 OK = constant("FL_OK")
 BAD_ARGUMENT = constant("FL_BAD_ARGUMENT")
@@ -26,7 +35,7 @@ def code_of(robot: Robot, wrench: Array, **asked: Any) -> int:
     question, _arrays = question_of(wrench, asked)
     answer = np.zeros(1, struct("fl_answer"))
     places = ctypes.c_void_p(question.ctypes.data), ctypes.c_void_p(answer.ctypes.data)
-    return int(functions().fl_answer_one(at(robot.block), robot.work(), *places))
+    return int(functions().fl_answer_one(at(robot.block), prepared_work(robot.block), *places))
 
 
 @pytest.mark.parametrize("name", ["thrusters", "azimuths", "fins"])
@@ -68,7 +77,7 @@ def test_each_number_of_a_question_is_looked_at(name: str) -> None:
 def test_a_policy_that_is_none_is_refused(kind: Any, field: str, values: dict[int, bool]) -> None:
     robot = robot_of("thrusters")
     for value, passes in values.items():
-        record = _policy_record(Policy(kind)).copy()
+        record = policy_record(Policy(kind)).copy()
         record[field] = value
         code = code_of(robot, np.zeros(6), policy=record.ctypes.data)
         assert code == (OK if passes else BAD_ARGUMENT)
@@ -78,7 +87,7 @@ def test_a_policy_that_is_none_is_refused(kind: Any, field: str, values: dict[in
 def test_a_weight_of_an_axis_is_at_most_one(axis: int) -> None:
     robot = robot_of("thrusters")
     for kind, passes in (("closest", False), ("direction", True)):
-        record = _policy_record(Policy(kind)).copy()  # type: ignore[arg-type]
+        record = policy_record(Policy(kind)).copy()  # type: ignore[arg-type]
         record["axis_weight"][0, axis] = 1.5
         code = code_of(robot, np.zeros(6), policy=record.ctypes.data)
         assert code == (OK if passes else BAD_ARGUMENT)
@@ -113,7 +122,7 @@ def dual_value(robot: Robot, wrench: Array) -> float:
     inner: Array = answer["lambda_reduced"].copy()
     value = functions().fl_dual_value(
         at(robot.block),
-        robot.work(),
+        prepared_work(robot.block),
         at(wrench - robot.head["wrench_offset"]),
         at(inner),
         at(force),
@@ -128,7 +137,7 @@ def test_an_answer_gives_the_wrench_that_it_says_it_serves(name: str) -> None:
     head = robot.head
     for share in (0.3, 4.0):
         for policy in ("closest", "direction", "priority"):
-            record = _policy_record(Policy(policy))  # type: ignore[arg-type]
+            record = policy_record(Policy(policy))  # type: ignore[arg-type]
             wrench = share * robot.plant.wrench(robot.plant.sample(rng, ()))
             answer = robot.answer(wrench, policy=record.ctypes.data)
             command = np.ascontiguousarray(answer["command"][: robot.n])
@@ -148,7 +157,7 @@ def test_settings_below_zero_are_refused_and_zero_is_taken(field: str) -> None:
     settings = np.zeros(1, struct("fl_settings"))
     functions().fl_usual_settings(ctypes.c_void_p(settings.ctypes.data))
     assert all(value > 0 for value in settings[0])
-    work = robot.work()
+    work = prepared_work(robot.block)
     for value, code in ((-1, BAD_ARGUMENT), (0, OK), (5, OK)):
         settings[field] = value
         place = ctypes.c_void_p(settings.ctypes.data)

@@ -9,7 +9,7 @@ import pytest
 
 from finlab.arrays import Array
 from finlab.core.fields import constant
-from tests.core.parts import (
+from tests.core.internal_functions import (
     EITHER_WAY,
     FIN,
     MOST,

@@ -7,13 +7,17 @@ import numpy as np
 import pytest
 
 from finlab.arrays import Array
-<<<<<<< HEAD
-from tests.core.internal_functions import EITHER_WAY, MOST, Robot, at, functions, robot_of
-=======
 from finlab.layout.load import parse_layout
-from tests.core.parts import EITHER_WAY, MOST, Robot, at, functions, in_the_core, robot_of
-from tests.mixed_robots import random_flow, random_robot
->>>>>>> c69eb91d (Tests of foils whose drag is welcome, and of steps on thrusters and foils)
+from tests.core.internal_functions import (
+    EITHER_WAY,
+    MOST,
+    Robot,
+    at,
+    functions,
+    in_the_core,
+    robot_of,
+)
+from tests.random_robots import random_flow, random_robot
 
 # Their commands have no dead bands, and none of their foils stalls.
 SMOOTH = ("azimuths", "fins", "fins any shaft", "fins uneven", "wide arcs", "holes")
@@ -92,12 +96,8 @@ def test_commands_at_their_limits_are_held_where_steps_would_leave(name: str) ->
             )
             error, command = refined(robot, wrench, np.minimum(lower + near * width, upper), 12)
             assert (command >= lower).all() and (command <= upper).all()
-<<<<<<< HEAD
             errors.append(error)
     assert np.median(errors) <= EXACT
-=======
-            left.append(error)
-    assert np.median(left) <= EXACT
 
 
 @pytest.mark.parametrize("number", range(3))
@@ -115,4 +115,3 @@ def test_of_thrusters_a_step_is_exact_and_of_foils_nearly(number: int) -> None:
             begun, _ = refined(robot, wrench, start, 0)
             left, _ = refined(robot, wrench, start, 1)
             assert left <= rest * begun
->>>>>>> c69eb91d (Tests of foils whose drag is welcome, and of steps on thrusters and foils)

@@ -21,6 +21,7 @@ from tests.core.internal_functions import (
     at,
     functions,
     in_the_core,
+    prepared_work,
     question_of,
     robot_of,
 )
@@ -203,7 +204,7 @@ def multipliers_at_begin(robot: Robot, previous: Array, lost: Array) -> Array | 
     question, _arrays = question_of(
         np.zeros(6), {"previous": previous, "calm": 2.0, "lost": lost.astype(np.uint8)}
     )
-    work = robot.work()
+    work = prepared_work(robot.block)
     place = ctypes.c_void_p(question.ctypes.data)
     assert functions().fl_prepare_question(at(robot.block), work, place)
     known = Work.from_buffer(work)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from finlab.arrays import Array
-from tests.core.parts import REAL, Robot, Set, Tangent, at, functions, robot_of
+from tests.core.internal_functions import REAL, Robot, Set, Tangent, at, functions, robot_of
 from tests.core.test_foil_power import stalling_robot
 
 STEP = 1e-6

@@ -8,7 +8,7 @@ import pytest
 from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq
 
-from tests.core.parts import REAL, GaugePoint, LineResponse, at, functions
+from tests.core.internal_functions import REAL, GaugePoint, LineResponse, at, functions
 
 CELLS = (1, 2, 7, 16)
 

@@ -13,10 +13,9 @@ from finlab.arrays import Array
 from finlab.core.fields import Record
 from finlab.layout import Layout, Thruster
 from finlab.layout.load import parse_layout
-from tests.core.parts import Robot, in_the_core, pods_either_way
-from tests.core.test_dual_newton import looked_at
+from tests.core.internal_functions import Robot, dual_function, in_the_core, pods_either_way
 from tests.core.test_set_gaps import has
-from tests.mixed_robots import random_robot
+from tests.random_robots import random_robot
 
 POINTS = 801
 """Values of the number that is free."""
@@ -184,7 +183,7 @@ def test_the_least_power_of_all_forces_is_found_and_proved(name: str) -> None:
             # What gaps are proved to need is no more than any forces take; that, or the dual at
             # the answer's multipliers, is nearly as much.
             gap_bound = float(answer["gap_power_bound"])
-            dual, _ = looked_at(robot, wrench, answer["lambda_reduced"].copy())
+            _, dual = dual_function(robot.block, wrench, answer["lambda_reduced"].copy())
             assert max(gap_bound, dual) <= own_power * (1.0 + 1e-6)
             assert max(gap_bound, dual) >= own_power * (1.0 - 2e-3)
         cases += 1
@@ -244,7 +243,7 @@ def test_of_five_thrusters_near_their_dead_bands_the_cheapest_choice_is_found(se
         assert own_power <= least * (1.0 + NEAR)
         assert not answer["is_truncated"]
         gap_bound = float(answer["gap_power_bound"])
-        dual, _ = looked_at(robot, wrench, answer["lambda_reduced"].copy())
+        _, dual = dual_function(robot.block, wrench, answer["lambda_reduced"].copy())
         assert max(gap_bound, dual) <= min(own_power, least) * (1.0 + NEAR)
         assert max(gap_bound, dual) >= own_power * (1.0 - 2e-3)
         searched += dual < own_power * (1.0 - 2e-3)

@@ -15,7 +15,7 @@ from finlab.core.calls import NOMINAL, Conditions
 from finlab.core.coupled_core import CoupledCore, OuterResult, WrenchOffset
 from finlab.layout import Layout, Thruster
 from finlab.layout.load import parse_layout
-from tests.mixed_robots import bluerov2_heavy, random_flow, random_robot
+from tests.random_robots import bluerov2_heavy, random_flow, random_robot
 
 SMOOTH = ("thrusters", "azimuths", "fins", "fins any shaft", "rudders", "mixed")
 """Robots whose answers are exact; what has gaps is left out."""

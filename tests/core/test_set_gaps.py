@@ -3,11 +3,13 @@ not, and the force in the gap is left out."""
 
 import ctypes
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from finlab.arrays import Array
+from finlab.layout import Layout
 from tests.core.internal_functions import (
     EITHER_WAY,
     Robot,
@@ -17,6 +19,7 @@ from tests.core.internal_functions import (
     functions,
     in_the_core,
     pods_either_way,
+    prepared_work,
     robot_of,
 )
 from tests.core.test_actuator_response import forces_of
@@ -255,7 +258,7 @@ def test_the_largest_force_is_that_of_all_actuators_along_their_rows(name: str) 
 
 def gap_of(robot: Robot, i: int, limits: Set, force: Array) -> float:
     """How far a force (2,) that comes of no multipliers is in a gap of a set."""
-    work = robot.work()
+    work = prepared_work(robot.block)
     Work.from_buffer(work).set[i] = limits
     gap = functions().fl_gap_of
     gap.restype = ctypes.c_double
@@ -336,3 +339,22 @@ def test_a_line_in_its_dead_band_is_in_a_gap_unless_it_is_fixed_there() -> None:
     assert gap_of(robot, banded, limits, -force) == 1.0
     limits.force_min = limits.force_max = force[0]
     assert gap_of(robot, banded, limits, force) == 0.0
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_band_is_left_on_the_side_on_which_the_force_is(sign: float) -> None:
+    """Of a pod that pushes either way: beyond the band ahead or in reverse, or all else."""
+    pods = pods_either_way(5).actuators
+    banded = tuple(replace(pod, dead_band=3.0) for pod in pods[:2])
+    robot = in_the_core(Layout("pods", banded))
+    for i in range(robot.n):
+        limits = robot.whole_set(i)
+        assert limits.force_max_reverse > 3.0
+        center = limits.sector_center
+        cut = sign * 1.5 * np.array([math.cos(center), math.sin(center)])
+        parts = [narrowed(robot, i, limits, cut, side) for side in (-1, 1)]
+        check_other_way(robot, i, limits, parts, cut)
+        other_way = -cut * (3.000001 / 1.5)
+        assert has(robot, i, parts[0], other_way) and not has(robot, i, parts[1], other_way)
+        for part in parts:
+            costs_hold(robot, i, part)

@@ -15,7 +15,7 @@ from finlab.layout import Azimuth, Fin, Layout, Limits, Thruster
 from finlab.layout.load import parse_layout
 from finlab.physics import plant_of
 from finlab.physics.objective import wrench_scale_of
-from tests.mixed_robots import random_flow, random_robot
+from tests.random_robots import random_flow, random_robot
 
 ROBOTS = ("thrusters", "azimuths", "fins", "fins uneven", "wide arcs", "rudders", "mixed")
 ORIGIN = (0.0, 0.0, 0.0)

@@ -16,7 +16,7 @@ from finlab.arrays import NEARLY, Array
 from finlab.core.calls import NOMINAL, Conditions
 from finlab.layout import Layout, Limits, load_layout
 from finlab.layout.load import parse_layout
-from tests.mixed_robots import random_robot
+from tests.random_robots import random_robot
 
 
 def dual_of(layout: Layout, **settings: float) -> Any:

@@ -13,7 +13,7 @@ from finlab.allocation.dual.ray import NONE_ALONE, _cancelling_command, keep_on_
 from finlab.arrays import NEARLY, Array
 from finlab.core.calls import NOMINAL
 from finlab.layout.load import parse_layout
-from tests.mixed_robots import random_robot
+from tests.random_robots import random_robot
 
 SCALE = np.array([10.0, 20.0, 5.0, 1.0, 2.0, 3.0])
 TARGET = np.array([30.0, -10.0, 20.0, 1.0, -0.5, 2.0])

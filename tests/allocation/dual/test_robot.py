@@ -117,7 +117,7 @@ def test_the_usual_price_is_that_of_a_cost_of_power_one_and_a_half_from_half_the
     """From the price p of half of the largest force: p sqrt(2), but at most the largest price."""
     model = PowerLaw(0.3, exponent=exponent)
     pod = Azimuth("pod", (0.3, 0, 0), (0, 0, 1), (1, 0, 0), (0.0, 40.0), model)
-    (response,) = AnyRobot().method(Layout("one", (pod,))).compiled.robot.responses
+    (response,) = AllocatorCache().method(Layout("one", (pod,))).compiled.robot.responses
     of_half = exponent * 0.3 * 20.0 ** (exponent - 1.0)
     of_all = exponent * 0.3 * 40.0 ** (exponent - 1.0)
     expected = min(math.sqrt(2.0) * of_half, of_all)
