@@ -107,3 +107,13 @@ static double last(const double *a, int n) {
     ):
         assert any(line in text for text in made), line
     assert not any("a + b" in text or "(x) + 1" in text or "sum[2]" in text for text in made)
+
+
+def test_the_sign_of_a_tolerance_is_known_by_what_follows_it() -> None:
+    source = "a = b * (1 - CLOSE);\nc = d - CLOSEST;\ne = f + 2 * NOTHING;\ng = h - 0.5;\n"
+    told = [fault.is_of_tolerance(source) for fault in c_faults("a.c", source)]
+    assert told == [True, False, True, False]
+    python = "a = b * (1.0 - 10.0 * NEARLY)\nc = d - e\n"
+    faults = sorted(PythonFile("a.py", python).faults())
+    of_python = [fault.is_of_tolerance(python) for fault in faults]
+    assert of_python == [True, False]

@@ -13,6 +13,12 @@ from pathlib import Path
 
 OPPOSITE = {"<": ">=", ">=": "<", ">": "<=", "<=": ">", "==": "!=", "!=": "=="}
 SIGNS = {"+": "-", "-": "+", "+=": "-=", "-=": "+="}
+TOLERANCE = re.compile(
+    r"\s*(?:\d+\.?\d* \* )?"
+    r"(?:NOTHING|NEARLY|CLOSE|FINE|ROUNDING|BARELY|TINY|CHEAPER|TABLE_ERROR|0\.0)\b"
+)
+"""What a sign may stand before that gives a tolerance: the fault then changes a limit by itself
+alone, and mostly no answer."""
 EXTREMES = {
     "MIN": "MAX",
     "MAX": "MIN",
@@ -38,6 +44,11 @@ class Fault:
     def applied(self, source: str) -> str:
         """The file's text with the fault."""
         return source[: self.start] + self.text + source[self.end :]
+
+    def is_of_tolerance(self, source: str) -> bool:
+        """Whether the fault turns round the sign of a tolerance and nothing else, by the look of
+        the text behind it."""
+        return self.kind == "sign" and bool(TOLERANCE.match(source, self.end))
 
     def shown(self, source: str) -> str:
         """File, line, kind and both versions of the line."""

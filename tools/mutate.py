@@ -270,6 +270,11 @@ def main() -> int:
         number: fault.shown((ROOT / fault.file).read_text("utf-8"))
         for number, fault in wanted.items()
     }
+    of_tolerance = {
+        number
+        for number, fault in wanted.items()
+        if fault.is_of_tolerance((ROOT / fault.file).read_text("utf-8"))
+    }
     if options.list:
         print(*(f"{number} {text}" for number, text in shown.items()), sep="\n")
         return 0
@@ -277,10 +282,10 @@ def main() -> int:
     for number, (_, found) in zip(
         wanted, judged(list(wanted.values()), options.jobs, options.seconds), strict=True
     ):
-        print(
-            f"{number} {shown[number]}\n    {'found by ' + found if found else 'MISSED'}",
-            flush=True,
-        )
+        verdict = f"found by {found}" if found else "MISSED"
+        if not found and number in of_tolerance:
+            verdict = "MISSED (the sign of a tolerance)"
+        print(f"{number} {shown[number]}\n    {verdict}", flush=True)
         if not found or found.startswith(NOTHING):
             missed.append(number)
     print(f"{len(wanted) - len(missed)} of {len(wanted)} faults were found; missed:", *missed)

@@ -2,6 +2,7 @@
 
 import math
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,9 +10,10 @@ import pytest
 from finlab import Azimuth, PowerLaw
 from finlab.allocation.levenberg_marquardt import RIDGE, CommandProblem, _smallest_change, refine
 from finlab.allocation.rates import Rates
+from finlab.interaction.jets import Jets
 from finlab.layout import Fin, FinModelSpec, Layout, Limits
 from finlab.physics import plant_of
-from finlab.research.random_layouts import random_layout
+from finlab.research.random_layouts import random_jet_robot, random_layout
 from tests.allocator_cache import AllocatorCache
 
 
@@ -263,3 +265,49 @@ def test_steps_solve_the_ridge_system_where_the_jacobian_is_singular(
     expected = np.linalg.lstsq(system, right, rcond=None)[0]
     step = _smallest_change(jacobian.T[None], residual[None, :, None], np.array([damping]))
     np.testing.assert_allclose(step[0, :, 0], expected, rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize("restricted", [False, True])
+@pytest.mark.parametrize("coupled", [False, True])
+def test_wrenches_and_derivatives_are_those_of_the_plant(restricted: bool, coupled: bool) -> None:
+    """With what jets take and without, of all actuators and axes or of some."""
+    rng = np.random.default_rng(3)
+    layout = replace(
+        random_jet_robot(rng, "robot", (4, 6)), interaction=Jets() if coupled else None
+    )
+    plant = plant_of(layout)
+    scale = rng.uniform(1.0, 10.0, 6)
+    problem = CommandProblem.of(plant, scale)
+    works = np.ones(layout.n, bool)
+    counts = np.ones(6, bool)
+    if restricted:
+        works[1] = False
+        counts[[2, 4]] = False
+        problem = problem.restricted(works, counts)
+    command = random_commands(problem, 3, 4)
+    wrench, jacobian = problem.wrench_and_jacobian(command)
+    np.testing.assert_allclose(wrench, problem.wrench(command), atol=1e-12)
+    known = plant.wrench(np.where(works[:, None], command, np.nan)) / scale
+    np.testing.assert_allclose(wrench, np.where(counts, known, 0.0), atol=1e-9)
+    for i in range(layout.n):
+        for k in range(3):
+            step = np.zeros(command.shape)
+            step[:, i, k] = 1e-6
+            ahead, back = problem.wrench(command + step), problem.wrench(command - step)
+            np.testing.assert_allclose(
+                jacobian[:, i, k], (ahead - back) / 2e-6, atol=1e-4 * np.abs(jacobian).max()
+            )
+
+
+def test_commands_that_all_angles_may_follow_are_at_no_limit() -> None:
+    pod = Azimuth("pod", (0.0, 0.0, 0.0), (0, 0, 1), (1, 0, 0), (0.0, 40.0), PowerLaw(1.0))
+    plant = plant_of(Layout("pod", (pod,)))
+    problem = CommandProblem.of(plant, np.ones(6))
+    low, high = problem.edges
+    assert low[0, 0] == -np.inf and high[0, 0] == np.inf
+    assert 0.0 < low[0, 1] < 1e-6 and 40.0 - 1e-6 < high[0, 1] < 40.0
+    np.testing.assert_array_equal(problem.width, [[2.0 * math.pi, 40.0, 0.0]])
+    rates = Rates(plant, np.array([[0.2, 5.0, 0.0]]))
+    in_tick = problem.in_tick(rates.box(np.array([[3.1, 10.0, 0.0]])))
+    low, high = in_tick.edges
+    np.testing.assert_allclose([low[0, :2], high[0, :2]], [[2.9, 5.0], [3.3, 15.0]], atol=1e-6)

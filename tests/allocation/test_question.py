@@ -164,3 +164,53 @@ def test_previous_commands_may_hold_nan_but_nothing_infinite() -> None:
         sentence = f"(3, 3) for layout 'robot', got shape {wrong.shape}; pass the `command`"
         with pytest.raises(CommandError, match=re.escape(sentence)):
             question.check_previous(wrong, ROBOT)
+
+
+@pytest.mark.parametrize("rows", [1, 16, 17, 40])
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf, 2e6, -2e6])
+def test_one_number_out_of_range_is_found_among_few_and_many(rows: int, bad: float) -> None:
+    rng = np.random.default_rng(rows)
+    wrenches = rng.uniform(-1e5, 1e5, (rows, 6))
+    np.testing.assert_array_equal(question.check_wrenches(wrenches), wrenches)
+    row, axis = int(rng.integers(rows)), int(rng.integers(6))
+    wrenches[row, axis] = bad
+    name = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")[axis]
+    with pytest.raises(
+        CommandError, match=f"wrench: {name} must be a number .* got {bad}"
+    ) as caught:
+        question.check_wrenches(wrenches)
+    assert (f'free=("{name}",)' in str(caught.value)) == (not math.isfinite(bad))
+
+
+def test_many_numbers_that_are_large_together_are_no_error() -> None:
+    """What bounds them all is above the limit, none of them is."""
+    wrenches = np.full((10, 6), 9e5)
+    np.testing.assert_array_equal(question.check_wrenches(wrenches), wrenches)
+    wrenches[3, 2] = -1e6
+    np.testing.assert_array_equal(question.check_wrenches(wrenches), wrenches)
+
+
+@pytest.mark.parametrize("axis", range(6))
+def test_a_flow_is_as_fast_as_it_may_be_at_most(axis: int) -> None:
+    flow = np.zeros(6)
+    assert question.check_flow(flow) is None
+    flow[axis] = -question.MAX_FLOW
+    np.testing.assert_array_equal(question.check_flow(flow), flow)
+    for bad in (1.001 * question.MAX_FLOW, math.nan, math.inf):
+        flow[axis] = bad
+        with pytest.raises(CommandError, match="flow: each component must be finite"):
+            question.check_flow(flow)
+
+
+@pytest.mark.parametrize("n", [3, 40])
+def test_of_a_previous_command_infinity_is_refused_and_nan_is_not(n: int) -> None:
+    fins = tuple(Fin(f"f{i}", (0.01 * i, 0.0, 0.0), 0.0) for i in range(n))
+    layout = Layout("many", fins)
+    command = np.ones((n, 3))
+    command[1] = np.nan
+    np.testing.assert_array_equal(question.check_previous(command, layout), command)
+    command[2, 1] = -math.inf
+    with pytest.raises(CommandError, match="previous: expected finite commands"):
+        question.check_previous(command, layout)
+    with pytest.raises(CommandError, match="previous: expected a command of shape"):
+        question.check_previous(np.ones((n - 1, 3)), layout)

@@ -36,7 +36,7 @@ POD = constant("FL_POD")
 """Form of a pod's command, FL_POD."""
 POINTS = 8
 """Most points of a mixture, FL_POINTS."""
-_LENGTHS = {"FL_MOST": MOST, "FL_POINTS": POINTS}
+_LENGTHS = {"FL_MOST": MOST, "FL_POINTS": POINTS, "FL_SCORES": 6, "FL_DEPTH": 16 + MOST}
 """Lengths of arrays in the headers that are macros."""
 _KINDS: dict[str, Any] = {
     "fl_real": REAL,
@@ -111,8 +111,19 @@ class Box(ctypes.Structure):
     _fields_ = _members("fl_work.h", "fl_box")
 
 
+_KINDS["fl_set"] = Set
+
+
+class Node(ctypes.Structure):
+    """A cut on the way to a part of sets with gaps: `fl_node`."""
+
+    _fields_ = _members("fl_work.h", "fl_node")
+
+
 _KINDS |= {
-    "fl_set": Set,
+    "fl_node": Node,
+    "fl_mixture": Mixture,
+    "fl_tangent": Tangent,
     "fl_span": Span,
     "fl_box": Box,
     "fl_state": State,
@@ -130,9 +141,9 @@ def _work_until(last: str) -> list[tuple[str, Any]]:
 
 
 class Work(ctypes.Structure):
-    """The work area up to what follows from all sets."""
+    """The work area up to the multipliers at which a tick begins."""
 
-    _fields_ = _work_until("has_turn_cost")
+    _fields_ = _work_until("has_lambda_begin")
 
 
 class Response(ctypes.Structure):

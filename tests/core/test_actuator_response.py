@@ -369,3 +369,42 @@ def force_of_price(table: Array, price: float) -> LineResponse:
     """Force, slope and conjugate of a table at a price."""
     response: LineResponse = functions().fl_force_of_price(at(table), ctypes.c_double(price))
     return response
+
+
+@pytest.mark.parametrize("number", range(3))
+def test_where_drag_is_welcome_a_foil_answers_with_its_chord(number: int) -> None:
+    """With the most drag that the hull of its curve has at a lift: that between the ends."""
+    rng = np.random.default_rng([8, number])
+    robot = robot_of("rudders", number)
+    foils = np.flatnonzero(robot.actuators["flow_speed"] > 0.0).tolist()
+    assert foils
+    for i in foils:
+        speed = float(robot.actuators[i]["flow_speed"])
+        for limits in sets_of(robot, i, rng):
+            low, high = limits.force_min, limits.force_max
+            lift = np.linspace(low, high, 201)
+            ends = robot.drag(i, low), robot.drag(i, high)
+            drag = np.interp(lift, (low, high), ends)
+            at_rest = robot.power(i, low) - speed * ends[0]
+            power = at_rest + speed * drag
+            for _ in range(6):
+                price = speed * np.array([rng.normal(), rng.uniform(1.5, 4.0)])
+                told = robot.response(i, limits, price)
+                value = float((price[0] * lift + price[1] * drag - power).max())
+                scale = np.abs(price).max() * max(np.abs(lift).max(), drag.max())
+                assert told.conjugate == pytest.approx(value, abs=0.02 * scale)
+                check_slopes_of_foil(robot, i, limits, price)
+            for _ in range(6):  # where drag is nearly paid for, it is softened
+                price = speed * np.array([rng.normal(), rng.uniform(0.7, 1.3)])
+                check_slopes_of_foil(robot, i, limits, price)
+
+
+def check_slopes_of_foil(robot: Robot, i: int, limits: Set, price: Array) -> None:
+    """Forces are the gradient of the conjugate, and slopes those of the forces."""
+    told = robot.response(i, limits, price)
+    gradient, slope = differences(robot, i, limits, price, 1e-5 * np.abs(price).max())
+    largest = float(np.abs(robot.actuators[i]["row_force_max"]).max())
+    np.testing.assert_allclose(told.force, gradient, atol=1e-4 * largest)
+    own = [[told.xx, told.xy], [told.xy, told.yy]]
+    rounding = 1e-6 * largest / np.abs(price).max()
+    np.testing.assert_allclose(own, slope, atol=1e-2 * np.abs(own).max() + rounding)

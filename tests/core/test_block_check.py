@@ -1,6 +1,8 @@
 """What `fl_check` of the core refuses: each number of a block that makes no sense, with its
 code."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -201,3 +203,121 @@ def test_a_grid_with_a_wrong_number_is_refused(name: str) -> None:
             block = robot.block.copy()
             block[grid + 3] = share * (last_axis[-1] - last_axis[0])
             assert code_of(block) == refused
+
+
+@pytest.mark.parametrize(("field", "count"), [("secant", 2), ("max_change", 3)])
+def test_each_of_several_numbers_is_looked_at(field: str, count: int) -> None:
+    for k in range(count):
+        block = robot_of("azimuths").block.copy()
+        actuators_of(block)[field][1, k] = -0.1
+        assert code_of(block) == "FL_BAD_NUMBER", k
+        actuators_of(block)[field][1, k] = 0.0
+        assert code_of(block) == "FL_OK", k
+
+
+TABLES = [
+    ("force_table", "thrusters", 0, 1, lambda cells: 3 + 3 * (cells + 1)),
+    ("force_table_reverse", "thrusters", 0, 1, lambda cells: 3 + 3 * (cells + 1)),
+    ("gauge_table", "fins uneven", FIN, 0, lambda points: 1 + 4 * points),
+    ("command_table", "fins", FIN, 0, lambda cells: 1 + 2 * (cells + 1)),
+    ("command_table", "rudders", FOIL, 0, lambda points: 1 + 2 * points),
+]
+"""Fields of offsets, a robot and a kind that have such a table, which of its numbers is the count,
+and how many numbers there are for a count."""
+
+
+@pytest.mark.parametrize("table", TABLES)
+def test_a_table_at_the_end_of_a_block_is_whole_or_refused(table: tuple[Any, ...]) -> None:
+    field, name, kind, count_index, length_of = table
+    robot = robot_of(name)
+    i = first_of(robot, kind)
+    offset = int(robot.actuators["force_table" if field.startswith("force") else field][i])
+    numbers = robot.block[offset : offset + length_of(int(robot.block[offset + count_index]))]
+
+    def with_table(table_numbers: Array) -> Array:
+        block = np.concatenate([robot.block, table_numbers])
+        head_of(block)["length"] = len(block)
+        actuators_of(block)[field][i] = len(robot.block)
+        return np.asarray(block)
+
+    assert code_of(with_table(numbers)) == "FL_OK"
+    assert code_of(with_table(numbers[:-1])) == "FL_BAD_BLOCK"
+    for count in (0.0, -1.0, 1.5, numbers[count_index] + 1.0, 65537.0):
+        spoiled = numbers.copy()
+        spoiled[count_index] = count
+        assert code_of(with_table(spoiled)) == "FL_BAD_BLOCK", count
+    if field.startswith("force"):
+        spoiled = numbers.copy()
+        spoiled[0] = 0.0
+        assert code_of(with_table(spoiled)) == "FL_BAD_NUMBER"
+
+
+@pytest.mark.parametrize("columns", [1, 2, 3])
+def test_a_grid_at_the_end_of_a_block_is_whole_or_refused(columns: int) -> None:
+    robot = robot_of("fins")
+    i = first_of(robot, FIN)
+    knots = [np.arange(count) + 0.5 for count in (2, 3, 4)]
+    header = [2.0, 3.0, 4.0, 10.0, 0.0, columns, 0.0]
+    values = np.zeros(24 * columns)
+    grid = np.concatenate([header, *knots, values])
+
+    def with_grid(numbers: Array) -> Array:
+        block = np.concatenate([robot.block, numbers])
+        head_of(block)["length"] = len(block)
+        actuators_of(block)["law_grid"][i] = len(robot.block)
+        return np.asarray(block)
+
+    assert code_of(with_grid(grid)) == "FL_OK"
+    assert code_of(with_grid(grid[:-1])) == "FL_BAD_BLOCK"
+    for count in range(1, 7):
+        assert code_of(with_grid(grid[:count])) == "FL_BAD_BLOCK"
+    for k in range(3):
+        longer = grid.copy()
+        longer[k] += 1.0
+        assert code_of(with_grid(longer)) == "FL_BAD_BLOCK"
+    # Every pair of neighbours on every axis ascends.
+    place = 7
+    for axis in knots:
+        for j in range(1, len(axis)):
+            level = grid.copy()
+            level[place + j] = level[place + j - 1]
+            assert code_of(with_grid(level)) == "FL_BAD_BLOCK"
+        place += len(axis)
+    for period, passes in ((2.9, False), (3.0, False), (3.1, True), (0.0, True)):
+        other = grid.copy()
+        other[3] = period
+        assert (code_of(with_grid(other)) == "FL_OK") == passes, period
+
+
+def test_a_fin_or_a_thruster_in_a_flow_is_no_foil() -> None:
+    """Drag has a price of its own on foils of two rows alone."""
+    robot = robot_of("rudders")
+    i = first_of(robot, FOIL)
+    assert robot.actuators["flow_speed"][i] > 0.0
+    block = robot.block.copy()
+    actuators_of(block)["rows"][i] = 1.0
+    assert code_of(block) == "FL_BAD_BLOCK"
+    actuators_of(block)["flow_speed"][i] = 0.0
+    assert code_of(block) == "FL_OK"
+    for name in ("azimuths", "fins"):
+        block = robot_of(name).block.copy()
+        assert actuators_of(block)["rows"][0] == 2.0
+        actuators_of(block)["flow_speed"][0] = 1.0
+        assert code_of(block) == "FL_BAD_BLOCK"
+
+
+def test_a_thruster_has_no_grid_and_numbers_that_are_just_allowed_pass() -> None:
+    robot = robot_of("thrusters")
+    block = robot.block.copy()
+    grid_of_fin = robot_of("fins")
+    assert grid_of_fin.actuators["law_grid"][0] > 0.0
+    own = actuators_of(block)
+    own["force_max"][0] = own["force_min"][0]
+    own["sector_half_angle"][0] = 0.0
+    own["dead_band"][0] = 0.0
+    own["command_max"][0] = own["command_min"][0]
+    assert code_of(block) == "FL_OK"
+    head_of(block)["rank"] = 0.0
+    assert code_of(block) == "FL_OK"
+    head_of(block)["wrench_offset"][5] = 1e30
+    assert code_of(block) == "FL_OK"

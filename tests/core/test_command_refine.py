@@ -7,7 +7,17 @@ import numpy as np
 import pytest
 
 from finlab.arrays import Array
-from tests.core.internal_functions import EITHER_WAY, MOST, Robot, at, functions, robot_of
+from finlab.layout.load import parse_layout
+from tests.core.internal_functions import (
+    EITHER_WAY,
+    MOST,
+    Robot,
+    at,
+    functions,
+    in_the_core,
+    robot_of,
+)
+from tests.random_robots import random_flow, random_robot
 
 # Their commands have no dead bands, and none of their foils stalls.
 SMOOTH = ("azimuths", "fins", "fins any shaft", "fins uneven", "wide arcs", "holes")
@@ -88,3 +98,20 @@ def test_commands_at_their_limits_are_held_where_steps_would_leave(name: str) ->
             assert (command >= lower).all() and (command <= upper).all()
             errors.append(error)
     assert np.median(errors) <= EXACT
+
+
+@pytest.mark.parametrize("number", range(3))
+def test_of_thrusters_a_step_is_exact_and_of_foils_nearly(number: int) -> None:
+    """Their forces are linear in the commands, but for the drag and the curve of lift of foils."""
+    for name, rest in (("thrusters", 1e-3), ("rudders", 0.05)):
+        layout = parse_layout(random_robot(name, number, 71))
+        robot = in_the_core(layout, random_flow(name, number, 71))
+        rng = np.random.default_rng([10, number])
+        width = robot.plant.width
+        for _ in range(6):
+            known = robot.plant.lower + (0.3 + 0.4 * rng.random(width.shape)) * width
+            start = known + 0.01 * rng.uniform(-1.0, 1.0, width.shape) * width
+            wrench = wrench_of(robot, known)
+            begun, _ = refined(robot, wrench, start, 0)
+            left, _ = refined(robot, wrench, start, 1)
+            assert left <= rest * begun

@@ -1,14 +1,30 @@
 """What may be given in a tick: the forces of commands that drives can reach, and what turning costs
 there."""
 
+import ctypes
 import math
 
 import numpy as np
 import pytest
 
+from finlab.actuators.thrust_model import PowerLaw
 from finlab.allocation.rates import Rates
 from finlab.arrays import Array
-from tests.core.internal_functions import FIN, POD, ROBOTS, Robot, Set, robot_of
+from finlab.layout import Azimuth, Layout, Thruster
+from tests.core.internal_functions import (
+    FIN,
+    POD,
+    ROBOTS,
+    Robot,
+    Set,
+    Work,
+    at,
+    functions,
+    in_the_core,
+    prepared_work,
+    question_of,
+    robot_of,
+)
 
 PERIOD_S = 0.1
 """Length of a tick [s]."""
@@ -180,3 +196,71 @@ def test_a_number_on_a_free_axis_changes_no_command(name: str) -> None:
             quiet_answer = robot.answer(wrench, free=free, **tick)
             loud_answer = robot.answer(loud, free=free, **tick)
             np.testing.assert_array_equal(loud_answer["command"], quiet_answer["command"])
+
+
+def multipliers_at_begin(robot: Robot, previous: Array, lost: Array) -> Array | None:
+    """Multipliers (6,) in the basis [W] at which a tick begins after a command (n, 3); None where
+    it tells none."""
+    question, _arrays = question_of(
+        np.zeros(6), {"previous": previous, "calm": 2.0, "lost": lost.astype(np.uint8)}
+    )
+    work = prepared_work(robot.block)
+    place = ctypes.c_void_p(question.ctypes.data)
+    assert functions().fl_prepare_question(at(robot.block), work, place)
+    known = Work.from_buffer(work)
+    return np.array(known.lambda_begin) if known.has_lambda_begin else None
+
+
+def turning_pods(number: int) -> Robot:
+    """Four pods that turn all round at a rate and push one way, and two thrusters."""
+    rng = np.random.default_rng([8, number])
+    law = PowerLaw(0.3)
+    pods = [
+        Azimuth(
+            f"p{k}",
+            tuple(rng.uniform(-0.5, 0.5, 3)),
+            (0.0, 0.6 * (-1.0) ** k, 0.8),
+            (1.0, 0.0, 0.0),
+            (0.0, 40.0),
+            law,
+            turn_rate=1.0,
+        )
+        for k in range(4)
+    ]
+    thrusters = [
+        Thruster(f"t{k}", tuple(rng.uniform(-0.5, 0.5, 3)), axis, (-40.0, 40.0), law)
+        for k, axis in enumerate(((0.0, 0.0, 1.0), (0.0, 1.0, 0.0)))
+    ]
+    return in_the_core(Layout("pods", (*pods, *thrusters)))
+
+
+def test_a_tick_begins_at_the_multipliers_of_the_answer_before() -> None:
+    """Of actuators within their limits the command says the price: together they say the
+    multipliers."""
+    judged = 0
+    for number in range(4):
+        robot = turning_pods(number)
+        rng = np.random.default_rng([6, number])
+        nothing_lost = np.zeros(robot.n, bool)
+        for command in robot.plant.sample(rng, (2,)):
+            answer = robot.answer(0.3 * robot.plant.wrench(command))
+            size = np.hypot(*answer["force"][: robot.n].T)
+            if (size > 38.0).any():
+                continue
+            previous = np.ascontiguousarray(answer["command"][: robot.n])
+            begin = multipliers_at_begin(robot, previous, nothing_lost)
+            known: Array = answer["lambda_reduced"]
+            assert begin is not None
+            np.testing.assert_allclose(begin, known, atol=0.01 * np.abs(known).max())
+            judged += 1
+    assert judged >= 4
+
+
+def test_a_robot_at_rest_or_unknown_says_no_multipliers() -> None:
+    robot = turning_pods(0)
+    nothing_lost = np.zeros(robot.n, bool)
+    assert multipliers_at_begin(robot, np.zeros((robot.n, 3)), nothing_lost) is None
+    assert multipliers_at_begin(robot, np.full((robot.n, 3), np.nan), nothing_lost) is None
+    previous = robot.plant.sample(np.random.default_rng(7), ())
+    assert multipliers_at_begin(robot, previous, nothing_lost) is not None
+    assert multipliers_at_begin(robot, previous, ~nothing_lost) is None

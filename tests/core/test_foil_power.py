@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
+from finlab.actuators.rudder import Rudder
+from finlab.actuators.thrust_model import PowerLaw
 from finlab.arrays import Array
+from finlab.layout import Azimuth, Layout, Thruster
 from finlab.layout.load import parse_layout
 from tests.core.internal_functions import Robot, in_the_core
 from tests.random_robots import random_flow, random_robot
@@ -85,3 +88,45 @@ def test_robots_with_stalled_foils_take_no_more_than_slsqp_finds(number: int) ->
     least = least_power(robot, wrench, starts)
     assert np.isfinite(least)
     assert robot.plant.power(found).sum() <= least * (1.0 + SLACK)
+
+
+@cache
+def pods_and_rudders(number: int) -> Robot:
+    """Pods that turn all round, a thruster with a dead band, and rudders that stall, in a flow."""
+    rng = np.random.default_rng([9, number])
+
+    def place() -> tuple[float, float, float]:
+        x, y, z = rng.uniform(-0.6, 0.6, 3).tolist()
+        return x, y, z
+
+    law = PowerLaw(0.3)
+    pods = [
+        Azimuth(f"p{k}", place(), (0.0, 0.6 * (-1.0) ** k, 0.8), (1.0, 0.0, 0.0), (0.0, 30.0), law)
+        for k in range(2)
+    ]
+    heave = Thruster("t", place(), (0.0, 0.0, 1.0), (-30.0, 30.0), law, dead_band=3.0)
+    axes = ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (0.0, 0.8, 0.6))
+    rudders = [
+        Rudder(f"r{k}", place(), axis, (1.0, 0.0, 0.0), 0.04, (-0.9, 0.7), 3.0)
+        for k, axis in enumerate(axes)
+    ]
+    flow = np.array([1.5, 0.2, -0.1, 0.0, 0.0, 0.0])
+    return in_the_core(Layout("both", (*pods, heave, *rudders)), flow)
+
+
+@pytest.mark.parametrize("number", range(4))
+def test_robots_of_foils_and_pods_take_no_more_than_slsqp_finds(number: int) -> None:
+    robot = pods_and_rudders(number)
+    rng = np.random.default_rng([6, number])
+    for _ in range(2):
+        command = robot.plant.sample(rng, (1,))[0]
+        command[2, 0] = np.copysign(3.0 + abs(command[2, 0]) * 0.5, command[2, 0])
+        wrench = robot.plant.wrench(command)
+        answer = robot.answer(wrench)
+        found = np.ascontiguousarray(answer["command"][: robot.n])
+        given = robot.plant.wrench(found)
+        assert np.linalg.norm((given - wrench) / robot.head["wrench_scale"]) <= 3e-5
+        starts = [found, command, *robot.plant.sample(rng, (3,))]
+        known = float(robot.plant.power(command).sum())
+        least = min(known, least_power(robot, wrench, starts))
+        assert robot.plant.power(found).sum() <= least * (1.0 + SLACK)

@@ -3,19 +3,23 @@ not, and the force in the gap is left out."""
 
 import ctypes
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from finlab.arrays import Array
+from finlab.layout import Layout
 from tests.core.internal_functions import (
     EITHER_WAY,
     Robot,
     Set,
+    Work,
     at,
     functions,
     in_the_core,
     pods_either_way,
+    prepared_work,
     robot_of,
 )
 from tests.core.test_actuator_response import forces_of
@@ -24,9 +28,9 @@ SLACK = 1e-6
 """Share of the largest force by which ends of sets may differ."""
 
 
-def has(robot: Robot, i: int, limits: Set, force: Array) -> bool:
-    """Whether a set has a force (2,) by its definition: sizes in an arc, some in reverse, none in a
-    band."""
+def has(robot: Robot, i: int, limits: Set, force: Array, arc_slack: float = 1e-6) -> bool:
+    """Whether a set has a force (2,) by its definition: sizes in an arc, to some rounding [rad],
+    some in reverse, none in a band."""
     actuator = robot.actuators[i]
     slack = SLACK * float(actuator["row_force_max"][0])
     if not robot.is_plane(i):
@@ -45,7 +49,7 @@ def has(robot: Robot, i: int, limits: Set, force: Array) -> bool:
         if (
             high > 0.0
             and low - slack <= radius <= high + slack
-            and abs(angle_error) <= limits.sector_half_angle + 1e-6
+            and abs(angle_error) <= limits.sector_half_angle + arc_slack
         ):
             return True
     return False
@@ -250,3 +254,107 @@ def test_the_largest_force_is_that_of_all_actuators_along_their_rows(name: str) 
         force = rng.normal(size=(robot.n, 2))
         size = np.where(planes, np.hypot(*force.T), np.abs(force[:, 0]))
         assert largest(at(robot.block), at(force)) == pytest.approx(size.max())
+
+
+def gap_of(robot: Robot, i: int, limits: Set, force: Array) -> float:
+    """How far a force (2,) that comes of no multipliers is in a gap of a set."""
+    work = prepared_work(robot.block)
+    Work.from_buffer(work).set[i] = limits
+    gap = functions().fl_gap_of
+    gap.restype = ctypes.c_double
+    largest = ctypes.c_double(float(robot.actuators[i]["row_force_max"][0]))
+    return float(gap(at(robot.block), work, i, at(force), largest, None))
+
+
+@pytest.mark.parametrize("name", ["thrusters", "wide arcs", "holes", "all", EITHER_WAY])
+def test_forces_in_a_gap_are_those_of_the_hull_that_the_set_has_not(name: str) -> None:
+    rng = np.random.default_rng(5)
+    judged = {True: 0, False: 0}
+    for number in range(2):
+        robot = robot_of(name, number)
+        for i in range(robot.n):
+            own = robot.actuators[i]
+            if own["flow_speed"] > 0.0:
+                continue
+            most = float(own["row_force_max"][0])
+            limits = robot.whole_set(i)
+            force, _ = forces_of(robot, i, limits)
+            tried = [*cuts_of(robot, i, limits, rng), *force[rng.integers(len(force), size=12)]]
+            for one in tried:
+                if not robot.is_plane(i) and limits.force_min == limits.force_max:
+                    continue
+                held = in_a_band(robot, i, one)
+                inside = has(robot, i, limits, one)
+                size = math.hypot(*one)
+                if (
+                    0.0 < limits.force_min <= 1e-3 * most
+                    or abs(size - limits.force_min) < 1e-3 * most
+                ):
+                    continue  # a least force this small is no hole
+                if own["gauge_table"] > 0.0 and size < 1.2 * limits.force_min:
+                    continue
+                is_in_gap = held or not inside
+                off = math.remainder(math.atan2(one[1], one[0]) - limits.sector_center, 2 * math.pi)
+                near_end = abs(abs(off) - limits.sector_half_angle) < 1e-2
+                if robot.is_plane(i) and (near_end or limits.sector_half_angle <= 0.2):
+                    continue  # of a narrow arc the chord counts as the arc
+                assert (gap_of(robot, i, limits, np.ascontiguousarray(one)) > 0.0) == is_in_gap
+                judged[is_in_gap] += 1
+    assert judged[False] > 10
+    assert judged[True] > 3 or name in ("wide arcs", "all")
+
+
+def test_a_foil_is_cut_at_a_lift_and_lies_on_the_nearer_half() -> None:
+    rng = np.random.default_rng(8)
+    robot = robot_of("rudders")
+    foils = np.flatnonzero(robot.actuators["flow_speed"] > 0.0).tolist()
+    for i in foils:
+        limits = robot.whole_set(i)
+        middle = 0.5 * (limits.force_min + limits.force_max)
+        for share in rng.uniform(0.05, 0.95, 8):
+            lift = limits.force_min + share * (limits.force_max - limits.force_min)
+            drag = float(robot.actuators[i]["row_force_max"][1])
+            cut = np.array([lift, drag])
+            below, above = (narrowed(robot, i, limits, cut, side) for side in (-1, 1))
+            assert (below.force_min, below.force_max) == (limits.force_min, lift)
+            assert (above.force_min, above.force_max) == (lift, limits.force_max)
+            for part in (below, above):
+                costs_hold(robot, i, part)
+            side = functions().fl_nearer_side(at(robot.block), i, ctypes.byref(limits), at(cut))
+            assert side == (1 if lift >= middle else -1)
+            # Drag above that of the lift is a gap.
+            own_drag = robot.drag(i, lift)
+            on_curve = np.array([lift, own_drag])
+            assert gap_of(robot, i, limits, on_curve) == 0.0
+            beyond = np.array([lift, own_drag + 0.01 * drag])
+            assert gap_of(robot, i, limits, beyond) == pytest.approx(0.01)
+
+
+def test_a_line_in_its_dead_band_is_in_a_gap_unless_it_is_fixed_there() -> None:
+    robot = robot_of("thrusters")
+    (banded, *_) = np.flatnonzero(robot.actuators["dead_band"] > 0.0).tolist()
+    limits = robot.whole_set(banded)
+    force = np.array([0.5 * robot.actuators[banded]["dead_band"], 0.0])
+    assert gap_of(robot, banded, limits, force) == 1.0
+    assert gap_of(robot, banded, limits, -force) == 1.0
+    limits.force_min = limits.force_max = force[0]
+    assert gap_of(robot, banded, limits, force) == 0.0
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_band_is_left_on_the_side_on_which_the_force_is(sign: float) -> None:
+    """Of a pod that pushes either way: beyond the band ahead or in reverse, or all else."""
+    pods = pods_either_way(5).actuators
+    banded = tuple(replace(pod, dead_band=3.0) for pod in pods[:2])
+    robot = in_the_core(Layout("pods", banded))
+    for i in range(robot.n):
+        limits = robot.whole_set(i)
+        assert limits.force_max_reverse > 3.0
+        center = limits.sector_center
+        cut = sign * 1.5 * np.array([math.cos(center), math.sin(center)])
+        parts = [narrowed(robot, i, limits, cut, side) for side in (-1, 1)]
+        check_other_way(robot, i, limits, parts, cut)
+        other_way = -cut * (3.000001 / 1.5)
+        assert has(robot, i, parts[0], other_way) and not has(robot, i, parts[1], other_way)
+        for part in parts:
+            costs_hold(robot, i, part)

@@ -152,3 +152,104 @@ def test_they_take_thrusters_alone_and_no_policy(method: str) -> None:
         Allocator(load_layout("turtle_hybrid"), method)
     with pytest.raises(AllocationError, match=f"method '{method}' minimizes the plain error"):
         Allocator(HEAVY, method).allocate(np.zeros(6), policy="priority")
+
+
+def test_a_setpoint_of_px4_turns_and_pushes_in_its_frame() -> None:
+    """Of x forward, y right, z down: roll, pitch and yaw, then surge, sway and heave."""
+    method = px4(HEAVY)
+    wrench_of_setpoint = method.plant.effectiveness[:, 0].T * method._largest @ method.mix
+    from_own_frame = np.kron(np.eye(2), np.diag([1.0, -1.0, -1.0]))
+    given = (from_own_frame @ wrench_of_setpoint)[[3, 4, 5, 0, 1, 2]]
+    assert (np.diag(given) > 0.0).all()
+    # A setpoint of 1 asks for the unit of its axis.
+    along_axis = np.abs(np.diag(wrench_of_setpoint[[3, 4, 5, 0, 1, 2]]))
+    np.testing.assert_allclose(along_axis, method.setpoint_unit[[3, 4, 5, 0, 1, 2]], rtol=2e-3)
+
+
+def test_px4_takes_the_stronger_way_of_each_thruster_for_its_full_strength() -> None:
+    ends = [(-50.0, 20.0), (-20.0, 50.0), (-30.0, 30.0), (0.0, 40.0)] * 2
+    uneven = [replace(part, force=force) for part, force in zip(HEAVY.actuators, ends, strict=True)]
+    method = px4(replace(HEAVY, actuators=tuple(uneven)))
+    np.testing.assert_allclose(method._largest, np.abs(ends).max(axis=1))
+    np.testing.assert_allclose(method._low * method._largest, np.array(ends)[:, 0])
+    np.testing.assert_allclose(method._high * method._largest, np.array(ends)[:, 1])
+
+
+def test_yaw_may_exceed_the_range_of_px4_by_its_margin() -> None:
+    method = px4(HEAVY)
+    column = method.mix[:, 2]
+    forward = int(np.flatnonzero(column > 0.5)[0])
+    edge = method._high[forward] + 0.15 * (method._high - method._low)[forward]
+    for beyond, moves in ((-0.01, False), (0.01, True)):
+        u = np.zeros((1, 8))
+        u[0, forward] = edge + beyond
+        moved = method._desaturated(u, 2, margin=0.15)
+        assert bool((moved != u).any()) == moves
+    # What is beyond on the other side has no margin.
+    u = np.zeros((1, 8))
+    u[0, forward] = method._low[forward] - 0.01
+    assert (method._desaturated(u, 2, margin=0.15) != u).any()
+
+
+def test_a_half_step_back_leaves_both_excesses_of_px4_alike() -> None:
+    """The whole step brings one end within and takes the other one out as far; half of that is
+    taken back."""
+    method = px4(HEAVY)
+    heave = method.mix[:, 5]
+    first, second = np.flatnonzero(np.abs(heave) >= 0.2)[:2]
+    assert heave[first] == pytest.approx(heave[second])
+    u = np.zeros((1, 8))
+    u[0, first] = method._high[first] + 0.4
+    u[0, second] = method._low[second]
+    moved = method._desaturated(u, 5)[0]
+    assert moved[first] - method._high[first] == pytest.approx(0.2)
+    assert method._low[second] - moved[second] == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize("group", [(0, 1, 3), (2, 4, 5)])
+def test_each_group_of_ardusub_is_scaled_down_until_all_its_thrusters_fit(
+    group: tuple[int, ...],
+) -> None:
+    """By the one that exceeds its own limits most, on the side on which it pushes."""
+    ends = [(-20.0, 50.0), (-50.0, 20.0), (-30.0, 45.0), (-45.0, 30.0)] * 2
+    uneven = [replace(part, force=force) for part, force in zip(HEAVY.actuators, ends, strict=True)]
+    layout = replace(HEAVY, actuators=tuple(uneven))
+    low, high = np.array(ends).T
+    allocator = Allocator(layout, "ardusub")
+    wrench_axis = [3, 4, 5, 2, 0, 1]  # of roll, pitch, yaw, throttle, forward, lateral
+    rng = np.random.default_rng(6)
+    for _ in range(8):
+        target = np.zeros(6)
+        target[[wrench_axis[column] for column in group]] = rng.normal(size=3)
+        force = 1e3 * forces(layout, "ardusub", 1e-3 * target)
+        share = np.where(force > 0.0, high, low) / np.where(np.abs(force) > 1e-9, force, np.nan)
+        fits = float(np.nanmin(share))
+        np.testing.assert_allclose(
+            allocator.allocate(3.0 * fits * target).command[:, 0], fits * force, atol=1e-6
+        )
+        np.testing.assert_allclose(
+            allocator.allocate(0.9 * fits * target).command[:, 0], 0.9 * fits * force, atol=1e-6
+        )
+
+
+def test_a_setpoint_of_ardusub_asks_for_the_mean_of_both_ways_of_all_thrusters() -> None:
+    method = ArduSub(HEAVY, ArduSub.settings_class(), wrench_scale_of(HEAVY))
+    full = np.mean([0.5 * (part.force[1] - part.force[0]) for part in HEAVY.actuators])
+    wrench_of_column = method.plant.effectiveness[:, 0].T @ (full * method.factors)
+    for column, axis in enumerate([3, 4, 5, 2, 0, 1]):
+        along_axis = SIGNS[column] * wrench_of_column[axis, column]
+        assert method.setpoint_unit[axis] == pytest.approx(along_axis)
+
+
+def test_an_axis_of_little_force_or_torque_counts_beside_its_own_kind_alone() -> None:
+    """Torques are small numbers beside forces, and still are served."""
+    factors = FRAMES["VECTORED_6DOF"]
+    lever = np.array([0.05, 0.04, 0.06, 1.0, 0.9, 0.9])
+    np.testing.assert_array_equal(frame_factors(factors * lever), factors)
+    # Where one axis is hardly served beside its kind, the frame is not meant: geometry suggests.
+    uneven = lever * np.linspace(0.8, 1.0, len(factors))[:, None]
+    np.testing.assert_array_equal(frame_factors(factors * uneven), factors)
+    for weak in range(6):
+        traces = factors * uneven * np.where(np.arange(6) == weak, 0.05, 1.0)
+        strongest = np.abs(traces).max(axis=0)
+        np.testing.assert_allclose(frame_factors(traces), traces / strongest)

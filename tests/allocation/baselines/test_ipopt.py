@@ -250,3 +250,31 @@ def test_power_is_measured_by_that_of_all_actuators_at_full_load(kind: str) -> N
     program = AllocatorCache("ipopt").method(layout).at(flow)._program
     most = AllocatorCache().method(layout).at(flow).compiled.largest_power
     assert sum(part.full_power for part in program._actuators) == pytest.approx(most, rel=0.02)
+
+
+@pytest.mark.parametrize("case", PLANES)
+def test_power_and_conditions_of_a_plane_have_slopes_at_rest(
+    case: tuple[float, float, float, bool],
+) -> None:
+    """IPOPT may begin there: it needs finite values and derivatives."""
+    plane = plane_of(*case)
+    share = casadi.MX.sym("share", 2)
+    part = _PlaneProgram(casadi, plane, share)
+    values = casadi.vertcat(part.power, *(value for value, _, _ in part.constraints))
+    told = casadi.Function("told", [share], [values, casadi.jacobian(values, share)])
+    for at_rest in ([0.0, 0.0], [1e-5, -1e-5]):
+        for each in told(at_rest):
+            assert np.isfinite(np.array(each)).all()
+
+
+def test_a_program_takes_its_own_shares_of_each_actuator() -> None:
+    """The answer to the wrench of known forces is these forces, where no others give it."""
+    layout = load_layout("bluerov2_heavy")
+    six = replace(layout, actuators=(*layout.actuators[:3], *layout.actuators[4:7]))
+    plant = plant_of(six)
+    rng = np.random.default_rng(4)
+    assert np.linalg.matrix_rank(plant.effectiveness[:, 0], tol=1e-6) == 6
+    force = rng.uniform(-15.0, 15.0, 6)
+    command = np.stack([force, np.zeros(6), np.zeros(6)], axis=1)
+    answer = Allocator(six, "ipopt").allocate(plant.wrench(command))
+    np.testing.assert_allclose(answer.command[:, 0], force, atol=1e-3)

@@ -2,12 +2,17 @@
 it."""
 
 import math
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
 from finlab import Allocator, Azimuth, Layout, PowerLaw, load_layout
+from finlab.allocation.dual.ahead import conditions_ahead
+from finlab.allocation.dual.compiled import Compiled
 from finlab.arrays import Array
+from finlab.core.calls import Conditions
 
 PERIOD_S = 0.1
 """Length of a tick [s]."""
@@ -122,3 +127,54 @@ def test_lost_pods_and_free_axes_keep_out_of_it() -> None:
         wrench, previous=before, reference=known, lost=["left"], free=("Fy",)
     )
     assert np.isnan(answer.command[0]).all() and np.isfinite(answer.command[1:]).all()
+
+
+class CompiledStandIn:
+    """Stands for a compiled robot whose answer to any later wrench is known."""
+
+    def __init__(self, angles: list[float]) -> None:
+        """Takes the angles [rad] of that answer."""
+        self.angles = angles
+        self.asked: list[tuple[Array, int]] = []
+
+    def forces(self, targets: Array, _: Any, __: Any, conditions: Conditions) -> Any:
+        """The answer."""
+        self.asked.append((targets, conditions.ticks))
+        return SimpleNamespace(command=np.array([[[angle, 1.0, 0.0] for angle in self.angles]]))
+
+
+def test_half_of_a_turn_but_for_its_small_part_is_wanted_now() -> None:
+    """In five ticks at 1 rad/s a pod turns by 0.5 rad, of which 0.05 is too little to turn for."""
+    before = np.zeros((6, 3))
+    before[:, 0] = [0.0, 0.0, 0.0, 3.0, -3.0, 0.0]
+    compiled = CompiledStandIn([0.25, -0.45, 0.04, -3.0, 3.0, 0.3])
+    turn_rates = np.array([1.0, 1.0, 1.0, 1.0, 1.0, math.nan])
+    reference = np.arange(4.0)[:, None] * np.ones(6)
+    asked = Conditions(command_previous=before, calm=2.0)
+    told = conditions_ahead(cast("Compiled", compiled), turn_rates, PERIOD_S, reference, asked)
+    over_seam = 2.0 * math.pi - 6.0
+    expected = [
+        0.5 * (0.25 - 0.05),
+        -0.5 * (0.45 - 0.05),
+        0.0,
+        3.0 + 0.5 * (over_seam - 0.05),
+        -3.0 - 0.5 * (over_seam - 0.05),
+        math.nan,
+    ]
+    assert told.angles_wanted is not None
+    np.testing.assert_allclose(told.angles_wanted, expected, atol=1e-12)
+    assert told.calm == 20.0 and told.ticks == asked.ticks
+    ((wrench, ticks),) = compiled.asked
+    np.testing.assert_array_equal(wrench, [reference[3]])
+    assert ticks == 5
+
+
+@pytest.mark.parametrize(("known", "last"), [(1, 0), (8, 7), (30, 7)])
+def test_no_more_than_eight_ticks_are_looked_ahead(known: int, last: int) -> None:
+    compiled = CompiledStandIn([0.3])
+    reference = np.arange(float(known))[:, None] * np.ones(6)
+    asked = Conditions(command_previous=np.zeros((1, 3)), calm=2.0)
+    conditions_ahead(cast("Compiled", compiled), np.ones(1), PERIOD_S, reference, asked)
+    ((wrench, ticks),) = compiled.asked
+    np.testing.assert_array_equal(wrench, [reference[last]])
+    assert ticks == last + 2

@@ -108,3 +108,19 @@ def test_axes_that_come_together_only_are_told_where_they_are_asked_for_apart() 
     apart = allocator.allocate([10.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     assert together.reachable and not any("apart" in note for note in together.notes)
     assert any("Fx" in note and "Tz" in note and "apart" in note for note in apart.notes)
+
+
+@pytest.mark.parametrize("exponent", [1.5, 2.0])
+def test_the_usual_price_is_that_of_a_cost_of_power_one_and_a_half_from_half_the_force(
+    exponent: float,
+) -> None:
+    """From the price p of half of the largest force: p sqrt(2), but at most the largest price."""
+    model = PowerLaw(0.3, exponent=exponent)
+    pod = Azimuth("pod", (0.3, 0, 0), (0, 0, 1), (1, 0, 0), (0.0, 40.0), model)
+    (response,) = AllocatorCache().method(Layout("one", (pod,))).compiled.responses
+    of_half = exponent * 0.3 * 20.0 ** (exponent - 1.0)
+    of_all = exponent * 0.3 * 40.0 ** (exponent - 1.0)
+    expected = min(math.sqrt(2.0) * of_half, of_all)
+    assert _usual_price(response) == pytest.approx(expected, rel=0.02)
+    if exponent > 1.5:
+        assert expected < 0.8 * of_all

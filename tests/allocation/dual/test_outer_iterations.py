@@ -13,9 +13,11 @@ from finlab.allocation import Allocator
 from finlab.allocation.dual.compiled import Compiled, core_policy
 from finlab.allocation.dual.outer_iterations import (
     JET_ROTATION,
+    MAX_WORK,
     RANDOM_STARTS,
     WALSH,
     _best_of_starts,
+    _is_better,
     _rotated_starts,
 )
 from finlab.allocation.levenberg_marquardt import CommandProblem
@@ -40,8 +42,10 @@ def test_other_starts_rotate_planes_and_change_sizes() -> None:
     lines = np.array([False, True, False, False, True, False])
     force = rng.normal(size=(6, 2))
     force[lines, 1] = 0.0
-    starts = _rotated_starts(force, lines).all()
+    parts = _rotated_starts(force, lines)
+    starts = parts.all()
     patterns = len(WALSH) + 1
+    assert [len(part) for part in parts] == [len(WALSH), 1, RANDOM_STARTS]
     assert starts.shape == (patterns + RANDOM_STARTS, 6, 2)
 
     complex_force = force[:, 0] + 1j * force[:, 1]
@@ -205,3 +209,74 @@ def test_starts_that_make_nothing_cheaper_are_reversed_in_one_round_alone() -> N
     )
     rotated = len(WALSH) + 1 + RANDOM_STARTS
     assert coupled.starts_without_iteration == n + rotated
+
+
+@pytest.mark.parametrize(
+    ("error", "power", "is_better"),
+    [
+        (0.0, 9.0, True),  # as near at less power
+        (0.0, 11.0, False),
+        (2e-3, 9.0, False),  # cheaper, but off
+        (0.5e-6, 9.0, True),
+        (-0.5e-6, 11.0, False),
+        (-2e-3, 11.0, True),  # dearer, but nearer
+    ],
+)
+def test_the_better_of_two_is_nearer_or_as_near_and_cheaper(
+    error: float, power: float, is_better: bool
+) -> None:
+    """By more than a millionth of the wrench scale."""
+    known = OuterResult(None, np.zeros((1, 2)), power=10.0, penalty=1.0, error=0.01, steps=1.0)
+    other = known._replace(error=0.01 + error, power=power)
+    assert _is_better(other, known) == is_better
+
+
+class _CountedIterations(_ConstantIterations):
+    """The same, each with so many steps, where reversed starts are cheaper and cheaper."""
+
+    def __init__(self, steps: float) -> None:
+        super().__init__()
+        self.steps = steps
+        self.power = 2.0
+        self.followed = 0
+        self.allowed: list[float] = []
+
+    def iterate(
+        self, target: Array, force: Array, most_iterations: int, *_: Any, **more: Any
+    ) -> OuterResult:
+        if most_iterations == 0:
+            return OuterResult(None, force, power=self.power, penalty=1.0, error=0.0, steps=5.0)
+        self.followed += 1
+        self.allowed.append(more["most_steps"])
+        self.power *= 0.9
+        return OuterResult(None, force, self.power, penalty=1.0, error=0.0, steps=self.steps)
+
+
+@pytest.mark.parametrize(("share", "followed"), [(0.3, 4), (0.6, 2), (1.5, 1)])
+def test_steps_of_all_starts_together_bound_how_many_are_followed(
+    share: float, followed: int
+) -> None:
+    n = 4
+    steps = share * MAX_WORK / n
+    coupled = _CountedIterations(steps)
+    laws = SimpleNamespace(
+        force=np.ones((1, n, 2)), multipliers=np.zeros((1, 6)), command=np.zeros((1, n, 3))
+    )
+    compiled = SimpleNamespace(
+        core=SimpleNamespace(answer_one=lambda *_: laws), is_line=np.zeros(n, bool)
+    )
+    problem = SimpleNamespace(
+        plant=SimpleNamespace(power=lambda command: np.full(command.shape[:-1], 0.1 / n))
+    )
+    _best_of_starts(
+        cast("CoupledCore", coupled),
+        cast("Compiled", compiled),
+        cast("CommandProblem", problem),
+        np.zeros(6),
+        CLOSEST,
+        NOMINAL,
+        None,
+    )
+    assert coupled.followed == followed
+    left = MAX_WORK / n - steps * np.arange(followed)
+    np.testing.assert_allclose(coupled.allowed, left)
