@@ -230,7 +230,12 @@ def test_in_a_tick_commands_stay_within_the_rates_and_come_to_the_wrench(name: s
     previous = robot.plant.feasible(first.answer.command[0])
     near = 1.01 * wrench
     result = robot.core.iterate(
-        near, None, 2, CLOSEST, first.answer.multipliers[0], Conditions(previous, calm=2.0)
+        near,
+        None,
+        2,
+        core_policy(CLOSEST),
+        first.answer.multipliers[0],
+        Conditions(previous, calm=2.0),
     )
     assert result.answer is not None
     command = result.answer.command[0]
