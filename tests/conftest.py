@@ -1,6 +1,7 @@
 """What tests share: settings, an untrained checkpoint, and a robot and a method that are quick to
 make."""
 
+import gc
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,13 @@ from tests.allocator_cache import AllocatorCache
 # Machines that run tests also run browsers and trainings: an example that takes long is no failure.
 settings.register_profile("finlab", deadline=None)
 settings.load_profile("finlab")
+
+
+def pytest_collection_finish() -> None:
+    """Keep what was collected out of the garbage collector's way: it would walk through thousands of
+    tests and the modules of torch again and again."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(scope="session")

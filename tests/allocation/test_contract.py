@@ -127,7 +127,7 @@ def cases_of(method: str) -> list[Any]:
                 always.append(case)
             else:
                 others.append(case)
-    return [*always, *sampled(others, 7 if method in SLOW_METHODS else 4)]
+    return [*always, *sampled(others, 11 if method in SLOW_METHODS else 6)]
 
 
 CASES = list(chain.from_iterable(map(cases_of, METHODS)))

@@ -10,12 +10,13 @@ from finlab.layout import load_layout
 from finlab.layout.effectiveness import layout_effectiveness
 from finlab.physics.objective import REACHED
 from tests.random_robots import KINDS, load, random_flow, random_plant, random_robot, within
+from tests.sampled_cases import sampled
 
 SAME = 1e-6
 """Normalized error that counts as none, and share of power."""
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", sampled(KINDS, every=3))
 def test_along_it_the_wrench_stays_and_watts_are_no_less(kind: str) -> None:
     rng = np.random.default_rng(4)
     off = []

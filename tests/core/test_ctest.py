@@ -14,6 +14,6 @@ CORE_FOLDER = Path(core.__path__[0])
 @pytest.mark.parametrize("single", ["OFF", "ON"])
 def test_tests_in_c_hold(single: str, tmp_path: Path) -> None:
     configure = ["cmake", "-S", str(CORE_FOLDER), "-B", str(tmp_path), f"-DFL_SINGLE={single}"]
-    subprocess.run([*configure, "-DCMAKE_BUILD_TYPE=Release"], check=True)
+    subprocess.run([*configure, "-DCMAKE_BUILD_TYPE=Debug"], check=True)
     subprocess.run(["cmake", "--build", str(tmp_path)], check=True)
     subprocess.run(["ctest", "--output-on-failure"], check=True, cwd=tmp_path)

@@ -56,12 +56,14 @@ def test_wheels_and_the_tree_get_a_new_library_and_the_source_distribution_none(
         assert (tag, abi) == ("py3", "none") and platform in platform_tags()
         (name,) = (name for name in zipfile.ZipFile(wheel).namelist() if "libfinlab." in name)
         packed = zipfile.ZipFile(wheel).extract(name, tree / "packed")
-        assert python(tree, "hatch_build.py").returncode == 0
-        for path in (packed, str(tree / name)):
-            assert ctypes.PyDLL(path).fl_version() == library.VERSION
+        assert ctypes.PyDLL(packed).fl_version() == library.VERSION
+    assert python(source, "hatch_build.py").returncode == 0
+    assert ctypes.PyDLL(str(source / name)).fl_version() == library.VERSION
 
 
 def test_what_does_not_compile_is_said_in_the_words_of_the_compiler(project: Path) -> None:
+    for source in (project / "finlab" / "core" / "src").glob("*.c"):
+        source.unlink()  # one file is compiled sooner than all
     (project / "finlab" / "core" / "src" / "wrong.c").write_text(
         "int wrong(void) { return nowhere; }\n"
     )

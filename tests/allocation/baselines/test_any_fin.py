@@ -141,7 +141,7 @@ def few_starts(method: str, objective: Name) -> AllocatorCache:
 
 
 @pytest.mark.parametrize(
-    ("objective", "name", "method"), crossed(["power", "effort"], MODELS, METHODS, every=9)
+    ("objective", "name", "method"), crossed(["power", "effort"], MODELS, METHODS, every=17)
 )
 def test_every_method_on_every_fin(
     method: str, name: str, objective: Name, model: Callable[[str], list[FinModelSpec]]

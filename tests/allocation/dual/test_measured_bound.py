@@ -97,7 +97,7 @@ def test_no_command_is_worth_more_and_hardly_any_less(
 
 
 @pytest.mark.parametrize("number", sampled(range(2)))
-@pytest.mark.parametrize("kind", ["fins any shaft", "fins uneven", "holes", "all"])
+@pytest.mark.parametrize("kind", sampled(["fins uneven", "fins any shaft", "holes", "all"], 2))
 def test_no_command_takes_less(kind: str, number: int, tmp_path: Path) -> None:
     layout = measured(kind, number, tmp_path)
     allocator = Allocator(layout)

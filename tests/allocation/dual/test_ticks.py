@@ -25,6 +25,7 @@ from tests.random_robots import (
     random_robot,
     with_rates,
 )
+from tests.sampled_cases import sampled
 
 PERIOD_S = 0.1
 """Length of a tick [s]."""
@@ -90,15 +91,15 @@ def ride(robot: Layout, rng: np.random.Generator, flow: Array | None, ticks: int
         previous = np.where(np.isnan(answer.command), previous, answer.command)
 
 
+@pytest.mark.parametrize("number", sampled(range(3), every=3))
 @pytest.mark.parametrize("kind", KINDS)
-def test_no_command_of_a_tick_passes_limits_or_rates(kind: str) -> None:
-    rng = np.random.default_rng([31, KINDS.index(kind)])
-    for number in range(3):
-        robot = parse_layout(with_rates(random_robot(kind, number, 31)))
-        ride(robot, rng, random_flow(kind, number, 31), 10)
+def test_no_command_of_a_tick_passes_limits_or_rates(kind: str, number: int) -> None:
+    rng = np.random.default_rng([31, KINDS.index(kind), number])
+    robot = parse_layout(with_rates(random_robot(kind, number, 31)))
+    ride(robot, rng, random_flow(kind, number, 31), 10)
 
 
-@pytest.mark.parametrize("number", range(12))
+@pytest.mark.parametrize("number", sampled(range(12), every=3))
 def test_no_command_of_a_tick_passes_limits_or_rates_of_an_extreme_robot(number: int) -> None:
     ride(hostile_robot(number, 31), np.random.default_rng([32, number]), None, 10)
 
