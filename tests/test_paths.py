@@ -5,7 +5,7 @@ import io
 import re
 import subprocess
 import tokenize
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import pytest
@@ -13,6 +13,12 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 PATH = re.compile(r"(?<![\w/.-])(?:finlab|tests|webapp|tools)/[\w./*\[\]-]*\.(?:py|c|h)\b")
 """A path from the top of the tree, or a pattern of paths: `*` stands for a part of a name."""
+SHORT_PATH = re.compile(r"`((?:[\w.-]+/)*[\w-]+\.(?:py|c|h))`")
+"""A file on a page, by its name alone or with some of its folders."""
+FOLDER = re.compile(r"`((?:finlab|tests|webapp|tools|docs)(?:/\w+)*)(?:/|/\*\.py)?`")
+"""A folder on a page, or all Python files in it, from the top of the tree."""
+NOT_OF_THE_TREE = {"math.h", "robot.c", "robot.h", "water_jet.py"}
+"""Files that pages name and that are no files of ours: C's own, exported ones, a reader's."""
 FOLDERS = ("finlab", "tests", "webapp", "tools", "examples", "docs")
 """Folders whose comments and pages are read."""
 HISTORY = {"CHANGELOG.md"}
@@ -32,6 +38,22 @@ def prose_of(source: str) -> Iterator[str]:
 def missing_paths(text: str) -> list[str]:
     """The paths and patterns in a text that no file has."""
     return [named for named in PATH.findall(text) if not any(ROOT.glob(named))]
+
+
+def unclear_files(page: str, tree: Sequence[str]) -> list[str]:
+    """The files on a page that a reader cannot find: neither in a folder that their line names, nor
+    the only ones in the `tree` whose paths end so."""
+    unclear = []
+    for line in page.splitlines():
+        folders = [ROOT / folder for folder in FOLDER.findall(line)]
+        for name in SHORT_PATH.findall(line):
+            if name in NOT_OF_THE_TREE or (ROOT / name).exists():
+                continue
+            in_folder = any((folder / name).exists() for folder in folders)
+            ends_so = [path for path in tree if path.endswith(f"/{name}")]
+            if not in_folder and len(ends_so) != 1:
+                unclear.append(name)
+    return unclear
 
 
 def files() -> list[Path]:
@@ -60,6 +82,28 @@ def test_the_files_that_are_named_are_there(folder: str) -> None:
         prose = "\n".join(prose_of(text)) if path.suffix == ".py" else text
         wrong += [f"{name}: {missing}" for missing in missing_paths(prose)]
     assert not wrong, wrong
+
+
+def test_a_file_that_no_reader_finds_is_unclear() -> None:
+    tree = ["finlab/a.py", "finlab/core/a.py", "finlab/axes.py"]
+    assert unclear_files("`axes.py`, `core/a.py` and `finlab/axes.py`", tree) == []
+    assert unclear_files("| `finlab/core` | `calls.py` |", tree) == []
+    assert unclear_files("| `finlab/core` | `axes.c` |\n`a.py`, `calls.py`", tree) == [
+        "axes.c",
+        "a.py",
+        "calls.py",
+    ]
+
+
+def test_files_that_pages_name_by_their_ends_are_found() -> None:
+    paths = [path.relative_to(ROOT) for path in files()]
+    tree = [path.as_posix() for path in paths]
+    unclear = []
+    for path in paths:
+        if path.suffix == ".md" and path.parts[0] in ("docs", "DEVELOPMENT.md", "CONTRIBUTING.md"):
+            text = (ROOT / path).read_text(encoding="utf-8")
+            unclear += [f"{path}: {name}" for name in unclear_files(text, tree)]
+    assert not unclear, unclear
 
 
 PATCH = re.compile(r'^```diff title="([^"]+)"\n(.*?)^```$', re.MULTILINE | re.DOTALL)

@@ -91,6 +91,7 @@ class View:
             try:
                 self._look()
                 if self._is_due and not self._is_held():
+                    self._end_hold()
                     await self._write()
             except Exception as error:  # the page must go on, whatever we have got wrong
                 self.intents.fault(error)
@@ -152,14 +153,15 @@ class View:
 
     def _is_held(self) -> bool:
         """Whether an answer is to come that the page waits for."""
-        for slot in self._held_for:
-            if slot.busy:
-                return True
+        return any(slot.busy for slot in self._held_for)
+
+    def _end_hold(self) -> None:
+        """Wait for no answer any longer, nor for the time after which the page would be written
+        without it."""
         self._held_for = NO_SLOTS
         if self._patience is not None:
             self._patience.cancel()
             self._patience = None
-        return False
 
     async def _write(self) -> None:
         """Words first, then the view."""

@@ -16,7 +16,7 @@ from finlab.layout import Layout
 
 AXES = MOTIONS
 """Names of the axes in what is said of a layout."""
-NOTHING = 1e-4
+NEGLIGIBLE_SIZE = 1e-4
 """Largest wrench [N, scaled] below which an axis counts as out of reach; the solver is exact to
 about 1e-5."""
 
@@ -71,7 +71,7 @@ class Authority(HeldAxes):
     def reachable(self) -> tuple[MotionAxis, ...]:
         """Axes along which something can be had both ways with the other five at zero."""
         ranges = zip(AXES, self.largest, self.most_negative, SCALE, strict=True)
-        return tuple(name for name, a, b, unit in ranges if min(a, b) > NOTHING * unit)
+        return tuple(name for name, a, b, unit in ranges if min(a, b) > NEGLIGIBLE_SIZE * unit)
 
 
 @dataclass(frozen=True)
@@ -148,7 +148,7 @@ def _authorities(
             [[axis in held_axes_of.alone for axis in AXES] for held_axes_of in held_of]
         )
         size = np.where(np.tile(pushed_alone, 2), size, 0.0)
-    size = np.where(size > NOTHING, size, 0.0)
+    size = np.where(size > NEGLIGIBLE_SIZE, size, 0.0)
     least = weakest(counting)
     direction = np.zeros((len(failures), 6))
     direction[:, counted_rows] = least.direction

@@ -97,7 +97,7 @@ def policy_record(
     """
     weights = np.array(axis_weights)
     record = np.zeros(1, struct("fl_policy"))
-    record["policy"] = constant(f"FL_{kind.upper()}")
+    record["kind"] = constant(f"FL_{kind.upper()}")
     record["group_count"] = len(groups)
     record["axis_weight"] = weights / weights.max()
     for index, axes in enumerate(groups):

@@ -109,7 +109,7 @@ enum {
   FL_KINDS     /* how many kinds there are */
 };
 
-/* What to give for a wrench beyond reach: fl_policy.policy. */
+/* What to give for a wrench beyond reach: fl_policy.kind. */
 enum {
   FL_CLOSEST,   /* the nearest wrench by the weights of the axes */
   FL_DIRECTION, /* the largest share of the wrench */

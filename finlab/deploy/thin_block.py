@@ -160,25 +160,32 @@ def _grid(grid: Array, users: Record) -> Array:
     return np.concatenate([[*map(len, axes)], [period], grid[4:7], *axes, values.ravel()])
 
 
-def _reached(knot: Array, value: Array, period: float, foils: Record) -> tuple[Array, Array, float]:
-    """Returns the knots that foils reach, and three beyond; all of them where that is no less.
+def _reached(knot: Array, value: Array, period: float, users: Record) -> tuple[Array, Array, float]:
+    """Returns the knots that foils reach, and three beyond; all of them where that is no less, and
+    of a grid of fins.
 
     Args:
         knot: angles (K,) of one period [rad].
         value: coefficients (K, c) there.
         period: of the angles [rad]; 0 for none.
-        foils: actuators (m,) whose law it is.
+        users: actuators (m,) whose law it is, all foils or all fins.
 
     Returns:
         Knots, values, and their period: 0 where only a part of it is left.
     """
-    angle_min = (foils["command_min"][:, 0] - foils["lean_angle"]).min()
-    angle_max = (foils["command_max"][:, 0] - foils["lean_angle"]).max()
+    # The first user speaks for all: a law's columns are coefficients of foils or forces of fins, so
+    # that users of one grid share a kind. A fin's angle is number 2 of its command and may go all
+    # round, so that a fin reaches each knot; the angle of a foil is number 0, within limits.
+    is_of_fins = users["command_kind"][0] == constant("FL_FIN")
+    if not period or is_of_fins:
+        return knot, value, period
+    angle_min = (users["command_min"][:, 0] - users["lean_angle"]).min()
+    angle_max = (users["command_max"][:, 0] - users["lean_angle"]).max()
     around = np.concatenate([knot - period, knot, knot + period])
     begin = np.searchsorted(around, angle_min) - 3
     stop = np.searchsorted(around, angle_max) + 3
     has_room = begin >= 0 and stop <= len(around) and stop - begin < len(knot)
-    if not period or foils["command_kind"][0] == constant("FL_FIN") or not has_room:
+    if not has_room:
         return knot, value, period
     rows = np.arange(begin, stop)
     return around[rows], value[rows % len(knot)], 0.0

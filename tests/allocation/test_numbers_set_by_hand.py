@@ -1,9 +1,14 @@
 """The page of the default method has every number set by hand, with its value and its reason."""
 
 import ast
+import math
+import operator
 import re
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 ROW = re.compile(r"^\| `(\w+)` \| ([^|]+) \| `([^`|]+)` \| ([^|]+) \|$", re.MULTILINE)
@@ -26,12 +31,19 @@ PYTHON_FILES = [
 
 C_FILES = sorted((ROOT / "finlab/core").rglob("*.[ch]"))
 """Files of the core whose constants the page has to have."""
-DEFINED = re.compile(r"^#define (\w+) (?:R\()?([\d.]+(?:e-?\d+)?)\b", re.MULTILINE)
-"""A constant in C: name, value."""
+HEADERS = [ROOT / "finlab/core/finlab.h", ROOT / "finlab/core/src/internal.h"]
+"""Files whose constants those of other C files are made of."""
+DEFINED = re.compile(r"^#define (\w+) ([^\n]+)$", re.MULTILINE)
+"""A macro in C without arguments: name, text."""
+COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
+"""A comment in C."""
 SINGLE = re.compile(r"^#ifdef FL_SINGLE\n.*?^#else\n", re.MULTILINE | re.DOTALL)
 """Constants of single precision, which the page leaves out."""
+BOTH_LANGUAGES = {"ROUNDING", "NOTHING", "NEARLY", "FINE", "CLOSE", "EXACT"}
+"""Constants of Python that C has, too."""
 NO_CHOICE = {
     "PI",
+    "THIRD",
     "TINY",
     "LARGEST",
     "INFEASIBLE_COST",
@@ -40,8 +52,33 @@ NO_CHOICE = {
     "FL_MAGIC",
     "FL_POINTS",
     "FL_SCORES",
+    "FL_DIVE",
+    "FL_SEARCH",
+    "FL_FORCES",
+    "FL_STARTS",
+    "FL_FOILS",
+    "FL_BOUND",
+    "FL_DEPTH",
+    "DEPENDENT",
+    "LATTICE",
+    "KINDS",
+    "WALSH",
 }
-"""Constants in C that nobody has chosen: sizes, versions, numbers of mathematics."""
+"""Constants that nobody has chosen: sizes, versions, mathematics, and what follows from others."""
+OPERATORS: dict[type, Callable[[Any, Any], Any]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+}
+"""Operators in the value of a constant."""
+FUNCTIONS: dict[str, Callable[..., Any]] = {
+    "R": float,
+    "SQRT": math.sqrt,
+    "larger": max,
+    "np.geomspace": lambda *arguments: arguments,  # as numbers that were chosen
+}
+"""Functions in the value of a constant."""
 
 
 class Row(NamedTuple):
@@ -58,40 +95,91 @@ def rows_of_page() -> list[Row]:
     return [Row(*cells) for cells in ROW.findall(PAGE.read_text())]
 
 
-def numbers(path: Path) -> dict[str, object]:
+def evaluated(node: ast.expr, known: Mapping[str, object]) -> Any:
+    """The value of an expression of numbers and known constants; ValueError for any other."""
+    if isinstance(node, ast.BinOp) and type(node.op) in OPERATORS:
+        left = evaluated(node.left, known)
+        return OPERATORS[type(node.op)](left, evaluated(node.right, known))
+    if isinstance(node, ast.Call) and ast.unparse(node.func) in FUNCTIONS:
+        arguments = [evaluated(argument, known) for argument in node.args]
+        return FUNCTIONS[ast.unparse(node.func)](*arguments)
+    if isinstance(node, ast.Name | ast.Attribute):
+        name = ast.unparse(node)
+        if name in known:
+            return known[name]
+        raise ValueError(f"no known constant: {name}")
+    return ast.literal_eval(node)
+
+
+def constants_of_python(path: Path, known: Mapping[str, object]) -> dict[str, object]:
     """The public constants of a file that are numbers, or tuples of them."""
-    constants = {}
+    constants: dict[str, object] = {}
     for line in ast.parse(path.read_text()).body:
         if not (isinstance(line, ast.Assign) and isinstance(line.targets[0], ast.Name)):
             continue
         name = line.targets[0].id
-        if name.isupper() and not name.startswith("_"):
-            try:
-                value = ast.literal_eval(line.value)
-            except ValueError:
-                continue
+        if name.isupper() and not name.startswith("_") and name not in NO_CHOICE:
+            value = evaluated(line.value, {**known, **constants})
             if not isinstance(value, str):
                 constants[name] = value
     return constants
 
 
+def constants_of_c(path: Path, known: Mapping[str, object]) -> dict[str, object]:
+    """The constants of a file, in double precision."""
+    constants: dict[str, object] = {}
+    source = COMMENT.sub("", SINGLE.sub("", path.read_text()))
+    for name, text in DEFINED.findall(source):
+        expression = text.strip().replace("(wide)", "")
+        is_other_name = expression.isidentifier() and expression not in {**known, **constants}
+        if name in NO_CHOICE or is_other_name:  # such as `#define SQRT sqrt`
+            continue
+        node = ast.parse(expression, mode="eval").body
+        constants[name] = evaluated(node, {**known, **constants})
+    return constants
+
+
+def numbers_in_code() -> dict[tuple[str, str], object]:
+    """All constants that the page has to have, by their file and name."""
+    numbers: dict[tuple[str, str], object] = {}
+    shared = constants_of_python(ROOT / "finlab/arrays.py", {})
+    for path in PYTHON_FILES:
+        constants = constants_of_python(path, {**shared, "math.pi": math.pi})
+        for name, value in constants.items():
+            numbers[str(path.relative_to(ROOT)), name] = value
+    in_python = {name: value for (_, name), value in numbers.items() if name in BOTH_LANGUAGES}
+    of_headers: dict[str, object] = {}
+    for path in HEADERS:
+        of_headers.update(constants_of_c(path, of_headers))
+    for path in C_FILES:
+        for name, value in constants_of_c(path, of_headers).items():
+            if name in BOTH_LANGUAGES:
+                assert value == in_python[name], name
+            else:
+                numbers[str(path.relative_to(ROOT)), name] = value
+    return numbers
+
+
 def test_the_page_has_every_number_with_a_reason() -> None:
     rows = rows_of_page()
-    on_page = {(row.file, row.name): ast.literal_eval(row.value) for row in rows}
-    in_code: dict[tuple[str, str], object] = {}
-    for path in PYTHON_FILES:
-        for name, value in numbers(path).items():
-            in_code[str(path.relative_to(ROOT)), name] = value
-    for path in C_FILES:
-        for name, text in DEFINED.findall(SINGLE.sub("", path.read_text())):
-            same = [value for (_, other), value in in_code.items() if other == name]
-            if same:  # said in both languages
-                assert float(text) in same, name
-            elif name not in NO_CHOICE:
-                in_code[str(path.relative_to(ROOT)), name] = ast.literal_eval(text)
+    in_code = numbers_in_code()
+    known = {"math.pi": math.pi}
+    known.update((name, value) for (_, name), value in in_code.items())  # type: ignore[misc]
+    on_page = {}
+    for row in rows:
+        node = ast.parse(row.value.strip(), mode="eval").body
+        on_page[row.file, row.name] = evaluated(node, known)
     assert on_page == in_code
     assert len(rows) == len(on_page)
     assert all(len(row.reason.split()) > 3 for row in rows)
+
+
+def test_products_of_known_constants_are_numbers() -> None:
+    known = {"CLOSE": 1e-4}
+    for expression, value in (("R(0.1) * CLOSE", 0.1 * 1e-4), ("1 - 10 * CLOSE", 1 - 10 * 1e-4)):
+        assert evaluated(ast.parse(expression, mode="eval").body, known) == value
+    with pytest.raises(ValueError, match="FAR"):
+        evaluated(ast.parse("2 * FAR", mode="eval").body, known)
 
 
 def test_the_rows_of_the_page_are_sorted_by_file() -> None:

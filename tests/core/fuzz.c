@@ -38,7 +38,7 @@ static void ask(fl_question *q, fl_policy *policy, fl_real *price, fl_real *prev
     policy->axis_weight[k] = (fl_real)uniform();
     for (int g = 0; g < 6; g++) policy->group[g][k] = (unsigned char)below(2);
   }
-  policy->policy = below(20) ? below(3) : below(100) - 50, policy->group_count = below(20) ? below(7) : below(100) - 50;
+  policy->kind = below(20) ? below(3) : below(100) - 50, policy->group_count = below(20) ? below(7) : below(100) - 50;
   if (!below(30)) policy->axis_weight[below(6)] = wild(1);
   if (!below(30)) price[below(6)] = wild(1);
   for (int k = 0; k < 3 * ROBOT_COUNT; k++) {

@@ -69,7 +69,7 @@ def test_each_number_of_a_question_is_looked_at(name: str) -> None:
 @pytest.mark.parametrize(
     ("kind", "field", "values"),
     [
-        ("closest", "policy", {-1: False, 0: True, 1: True, 3: False}),
+        ("closest", "kind", {-1: False, 0: True, 1: True, 3: False}),
         ("priority", "group_count", {-1: False, 0: True, 6: True, 7: False}),
         ("direction", "group_count", {-1: True, 7: True}),  # which it does not read
     ],

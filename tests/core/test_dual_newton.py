@@ -51,8 +51,13 @@ MOST_STEPS = {
     "all": NewtonSteps(134, 1905, 122),
     "pods either way": NewtonSteps(465, 3741, 333),
 }
-"""Most steps of each kind of robot: those that it took when this was written, and a tenth more. A
-wrong slope costs steps, where it costs nothing else."""
+"""Most steps of each kind of robot: the sum that `newton_steps` counted over its two robots, and a
+tenth more. Robots and wrenches come from seeds, so that the sum changes with the code alone, or by
+a step or two with the rounding of another compiler.
+
+More steps than that are a slower answer, and mostly a fault: a derivative of a response that is
+slightly wrong gives the same forces, and shows in nothing but steps that are refused. Who needs the
+steps for a better answer counts them anew."""
 
 
 def wrenches(robot: Robot, number: int, times: float, count: int) -> Array:

@@ -236,7 +236,7 @@ response fl_response(const real *block, int i, const fl_set *set, const real *pr
     return (response){{line.force, 0}, line.slope, 0, 0, line.conjugate, 0};
   }
   if (set->tangent) return tangent_response(set, price);
-  if (a->flow_speed > 0) return foil_response(block, a, set, price);
+  if (is_foil(a)) return foil_response(block, a, set, price);
   if (set->turn_cost > 0) return fl_response_with_turning(block, i, set, price);
   return plane_response(block, a, set, price);
 }
@@ -244,7 +244,7 @@ response fl_response(const real *block, int i, const fl_set *set, const real *pr
 /* Drag [N], beyond that at rest, of a foil's lift [N]. */
 real fl_drag_of_lift(const real *block, int i, real force) {
   const fl_actuator *a = ACTUATOR(block, i);
-  if (!(a->flow_speed > 0)) return 0;
+  if (!is_foil(a)) return 0;
   return (fl_power_of_force(block, i, force) - power_at_rest(block, a)) / a->flow_speed;
 }
 
@@ -299,7 +299,7 @@ real fl_support_of_set(const real *block, int i, const fl_set *set, const real *
     if (price[0] > 0) force[0] = set->force_max;
     return price[0];
   }
-  if (a->flow_speed > 0) {
+  if (is_foil(a)) {
     farthest_foil(block, i, set, price, force);
     return price[0];
   }

@@ -50,11 +50,9 @@ static int leave_gaps(const real *block, fl_work *work, const real *target_reduc
   const int is_in_gap = fl_worst_gap(block, work, out->force, out->lambda_reduced) >= 0;
   if (!within || !is_in_gap) return within && status == FL_MET;
   real bound;
-  out->gap_power_bound = 0;
   if (!fl_search_gaps(block, work, target_reduced, status, &bound)) return 0;
   copy_forces(block, work->best_force, out->force);
-  if (!work->has_turn_cost)
-    out->gap_power_bound = bound * (1 - FINE); /* with turning it is more than power */
+  out->gap_power_bound = fl_gap_power_bound(work, bound);
   return 1;
 }
 
@@ -223,9 +221,9 @@ static void answer_question(const real *block, fl_work *work, const fl_question 
 }
 
 static int is_valid_policy(const fl_policy *p) {
-  if (p->policy < FL_CLOSEST || p->policy > FL_PRIORITY) return 0;
-  if (p->policy == FL_PRIORITY && (p->group_count < 0 || p->group_count > 6)) return 0;
-  if (p->policy == FL_CLOSEST && !fl_are_within(p->axis_weight, 6, 1)) return 0;
+  if (p->kind < FL_CLOSEST || p->kind > FL_PRIORITY) return 0;
+  if (p->kind == FL_PRIORITY && (p->group_count < 0 || p->group_count > 6)) return 0;
+  if (p->kind == FL_CLOSEST && !fl_are_within(p->axis_weight, 6, 1)) return 0;
   return 1;
 }
 

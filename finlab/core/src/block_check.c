@@ -117,7 +117,7 @@ static int check_actuator(const real *block, const fl_actuator *a) {
   if (!(a->dead_band >= 0 && a->flow_speed >= 0 && a->uncertainty_cost >= 0)) return FL_BAD_NUMBER;
   if (!(a->secant[0] >= 0 && a->secant[1] >= 0)) return FL_BAD_NUMBER;
   const int drags = fl_form_of(a)->has_drag && a->rows == 2;
-  if (a->flow_speed > 0 && !drags) return FL_BAD_BLOCK;
+  if (is_foil(a) && !drags) return FL_BAD_BLOCK;
   return FL_OK;
 }
 

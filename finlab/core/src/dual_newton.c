@@ -26,16 +26,19 @@
 
 /* Share c of M, and first mu where an actuator may be at its limit; NEARLY elsewhere. */
 #define SATURATED R(1e-1)
-#define NEAR_LIMIT R(0.8)     /* share of the largest force from which an actuator may be there */
-#define FELL R(0.9)           /* a residual above this share of the last one has not improved */
-#define JUMPS 4               /* trials with a jump after which Newton's method stands still */
-#define JUMP_STEP R(1e-3)     /* squared step, over squared multipliers, too long to judge */
-#define SHORT_STEP R(1e-7)    /* the same, in which any large change of a force is a jump */
+#define NEAR_LIMIT R(0.8)  /* share of the largest force from which an actuator may be there */
+#define FELL R(0.9)        /* a residual above this share of the last one has not improved */
+#define JUMPS 4            /* trials with a jump after which Newton's method stands still */
+#define JUMP_STEP R(1e-3)  /* squared step, over squared multipliers, too long to judge */
+#define SHORT_STEP R(1e-7) /* the same, in which any large change of a force is a jump */
+/* What squared multipliers count at least in these two, over NOTHING and the squared cost C. */
+#define MULTIPLIERS_MIN 100
 #define MU_SINGULAR 10        /* mu grows by this where the step's matrix is singular to rounding */
 #define MU_KEPT_LEAST R(0.05) /* mu after a kept step, over that before: at least */
 #define MU_KEPT_EARLY R(0.3)  /* the same where more than half of the slope is left at its end */
 #define SHARE_LEAST R(1e-3)   /* of a refused step, the least share that is tried next */
 #define SHARE_MOST R(0.7)     /* the largest one */
+#define WRENCH_MIN R(1e-3)    /* what a scaled wrench counts at least, in rounding of its range */
 
 /* Scaled wrench in the basis. */
 void fl_reduce_wrench(const fl_work *work, const real *wrench, real *target_reduced) {
@@ -70,7 +73,7 @@ int fl_is_in_range(const fl_work *work, const real *wrench, const real *target_r
     size_squared += scaled * scaled;
   }
   const real rounding = larger(NEARLY, 10 * ROUNDING);
-  return SQRT(outside_squared) <= rounding * (R(1e-3) + SQRT(size_squared));
+  return SQRT(outside_squared) <= rounding * (WRENCH_MIN + SQRT(size_squared));
 }
 
 /* The wrench [N, N m] of forces, sum B y. */
@@ -111,7 +114,7 @@ void fl_prepare_sets(const real *block, fl_work *work) {
       work->has_turn_cost = 1;
     }
     work->has_forks |= set->is_forked || set->force_max_reverse > 0;
-    work->has_drag |= a->flow_speed > 0 && !work->span.is_lost[i];
+    work->has_drag |= is_foil(a) && !work->span.is_lost[i];
     if (work->has_forks || work->has_drag || work->has_turn_cost || a->dead_band > 0)
       work->is_convex = 0;
   }
@@ -166,7 +169,7 @@ void fl_dual_at(const real *block, const fl_work *work, const real *target_reduc
   state->residual_size = SQRT(dot(state->residual, state->residual, 6));
 }
 
-/* Starts Newton's method at given multipliers. */
+/* Starts Newton's method at given multipliers: work->state_found is the dual there. */
 void fl_dual_start(const real *block, fl_work *work, const real *target_reduced,
                    const real *lambda) {
   work->state_found = work->state;
@@ -269,7 +272,7 @@ static int jumps_between(const real *block, fl_work *work, const fl_state *one,
   const real full = NOTHING * work->power_cost_max; /* in a hole around rest multipliers go to 0 */
   const real step_squared = dot(step, step, 6);
   const real lambda_squared = dot(one->lambda_reduced, one->lambda_reduced, 6) +
-                              100 * work->power_cost_max * full;
+                              MULTIPLIERS_MIN * work->power_cost_max * full;
   if (!(step_squared < JUMP_STEP * lambda_squared)) return 0;
   const int is_short = step_squared < SHORT_STEP * lambda_squared;
   int jumps = 0;
@@ -327,8 +330,8 @@ static real mu_after_refused(real mu, real nu, const step_result *result) {
   return larger(mu * factor, ROUNDING);
 }
 
-/* Newton's method from multipliers on, or from its own first ones where there are none;
-   work->state_found is what it comes to. Returns FL_MET, FL_BEYOND or FL_STUCK. */
+/* Newton's method from multipliers on, or from its own first ones where there are none.
+   work->state_found is the dual at the multipliers that it comes to, however it ends. Returns FL_MET, FL_BEYOND or FL_STUCK. */
 int fl_dual_newton(const real *block, fl_work *work, const real *target_reduced, const real *lambda,
                    int most_steps) {
   /* No forces cost more than C: a larger value proves that none add up to the target, Eq. 13. */

@@ -129,8 +129,8 @@ static void draw_tangents(const real *block, fl_work *work, const fl_box *box, c
 }
 
 /* Makes commands cheaper, from their forces and cost [W] on, by steps of sequential quadratic
-   programming that keep giving work->wrench_wanted; `lambda` becomes that of the last step.
-   Their cost. */
+   programming that keep giving work->wrench_wanted; `lambda` becomes that of the last step, and
+   work->state_found the dual of its tangents. Their cost. */
 static real cheapen(const real *block, fl_work *work, const fl_box *box, const real *target_reduced,
                     real most_error, real cost, real *lambda, real command[][3], real force[][2]) {
   real share = 1;
@@ -198,7 +198,8 @@ static void improve_from(const real *block, fl_work *work, const real *target_re
   memcpy(work->best_lambda, lambda_near, sizeof lambda_near);
 }
 
-/* The same of the forces and multipliers that Newton's method came to. */
+/* The same of the forces and multipliers that Newton's method came to. Steps on the commands run
+   that method on tangents: work->state_found is of the last of them afterwards. */
 void fl_improve_commands(const real *block, fl_work *work, const real *target_reduced,
                          real *best_cost) {
   real command[FL_MOST][3];
@@ -326,7 +327,7 @@ static void improve_from_stalls(const real *block, fl_work *work, const real *ta
 }
 
 /* The same as fl_improve_commands of several starts, as steps from a cheap one may end
-   early: each has its own valley. */
+   early: each has its own valley. work->state_found is of the last steps, too. */
 void fl_improve_from_starts(const real *block, fl_work *work, const real *target_reduced,
                             real *best_cost) {
   real most_cost;

@@ -19,7 +19,8 @@ static int any_hollow(const real *block, const fl_work *work) {
   return 0;
 }
 
-/* Remembers an answer without a gap, where it is the cheapest so far. */
+/* Remembers an answer without a gap, where it is the cheapest so far: its forces in
+   work->best_force. With foils it also changes work->state_found, as fl_improve_commands does. */
 static void keep_answer(const real *block, fl_work *work, const real *target_reduced,
                         real *best_cost) {
   if (work->has_drag) {
@@ -52,7 +53,8 @@ static int is_restless(const real *block, int i, const fl_set *set, const real *
 }
 
 /* Leaves all gaps on their nearer sides, round after round, until there are none; forces
-   that cannot rest keep their direction. */
+   that cannot rest keep their direction. The sets become those of the last round, and
+   work->state_found the dual of these. */
 static void dive(const real *block, fl_work *work, const real *target_reduced, int status,
                  real *best_cost) {
   for (int round = 0; round < FL_DIVE_ROUNDS; round++) {
@@ -79,7 +81,8 @@ static void dive(const real *block, fl_work *work, const real *target_reduced, i
   }
 }
 
-/* Solves both sides of a cut from the multipliers so far and stays at the cheaper one. */
+/* Solves both sides of a cut from the multipliers so far and stays at the cheaper one: of that
+   are the sets, work->state_found, and the status of Newton's method that it returns. */
 static int cheaper_side(const real *block, fl_work *work, const real *target_reduced,
                         fl_node *node) {
   const int nearer = fl_nearer_side(block, node->actuator, &node->set_before, node->force);
@@ -114,7 +117,8 @@ static int most_parts_of(const fl_work *work) {
   return settings->most_parts;
 }
 
-/* Dives with the sets as they are, and leaves these as they were. */
+/* Dives with the sets as they are, and leaves these as they were; work->state_found is the dual
+   of the last round of the dive. */
 static void dive_and_return(const real *block, fl_work *work, const real *target_reduced,
                             int status, real *best_cost) {
   fl_set before[FL_MOST];
@@ -135,9 +139,11 @@ static fl_node *last_cheaper_cut(const real *block, fl_work *work, int *depth, r
   }
 }
 
-/* Least power for a target at whose multipliers some force is in a gap: forces in
-   work->best, and the power [W] that no forces in the sets undercut; 0 where no part meets
-   the target. */
+/* Least power for a target at whose multipliers some force is in a gap, from what Newton's
+   method came to (`status`, work->state_found). Forces are in work->best_force; with foils
+   commands in work->best_command, and multipliers near to these in work->best_lambda, too;
+   `bound` is the power [W] that no forces in the sets undercut. Returns 0 where no part meets
+   the target. The sets are left as they were, work->state_found as that of the last part. */
 int fl_search_gaps(const real *block, fl_work *work, const real *target_reduced, int status,
                    real *bound) {
   const int most_parts = most_parts_of(work);
@@ -168,7 +174,7 @@ int fl_search_gaps(const real *block, fl_work *work, const real *target_reduced,
       status = FL_BEYOND;
       open = 0;
     }
-    const int can_cut = open && ACTUATOR(block, gap)->flow_speed == 0;
+    const int can_cut = open && !is_foil(ACTUATOR(block, gap));
     fl_node *node = 0;
     if (can_cut && parts < most_parts) {
       node = fl_cut_set(block, work, &depth, gap, state->force[gap]);
@@ -190,8 +196,16 @@ int fl_search_gaps(const real *block, fl_work *work, const real *target_reduced,
   return best_cost < INFEASIBLE_COST;
 }
 
-/* Commands that give work->wrench_wanted, from what Newton's method came to; 0 where none are
-   found. */
+/* Power [W] that gaps are proved to need, by the bound [W] of a search: with turning costs that is
+   of more than power, and proves nothing. */
+real fl_gap_power_bound(const fl_work *work, real bound) {
+  if (work->has_turn_cost) return 0;
+  return bound * (1 - FINE);
+}
+
+/* Commands in `out` that give work->wrench_wanted, from what Newton's method came to; 0 where none
+   are found. work->state_found is not that of the commands afterwards: their multipliers are in
+   `out`. */
 int fl_answer_with_drag(const real *block, fl_work *work, const real *target_reduced, int status,
                         fl_answer *out) {
   const real dual_value = work->state_found->dual_value;

@@ -83,24 +83,26 @@ static inline real size_of(const real *force) {
   return SQRT(force[0] * force[0] + force[1] * force[1]);
 }
 
-/* Whether an actuator pushes in a plane. */
-static inline int is_plane(const fl_actuator *a) { return a->rows == 2 && a->flow_speed == 0; }
-
-/* Whether an actuator is a foil in a flow, whose drag counts. */
-static inline int is_foil(const fl_actuator *a) { return a->flow_speed > 0; }
-
-/* Prices s = B' lambda of an actuator's force along its rows, Eq. 4. */
-static inline void actuator_price(const fl_work *work, int i, const real *lambda, real *s) {
-  s[0] = dot(work->span.effectiveness_reduced[i][0], lambda, 6);
-  s[1] = dot(work->span.effectiveness_reduced[i][1], lambda, 6);
-}
-
 real fl_wrap_angle(real angle);
 void fl_add_square(real H[6][6], const real *b, real weight);
 real fl_trace(real H[6][6]);
 int fl_factor(real A[6][6]);
 void fl_solve(real factor[6][6], const real *right, real *x);
 int fl_are_within(const real *values, int count, real most);
+
+/* What sort of forces an actuator has, and the price of them: what files of the core ask often. */
+
+/* Whether an actuator is a foil: a rudder in a flow that it feels, whose drag costs power. */
+static inline int is_foil(const fl_actuator *a) { return a->flow_speed > 0; }
+
+/* Whether an actuator pushes in a plane. */
+static inline int is_plane(const fl_actuator *a) { return a->rows == 2 && !is_foil(a); }
+
+/* Prices s = B' lambda of an actuator's force along its rows [W/N], Eq. 4. */
+static inline void actuator_price(const fl_work *work, int i, const real *lambda, real *s) {
+  s[0] = dot(work->span.effectiveness_reduced[i][0], lambda, 6);
+  s[1] = dot(work->span.effectiveness_reduced[i][1], lambda, 6);
+}
 
 /* force_table.c: tables of force over price, gauges of directions */
 typedef struct {
@@ -229,6 +231,7 @@ fl_node *fl_last_open_cut(const real *block, fl_work *work, int *depth);
 /* gap_search.c: least power where sets have gaps */
 int fl_search_gaps(const real *block, fl_work *work, const real *target_reduced, int status,
                    real *bound);
+real fl_gap_power_bound(const fl_work *work, real bound);
 int fl_answer_with_drag(const real *block, fl_work *work, const real *target_reduced, int status,
                         fl_answer *out);
 

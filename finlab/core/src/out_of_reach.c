@@ -157,9 +157,9 @@ static void serve_priority(const real *block, fl_work *work, const real *wrench,
 static void serve(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,
                   real force[][2], real *score) {
   memset(score, 0, FL_SCORES * sizeof *score);
-  if (policy->policy == FL_DIRECTION)
+  if (policy->kind == FL_DIRECTION)
     serve_direction(block, work, wrench, score);
-  else if (policy->policy == FL_PRIORITY)
+  else if (policy->kind == FL_PRIORITY)
     serve_priority(block, work, wrench, policy, score);
   else
     serve_closest(block, work, wrench, policy, score);
@@ -213,7 +213,7 @@ static void take_answer(const real *block, const fl_work *work, const real *wren
 
 /* The least power for a wrench that forces give, or hardly another one that is wanted; a
    little towards the wrench `inside` where power is steep at the rim; where Newton's method
-   settles at none, these forces. */
+   settles at none, these forces. work->state_found is that of the last trial. */
 static void cheapest_forces(const real *block, fl_work *work, real force[][2], const real *inside,
                             const real *wanted, fl_answer *out) {
   enum { WANTED, GIVEN, INSIDE, TRIALS };
@@ -338,7 +338,8 @@ static void wrench_wanted_of(const real *block, const fl_work *work, const real 
   }
 }
 
-/* Looks for least power for an answer's wrench in other parts of sets with gaps. */
+/* Looks for least power for an answer's wrench in other parts of sets with gaps, from what
+   Newton's method came to for it (`status`, work->state_found). */
 static void cheapen_by_parts(const real *block, fl_work *work, const real *target_reduced,
                              int status, fl_answer *out) {
   if (status == FL_BEYOND) return;
@@ -354,14 +355,12 @@ static void cheapen_by_parts(const real *block, fl_work *work, const real *targe
   real bound;
   if (!fl_search_gaps(block, work, target_reduced, status, &bound)) return;
   memcpy(out->force, work->best_force, size);
-  out->gap_power_bound = 0;
-  if (!work->has_turn_cost)
-    out->gap_power_bound = bound * (1 - FINE); /* with turning it is more than power */
+  out->gap_power_bound = fl_gap_power_bound(work, bound);
 }
 
 void fl_out_of_reach(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,
                      fl_answer *out) {
-  const int keeps_direction = policy->policy == FL_DIRECTION;
+  const int keeps_direction = policy->kind == FL_DIRECTION;
   real force[FL_MOST][2];
   real ray_share;
   real most_ray_share;

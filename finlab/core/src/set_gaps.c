@@ -47,7 +47,7 @@ static real gap_in_band(const fl_actuator *a, const fl_set *set, const real *for
 /* The same of a line, 1 or 0; of a foil how far its drag is above that of its lift. */
 static real gap_of_line(const real *block, const fl_actuator *a, int i, const fl_set *set,
                         const real *force) {
-  if (a->flow_speed > 0) {
+  if (is_foil(a)) {
     const real above = (force[1] - fl_drag_of_lift(block, i, force[0])) / a->row_force_max[1];
     if (above > HOLLOW) return above;
     return 0;
@@ -134,7 +134,7 @@ static int sign_of(int is_positive) {
 /* The side (-1, 1) of a gap on which a force is rather. */
 int fl_nearer_side(const real *block, int i, const fl_set *set, const real *force) {
   const fl_actuator *a = ACTUATOR(block, i);
-  if (a->flow_speed > 0) return sign_of(!(force[0] < (set->force_min + set->force_max) / 2));
+  if (is_foil(a)) return sign_of(!(force[0] < (set->force_min + set->force_max) / 2));
   if (!is_plane(a)) return sign_of(FABS(force[0]) > a->dead_band / 2);
   if (gap_in_band(a, set, force) > 0) return sign_of(size_of(force) > a->dead_band / 2);
   if (set->sector_half_angle >= PI && set->force_max_reverse == 0 && !set->has_jumped) return 1;
@@ -230,7 +230,7 @@ static void narrow_line(const real *block, int i, fl_set *set, const real *force
   const fl_actuator *a = ACTUATOR(block, i);
   real edge = 0;
   int is_above = (side > 0) == (force[0] > 0);
-  if (a->flow_speed > 0) {
+  if (is_foil(a)) {
     edge = force[0];
     is_above = side > 0;
   } else if (side > 0) {
