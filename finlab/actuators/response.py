@@ -324,8 +324,12 @@ class Form(NamedTuple):
     beat: Array | None = None
     """Of a fin: amplitudes [rad] and frequencies [Hz] (K + 1, 2) at (j / K)^2 of its largest force.
     Of a foil: lift coefficients, rising [1], and angles [rad] (K, 2)."""
+    beat_count: int = 0
+    """K of `beat`, which the core reads before its rows: cells of a fin, points of a foil."""
     deflection: Array | None = None
     """Of a fin with a gauge: angles (POINTS,) [rad] from the command's direction to the force's."""
+    turning_costs: bool = False
+    """Whether a change of the command's angle has a cost in a tick (Eq. 16), as of a pod."""
     command_sign: float = 1.0
     """Of a thruster: sign of its command over its force, -1 where it only pulls."""
     lean_angle: float = 0.0

@@ -112,8 +112,8 @@ class Compiled:
         """Least and largest forces (n, 2) [N], of planes below 0 in reverse."""
         self.is_line = np.array([isinstance(response, Line) for response in self.responses])
         """Which have one direction (n,)."""
-        self.is_pod = np.array([form.kind == "pod" for form in forms])
-        """Which push at an angle of their own (n,)."""
+        self.turning_costs = np.array([form.turning_costs for form in forms])
+        """Of which a change of the command's angle has a cost in a tick (n,)."""
         flow_speed = np.array([_flow_speed(response) for response in self.responses])
         self._largest_force = self._largest_forces(flow_speed)
         self.row_force_max = self._largest_force + _NO_FORCE

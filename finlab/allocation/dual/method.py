@@ -9,7 +9,7 @@ commands, within the same limits.
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, NamedTuple, Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,14 +56,6 @@ class DualSettings(Settings):
     )
 
 
-class _MethodInFlow(NamedTuple):
-    """A method for a robot in one flow: one is kept, as a control loop asks in the same flow for
-    many ticks, or in another one at each."""
-
-    flow: bytes
-    method: "Dual"
-
-
 class Dual(Method):
     """Exact and cheapest on any actuators whose laws are known, without a network."""
 
@@ -82,7 +74,11 @@ class Dual(Method):
             self.layout, self.plant, self.scale, self.settings.period_s, miss_cost
         )
         """The robot as the core reads it."""
-        self._in_last_flow: _MethodInFlow | None = None
+        self._in_last_flow: Dual | None = None
+        """The method in the flow of the last question: a control loop asks in the same flow for
+        many ticks, or in another one at each."""
+        self._flow_key = b""
+        """Bytes of the flow that this method is for; none at rest."""
         self._bases: dict[bytes, Array] = {}
 
     @cached_property
@@ -102,14 +98,16 @@ class Dual(Method):
         if flow is None:
             return self
         key = flow.tobytes()
-        if self._in_last_flow is not None and self._in_last_flow.flow == key:
-            return self._in_last_flow.method  # type: ignore[return-value]
+        last = self._in_last_flow  # read once: threads may share the method
+        if last is not None and last._flow_key == key:
+            return last  # type: ignore[return-value]
         other = super().at(flow)
         if other is not self:
             other.compiled = self.compiled.at(other.plant.inflow(None))
             other._in_last_flow = None
             other._bases = {}
-            self._in_last_flow = _MethodInFlow(key, other)
+            other._flow_key = key
+            self._in_last_flow = other
         return other
 
     def solve(self, question: MethodQuestion) -> Solution:
@@ -139,8 +137,8 @@ class Dual(Method):
     def turn_rates(self) -> Array:
         """Rates (n,) [rad/s] at which pods turn whose turning costs; NaN of other actuators."""
         turn_rate = self.layout.rates[:, 0]
-        turning_costs = self.compiled.is_pod & np.isfinite(turn_rate)
-        return np.where(turning_costs, turn_rate, np.nan)
+        turns_slowly = self.compiled.turning_costs & np.isfinite(turn_rate)
+        return np.where(turns_slowly, turn_rate, np.nan)
 
     @property
     def turns_ahead(self) -> bool:
