@@ -11,12 +11,12 @@ from collections.abc import Mapping
 from copy import copy
 from dataclasses import fields
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple, Protocol, Self
+from typing import TYPE_CHECKING, ClassVar, Literal, Protocol, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from finlab.allocation.policy import CLOSEST, Policy, PolicyName
+from finlab.allocation.policy import Policy, PolicyName
+from finlab.allocation.question import MethodQuestion
 from finlab.allocation.settings import USUAL_PERIOD_S, Settings
 from finlab.allocation.solution import Candidates, Solution
 from finlab.arrays import Array
@@ -55,31 +55,6 @@ class Networks(Protocol):
 
 Checkpoint = str | os.PathLike[str] | Networks | None
 """A checkpoint folder, the name of a shipped checkpoint, or the contents of one."""
-
-
-class MethodQuestion(NamedTuple):
-    """What a method is asked, all checked, of a robot of n actuators."""
-
-    targets: Array
-    """Desired wrenches (N, 6) [N, N m]; 0 along axes that do not count."""
-    policy: Policy = CLOSEST
-    """What to give for those out of reach."""
-    previous: Array | None = None
-    """Command (n, 3) of the tick before, for a single target; None outside of ticks."""
-    flow: Array | None = None
-    """Velocity (6,) of the body relative to the water [m/s, rad/s]; None at rest."""
-    seed: int = 0
-    """Makes the answer repeatable."""
-    lost: NDArray[np.bool_] | None = None
-    """Which actuators (n,) do not work, for methods that read losses; None where all do."""
-    free: NDArray[np.bool_] | None = None
-    """Which axes (6,) may take any wrench, for methods that read losses; None for none."""
-    multipliers: Array | None = None
-    """Multipliers (6,) [W/N, W/(N m)] of an earlier answer, for a single target and methods that
-    read them; None for their own."""
-    reference: Array | None = None
-    """Wrenches (K, 6) of the next ticks [N, N m], for methods that read them; None where they are
-    not known."""
 
 
 class Method(ABC):

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.arrays import Array
+from finlab.core import library
 from finlab.core.fields import Record, constant, struct
-from finlab.core.library import library
 from finlab.errors import CommandError, DataError
 
 

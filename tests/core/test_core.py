@@ -11,9 +11,9 @@ import pytest
 from finlab.allocation import Policy
 from finlab.allocation.dual.compiled import Compiled, core_policy
 from finlab.allocation.policy import CLOSEST
+from finlab.core import library
 from finlab.core.calls import Conditions, Core, error_text
 from finlab.core.fields import constant, head_of, struct
-from finlab.core.library import library
 from finlab.errors import CommandError, DataError
 from finlab.layout import Layout
 from tests.random_robots import KINDS, bluerov2_heavy, load, random_plant, random_robot, within

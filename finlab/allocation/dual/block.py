@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from finlab.actuators.response import POINTS, Form, Plane, RadialTable, Response, price_grid
 from finlab.arrays import CLOSE, NEARLY, AnyArray, Array
 from finlab.axes import TURN
+from finlab.core import VERSION
 from finlab.core.fields import constant, numbers_of, struct, tables_begin
-from finlab.core.library import VERSION
 
 _FIELDS_OF_FORM = (
     "command_sign",

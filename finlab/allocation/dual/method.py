@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from finlab.allocation.dual.compiled import Compiled, miss_cost_of, power_bound
 from finlab.allocation.levenberg_marquardt import CommandProblem, exact_commands, norms
-from finlab.allocation.method import Method, MethodQuestion
+from finlab.allocation.method import Method
 from finlab.allocation.policy import CLOSEST, Policy
+from finlab.allocation.question import MethodQuestion
 from finlab.allocation.settings import Settings, number
 from finlab.allocation.solution import Solution
 from finlab.arrays import CLOSE, NEARLY, NOTHING, ROUNDING, Array

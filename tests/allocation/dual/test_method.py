@@ -12,7 +12,7 @@ from finlab.allocation import Allocator
 from finlab.allocation.dual.compiled import _shares_tables, power_bound
 from finlab.allocation.dual.method import MAX_BASES, TABLE_ERROR
 from finlab.allocation.levenberg_marquardt import _starts_around, cheapest_exact
-from finlab.allocation.method import MethodQuestion
+from finlab.allocation.question import MethodQuestion
 from finlab.arrays import NEARLY, Array
 from finlab.core.calls import NOMINAL, Conditions
 from finlab.layout import Layout, Limits, load_layout
