@@ -281,9 +281,9 @@ class Dual(Method):
             works = None if conditions.lost is None else ~conditions.lost
             counts = None if conditions.free is None else ~conditions.free
             problem = problem.restricted(works, counts)
-        if conditions.command_previous is None:
+        if conditions.previous is None:
             return problem
-        return problem.in_tick(self.rates.box(conditions.command_previous))
+        return problem.in_tick(self.rates.box(conditions.previous))
 
     def _basis_under(self, conditions: Conditions) -> Array:
         """Directions (6, r) of scaled wrenches that the actuators drive, orthonormal."""
