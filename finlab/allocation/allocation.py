@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.actuators.actuator import Command
+from finlab.allocation.method import USUAL_PERIOD_S
 from finlab.allocation.policy import CLOSEST, Policy
 from finlab.allocation.report import allocation_blocks, answer_notes, doubts, next_measurement
-from finlab.allocation.settings import USUAL_PERIOD_S
 from finlab.allocation.solution import CANDIDATE_ARRAYS, Candidates, PlainData, Solution
 from finlab.arrays import Array
 from finlab.display import html, text

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from finlab.allocation import methods
 from finlab.allocation.allocation import Allocation, BatchAllocation, LazyFigures, chunks
-from finlab.allocation.method import Checkpoint, Method, Networks
+from finlab.allocation.method import Checkpoint, Method, Networks, Settings
 from finlab.allocation.policy import CLOSEST, Policy, PolicyName, as_policy
 from finlab.allocation.question import (
     MethodQuestion,
@@ -29,7 +29,6 @@ from finlab.allocation.question import (
     free_mask,
 )
 from finlab.allocation.robot_state import RobotState, without_lost, working_actuators
-from finlab.allocation.settings import Settings
 from finlab.allocation.solution import Candidates, Rows, Solution, joined
 from finlab.arrays import Array
 from finlab.axes import Axis, axes_in

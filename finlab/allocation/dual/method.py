@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.dual.compiled import Compiled, miss_cost_of, power_bound
+from finlab.allocation.dual.bound import TABLE_ERROR, bound_by_laws, bound_by_measured_tables
+from finlab.allocation.dual.compiled import Compiled
 from finlab.allocation.levenberg_marquardt import CommandProblem, exact_commands, norms
-from finlab.allocation.method import Method
+from finlab.allocation.method import Method, Settings, number
 from finlab.allocation.policy import CLOSEST, Policy
 from finlab.allocation.question import MethodQuestion
-from finlab.allocation.settings import Settings, number
 from finlab.allocation.solution import Solution
-from finlab.arrays import CLOSE, NEARLY, NOTHING, ROUNDING, Array
+from finlab.arrays import NEARLY, NOTHING, ROUNDING, Array
 from finlab.axes import axes_in
 from finlab.core.calls import NOMINAL, Conditions
 from finlab.layout.effectiveness import wrench_of_forces
@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 
 MAX_BASES = 32
 """States of losses and free axes of which the basis of what is driven is kept."""
-TABLE_ERROR = 10.0 * CLOSE
-"""Share of a power by which the core's tables may be off."""
 _TRUNCATED = (
     "the search for a better answer was ended by its limit of steps: the power may be above the "
     "least, by no more than it is above bound"
@@ -70,7 +68,11 @@ class Dual(Method):
 
     def prepare(self) -> None:
         """Compiles the robot for the core."""
-        miss_cost = miss_cost_of(self.layout, self.scale, self.settings.robust)
+        miss_cost: Array | None = None
+        if self.settings.robust > 0.0:
+            from finlab.physics.expected_miss import miss_cost_of
+
+            miss_cost = miss_cost_of(self.layout, self.scale, self.settings.robust)
         self.compiled = Compiled(
             self.layout, self.plant, self.scale, self.settings.period_s, miss_cost
         )
@@ -375,7 +377,7 @@ class Dual(Method):
         multipliers = np.where(is_finite, multipliers, 0.0)
         power = self.plant.power(command)[:, works].sum(axis=-1)
 
-        bound = self._bound_by_laws(wrench, multipliers, conditions)
+        bound = bound_by_laws(self.compiled, wrench, multipliers, conditions)
         if not self._reads_tables:
             is_served = norms((wrench - wrench_served) / self.scale) <= NEARLY
             with_gaps = np.maximum(bound, self._bound_of_gaps(gap_power_bound, power))
@@ -383,8 +385,14 @@ class Dual(Method):
         elif works.all():
             # The multipliers are those of the smooth shapes that stand for measured tables.
             low = np.flatnonzero(bound < (1.0 - TABLE_ERROR) * power)
-            by_measurements = self._bound_of_measured_tables(
-                wrench[low], multipliers[low], command[low], conditions
+            by_measurements = bound_by_measured_tables(
+                self.compiled,
+                self.plant,
+                self.scale,
+                wrench[low],
+                multipliers[low],
+                command[low],
+                conditions,
             )
             bound[low] = np.maximum(bound[low], by_measurements)
 
@@ -392,15 +400,6 @@ class Dual(Method):
         largest_by_tables = (1.0 + TABLE_ERROR) * power + self._least_table_error
         bound = np.where(bound > largest_by_tables, 0.0, np.clip(bound, 0.0, power))
         return np.asarray(bound * (1.0 - ROUNDING))
-
-    def _bound_by_laws(self, wrench: Array, multipliers: Array, conditions: Conditions) -> Array:
-        """Lower bounds (N,) [W] by the laws' conjugates: at multipliers (N, 6), or at 0 where that
-        proves more."""
-        # The last row is the multiplier 0, which proves for any wrench what all take at rest.
-        multipliers_and_zero = np.concatenate([multipliers, np.zeros((1, 6))])
-        wrenches = np.concatenate([wrench, np.zeros((1, 6))])
-        bounds = power_bound(self.compiled, wrenches, multipliers_and_zero, conditions)
-        return np.asarray(np.maximum(bounds[:-1], bounds[-1]))
 
     def _bound_of_gaps(self, gap_power_bound: Array, power: Array) -> Array:
         """Lower bounds (N,) [W] of what the core proved of gaps by its tables, which are off by a
@@ -412,21 +411,6 @@ class Dual(Method):
     def _least_table_error(self) -> float:
         """By how much [W] tables may be off at the least forces."""
         return NEARLY * self.compiled.largest_power
-
-    def _bound_of_measured_tables(
-        self, wrench: Array, multipliers: Array, command: Array, conditions: Conditions
-    ) -> Array:
-        """Lower bounds (R,) [W] for wrenches (R, 6) of commands (R, n, 3), at multipliers (R, 6)
-        that are raised by the measured tables themselves."""
-        from finlab.allocation.dual.multiplier_ascent import raised_multipliers
-
-        if len(wrench) == 0:
-            return np.empty(0)
-        raised = [
-            raised_multipliers(self.plant, self.scale, *row)
-            for row in zip(wrench, multipliers, command, strict=True)
-        ]
-        return power_bound(self.compiled, wrench, np.stack(raised), conditions)
 
     @cached_property
     def _reads_tables(self) -> bool:
