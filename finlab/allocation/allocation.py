@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.actuators.actuator import Command
-from finlab.allocation.method import USUAL_PERIOD_S
 from finlab.allocation.policy import CLOSEST, Policy
 from finlab.allocation.report import allocation_blocks, answer_notes, doubts, next_measurement
 from finlab.allocation.solution import CANDIDATE_ARRAYS, Candidates, PlainData, Solution
@@ -412,6 +411,7 @@ class Allocation(Answer[float]):
         if self.reachable or self.unknown_fins:
             return ()
         from finlab.allocation.binding import what_binds
+        from finlab.allocation.method import USUAL_PERIOD_S
 
         period_s = float(self.settings.get("period_s", USUAL_PERIOD_S))
         missing = self.unallocated / self.scale
