@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from finlab.allocation import Allocation, Allocator, BatchAllocation
-from finlab.allocation.method import Method
+from finlab.allocation.method import Method, Settings
 from finlab.allocation.methods import (
     Checkpoint,
     MethodChoice,
@@ -20,7 +20,6 @@ from finlab.allocation.methods import (
     choose_method,
     method_class,
 )
-from finlab.allocation.settings import Settings
 from finlab.assets import shipped_layouts
 from finlab.layout import Layout, load_layout
 from finlab.research.networks.checkpoint import read_normalization, resolve_checkpoint

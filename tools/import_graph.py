@@ -9,7 +9,7 @@ imports. Dependencies that no import statement names are edges, too:
 - a module that is loaded by name, where its full name stands as a string, as in registries
   (`module:Class`);
 - a fixture, by the name of an argument, leads to its `conftest.py`;
-- `finlab/core/library.py` loads what is compiled from the C files, and a Python file that shares
+- `finlab/core/__init__.py` loads what is compiled from the C files, and a Python file that shares
   its name with a C file does the same work or calls it.
 """
 
@@ -23,7 +23,7 @@ ROOMS = ("finlab", "webapp", "tests")
 """Folders whose Python files are in the graph."""
 CORE = "finlab/core/"
 """The folder of the C files."""
-LOADER = "finlab/core/library.py"
+LOADER = "finlab/core/__init__.py"
 """The file that loads the compiled core."""
 PASSES_NAMES_ON = {"__getattr__", "__dir__"}
 """Functions of a package's `__init__.py` that only passes names on."""

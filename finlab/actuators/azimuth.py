@@ -106,7 +106,7 @@ class AzimuthGroup(Group):
 
     @property
     def forms(self) -> list[Form]:
-        return [form_of("pod", limits) for limits in self._limits]
+        return [form_of("pod", limits, turning_costs=True) for limits in self._limits]
 
     def radial_conjugate_bound(self, price: Array, back: Array, ends: Array | None) -> Array:
         least, most = (self._limits if ends is None else ends).T

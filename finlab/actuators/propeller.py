@@ -190,16 +190,28 @@ def usable_force(propeller: Any) -> tuple[float, float]:
     return 0.0, 0.0
 
 
-def form_of(kind: Literal["thruster", "pod"], limits: Array, sign: float = 1.0) -> Form:
+def form_of(
+    kind: Literal["thruster", "pod"],
+    limits: Array,
+    sign: float = 1.0,
+    *,
+    turning_costs: bool = False,
+) -> Form:
     """Returns how forces of a propeller become commands.
 
     Args:
         kind: whether its axis is fixed.
         limits: its usable force, least and most (2,) [N]; zeros for one that gives none.
         sign: sign of a thruster's command for a force along its `Line`.
+        turning_costs: whether a change of the command's angle has a cost in a tick.
     """
     gives_nothing = not limits.any()
-    return Form(kind, axes=np.zeros((3, 3)) if gives_nothing else None, command_sign=sign)
+    return Form(
+        kind,
+        axes=np.zeros((3, 3)) if gives_nothing else None,
+        turning_costs=turning_costs,
+        command_sign=sign,
+    )
 
 
 def _law_of(table: PowerTable) -> PowerLaw:

@@ -83,6 +83,11 @@ class RadialTable:
         """The table that this one is scaled of, itself at scales of 1 where it is of none."""
         return self.base or Origin(self, 1.0, 1.0)
 
+    @cached_property
+    def price(self) -> Array:
+        """Prices (CELLS + 1,) [W/N] of `force`."""
+        return price_grid(self.top)
+
     def scaled(self, share: float, cost: float = 1.0) -> RadialTable:
         """Returns the table with `share` times the force, and `cost` times the power, at each
         command."""
@@ -98,7 +103,7 @@ class RadialTable:
 
     def cost(self, force: Array) -> Array:
         """Returns the power (...) [W] of forces (...) [N] within the table, v T - c*(v)."""
-        price = np.interp(force, self.force, price_grid(self.top))
+        price = np.interp(force, self.force, self.price)
         return np.asarray(price * force - self.conjugate(price))
 
     def conjugate(self, price: Array) -> Array:
@@ -162,7 +167,7 @@ class RadialTable:
     def with_square(self, weight: float) -> RadialTable:
         """Returns the table of the cost c(T) + `weight` T^2 [W]: at the price v + 2 weight T it
         responds as this one does at v."""
-        price = price_grid(self.top) + 2.0 * weight * self.force
+        price = self.price + 2.0 * weight * self.force
         top = float(price[-1])
         power_at_least = self.power_at_least + weight * float(self.force[0]) ** 2
         return self.of_forces(top, np.interp(price_grid(top), price, self.force), power_at_least)
@@ -324,8 +329,12 @@ class Form(NamedTuple):
     beat: Array | None = None
     """Of a fin: amplitudes [rad] and frequencies [Hz] (K + 1, 2) at (j / K)^2 of its largest force.
     Of a foil: lift coefficients, rising [1], and angles [rad] (K, 2)."""
+    beat_count: int = 0
+    """K of `beat`, which the core reads before its rows: cells of a fin, points of a foil."""
     deflection: Array | None = None
     """Of a fin with a gauge: angles (POINTS,) [rad] from the command's direction to the force's."""
+    turning_costs: bool = False
+    """Whether a change of the command's angle has a cost in a tick (Eq. 16), as of a pod."""
     command_sign: float = 1.0
     """Of a thruster: sign of its command over its force, -1 where it only pulls."""
     lean_angle: float = 0.0

@@ -379,6 +379,7 @@ class RudderGroup(Group):
                 axes=np.array([lift_axis, drag_axis, [0.0, 0.0, 0.0]]),
                 law=self._grids[i],
                 beat=np.stack([curve.lift, curve.angle], axis=-1),
+                beat_count=len(curve.lift),
                 lean_angle=course,
                 pressure_area=max(self._flow.pressure[i], NOTHING),
                 zero_lift_angle=self._no_lift[i],

@@ -6,16 +6,15 @@
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, NamedTuple, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finlab.actuators.actuator import Command
 from finlab.allocation.policy import CLOSEST, Policy
-from finlab.allocation.report import allocation_blocks, doubts, next_measurement
-from finlab.allocation.settings import USUAL_PERIOD_S
-from finlab.allocation.solution import CANDIDATE_ARRAYS, Candidates, PlainData
+from finlab.allocation.report import allocation_blocks, answer_notes, doubts, next_measurement
+from finlab.allocation.solution import CANDIDATE_ARRAYS, Candidates, PlainData, Solution
 from finlab.arrays import Array
 from finlab.display import html, text
 from finlab.layout.damage import Damage
@@ -24,7 +23,7 @@ from finlab.physics.objective import REACHED, judged_effort, judged_power
 from finlab.physics.plant import Plant, plant_of
 
 if TYPE_CHECKING:
-    from finlab.allocation.question import LazyFigures
+    from finlab.allocation.robot_state import RobotState
 
 Number = TypeVar("Number", float, Array)
 """A figure of one answer, or of each of many (N,)."""
@@ -38,6 +37,62 @@ def read_only(array: Array) -> Array:
     """Makes an array read-only, which nobody else writes to, and returns it."""
     array.setflags(write=False)
     return array
+
+
+class LazyFigures(NamedTuple):
+    """The figures that a result computes when they are first read."""
+
+    state: "RobotState"
+    """Of the robot that was asked."""
+    flow: Array | None
+    """Velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at rest."""
+    wrenches: Array
+    """Desired wrenches as they came, (6,) or (N, 6) [N, N m]."""
+    solution: Solution
+    """What the method answered."""
+
+    @property
+    def plant(self) -> Plant:
+        """Judge of commands: the laws of all actuators, lost ones included, in the question's
+        flow."""
+        return self.state.plant.at(self.flow)
+
+    def notes(self) -> tuple[str, ...]:
+        """Returns sentences about the robot and the method, not about single answers."""
+        state = self.state
+        asked = self.wrenches
+        if state.free is not None:
+            # What was asked of an axis that the layout does not command stays: a note tells of it.
+            asked = np.where(state.free & state.layout.commanded, 0.0, asked)
+        return answer_notes(state.healthy, state.method, self.flow, asked, self.solution.notes)
+
+    def candidates(self) -> Candidates | None:
+        """Returns the refined candidates of all n actuators; None where the method has none."""
+        return self._candidates_of_all(self.solution.candidates)
+
+    def samples(self) -> Candidates | None:
+        """Returns the candidates before refinement; None where the method has none."""
+        return self._candidates_of_all(self.solution.samples)
+
+    def bound(self) -> Array | None:
+        """Returns the lower bound (N,) of the power [W]; None where the method proves none."""
+        bound = self.solution.bound
+        return None if bound is None else bound(self.solution.command)
+
+    def calm_power(self) -> Array | None:
+        """Returns the part (N,) of the power [W] that goes into less turning; None where the method
+        weighs no turning."""
+        calm_power = self.solution.calm_power
+        return None if calm_power is None else calm_power(self.solution.command)
+
+    def _candidates_of_all(self, make: Callable[[], Candidates] | None) -> Candidates | None:
+        """Candidates of the actuators that work, with rows for all n."""
+        if make is None:
+            return None
+        candidates = make()
+        if not candidates or not self.state.damage.lost:
+            return candidates
+        return replace(candidates, command=self.state.among_all(candidates.command))
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -88,7 +143,7 @@ class Answer(PlainData, Generic[Number]):
     unknown_fins: tuple[str, ...] = ()
     """Names of fins whose model the method's networks have not learned; answers for them are
     wrong."""
-    answered: "LazyFigures | None" = field(default=None, compare=False)
+    answered: LazyFigures | None = field(default=None, compare=False)
     """Computes the lazy properties; None in copies, which have them all."""
 
     def __post_init__(self) -> None:
@@ -356,6 +411,7 @@ class Allocation(Answer[float]):
         if self.reachable or self.unknown_fins:
             return ()
         from finlab.allocation.binding import what_binds
+        from finlab.allocation.method import USUAL_PERIOD_S
 
         period_s = float(self.settings.get("period_s", USUAL_PERIOD_S))
         missing = self.unallocated / self.scale

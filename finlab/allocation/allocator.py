@@ -13,12 +13,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from finlab.allocation import methods
-from finlab.allocation.allocation import Allocation, BatchAllocation, chunks
-from finlab.allocation.method import Checkpoint, Method, MethodQuestion, Networks
+from finlab.allocation.allocation import Allocation, BatchAllocation, LazyFigures, chunks
+from finlab.allocation.method import Checkpoint, Method, Networks, Settings
 from finlab.allocation.policy import CLOSEST, Policy, PolicyName, as_policy
 from finlab.allocation.question import (
-    LazyFigures,
-    RobotState,
+    MethodQuestion,
     check_flow,
     check_layout,
     check_previous,
@@ -28,10 +27,8 @@ from finlab.allocation.question import (
     check_wrenches,
     damage_of,
     free_mask,
-    without_lost,
-    working_actuators,
 )
-from finlab.allocation.settings import Settings
+from finlab.allocation.robot_state import RobotState, without_lost, working_actuators
 from finlab.allocation.solution import Candidates, Rows, Solution, joined
 from finlab.arrays import Array
 from finlab.axes import Axis, axes_in
@@ -242,28 +239,31 @@ class Allocator:
             DataError: a fin's force table cannot be read.
         """
         wrench_asked = check_target(wrench)
-        state, question = self._question(damage_of(damage, lost), policy, flow, seed, free)
-        method = state.method
+        all_damage = damage_of(damage, lost)
+        checked_policy = as_policy(policy)
+        checked_seed = check_seed(seed)
+        checked_flow = check_flow(flow)
+        state = self._state(all_damage, free)
         multipliers: Array | None = None
-        reference_of_method: Array | None = None
         if isinstance(previous, Allocation):
-            if "multipliers" in method.reads and previous.multipliers is not None:
-                multipliers = previous.multipliers
+            multipliers = previous.multipliers
             previous = previous.command
-        command_previous = None if previous is None else check_previous(previous, state.layout)
+        checked_previous = None if previous is None else check_previous(previous, state.layout)
 
         start = time.perf_counter()
         target = wrench_asked
+        checked_reference: Array | None = None
         if reference is not None:
-            wrenches_expected = check_reference(reference)
-            target = method.in_time(target, wrenches_expected)
-            if "reference" in method.reads:
-                reference_of_method = state.with_free_axes(wrenches_expected, 0.0)
-        question = question._replace(
-            targets=state.with_free_axes(target, 0.0)[None],
-            previous=command_previous,
-            multipliers=multipliers,
-            reference=reference_of_method,
+            checked_reference = check_reference(reference)
+            target = state.method.in_time(target, checked_reference)
+        question = state.question(
+            target[None],
+            checked_policy,
+            checked_flow,
+            checked_seed,
+            checked_previous,
+            multipliers,
+            checked_reference,
         )
         solution = state.solve(question)
         solve_ms = (time.perf_counter() - start) * 1e3
@@ -274,7 +274,7 @@ class Allocator:
             command=state.among_all(solution.command)[0].copy(),
             solve_ms=solve_ms,
             settings=vars(self.settings).copy(),
-            previous=command_previous,
+            previous=checked_previous,
             wrench_expected=None if solution.wrench is None else solution.wrench[0],
             multipliers=None if solution.multipliers is None else solution.multipliers[0],
         )
@@ -333,17 +333,17 @@ class Allocator:
             DataError: a fin's force table cannot be read.
         """
         wrenches_asked = check_wrenches(wrenches)
-        state, question = self._question(damage_of(damage, lost), policy, flow, seed, free)
+        all_damage = damage_of(damage, lost)
+        checked_policy = as_policy(policy)
+        checked_seed = check_seed(seed)
+        checked_flow = check_flow(flow)
+        state = self._state(all_damage, free)
         start = time.perf_counter()
+        question = state.question(wrenches_asked, checked_policy, checked_flow, checked_seed)
 
         def parts() -> Iterator[tuple[Rows, Solution]]:
             for rows in chunks(len(wrenches_asked)):
-                # The seed is shifted, so that a target gets the same answer in any batch.
-                part = question._replace(
-                    targets=state.with_free_axes(wrenches_asked[rows], 0.0),
-                    seed=question.seed + rows.start,
-                )
-                yield rows, state.solve(part)
+                yield rows, state.solve(question.part(rows))
 
         solution = joined(parts(), len(wrenches_asked), state.works)
         targets_shown = state.with_free_axes(wrenches_asked, np.nan)
@@ -355,26 +355,6 @@ class Allocator:
             solve_ms=np.broadcast_to(elapsed_ms / max(count, 1), count),
             wrench_expected=solution.wrench,
         )
-
-    def _question(
-        self,
-        damage: Damage,
-        policy: Policy | PolicyName,
-        flow: ArrayLike | None,
-        seed: int,
-        free: Sequence[str] = (),
-    ) -> tuple[RobotState, MethodQuestion]:
-        """Checks the arguments of a question, and prepares the robot in the state they name.
-
-        Returns:
-            The robot in that state, and the question to its method, but for the wrenches.
-        """
-        checked_policy = as_policy(policy)
-        check_seed(seed)
-        checked_flow = check_flow(flow)
-        state = self._state(damage, free)
-        state.method.check_policy(checked_policy)
-        return state, state.question(checked_policy, checked_flow, int(seed))
 
     def _common_fields(
         self,

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 from pkgutil import resolve_name
 from typing import Any, Literal
 
-from finlab.allocation.method import Checkpoint, Method, Networks
-from finlab.allocation.settings import Settings
+from finlab.allocation.method import Checkpoint, Method, Networks, Settings
 from finlab.errors import AllocationError
 
 MethodName = Literal[

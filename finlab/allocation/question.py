@@ -1,34 +1,25 @@
-"""One question to an allocator: the state of the robot, which asks its method, what a result
-computes later, and the checks of all arguments.
+"""The question to a method, and the checks of the arguments that it is made of.
 
-`Allocator` makes a `RobotState` for each damage and set of free axes, and `LazyFigures` for each
-result, which compute from state and solution what is first read later.
-The checks return their argument in the form in which methods take it, or raise an error that says
-what was got and what was expected. They stand here and in no file of their own since `finlab
-allocate` is to load few files.
+`Allocator` asks; who writes a method reads `MethodQuestion`. The checks return their argument in
+the form in which methods take it, or raise an error that says what was got and what was expected.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from finlab.allocation.method import Method, MethodQuestion
-from finlab.allocation.policy import Policy
-from finlab.allocation.report import answer_notes
-from finlab.allocation.solution import Candidates, Solution, among_all
+from finlab.allocation.policy import CLOSEST, Policy
 from finlab.arrays import Array
 from finlab.axes import AXES, mask_of
 from finlab.errors import AllocationError, CommandError
 from finlab.layout.damage import NO_DAMAGE, Damage, lost_names
 from finlab.layout.layout import Layout
-from finlab.physics.plant import Plant
 
 MAX_WRENCH = 1e6
 """Largest magnitude of a component of a wrench [N, N m]; beyond it something is wrong upstream."""
@@ -37,189 +28,39 @@ MAX_FLOW = 100.0
 """Largest magnitude of a component of the flow [m/s, rad/s]; beyond it something is wrong
 upstream."""
 
-_NO_TARGETS = np.empty((0, 6))
-"""Stands for the wrenches of a question that has none yet."""
-
 MAX_SIZE_IN_PYTHON = 100
 """Arrays of up to so many numbers are measured by Python's own functions, which is quicker than
 numpy's calls are for them; every tick pays for it."""
 
 
-def working_actuators(damaged: Layout, damage: Damage) -> NDArray[np.bool_]:
-    """Returns which actuators of a robot work.
+class MethodQuestion(NamedTuple):
+    """What a method is asked, all checked, of a robot of n actuators."""
 
-    Args:
-        damaged: the robot of n actuators, with the limits that damage has left.
-        damage: what is known of it.
+    targets: Array
+    """Desired wrenches (N, 6) [N, N m]; 0 along axes that do not count."""
+    policy: Policy = CLOSEST
+    """What to give for those out of reach."""
+    previous: Array | None = None
+    """Command (n, 3) of the tick before, for a single target; None outside of ticks."""
+    flow: Array | None = None
+    """Velocity (6,) of the body relative to the water [m/s, rad/s]; None at rest."""
+    seed: int = 0
+    """Makes the answer repeatable."""
+    lost: NDArray[np.bool_] | None = None
+    """Which actuators (n,) do not work, for methods that read losses; None where all do."""
+    free: NDArray[np.bool_] | None = None
+    """Which axes (6,) may take any wrench, for methods that read losses; None for none."""
+    multipliers: Array | None = None
+    """Multipliers (6,) [W/N, W/(N m)] of an earlier answer, for a single target and methods that
+    read them; None for their own."""
+    reference: Array | None = None
+    """Wrenches (K, 6) of the next ticks [N, N m], for methods that read them; None where they are
+    not known."""
 
-    Returns:
-        Mask (n,), False for the lost ones.
-
-    Raises:
-        LayoutError: an actuator that is lost is unknown, or none is left.
-    """
-    lost = set(damage.lost)
-    works = np.array([name not in lost for name in damaged.names])
-    lost_here = damaged.n - int(works.sum())
-    if lost and (not works.any() or len(lost) > lost_here):
-        damaged.without(damage.lost, "lost")  # raises the error that says what is wrong
-    return works
-
-
-def without_lost(damaged: Layout, damage: Damage) -> Layout:
-    """Takes the lost actuators out of a robot.
-
-    Args:
-        damaged: the robot, with the limits that damage has left.
-        damage: what is known of it.
-
-    Returns:
-        The robot of the actuators that are not lost; itself where none is.
-    """
-    return damaged.without(damage.lost) if damage.lost else damaged
-
-
-@dataclass(frozen=True, eq=False)
-class RobotState:
-    """A robot as damage has left it, asked for some axes of the wrench, with a method that is ready
-    for it."""
-
-    layout: Layout
-    """All n actuators, with the limits that damage has left."""
-    damage: Damage
-    """What is known of those that are damaged."""
-    works: NDArray[np.bool_]
-    """Mask (n,) of the actuators that are not lost."""
-    method: Method
-    """Made for the m actuators that work, or for all n where it takes losses with the question."""
-    plant: Plant
-    """Of all n actuators at rest in the water; judges answers."""
-    free: NDArray[np.bool_] | None
-    """Axes (6,) of the wrench that may take any value; None where all are commanded."""
-
-    @cached_property
-    def healthy(self) -> Layout:
-        """The robot of the m actuators that work alone."""
-        return without_lost(self.layout, self.damage)
-
-    @cached_property
-    def lost(self) -> NDArray[np.bool_] | None:
-        """Mask (n,) of the actuators that are lost; None where none is."""
-        return ~self.works if self.damage.lost else None
-
-    def among_all(self, command: Array) -> Array:
-        """Returns commands (..., m, 3) of the actuators that work as those (..., n, 3) of all, NaN
-        for the lost ones."""
-        return among_all(command, self.works)
-
-    def with_free_axes(self, wrench: Array, value: float) -> Array:
-        """Marks the free axes of wrenches.
-
-        Args:
-            wrench: (..., 6) [N, N m].
-            value: along the free axes: methods take 0 there, results show NaN.
-
-        Returns:
-            Wrenches (..., 6); the same array where no axis is free.
-        """
-        return wrench if self.free is None else np.where(self.free, value, wrench)
-
-    def question(self, policy: Policy, flow: Array | None, seed: int) -> MethodQuestion:
-        """Returns a question to the method, but for its wrenches: with the losses and free axes
-        where the method reads these, else it is made for the actuators that work alone.
-
-        Args:
-            policy: what to give for a wrench out of reach.
-            flow: velocity (6,) of the body relative to the water [m/s, rad/s]; None at rest.
-            seed: makes the answer repeatable.
-        """
-        reads_losses = "losses" in self.method.reads
-        return MethodQuestion(
-            _NO_TARGETS,
-            policy=policy,
-            flow=flow,
-            seed=seed,
-            lost=self.lost if reads_losses else None,
-            free=self.free if reads_losses else None,
-        )
-
-    def solve(self, question: MethodQuestion) -> Solution:
-        """Asks the method.
-
-        Args:
-            question: with its wrenches; its `previous` is that of all n actuators.
-
-        Returns:
-            The method's solution. In a tick its commands lie within the limits and rates of the
-            drives; outside of ticks actuators that have nothing to do are at rest.
-        """
-        method = self.method
-        previous = question.previous
-        if previous is None:
-            solution = method.solve(question)
-            return solution._replace(command=method.plant.rested(solution.command))
-        if "losses" not in method.reads:
-            previous = previous[self.works]
-            question = question._replace(previous=previous)
-        solution = method.solve(question)
-        box = method.rates.box(previous)
-        return solution._replace(command=box.clip_feasible(solution.command, method.plant))
-
-
-class LazyFigures(NamedTuple):
-    """The figures that a result computes when they are first read."""
-
-    state: RobotState
-    """Of the robot that was asked."""
-    flow: Array | None
-    """Velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at rest."""
-    wrenches: Array
-    """Desired wrenches as they came, (6,) or (N, 6) [N, N m]."""
-    solution: Solution
-    """What the method answered."""
-
-    @property
-    def plant(self) -> Plant:
-        """Judge of commands: the laws of all actuators, lost ones included, in the question's
-        flow."""
-        return self.state.plant.at(self.flow)
-
-    def notes(self) -> tuple[str, ...]:
-        """Returns sentences about the robot and the method, not about single answers."""
-        state = self.state
-        asked = self.wrenches
-        if state.free is not None:
-            # What was asked of an axis that the layout does not command stays: a note tells of it.
-            asked = np.where(state.free & state.layout.commanded, 0.0, asked)
-        return answer_notes(state.healthy, state.method, self.flow, asked, self.solution.notes)
-
-    def candidates(self) -> Candidates | None:
-        """Returns the refined candidates of all n actuators; None where the method has none."""
-        return self._candidates_of_all(self.solution.candidates)
-
-    def samples(self) -> Candidates | None:
-        """Returns the candidates before refinement; None where the method has none."""
-        return self._candidates_of_all(self.solution.samples)
-
-    def bound(self) -> Array | None:
-        """Returns the lower bound (N,) of the power [W]; None where the method proves none."""
-        bound = self.solution.bound
-        return None if bound is None else bound(self.solution.command)
-
-    def calm_power(self) -> Array | None:
-        """Returns the part (N,) of the power [W] that goes into less turning; None where the method
-        weighs no turning."""
-        calm_power = self.solution.calm_power
-        return None if calm_power is None else calm_power(self.solution.command)
-
-    def _candidates_of_all(self, make: Callable[[], Candidates] | None) -> Candidates | None:
-        """Candidates of the actuators that work, with rows for all n."""
-        if make is None:
-            return None
-        candidates = make()
-        if not candidates or not self.state.damage.lost:
-            return candidates
-        return replace(candidates, command=self.state.among_all(candidates.command))
+    def part(self, rows: slice) -> MethodQuestion:
+        """Returns the question for some of the targets. The seed is shifted by their first index,
+        so that a target gets the same answer in any batch."""
+        return self._replace(targets=self.targets[rows], seed=self.seed + rows.start)
 
 
 def check_layout(layout: object) -> None:
@@ -234,14 +75,15 @@ def check_layout(layout: object) -> None:
         )
 
 
-def check_seed(seed: object) -> None:
-    """Refuses seeds that are no whole number from 0.
+def check_seed(seed: object) -> int:
+    """Returns a seed, a whole number from 0.
 
     Raises:
         AllocationError: it is none.
     """
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
         raise AllocationError(f"seed: expected a whole number from 0, got {seed!r}")
+    return int(seed)
 
 
 def damage_of(damage: Damage | None, lost: Sequence[str]) -> Damage:

@@ -1,6 +1,6 @@
 """Solutions that methods hand over before they are judged, and the base of plain data.
 
-`Method.solve` returns a `Solution`; `question.py` and `allocation.py` make results of it.
+`Method.solve` returns a `Solution`; `robot_state.py` and `allocation.py` make results of it.
 """
 
 from collections.abc import Callable, Iterable, Sequence

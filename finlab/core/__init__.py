@@ -1,1 +1,70 @@
-"""Hot loops in C, and the way to them from Python."""
+"""Hot loops in C, and the way to them from Python: the compiled core as a ctypes library, loaded
+once. `hatch_build.py` compiles it from the C files here."""
+
+import ctypes
+import sys
+from functools import cache
+from pathlib import Path
+
+from finlab.errors import FinlabError
+
+VERSION = 9
+"""What `fl_version()` of the C files returns; both rise together where a signature or a struct
+changes."""
+SIGNATURES = {
+    "fl_fields": "s",
+    "fl_constant_name": "si",
+    "fl_constant_value": "ii",
+    "fl_error_text": "si",
+    "fl_check": "ipi",
+    "fl_prepare": "ipp",
+    "fl_answer_one": "ipppp",
+    "fl_answer_many": "ippppipppppppp",
+    "fl_commands": "vpppipp",
+    "fl_conjugates": "ippppip",
+    "fl_reach": "vpppppirppp",
+    "fl_jets": "vppipppp",
+    "fl_outer_iterations": "ipppppppp",
+}
+"""What each function returns and takes: i int, r real, p pointer, s text, v nothing."""
+_TYPES = {
+    "i": ctypes.c_int,
+    "r": ctypes.c_double,
+    "p": ctypes.c_void_p,
+    "s": ctypes.c_char_p,
+    "v": None,
+}
+"""Types of ctypes by the letters of `SIGNATURES`."""
+_SUFFIX = {"win32": "dll", "darwin": "dylib"}.get(sys.platform, "so")
+"""Of libraries on this system."""
+PATH = Path(__file__).with_name(f"libfinlab.{_SUFFIX}")
+"""Where the compiled core stands."""
+
+
+@cache
+def library() -> ctypes.PyDLL:
+    """Returns the library.
+
+    Its functions keep the interpreter's lock: most calls take microseconds; those of batches and of
+    coupled robots hold it for up to a tenth of a second.
+
+    Raises:
+        FinlabError: it is missing, does not load here, or was compiled from other C files.
+    """
+    try:
+        core = ctypes.PyDLL(str(PATH))
+    except OSError as error:
+        problem = f"cannot be loaded ({error})" if PATH.exists() else "is missing"
+    else:
+        version = core.fl_version() if hasattr(core, "fl_version") else 0
+        if version == VERSION:
+            for name, kinds in SIGNATURES.items():
+                function = getattr(core, name)
+                function.argtypes = [_TYPES[kind] for kind in kinds[1:]]
+                function.restype = _TYPES[kinds[0]]
+            return core
+        problem = f"has version {version}, and this finlab needs {VERSION}"
+    raise FinlabError(
+        f"the compiled core {PATH} {problem}; run `make setup` or `pip install .` in a source "
+        "tree, elsewhere install finlab again"
+    )

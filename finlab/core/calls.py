@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.arrays import Array
+from finlab.core import library
 from finlab.core.fields import Record, constant, struct
-from finlab.core.library import library
 from finlab.errors import CommandError, DataError
 
 
@@ -63,7 +63,7 @@ class Conjugates(NamedTuple):
 class Conditions(NamedTuple):
     """What holds of a robot of n actuators while it is asked, beside what is asked."""
 
-    command_previous: Array | None = None
+    previous: Array | None = None
     """Commands u^- (n, 3) of the tick before, NaN where one is unknown; None outside of ticks."""
     lost: NDArray[np.bool_] | None = None
     """Which actuators (n,) do not work; None where all do."""
@@ -74,10 +74,10 @@ class Conditions(NamedTuple):
     """What turning costs in a tick, from which Eq. 16 makes the cost of an angle; see
     `DualSettings.calm`."""
     ticks: int = 1
-    """How many ticks after `command_previous` the commands are for; the rates allow as many times
+    """How many ticks after `previous` the commands are for; the rates allow as many times
     the change."""
     angles_wanted: Array | None = None
-    """Angles (n,) [rad] from which turning of pods costs, in place of those of `command_previous`;
+    """Angles (n,) [rad] from which turning of pods costs, in place of those of `previous`;
     NaN of an actuator without; None for none."""
 
 
@@ -175,8 +175,8 @@ class QuestionRecord:
             self._angles_wanted[:] = conditions.angles_wanted
             self._angles_wanted_pointer[0] = self._angles_wanted_address
         self._previous_pointer[0] = 0
-        if conditions.command_previous is not None:
-            self._previous[:] = conditions.command_previous
+        if conditions.previous is not None:
+            self._previous[:] = conditions.previous
             self._previous_pointer[0] = self._previous_address
         self._lost_pointer[0] = 0
         if conditions.lost is not None:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.arrays import Array
+from finlab.core import library
 from finlab.core.calls import (
     NOMINAL,
     AnswerRecord,
@@ -25,7 +26,6 @@ from finlab.core.calls import (
     raise_refusal,
 )
 from finlab.core.fields import Record, struct
-from finlab.core.library import library
 
 _OFFSET_CALLBACK = ctypes.CFUNCTYPE(
     None,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.arrays import Array
-from finlab.core.library import library
+from finlab.core import library
 
 Record = NDArray[np.void]
 """An array of structs, whose fields are read by name."""
@@ -71,6 +71,7 @@ def _constants() -> dict[str, int]:
     return constants
 
 
+@cache
 def constant(name: str) -> int:
     """Returns a constant of the core.
 

@@ -6,8 +6,8 @@ import ctypes
 import numpy as np
 
 from finlab.arrays import Array
+from finlab.core import library
 from finlab.core.fields import actuators_of, constant, head_of, tables_begin
-from finlab.core.library import library
 
 LARGEST_CLOSE = 1e30
 """Infinity in the core, which reads none."""

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from finlab.arrays import AnyArray, Array
-from finlab.core.library import library
+from finlab.core import library
 from finlab.files.schema import Checked
 
 DENSITY = 1000.0

@@ -208,3 +208,24 @@ def _force_errors(actuator: Actuator, model: ForceError, command: Array, force: 
         errors[:, 1, 2] = errors[:, 0, 1]
         errors[:, 2, 0] = deviation[:, 1]
     return errors
+
+
+def miss_cost_of(layout: Layout, wrench_scale: Array, robust: float) -> Array | None:
+    """Returns what the expected miss of actuators costs.
+
+    Args:
+        layout: the robot of n actuators.
+        wrench_scale: (6,) [N, N m].
+        robust: what a miss of 1 % of the wrench scale costs [W], growing with its square.
+
+    Returns:
+        Cost (n, 6) [W, W/m^2 per N^2] of a squared force for the squared effectiveness along each
+        axis; None where nothing costs anything.
+
+    Raises:
+        DataError: a force table cannot be read.
+    """
+    shares = np.array([0.0 if own is None else own.share for own in uncertainties(layout)])
+    if not shares.any():
+        return None
+    return np.multiply.outer(robust * shares**2, (0.01 * wrench_scale) ** -2.0)

@@ -42,7 +42,7 @@ TURN_OF_A_LOOP = re.compile(r"\bfor \(?(?:int )?turns?\b")
 FREE_AXES = {
     "finlab/allocation/allocator.py",
     "finlab/allocation/question.py",
-    "finlab/allocation/method.py",
+    "finlab/allocation/robot_state.py",
 }
 """Files in which `free` names axes."""
 

@@ -17,8 +17,8 @@ from finlab import core
 from finlab.actuators.thrust_model import PowerLaw
 from finlab.allocation import Allocator
 from finlab.arrays import Array
+from finlab.core import PATH, library
 from finlab.core.fields import Record, actuators_of, constant, head_of, struct
-from finlab.core.library import PATH, library
 from finlab.layout import Azimuth, Layout
 from finlab.layout.load import parse_layout
 from finlab.physics.plant import Plant

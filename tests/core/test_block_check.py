@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from finlab.arrays import Array
+from finlab.core import library
 from finlab.core.fields import actuators_of, constant, head_of, tables_begin
-from finlab.core.library import library
 from tests.core.internal_functions import FIN, POD, Robot, robot_of
 
 FOIL = constant("FL_FOIL")

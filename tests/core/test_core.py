@@ -11,9 +11,9 @@ import pytest
 from finlab.allocation import Policy
 from finlab.allocation.dual.compiled import Compiled, core_policy
 from finlab.allocation.policy import CLOSEST
+from finlab.core import library
 from finlab.core.calls import Conditions, Core, error_text
 from finlab.core.fields import constant, head_of, struct
-from finlab.core.library import library
 from finlab.errors import CommandError, DataError
 from finlab.layout import Layout
 from tests.random_robots import KINDS, bluerov2_heavy, load, random_plant, random_robot, within
@@ -74,10 +74,10 @@ def test_multipliers_to_begin_with_that_are_not_finite_are_left_out(
 
 
 def test_commands_of_the_tick_before_may_be_unknown_but_not_infinite(heavy: Core) -> None:
-    infinite = Conditions(command_previous=np.full((8, 3), np.inf))
+    infinite = Conditions(previous=np.full((8, 3), np.inf))
     with pytest.raises(CommandError, match="not finite or out of range"):
         heavy.answer_one(np.zeros(6), None, conditions=infinite)
-    unknown = Conditions(command_previous=np.full((8, 3), np.nan))
+    unknown = Conditions(previous=np.full((8, 3), np.nan))
     assert heavy.answer_one(np.zeros(6), None, conditions=unknown).is_attainable[0]
 
 

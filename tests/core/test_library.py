@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from finlab import core
-from finlab.core.library import PATH, SIGNATURES
+from finlab.core import PATH, SIGNATURES
 from finlab.deploy.c_sources import c_sources, write_c
 from finlab.layout import load_layout
 

@@ -14,9 +14,8 @@ import viser
 from numpy.typing import NDArray
 
 from finlab.allocation.baselines.sqp import Sqp, SqpSettings
-from finlab.allocation.method import LeastErrorMethod
+from finlab.allocation.method import LeastErrorMethod, Settings, number
 from finlab.allocation.methods import METHODS, MethodChoice
-from finlab.allocation.settings import Settings, number
 from finlab.allocation.solution import Candidates, Solution
 from finlab.errors import AllocationError, FinlabError
 from finlab.layout import Layout

@@ -130,7 +130,7 @@ class FinGroup(Group):
             if table.box.law.measured:
                 continue
             v = price[:, i]
-            force = np.interp(v, price_grid(table.table.top), table.table.force)
+            force = np.interp(v, table.table.price, table.table.force)
             share = force / self._largest[i]
             cell = np.minimum((np.sqrt(share) * POINTS).astype(np.intp), POINTS - 1)
             starts = np.stack([table.beat[np.clip(cell + k, 0, POINTS)] for k in (-1, 0, 1, 2)])
@@ -203,6 +203,7 @@ def _form(law: FinLaw, box: LawBox, beat: Array, directions: Directions) -> Form
         "fin",
         law=law.grid_numbers(box.lower, box.upper),
         beat=beat,
+        beat_count=len(beat) - 1,
         deflection=None if is_even else directions.deflection,
         lean_angle=float(directions.deflection[0]) if is_even else float(law.offset),
         unevenness=e,

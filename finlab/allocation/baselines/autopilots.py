@@ -21,8 +21,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from finlab.allocation.baselines.fixed_actuators import fixed_actuators_of
-from finlab.allocation.method import LeastErrorMethod
-from finlab.allocation.settings import Settings, choice
+from finlab.allocation.method import LeastErrorMethod, Settings, choice
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
 from finlab.axes import AXES as WRENCH_AXES

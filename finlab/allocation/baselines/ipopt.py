@@ -21,7 +21,7 @@ from finlab.allocation.baselines.pseudo_inverse import (
     TimeLimitedSettings,
     pushed_axes,
 )
-from finlab.allocation.settings import number
+from finlab.allocation.method import number
 from finlab.arrays import Array
 from finlab.assets import install_command
 from finlab.axes import TURN

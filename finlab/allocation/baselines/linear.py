@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from finlab.allocation.baselines.pseudo_inverse import SOLVED, ModelBased, TimeLimitedSettings
-from finlab.allocation.settings import number
+from finlab.allocation.method import number
 from finlab.arrays import Array
 from finlab.physics import Plant
 

@@ -16,8 +16,7 @@ from finlab.actuators.response import Line, Plane, Response
 from finlab.allocation.baselines.fixed_actuators import fixed_actuators_of
 from finlab.allocation.dual.compiled import Compiled
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
-from finlab.allocation.method import LeastErrorMethod
-from finlab.allocation.settings import Settings, number
+from finlab.allocation.method import LeastErrorMethod, Settings, number
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
 from finlab.axes import wrapped

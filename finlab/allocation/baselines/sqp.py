@@ -12,7 +12,7 @@ from scipy.optimize import minimize
 
 from finlab.allocation.baselines.pseudo_inverse import ModelBased, TimeLimitedSettings, pushed_axes
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
-from finlab.allocation.settings import choice, number
+from finlab.allocation.method import choice, number
 from finlab.arrays import Array
 from finlab.layout import layout_effectiveness
 from finlab.physics import Plant

@@ -41,13 +41,13 @@ def conditions_ahead(
         The same with the wanted angles (n,) [rad], NaN of actuators that are no pods, are lost, or
         have no known command before, and with what it costs to stand elsewhere.
     """
-    assert conditions.command_previous is not None
+    assert conditions.previous is not None
     last = min(len(reference), MAX_TICKS_AHEAD)
     ticks = last + 1
     then = compiled.forces(
         reference[last - 1 : last], CLOSEST, None, conditions._replace(ticks=ticks)
     )
-    angle_previous = conditions.command_previous[:, 0]
+    angle_previous = conditions.previous[:, 0]
     turn = then.command[0, :, 0] - angle_previous
     turn = (turn + np.pi) % TURN - np.pi
     largest_turn = ticks * period_s * turn_rates

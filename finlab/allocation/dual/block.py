@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from finlab.actuators.response import POINTS, Form, Plane, RadialTable, Response, price_grid
 from finlab.arrays import CLOSE, NEARLY, AnyArray, Array
 from finlab.axes import TURN
+from finlab.core import VERSION
 from finlab.core.fields import constant, numbers_of, struct, tables_begin
-from finlab.core.library import VERSION
 
 _FIELDS_OF_FORM = (
     "command_sign",
@@ -201,19 +201,15 @@ class _Tables:
                 gauge, lambda: gauge_numbers(cast(Array, gauge), cast(Array, form.deflection))
             ),
             law_grid=self.offset(law, lambda: cast(Array, law)),
-            command_table=self.offset(beat, lambda: _counted(cast(Array, beat), form.kind)),
+            command_table=self.offset(
+                beat, lambda: np.concatenate([[form.beat_count], cast(Array, beat).ravel()])
+            ),
         )
 
     @property
     def numbers(self) -> Array:
         """All of them, in order."""
         return np.concatenate(self._numbers)
-
-
-def _counted(rows: Array, kind: str) -> Array:
-    """A curve, or a beat: how many points, or cells, then these."""
-    count = len(rows) - 1 if kind == "fin" else len(rows)
-    return np.concatenate([[count], rows.ravel()])
 
 
 def gauge_numbers(gauge: Array, deflection: Array) -> Array:

@@ -1,5 +1,5 @@
-"""A layout compiled for the dual: the responses of its actuators, the block of numbers that the
-core reads, and the bound that the conjugates prove.
+"""A layout compiled for the dual: the responses of its actuators, and the block of numbers that the
+core reads.
 
 Method `dual` compiles a robot once and in each flow. Other methods and the null space use the same
 for the commands that give forces.
@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from finlab.actuators.kinds import groups_of
 from finlab.actuators.response import Form, Group, Line, Plane, Response, power_of, with_square
 from finlab.allocation.dual.block import BlockContents, block_of
+from finlab.allocation.method import USUAL_PERIOD_S
 from finlab.allocation.policy import Policy
-from finlab.allocation.settings import USUAL_PERIOD_S
-from finlab.arrays import NOTHING, ROUNDING, Array
+from finlab.arrays import NOTHING, Array
 from finlab.core.calls import NOMINAL, Conditions, Conjugates, Core, CoreAnswer, policy_record
 from finlab.core.fields import Record
 from finlab.layout.layout import Layout
@@ -50,8 +50,8 @@ class Compiled:
                 are used.
             wrench_scale: (6,) [N, N m], by which errors are normalized.
             period_s: time between ticks [s].
-            miss_cost: of `miss_cost_of`, (n, 6); None where a squared force costs nothing beside
-                its power.
+            miss_cost: (n, 6), of `miss_cost_of` in `finlab.physics.expected_miss`; None where a
+                squared force costs nothing beside its power.
 
         Raises:
             DataError: a force table cannot be read.
@@ -112,8 +112,8 @@ class Compiled:
         """Least and largest forces (n, 2) [N], of planes below 0 in reverse."""
         self.is_line = np.array([isinstance(response, Line) for response in self.responses])
         """Which have one direction (n,)."""
-        self.is_pod = np.array([form.kind == "pod" for form in forms])
-        """Which push at an angle of their own (n,)."""
+        self.turning_costs = np.array([form.turning_costs for form in forms])
+        """Of which a change of the command's angle has a cost in a tick (n,)."""
         flow_speed = np.array([_flow_speed(response) for response in self.responses])
         self._largest_force = self._largest_forces(flow_speed)
         self.row_force_max = self._largest_force + _NO_FORCE
@@ -339,60 +339,3 @@ def _shares_tables(group: Group) -> bool:
     return all(
         plane.table is first.table and plane.reverse is first.reverse for plane in planes[1:]
     )
-
-
-def miss_cost_of(layout: Layout, wrench_scale: Array, robust: float) -> Array | None:
-    """Returns what the expected miss of actuators costs.
-
-    Args:
-        layout: the robot of n actuators.
-        wrench_scale: (6,) [N, N m].
-        robust: what a miss of 1 % of the wrench scale costs [W], growing with its square.
-
-    Returns:
-        Cost (n, 6) [W, W/m^2 per N^2] of a squared force for the squared effectiveness along each
-        axis; None where nothing costs anything.
-
-    Raises:
-        DataError: a force table cannot be read.
-    """
-    if robust == 0.0:
-        return None
-    from finlab.physics.expected_miss import uncertainties
-
-    shares = np.array([0.0 if own is None else own.share for own in uncertainties(layout)])
-    if not shares.any():
-        return None
-    return np.multiply.outer(robust * shares**2, (0.01 * wrench_scale) ** -2.0)
-
-
-def power_bound(
-    compiled: Compiled, wrench: Array, multipliers: Array, conditions: Conditions = NOMINAL
-) -> Array:
-    """Returns a lower bound of the power by weak duality (Eq. 3), with conjugates by the laws.
-
-    Args:
-        compiled: the robot.
-        wrench: (N, 6) [N, N m] that is given.
-        multipliers: lambda (N, 6) [W/N, W/(N m)]; any prove a bound.
-        conditions: what holds of the robot.
-
-    Returns:
-        Power (N,) [W] that no answer undercuts which gives these wrenches under the conditions.
-    """
-    by_tables = compiled.core.conjugates(multipliers, conditions)
-    conjugate = by_tables.conjugate.copy()
-    for index, (indices, group) in enumerate(compiled.groups):
-        along_price = compiled.conjugates_by_laws(index, by_tables)
-        in_all_directions = group.conjugate_bound(multipliers)
-        for by_laws in (along_price, in_all_directions):
-            if by_laws is not None:
-                is_said = ~np.isnan(by_laws)
-                conjugate[:, indices] = np.where(is_said, by_laws, conjugate[:, indices])
-    wrench_offset = compiled.wrench_offset
-    if conditions.lost is not None:
-        conjugate[:, conditions.lost] = 0.0
-        wrench_offset = compiled.wrench_offset_of(~conditions.lost)
-    paid = multipliers * (wrench - wrench_offset)
-    rounding = ROUNDING * (np.abs(paid).sum(axis=1) + np.abs(conjugate).sum(axis=1))
-    return np.asarray(paid.sum(axis=1) - conjugate.sum(axis=1) - rounding)

@@ -9,18 +9,19 @@ commands, within the same limits.
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, NamedTuple, Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.dual.compiled import Compiled, miss_cost_of, power_bound
+from finlab.allocation.dual.bound import TABLE_ERROR, bound_by_laws, bound_by_measured_tables
+from finlab.allocation.dual.compiled import Compiled
 from finlab.allocation.levenberg_marquardt import CommandProblem, exact_commands, norms
-from finlab.allocation.method import Method, MethodQuestion
+from finlab.allocation.method import Method, Settings, number
 from finlab.allocation.policy import CLOSEST, Policy
-from finlab.allocation.settings import Settings, number
+from finlab.allocation.question import MethodQuestion
 from finlab.allocation.solution import Solution
-from finlab.arrays import CLOSE, NEARLY, NOTHING, ROUNDING, Array
+from finlab.arrays import NEARLY, NOTHING, ROUNDING, Array
 from finlab.axes import axes_in
 from finlab.core.calls import NOMINAL, Conditions
 from finlab.layout.effectiveness import wrench_of_forces
@@ -30,8 +31,6 @@ if TYPE_CHECKING:
 
 MAX_BASES = 32
 """States of losses and free axes of which the basis of what is driven is kept."""
-TABLE_ERROR = 10.0 * CLOSE
-"""Share of a power by which the core's tables may be off."""
 _TRUNCATED = (
     "the search for a better answer was ended by its limit of steps: the power may be above the "
     "least, by no more than it is above bound"
@@ -56,14 +55,6 @@ class DualSettings(Settings):
     )
 
 
-class _MethodInFlow(NamedTuple):
-    """A method for a robot in one flow: one is kept, as a control loop asks in the same flow for
-    many ticks, or in another one at each."""
-
-    flow: bytes
-    method: "Dual"
-
-
 class Dual(Method):
     """Exact and cheapest on any actuators whose laws are known, without a network."""
 
@@ -77,12 +68,20 @@ class Dual(Method):
 
     def prepare(self) -> None:
         """Compiles the robot for the core."""
-        miss_cost = miss_cost_of(self.layout, self.scale, self.settings.robust)
+        miss_cost: Array | None = None
+        if self.settings.robust > 0.0:
+            from finlab.physics.expected_miss import miss_cost_of
+
+            miss_cost = miss_cost_of(self.layout, self.scale, self.settings.robust)
         self.compiled = Compiled(
             self.layout, self.plant, self.scale, self.settings.period_s, miss_cost
         )
         """The robot as the core reads it."""
-        self._in_last_flow: _MethodInFlow | None = None
+        self._in_last_flow: Dual | None = None
+        """The method in the flow of the last question: a control loop asks in the same flow for
+        many ticks, or in another one at each."""
+        self._flow_key = b""
+        """Bytes of the flow that this method is for; none at rest."""
         self._bases: dict[bytes, Array] = {}
 
     @cached_property
@@ -102,14 +101,16 @@ class Dual(Method):
         if flow is None:
             return self
         key = flow.tobytes()
-        if self._in_last_flow is not None and self._in_last_flow.flow == key:
-            return self._in_last_flow.method  # type: ignore[return-value]
+        last = self._in_last_flow  # read once: threads may share the method
+        if last is not None and last._flow_key == key:
+            return last  # type: ignore[return-value]
         other = super().at(flow)
         if other is not self:
             other.compiled = self.compiled.at(other.plant.inflow(None))
             other._in_last_flow = None
             other._bases = {}
-            self._in_last_flow = _MethodInFlow(key, other)
+            other._flow_key = key
+            self._in_last_flow = other
         return other
 
     def solve(self, question: MethodQuestion) -> Solution:
@@ -139,8 +140,8 @@ class Dual(Method):
     def turn_rates(self) -> Array:
         """Rates (n,) [rad/s] at which pods turn whose turning costs; NaN of other actuators."""
         turn_rate = self.layout.rates[:, 0]
-        turning_costs = self.compiled.is_pod & np.isfinite(turn_rate)
-        return np.where(turning_costs, turn_rate, np.nan)
+        turns_slowly = self.compiled.turning_costs & np.isfinite(turn_rate)
+        return np.where(turns_slowly, turn_rate, np.nan)
 
     @property
     def turns_ahead(self) -> bool:
@@ -282,9 +283,9 @@ class Dual(Method):
             works = None if conditions.lost is None else ~conditions.lost
             counts = None if conditions.free is None else ~conditions.free
             problem = problem.restricted(works, counts)
-        if conditions.command_previous is None:
+        if conditions.previous is None:
             return problem
-        return problem.in_tick(self.rates.box(conditions.command_previous))
+        return problem.in_tick(self.rates.box(conditions.previous))
 
     def _basis_under(self, conditions: Conditions) -> Array:
         """Directions (6, r) of scaled wrenches that the actuators drive, orthonormal."""
@@ -376,7 +377,7 @@ class Dual(Method):
         multipliers = np.where(is_finite, multipliers, 0.0)
         power = self.plant.power(command)[:, works].sum(axis=-1)
 
-        bound = self._bound_by_laws(wrench, multipliers, conditions)
+        bound = bound_by_laws(self.compiled, wrench, multipliers, conditions)
         if not self._reads_tables:
             is_served = norms((wrench - wrench_served) / self.scale) <= NEARLY
             with_gaps = np.maximum(bound, self._bound_of_gaps(gap_power_bound, power))
@@ -384,8 +385,14 @@ class Dual(Method):
         elif works.all():
             # The multipliers are those of the smooth shapes that stand for measured tables.
             low = np.flatnonzero(bound < (1.0 - TABLE_ERROR) * power)
-            by_measurements = self._bound_of_measured_tables(
-                wrench[low], multipliers[low], command[low], conditions
+            by_measurements = bound_by_measured_tables(
+                self.compiled,
+                self.plant,
+                self.scale,
+                wrench[low],
+                multipliers[low],
+                command[low],
+                conditions,
             )
             bound[low] = np.maximum(bound[low], by_measurements)
 
@@ -393,15 +400,6 @@ class Dual(Method):
         largest_by_tables = (1.0 + TABLE_ERROR) * power + self._least_table_error
         bound = np.where(bound > largest_by_tables, 0.0, np.clip(bound, 0.0, power))
         return np.asarray(bound * (1.0 - ROUNDING))
-
-    def _bound_by_laws(self, wrench: Array, multipliers: Array, conditions: Conditions) -> Array:
-        """Lower bounds (N,) [W] by the laws' conjugates: at multipliers (N, 6), or at 0 where that
-        proves more."""
-        # The last row is the multiplier 0, which proves for any wrench what all take at rest.
-        multipliers_and_zero = np.concatenate([multipliers, np.zeros((1, 6))])
-        wrenches = np.concatenate([wrench, np.zeros((1, 6))])
-        bounds = power_bound(self.compiled, wrenches, multipliers_and_zero, conditions)
-        return np.asarray(np.maximum(bounds[:-1], bounds[-1]))
 
     def _bound_of_gaps(self, gap_power_bound: Array, power: Array) -> Array:
         """Lower bounds (N,) [W] of what the core proved of gaps by its tables, which are off by a
@@ -413,21 +411,6 @@ class Dual(Method):
     def _least_table_error(self) -> float:
         """By how much [W] tables may be off at the least forces."""
         return NEARLY * self.compiled.largest_power
-
-    def _bound_of_measured_tables(
-        self, wrench: Array, multipliers: Array, command: Array, conditions: Conditions
-    ) -> Array:
-        """Lower bounds (R,) [W] for wrenches (R, 6) of commands (R, n, 3), at multipliers (R, 6)
-        that are raised by the measured tables themselves."""
-        from finlab.allocation.dual.multiplier_ascent import raised_multipliers
-
-        if len(wrench) == 0:
-            return np.empty(0)
-        raised = [
-            raised_multipliers(self.plant, self.scale, *row)
-            for row in zip(wrench, multipliers, command, strict=True)
-        ]
-        return power_bound(self.compiled, wrench, np.stack(raised), conditions)
 
     @cached_property
     def _reads_tables(self) -> bool:

@@ -144,7 +144,7 @@ def _best_of_starts(
     """What outer iterations come to for one target (6,): in a tick from the command before, else
     from the forces by the laws alone and, where the whole model takes more power, from others."""
     record = core_policy(policy)
-    if conditions.command_previous is not None:
+    if conditions.previous is not None:
         return coupled.iterate(target, None, ITERATIONS_IN_TICK, record, multipliers, conditions)
     by_laws = compiled.core.answer_one(target, record, multipliers, conditions)
     force_by_laws = by_laws.force[0]

@@ -91,7 +91,7 @@ def _on_ray(
     off_ray = first.wrench_served / scale - along_ray / size_squared * ray
     if error <= NEARLY and np.abs(off_ray).max() <= NEARLY:
         return first
-    if conditions.command_previous is not None:
+    if conditions.previous is not None:
         return first  # what the rates leave is the nearest to the ray already (Eq. 15)
 
     low = 0.0

@@ -22,7 +22,8 @@ import numpy as np
 
 from finlab.allocation import methods
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.method import Method, MethodQuestion, Reads
+from finlab.allocation.method import Method, Reads
+from finlab.allocation.question import MethodQuestion
 from finlab.allocation.solution import Solution
 from finlab.errors import AllocationError, DataError
 from finlab.layout import Layout

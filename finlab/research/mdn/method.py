@@ -17,10 +17,10 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from finlab.allocation.dual.method import Dual
-from finlab.allocation.method import Method, MethodQuestion, Takes
+from finlab.allocation.method import MAX_CANDIDATES, Method, Settings, Takes, number
 from finlab.allocation.policy import Policy
+from finlab.allocation.question import MethodQuestion
 from finlab.allocation.rates import Rates
-from finlab.allocation.settings import MAX_CANDIDATES, Settings, number
 from finlab.allocation.solution import Candidates, Solution
 from finlab.arrays import Array
 from finlab.layout import Layout

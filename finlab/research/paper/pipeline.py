@@ -7,8 +7,15 @@ from typing import ClassVar
 import numpy as np
 
 from finlab.allocation.levenberg_marquardt import CommandProblem
-from finlab.allocation.method import LeastErrorMethod, Takes
-from finlab.allocation.settings import MAX_CANDIDATES, Settings, choice, number, switch
+from finlab.allocation.method import (
+    MAX_CANDIDATES,
+    LeastErrorMethod,
+    Settings,
+    Takes,
+    choice,
+    number,
+    switch,
+)
 from finlab.allocation.solution import Candidates, Solution
 from finlab.arrays import AnyArray, Array
 from finlab.layout import FinModelSpec, Layout

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.method import Method, MethodQuestion, Networks
-from finlab.allocation.settings import Settings, number
+from finlab.allocation.method import Method, Networks, Settings, number
+from finlab.allocation.question import MethodQuestion
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
 from finlab.axes import wrapped

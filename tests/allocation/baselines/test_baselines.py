@@ -9,7 +9,7 @@ import pytest
 
 from finlab.allocation import Allocator
 from finlab.allocation.baselines.linear import PaperSqp, PaperSqpSettings, box_qp
-from finlab.allocation.method import MethodQuestion
+from finlab.allocation.question import MethodQuestion
 from finlab.errors import LayoutError
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout
 from finlab.physics import Plant, plant_of

@@ -150,7 +150,7 @@ def test_half_of_a_turn_but_for_its_small_part_is_wanted_now() -> None:
     compiled = CompiledStandIn([0.25, -0.45, 0.04, -3.0, 3.0, 0.3])
     turn_rates = np.array([1.0, 1.0, 1.0, 1.0, 1.0, math.nan])
     reference = np.arange(4.0)[:, None] * np.ones(6)
-    asked = Conditions(command_previous=before, calm=2.0)
+    asked = Conditions(previous=before, calm=2.0)
     told = conditions_ahead(cast("Compiled", compiled), turn_rates, PERIOD_S, reference, asked)
     over_seam = 2.0 * math.pi - 6.0
     expected = [
@@ -173,7 +173,7 @@ def test_half_of_a_turn_but_for_its_small_part_is_wanted_now() -> None:
 def test_no_more_than_eight_ticks_are_looked_ahead(known: int, last: int) -> None:
     compiled = CompiledStandIn([0.3])
     reference = np.arange(float(known))[:, None] * np.ones(6)
-    asked = Conditions(command_previous=np.zeros((1, 3)), calm=2.0)
+    asked = Conditions(previous=np.zeros((1, 3)), calm=2.0)
     conditions_ahead(cast("Compiled", compiled), np.ones(1), PERIOD_S, reference, asked)
     ((wrench, ticks),) = compiled.asked
     np.testing.assert_array_equal(wrench, [reference[last]])

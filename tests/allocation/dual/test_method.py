@@ -9,14 +9,17 @@ import numpy as np
 import pytest
 
 from finlab.allocation import Allocator
-from finlab.allocation.dual.compiled import _shares_tables, power_bound
-from finlab.allocation.dual.method import MAX_BASES, TABLE_ERROR
+from finlab.allocation.dual import method as dual_method
+from finlab.allocation.dual.bound import TABLE_ERROR, bound_by_laws, power_bound
+from finlab.allocation.dual.compiled import Compiled, _shares_tables
+from finlab.allocation.dual.method import MAX_BASES
 from finlab.allocation.levenberg_marquardt import _starts_around, cheapest_exact
-from finlab.allocation.method import MethodQuestion
+from finlab.allocation.question import MethodQuestion
 from finlab.arrays import NEARLY, Array
 from finlab.core.calls import NOMINAL, Conditions
 from finlab.layout import Layout, Limits, load_layout
 from finlab.layout.load import parse_layout
+from finlab.physics.plant import Plant
 from tests.random_robots import random_robot
 
 
@@ -46,7 +49,7 @@ def with_bound_by_laws(
     """Has the laws prove some shares of the power."""
     command = method.plant.sample(np.random.default_rng(1), (len(shares),))
     power = method.plant.power(command).sum(axis=-1)
-    monkeypatch.setattr(method, "_bound_by_laws", lambda *_: power * shares)
+    monkeypatch.setattr(dual_method, "bound_by_laws", lambda *_: power * shares)
     return lambda **said: bounds_of(method, command, **said)
 
 
@@ -57,13 +60,22 @@ def test_bounds_of_measured_tables_are_raised_where_they_are_low(
     bounds = with_bound_by_laws(heavy, monkeypatch, [0.5, 1.0 - 0.5 * TABLE_ERROR, 0.7, 0.9])
     asked = list[int]()
 
-    def raised(wrench: Array, lam: Array, command: Array, _: Conditions) -> Array:
+    def raised(
+        compiled: Compiled,
+        plant: Plant,
+        scale: Array,
+        wrench: Array,
+        lam: Array,
+        command: Array,
+        _: Conditions,
+    ) -> Array:
+        assert compiled is heavy.compiled and plant is heavy.plant and scale is heavy.scale
         asked.append(len(wrench))
         np.testing.assert_allclose(heavy.plant.wrench(command), wrench, atol=1e-9)
         power = np.asarray(heavy.plant.power(command).sum(axis=-1))
         return power * [0.8, 0.6, 0.95]
 
-    monkeypatch.setattr(heavy, "_bound_of_measured_tables", raised)
+    monkeypatch.setattr(dual_method, "bound_by_measured_tables", raised)
     np.testing.assert_allclose(bounds(), [0.8, 1.0 - 0.5 * TABLE_ERROR, 0.7, 0.95], rtol=1e-9)
     assert asked == [3]
 
@@ -127,7 +139,7 @@ def test_a_bound_of_many_takes_the_better_of_its_own_multipliers_and_none(heavy:
     answered = heavy.solve(MethodQuestion(wrench))
     assert answered.multipliers is not None
     lam[1] = answered.multipliers[1]
-    bound = heavy._bound_by_laws(wrench, lam, NOMINAL)
+    bound = bound_by_laws(heavy.compiled, wrench, lam, NOMINAL)
     alone = power_bound(heavy.compiled, wrench, lam)
     assert bound.shape == (4,)
     np.testing.assert_allclose(bound, np.maximum(alone, 0.0), atol=1e-9)

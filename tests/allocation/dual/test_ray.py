@@ -154,7 +154,7 @@ def test_in_a_tick_what_the_rates_leave_stays() -> None:
         is_attainable=np.array([False]),
     )
     commands = answer.wrench_served.reshape(1, 2, 3).copy()
-    in_tick = NOMINAL._replace(command_previous=np.zeros((2, 3)))
+    in_tick = NOMINAL._replace(previous=np.zeros((2, 3)))
     kept_on_rays(method, in_tick, TARGET[None], answer, commands)
     np.testing.assert_array_equal(commands.ravel(), 0.6 * TARGET)
 

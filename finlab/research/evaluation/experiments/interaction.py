@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from finlab.allocation.dual.method import Dual, DualSettings
-from finlab.allocation.method import MethodQuestion
+from finlab.allocation.question import MethodQuestion
 from finlab.arrays import NEARLY, ROUNDS, Array
 from finlab.fit.interaction.constants import fit_constants
 from finlab.fit.interaction.samples import Samples, left_by_laws

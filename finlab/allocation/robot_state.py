@@ -1,0 +1,165 @@
+"""A robot in one state, and what a method is asked about it.
+
+`Allocator` makes one `RobotState` for each damage and set of free axes, with a method that is ready
+for it, and keeps the last ones.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.allocation.method import Method
+from finlab.allocation.policy import Policy
+from finlab.allocation.question import MethodQuestion
+from finlab.allocation.solution import Solution, among_all
+from finlab.arrays import Array
+from finlab.layout.damage import Damage
+from finlab.layout.layout import Layout
+from finlab.physics.plant import Plant
+
+
+def working_actuators(damaged: Layout, damage: Damage) -> NDArray[np.bool_]:
+    """Returns which actuators of a robot work.
+
+    Args:
+        damaged: the robot of n actuators, with the limits that damage has left.
+        damage: what is known of it.
+
+    Returns:
+        Mask (n,), False for the lost ones.
+
+    Raises:
+        LayoutError: an actuator that is lost is unknown, or none is left.
+    """
+    lost = set(damage.lost)
+    works = np.array([name not in lost for name in damaged.names])
+    lost_here = damaged.n - int(works.sum())
+    if lost and (not works.any() or len(lost) > lost_here):
+        damaged.without(damage.lost, "lost")  # raises the error that says what is wrong
+    return works
+
+
+def without_lost(damaged: Layout, damage: Damage) -> Layout:
+    """Takes the lost actuators out of a robot.
+
+    Args:
+        damaged: the robot, with the limits that damage has left.
+        damage: what is known of it.
+
+    Returns:
+        The robot of the actuators that are not lost; itself where none is.
+    """
+    return damaged.without(damage.lost) if damage.lost else damaged
+
+
+@dataclass(frozen=True, eq=False)
+class RobotState:
+    """A robot as damage has left it, asked for some axes of the wrench, with a method that is ready
+    for it."""
+
+    layout: Layout
+    """All n actuators, with the limits that damage has left."""
+    damage: Damage
+    """What is known of those that are damaged."""
+    works: NDArray[np.bool_]
+    """Mask (n,) of the actuators that are not lost."""
+    method: Method
+    """Made for the m actuators that work, or for all n where it takes losses with the question."""
+    plant: Plant
+    """Of all n actuators at rest in the water; judges answers."""
+    free: NDArray[np.bool_] | None
+    """Axes (6,) of the wrench that may take any value; None where all are commanded."""
+
+    @cached_property
+    def healthy(self) -> Layout:
+        """The robot of the m actuators that work alone."""
+        return without_lost(self.layout, self.damage)
+
+    @cached_property
+    def lost(self) -> NDArray[np.bool_] | None:
+        """Mask (n,) of the actuators that are lost; None where none is."""
+        return ~self.works if self.damage.lost else None
+
+    def among_all(self, command: Array) -> Array:
+        """Returns commands (..., m, 3) of the actuators that work as those (..., n, 3) of all, NaN
+        for the lost ones."""
+        return among_all(command, self.works)
+
+    def with_free_axes(self, wrench: Array, value: float) -> Array:
+        """Marks the free axes of wrenches.
+
+        Args:
+            wrench: (..., 6) [N, N m].
+            value: along the free axes: methods take 0 there, results show NaN.
+
+        Returns:
+            Wrenches (..., 6); the same array where no axis is free.
+        """
+        return wrench if self.free is None else np.where(self.free, value, wrench)
+
+    def question(
+        self,
+        wrenches: Array,
+        policy: Policy,
+        flow: Array | None,
+        seed: int,
+        previous: Array | None = None,
+        multipliers: Array | None = None,
+        reference: Array | None = None,
+    ) -> MethodQuestion:
+        """Returns a question to the method, with what it reads of these arguments. Losses and free
+        axes are told to a method that reads them; any other is made for the actuators that work
+        alone, and is told their commands.
+
+        Args:
+            wrenches: desired (N, 6) [N, N m], whatever they hold along free axes.
+            policy: what to give for those out of reach.
+            flow: velocity (6,) of the body relative to the water [m/s, rad/s]; None at rest.
+            seed: makes the answer repeatable.
+            previous: command (n, 3) of all actuators in the tick before, for a single wrench; None
+                outside of ticks.
+            multipliers: (6,) [W/N, W/(N m)] of an earlier answer, for a single wrench.
+            reference: wrenches (K, 6) of the next ticks [N, N m].
+
+        Raises:
+            AllocationError: the method does not know the policy.
+        """
+        self.method.check_policy(policy)
+        reads = self.method.reads
+        reads_losses = "losses" in reads
+        if previous is not None and not reads_losses:
+            previous = previous[self.works]
+        if reference is not None:
+            reference = self.with_free_axes(reference, 0.0) if "reference" in reads else None
+        return MethodQuestion(
+            targets=self.with_free_axes(wrenches, 0.0),
+            policy=policy,
+            previous=previous,
+            flow=flow,
+            seed=seed,
+            lost=self.lost if reads_losses else None,
+            free=self.free if reads_losses else None,
+            multipliers=multipliers if "multipliers" in reads else None,
+            reference=reference,
+        )
+
+    def solve(self, question: MethodQuestion) -> Solution:
+        """Asks the method.
+
+        Args:
+            question: made by `question` of this state.
+
+        Returns:
+            The method's solution. In a tick its commands lie within the limits and rates of the
+            drives; outside of ticks actuators that have nothing to do are at rest.
+        """
+        method = self.method
+        solution = method.solve(question)
+        if question.previous is None:
+            return solution._replace(command=method.plant.rested(solution.command))
+        box = method.rates.box(question.previous)
+        return solution._replace(command=box.clip_feasible(solution.command, method.plant))
