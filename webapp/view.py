@@ -91,7 +91,8 @@ class View:
             try:
                 self._look()
                 if self._is_due and not self._is_held():
-                    self._end_hold()
+                    if self._held_for is not NO_SLOTS:
+                        self._end_hold()
                     await self._write()
             except Exception as error:  # the page must go on, whatever we have got wrong
                 self.intents.fault(error)
@@ -153,7 +154,10 @@ class View:
 
     def _is_held(self) -> bool:
         """Whether an answer is to come that the page waits for."""
-        return any(slot.busy for slot in self._held_for)
+        for slot in self._held_for:
+            if slot.busy:
+                return True
+        return False
 
     def _end_hold(self) -> None:
         """Wait for no answer any longer, nor for the time after which the page would be written

@@ -25,8 +25,7 @@ def reach_marks(low: float, high: float, width: float) -> tuple[tuple[float, str
     """
     if not np.isfinite(low):
         return ()
-    low_text = _end_text(low, width)
-    high_text = _end_text(high, width)
+    low_text, high_text = _end_texts((low, high), width)
     if high - low <= POINT_RANGE:
         return ((round(low, 3), low_text),)
     if high - low < CLOSE * width:
@@ -37,18 +36,22 @@ def reach_marks(low: float, high: float, width: float) -> tuple[tuple[float, str
     return (round(low, 3), low_text), (round(high, 3), high_text)
 
 
-def _end_text(value: float, width: float) -> str:
-    """An end of a range with as many digits as the slider's width needs."""
-    if abs(value) >= 9.95:
-        digits = 0
-    elif width >= 2.0:
-        digits = 1
-    elif width >= 0.2:
-        digits = 2
-    else:
-        digits = 3
-    rounded = round(value, digits)
-    return f"{rounded:.{digits}f}".replace("-", "−") if rounded else "0"
+def _end_texts(values: tuple[float, ...], width: float) -> list[str]:
+    """Ends of a range with as many digits as the slider's width needs."""
+    texts = list[str]()
+    for value in values:
+        if abs(value) >= 9.95:
+            digits = 0
+        elif width >= 2.0:
+            digits = 1
+        elif width >= 0.2:
+            digits = 2
+        else:
+            digits = 3
+        rounded = round(value, digits)
+        text = f"{rounded:.{digits}f}" if rounded else "0"
+        texts.append(text.replace("-", "−"))
+    return texts
 
 
 def reach_style(ranges: Ranges | None, able: Layout, *slider_ends: float) -> Markup:
