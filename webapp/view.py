@@ -154,10 +154,10 @@ class View:
 
     def _is_held(self) -> bool:
         """Whether an answer is to come that the page waits for."""
+        is_held = False
         for slot in self._held_for:
-            if slot.busy:
-                return True
-        return False
+            is_held = is_held or slot.busy
+        return is_held
 
     def _end_hold(self) -> None:
         """Wait for no answer any longer, nor for the time after which the page would be written
