@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from packaging.tags import platform_tags
 
-from finlab.core import library
+from finlab import core
 from finlab.errors import FinlabError
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -56,9 +56,9 @@ def test_wheels_and_the_tree_get_a_new_library_and_the_source_distribution_none(
         assert (tag, abi) == ("py3", "none") and platform in platform_tags()
         (name,) = (name for name in zipfile.ZipFile(wheel).namelist() if "libfinlab." in name)
         packed = zipfile.ZipFile(wheel).extract(name, tree / "packed")
-        assert ctypes.PyDLL(packed).fl_version() == library.VERSION
+        assert ctypes.PyDLL(packed).fl_version() == core.VERSION
     assert python(source, "hatch_build.py").returncode == 0
-    assert ctypes.PyDLL(str(source / name)).fl_version() == library.VERSION
+    assert ctypes.PyDLL(str(source / name)).fl_version() == core.VERSION
 
 
 def test_what_does_not_compile_is_said_in_the_words_of_the_compiler(project: Path) -> None:
@@ -86,17 +86,17 @@ def test_only_without_a_compiler_another_is_fetched(project: Path) -> None:
 def test_library_that_is_missing_broken_or_of_other_sources_is_refused(
     project: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    load = library.library.__wrapped__
-    monkeypatch.setattr(library, "VERSION", 99)
+    load = core.library.__wrapped__
+    monkeypatch.setattr(core, "VERSION", 99)
     with pytest.raises(
         FinlabError, match=r"has version \d+, and this finlab needs 99; run `make setup`"
     ):
         load()
-    monkeypatch.setattr(library, "PATH", project / "finlab" / "core" / library.PATH.name)
+    monkeypatch.setattr(core, "PATH", project / "finlab" / "core" / core.PATH.name)
     with pytest.raises(
         FinlabError, match=r"cannot be loaded \(.*\); run `make setup` or `pip install \.`"
     ):
         load()
-    library.PATH.unlink()
+    core.PATH.unlink()
     with pytest.raises(FinlabError, match=r"core .*libfinlab\.\w+ is missing; run `make setup`"):
         load()
