@@ -40,7 +40,7 @@ export function prepare(core, block, n) {
   };
   // Of the actuators the one whose number is `lost` does not work; -1 for none. Its rows are null.
   return (wrench, kind = "closest", groups = [], lost = -1) => {
-    served("policy")[0] = constants[`FL_${kind.toUpperCase()}`];
+    served("kind")[0] = constants[`FL_${kind.toUpperCase()}`];
     served("group_count")[0] = groups.length;
     served("axis_weight").fill(1);
     served("group").set(groups.flat());
