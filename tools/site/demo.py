@@ -1,5 +1,8 @@
 """The files of the page of six sliders: the core as WebAssembly, and robots as its blocks of
-numbers."""
+numbers.
+
+`hooks.py` adds them to the site; `make docs` alone runs this file, no test does.
+"""
 
 import json
 import subprocess

@@ -1,5 +1,8 @@
 """What mkdocs does beside its own work: generated pages, blocks that run, formulas as MathML,
-checks."""
+checks.
+
+`make docs` alone runs this file, no test does.
+"""
 
 import html
 import io

@@ -1,5 +1,8 @@
 """Pages of reference, made of what the code itself says: names, commands, file formats, shipped
-robots."""
+robots.
+
+`hooks.py` adds them to the site; `make docs` alone runs this file, no test does.
+"""
 
 import io
 import json
@@ -153,6 +156,8 @@ def classes(module: Any) -> dict[str, dict[str, str]]:
     docstrings below them, or under Args in the docstring of the class."""
     found = {}
     for each in module.members.values():
+        # What a module only imports is documented where it is defined; to resolve the alias would
+        # load that module, or fail where it lies outside of the package.
         if each.is_alias:
             continue
         if each.is_class:
