@@ -165,8 +165,8 @@ struct fl_work {
 
 /* How Newton's method ended: fl_answer.newton_status. */
 enum {
-  FL_MET,    /* the target is met */
-  FL_BEYOND, /* it is proved to be beyond reach, Eq. 13 */
-  FL_STALLED /* multipliers stand still; no damage, as a stuck actuator has it */
+  FL_MET,        /* the target is met */
+  FL_BEYOND,     /* it is proved to be beyond reach, Eq. 13 */
+  FL_NO_PROGRESS /* steps end short of the target, or come to their bound */
 };
 #endif

@@ -81,7 +81,7 @@ static void find_forces(const real *block, fl_work *work, const real *wrench_wan
   int most_steps = FL_STEPS;
   if (has_kinks) most_steps = FL_STEPS_AT_KINK;
   const int status = fl_dual_newton(block, work, target_reduced, lambda, most_steps);
-  const int may_be_met = status == FL_MET || (status == FL_STALLED && has_kinks);
+  const int may_be_met = status == FL_MET || (status == FL_NO_PROGRESS && has_kinks);
   int within = may_be_met && is_in_range;
   out->newton_status = status;
   memcpy(out->lambda_reduced, work->state_found->lambda_reduced, sizeof out->lambda_reduced);

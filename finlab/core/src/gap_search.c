@@ -41,7 +41,7 @@ static int is_open(const real *block, fl_work *work, const real *target_reduced,
     keep_answer(block, work, target_reduced, best_cost);
     return 0;
   }
-  const int is_bound = status == FL_MET || (status == FL_STALLED && gap >= 0);
+  const int is_bound = status == FL_MET || (status == FL_NO_PROGRESS && gap >= 0);
   return is_bound && dual_value < *best_cost * (1 - CLOSE);
 }
 
