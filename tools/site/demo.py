@@ -1,7 +1,7 @@
 """The files of the page of six sliders: the core as WebAssembly, and robots as its blocks of
 numbers.
 
-`hooks.py` adds them to the site; `make docs` alone runs this file, no test does.
+`hooks.py` adds them to the site; `tests/browser/test_six_sliders.py` holds them.
 """
 
 import json

@@ -1,7 +1,8 @@
 """What mkdocs does beside its own work: generated pages, blocks that run, formulas as MathML,
 checks.
 
-`make docs` alone runs this file, no test does.
+Of tests, `tests/examples/test_site.py` holds the numbers of formulas and the navigation; all else
+`make docs` alone runs.
 """
 
 import html
