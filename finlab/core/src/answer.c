@@ -62,8 +62,8 @@ static void take_off_offset(const fl_span *span, const real *wrench, real *of_fo
 }
 
 /* Forces for a wrench that the commands are to give [N, N m]; `lambda` are reduced multipliers to
-   begin with [W], 0 for none. Out of reach a policy, where there is one, gives another wrench in its
-   place: `out->wrench_served`, here without the wrench beside the forces. */
+   begin with [W], 0 for none. Out of reach a policy, where there is one, gives another wrench in
+   its place: `out->wrench_served`, here without the wrench beside the forces. */
 static void find_forces(const real *block, fl_work *work, const real *wrench_wanted,
                         const fl_policy *policy, const real *lambda, fl_answer *out) {
   const fl_span *span = &work->span;

@@ -202,9 +202,9 @@ real fl_gap_power_bound(const fl_work *work, real bound) {
   return bound * (1 - FINE);
 }
 
-/* Commands in `out` that give a wrench [N, N m], whose forces `target_reduced` is the target of, from
-   what Newton's method came to; 0 where none are found. work->state_found is not that of the commands afterwards: their multipliers are in
-   `out`. */
+/* Commands in `out` that give `wrench_wanted` [N, N m], from what Newton's method came to for the
+   target of its forces; 0 where none are found. work->state_found is not that of the commands
+   afterwards: their multipliers are in `out`. */
 int fl_answer_with_drag(const real *block, fl_work *work, const real *wrench_wanted,
                         const real *target_reduced, int status, fl_answer *out) {
   memcpy(work->wrench_wanted, wrench_wanted, sizeof work->wrench_wanted);
