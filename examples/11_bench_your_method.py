@@ -15,17 +15,17 @@ from finlab.physics import plant_of
 from finlab.research.evaluation.experiments.wrench import experiment
 
 
-def allocate(layout: finlab.Layout, targets: np.ndarray, sigma: np.ndarray) -> np.ndarray:
+def allocate(layout: finlab.Layout, targets: np.ndarray, scale: np.ndarray) -> np.ndarray:
     """Commands (N, n, 3) [rad, Hz, rad] for wrenches (N, 6)."""
     plant = plant_of(layout)
     low = plant.lower.ravel()
     high = plant.upper.ravel()
 
     def missing(u: np.ndarray, target: np.ndarray) -> Any:
-        return (plant.wrench(u.reshape(-1, 3)) - target) / sigma
+        return (plant.wrench(u.reshape(-1, 3)) - target) / scale
 
     def slopes(u: np.ndarray, target: np.ndarray) -> Any:
-        return plant.linearize(u.reshape(-1, 3))[1] / sigma[:, None]
+        return plant.linearize(u.reshape(-1, 3))[1] / scale[:, None]
 
     start = (low + high) / 2
     limits = (low, high)

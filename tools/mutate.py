@@ -163,7 +163,13 @@ def built(path: Path, objects: Path, library: Path) -> bool:
 
 def failure(words: list[str], loaded: tuple[str, ...]) -> str:
     """The first of some tests that fails, or what is said where a process dies; nothing where all
-    pass."""
+    pass.
+
+    Args:
+        words: arguments of pytest that choose the tests, such as paths and node ids.
+        loaded: names of modules that are imported here, before the process of the tests is forked:
+            it then need not load them itself. They may not load the code with the fault.
+    """
     for name in loaded:
         import_module(name)
     options = [

@@ -112,8 +112,8 @@ class QuestionRecord:
     0 for none: so no array of a caller has to outlive the call.
     """
 
-    def __init__(self, count: int) -> None:
-        """Makes the question of a robot of `count` actuators."""
+    def __init__(self, n: int) -> None:
+        """Makes the question of a robot of n actuators."""
         record = np.zeros(1, struct("fl_question"))
         self._record = record
         self.address = record.ctypes.data
@@ -132,10 +132,10 @@ class QuestionRecord:
         self._policy: Record | None = None
         """At which the question points, so that it lives as long."""
         self._multipliers = np.zeros(6)
-        self._previous = np.zeros((count, 3))
-        self._lost = np.zeros(count, np.uint8)
+        self._previous = np.zeros((n, 3))
+        self._lost = np.zeros(n, np.uint8)
         self._free = np.zeros(6, np.uint8)
-        self._angles_wanted = np.zeros(count)
+        self._angles_wanted = np.zeros(n)
         self._multipliers_address = self._multipliers.ctypes.data
         self._previous_address = self._previous.ctypes.data
         self._lost_address = self._lost.ctypes.data
@@ -191,17 +191,17 @@ class QuestionRecord:
 class AnswerRecord:
     """One `fl_answer`, and its address."""
 
-    def __init__(self, count: int) -> None:
-        """Makes the answer of a robot of `count` actuators."""
+    def __init__(self, n: int) -> None:
+        """Makes the answer of a robot of n actuators."""
         record = np.zeros(1, struct("fl_answer"))
         self._record = record
         self.address = record.ctypes.data
-        self._force = record["force"][:, :count]
+        self._force = record["force"][:, :n]
         self._multipliers = record["multipliers"]
         self._wrench_served = record["wrench_served"]
         self._gap_power_bound = record["gap_power_bound"]
         self._error = record["error"]
-        self._command = record["command"][:, :count]
+        self._command = record["command"][:, :n]
         self._is_attainable = record["is_attainable"]
         self._is_truncated = record["is_truncated"]
 
@@ -230,37 +230,37 @@ def prepared_work(block: Array) -> ctypes.Array[ctypes.c_char]:
     """
     core = library()
     work = ctypes.create_string_buffer(constant("sizeof fl_work"))
-    error = core.fl_check(block.ctypes.data, len(block))
-    if not error:
-        error = core.fl_prepare(block.ctypes.data, ctypes.addressof(work))
-    if error:
-        raise DataError(f"the core refuses the robot: {error_text(error)}")
+    code = core.fl_check(block.ctypes.data, len(block))
+    if not code:
+        code = core.fl_prepare(block.ctypes.data, ctypes.addressof(work))
+    if code:
+        raise DataError(f"the core refuses the robot: {error_text(code)}")
     return work
 
 
 class Core:
     """One robot in the core. Threads may share it: one call after the other is made."""
 
-    def __init__(self, block: Array, count: int) -> None:
+    def __init__(self, block: Array, n: int) -> None:
         """Takes the block of a robot.
 
         Args:
             block: its numbers; see finlab/core/fl_fields.h.
-            count: n, how many actuators it has.
+            n: how many actuators it has.
 
         Raises:
             DataError: its numbers are out of the range that the core works with.
         """
         self._core = library()
         self._block = block
-        self._count = count
+        self._n = n
         self._work = prepared_work(block)
         self._lock = Lock()
         """Held during a call: work area, question and answer are the same for all threads."""
         self._block_address = block.ctypes.data
         self._work_address = ctypes.addressof(self._work)
-        self._question = QuestionRecord(count)
-        self._answer = AnswerRecord(count)
+        self._question = QuestionRecord(n)
+        self._answer = AnswerRecord(n)
 
     def answer_one(
         self,
@@ -316,11 +316,11 @@ class Core:
         """
         wrenches = np.ascontiguousarray(wrenches)
         count = len(wrenches)
-        force = np.empty((count, self._count, 2))
+        force = np.empty((count, self._n, 2))
         multipliers = np.empty((count, 6))
         wrench_served = np.empty((count, 6))
         gap_power_bound = np.empty(count)
-        command = np.empty((count, self._count, 3))
+        command = np.empty((count, self._n, 3))
         is_attainable = np.empty(count, np.bool_)
         error = np.empty(count)
         is_truncated = np.empty(count, np.bool_)
@@ -364,7 +364,7 @@ class Core:
             Commands (N, n, 3).
         """
         force = np.ascontiguousarray(force)
-        command = np.empty((len(force), self._count, 3))
+        command = np.empty((len(force), self._n, 3))
         previous_address = None
         if previous is not None:
             previous = np.ascontiguousarray(previous)
@@ -394,10 +394,10 @@ class Core:
             CommandError: the core cannot work with these numbers.
         """
         multipliers = np.ascontiguousarray(multipliers)
-        records = np.empty((len(multipliers), self._count), struct("fl_actuator_conjugate"))
+        records = np.empty((len(multipliers), self._n), struct("fl_actuator_conjugate"))
         with self._lock:
             self._question.write_conditions(conditions)
-            error = self._core.fl_conjugates(
+            code = self._core.fl_conjugates(
                 self._block_address,
                 self._work_address,
                 self._question.address,
@@ -405,7 +405,7 @@ class Core:
                 len(multipliers),
                 records.ctypes.data,
             )
-        raise_refusal(error)
+        raise_refusal(code)
         return Conjugates(
             price_ahead=records["price_ahead"],
             price_reverse=records["price_reverse"],

@@ -91,16 +91,16 @@ class CoupledCore:
             block: of the robot by its laws alone; the core changes a copy of it.
             wrench_offset: what its actuators do to each other.
         """
-        count = len(wrench_offset.frames)
+        n = len(wrench_offset.frames)
         self._core = library()
-        self._count = count
+        self._n = n
         self._block_linear = block.copy()
         """The block of the linear model, which the core changes in each iteration."""
         self._work = prepared_work(self._block_linear)
         self._lock = Lock()
         """Held while outer iterations run: what they read and write is the same for all threads."""
-        self._question = QuestionRecord(count)
-        self._answer = AnswerRecord(count)
+        self._question = QuestionRecord(n)
+        self._answer = AnswerRecord(n)
         self._wrench_offset = wrench_offset
         self._raised: BaseException | None = None
         """Raised by the callback, for `_run_iterations` to raise again."""
@@ -128,7 +128,7 @@ class CoupledCore:
         """When the iterations end."""
         self._result: Record = np.zeros(1, struct("fl_outer_result"))
         """What they end with."""
-        self._force = np.zeros((count, 2))
+        self._force = np.zeros((n, 2))
         """Forces [N] at which the iterations begin, and then those at which they end."""
 
     def iterate(
@@ -182,7 +182,7 @@ class CoupledCore:
 
     def _run_iterations(self) -> int:
         """Runs the iterations for the question that is written; returns an error code."""
-        error: int = self._core.fl_outer_iterations(
+        code: int = self._core.fl_outer_iterations(
             self._robot.ctypes.data,
             self._block_linear.ctypes.data,
             ctypes.addressof(self._work),
@@ -196,13 +196,13 @@ class CoupledCore:
             raised = self._raised
             self._raised = None
             raise raised
-        return error
+        return code
 
     def _effect(
         self, _: int, force: int, count: int, inflow: int, change: int, wrench: int, slope: int
     ) -> None:
         """Writes the offset and its derivatives for C; the arguments are those of the callback."""
-        n = self._count
+        n = self._n
         try:
             offset, derivatives = self._wrench_offset.effect(
                 _numbers_at(force, (n, 3)), self._wrench_offset.inflow

@@ -92,7 +92,7 @@ typedef struct {
   int actuator;              /* whose set is cut */
   int first_side;            /* side taken first, 1 or -1 as fl_narrow_set has them */
   int has_both_sides;        /* whether the other one was taken, too */
-} fl_node;
+} fl_cut;
 
 /* Commands that are allowed. */
 typedef struct {
@@ -142,7 +142,7 @@ struct fl_work {
   const fl_wide *ray; /* (6,) of which a mixture may take a share, in weighted axes; 0 for none */
 
   /* Sets with gaps. */
-  fl_node node[FL_DEPTH];           /* cuts on the way to the part that is looked at */
+  fl_cut cut[FL_DEPTH];             /* cuts on the way to the part that is looked at */
   fl_set set_before[FL_MOST];       /* that a search began with */
   fl_set best_set[FL_MOST];         /* of its best part */
   fl_real best_force[FL_MOST][2];   /* of that part [N] */
@@ -165,8 +165,8 @@ struct fl_work {
 
 /* How Newton's method ended: fl_answer.newton_status. */
 enum {
-  FL_MET,    /* the target is met */
-  FL_BEYOND, /* it is proved to be beyond reach, Eq. 13 */
-  FL_STUCK   /* multipliers stood still */
+  FL_MET,        /* the target is met */
+  FL_BEYOND,     /* it is proved to be beyond reach, Eq. 13 */
+  FL_NO_PROGRESS /* steps end short of the target, or come to their bound */
 };
 #endif

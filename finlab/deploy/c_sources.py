@@ -31,7 +31,7 @@ SAMPLES = 24
 MAX_CORE_ERROR = 3e-7
 """Largest normalized error of the core's commands for a question of the self-test: beyond it the
 library would refine them, and its answer were not the core's."""
-FILES_LEFT_OUT = ("jets.c", "outer_iterations.c", "attainable_set.c", "for_python.c")
+FILES_LEFT_OUT = ("jets.c", "outer_iterations.c", "ray_reach.c", "for_python.c")
 """Files of the core that an export does not need: `interaction`, attainable sets, and what Python
 alone calls."""
 QUESTIONS: tuple[tuple[PolicyName, float], ...] = (

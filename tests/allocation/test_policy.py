@@ -25,7 +25,7 @@ HEAVE_AND_ROLL = (0.0, 0.0, 20.0, 3.0, 0.0, 0.0)
 """A wrench out of reach of fins, in heave and roll alone [N, N m]."""
 SHALLOW = (30.0, 0.0, 6.0, 0.0, 0.0, 0.0)
 """Its heave alone can be delivered, the whole cannot."""
-PATIENT = ("trf", "slsqp", "ipopt", "sqp")
+PATIENT = ("ipopt", "sqp")
 """Methods of the table that are left to their own tests here."""
 
 

@@ -114,14 +114,14 @@ class Box(ctypes.Structure):
 _KINDS["fl_set"] = Set
 
 
-class Node(ctypes.Structure):
-    """A cut on the way to a part of sets with gaps: `fl_node`."""
+class Cut(ctypes.Structure):
+    """A cut on the way to a part of sets with gaps: `fl_cut`."""
 
-    _fields_ = _members("fl_work.h", "fl_node")
+    _fields_ = _members("fl_work.h", "fl_cut")
 
 
 _KINDS |= {
-    "fl_node": Node,
+    "fl_cut": Cut,
     "fl_mixture": Mixture,
     "fl_tangent": Tangent,
     "fl_span": Span,

@@ -1,5 +1,5 @@
-"""Laws of actuators in the core: forces as the plant says, slopes as differences say, commands that
-give forces back, and ranges of forces that hold what commands give and no more."""
+"""Laws of actuators in the core: forces and power as the plant says, slopes as differences say,
+commands that give forces back, and ranges of forces that hold what commands give and no more."""
 
 import ctypes
 import math
@@ -14,6 +14,7 @@ from finlab.core.fields import actuators_of, numbers_of, struct, tables_begin
 from tests.core.internal_functions import (
     EITHER_WAY,
     FIN,
+    MOST,
     POD,
     ROBOTS,
     Box,
@@ -276,3 +277,61 @@ def test_an_arc_that_lacks_a_rounding_of_a_turn_is_all_round(name: str) -> None:
             assert force_range.middle == pytest.approx(0.4, abs=1e-12)
             assert force_range.low == box.command_min[i][1]
             assert force_range.high == box.command_max[i][1]
+
+
+def power_and_forces(robot: Robot, command: Array, lost: Array) -> tuple[float, Array]:
+    """Power [W] and forces (n, 2) [N] along the rows of commands (n, 3), actuators `lost` (n,)."""
+    work = robot.work()
+    gone = lost.astype(np.uint8)
+    state = ctypes.c_void_p(gone.ctypes.data), None
+    assert functions().fl_span_of_question(at(robot.block), work, *state)
+    commands = np.zeros((MOST, 3))
+    commands[: robot.n] = command
+    force = np.zeros((MOST, 2))
+    power = functions().fl_power_of_commands
+    power.restype = ctypes.c_double
+    cost = power(at(robot.block), work, at(commands), at(force))
+    return float(cost), force[: robot.n]
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_power_and_forces_of_commands_are_those_of_the_plant(name: str) -> None:
+    for number in range(2):
+        robot = robot_of(name, number)
+        rng = np.random.default_rng([1, number])
+        for command in robot.plant.sample(rng, (6,)):
+            lost = np.arange(robot.n) == rng.integers(2 * robot.n)
+            power, force = power_and_forces(robot, command, lost)
+            plant_power = robot.plant.power(command)
+            # A law has no power in its dead band, where the core has that of the force.
+            gives_force = np.abs(robot.plant.force(command)).max(axis=1) > 0.0
+            if gives_force[~lost].all():
+                # A fin has many beats for one force, of which the core knows the cheapest.
+                most = plant_power[~lost].sum()
+                assert power <= most * (1.0 + 2e-3) + 1e-6
+                if not (robot.actuators["command_kind"] == FIN).any():
+                    assert power == pytest.approx(most, rel=2e-3, abs=1e-6)
+            assert not force[lost].any()
+            for i in np.flatnonzero(~lost).tolist():
+                law, _ = robot.force(i, np.ascontiguousarray(command[i]))
+                rows = law[1:] if robot.is_plane(i) else law[:2]
+                sign = (
+                    robot.actuators[i]["command_sign"]
+                    if robot.actuators[i]["command_kind"] == 0.0
+                    else 1.0
+                )
+                np.testing.assert_allclose(force[i], sign * rows, atol=1e-12)
+
+
+@pytest.mark.parametrize("number", range(3))
+def test_foils_of_a_flow_cost_their_drag_at_the_speed_of_the_flow(number: int) -> None:
+    robot = robot_of("rudders", number)
+    rng = np.random.default_rng([2, number])
+    foils = robot.actuators["flow_speed"] > 0.0
+    assert foils.any()
+    command = robot.plant.sample(rng, (1,))[0]
+    power, force = power_and_forces(robot, command, np.zeros(robot.n, bool))
+    others, _ = power_and_forces(robot, command, foils)
+    rest = robot.actuators["pressure_area"] * robot.actuators["zero_lift_drag"]
+    drag = robot.actuators["flow_speed"] * (force[:, 1] + rest)
+    assert power - others == pytest.approx(drag[foils].sum(), rel=1e-9)

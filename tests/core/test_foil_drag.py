@@ -1,68 +1,133 @@
-"""Power and forces of commands, on which the search of robots whose foils drag steps from one to
-the next."""
+"""Power of robots whose foils stall, beside what SciPy's SLSQP finds on the commands."""
 
-import ctypes
+from functools import cache
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize
 
+from finlab.actuators.rudder import Rudder
+from finlab.actuators.thrust_model import PowerLaw
 from finlab.arrays import Array
-from tests.core.internal_functions import FIN, MOST, ROBOTS, Robot, at, functions, robot_of
+from finlab.layout import Azimuth, Layout, Thruster
+from finlab.layout.load import parse_layout
+from tests.core.internal_functions import Robot, in_the_core
+from tests.random_robots import random_flow, random_robot
+from tests.sampled_cases import sampled
+
+STARTS = 20
+"""Random commands at which SLSQP begins."""
+SLACK = 1e-3
+"""Share of the least power found by which the core may take more."""
+MISS = 1e-6
+"""Scaled wrench by which commands may miss the target."""
 
 
-def told(robot: Robot, command: Array, lost: Array) -> tuple[float, Array]:
-    """Power [W] and forces (n, 2) along the rows of commands (n, 3), some actuators (n,) lost."""
-    work = robot.work()
-    gone = lost.astype(np.uint8)
-    state = ctypes.c_void_p(gone.ctypes.data), None
-    assert functions().fl_span_of_question(at(robot.block), work, *state)
-    commands = np.zeros((MOST, 3))
-    commands[: robot.n] = command
-    force = np.zeros((MOST, 2))
-    power = functions().fl_power_of_commands
-    power.restype = ctypes.c_double
-    cost = power(at(robot.block), work, at(commands), at(force))
-    return float(cost), force[: robot.n]
+@cache
+def stalling_robot(number: int) -> Robot:
+    """A robot whose rudders turn far beyond stall, in a flow."""
+    mapping = random_robot("rudders", number, 71)
+    for one in mapping["actuators"]:
+        if one["type"] == "rudder":
+            one["deflection_deg"] = [-50.0, 40.0]
+    return in_the_core(parse_layout(mapping), random_flow("rudders", number, 71))
 
 
-@pytest.mark.parametrize("name", ROBOTS)
-def test_power_and_forces_of_commands_are_those_of_the_plant(name: str) -> None:
-    for number in range(2):
-        robot = robot_of(name, number)
-        rng = np.random.default_rng([1, number])
-        for command in robot.plant.sample(rng, (6,)):
-            lost = np.arange(robot.n) == rng.integers(2 * robot.n)
-            power, force = told(robot, command, lost)
-            plant_power = robot.plant.power(command)
-            # A law has no power in its dead band, where the core has that of the force.
-            gives_force = np.abs(robot.plant.force(command)).max(axis=1) > 0.0
-            if gives_force[~lost].all():
-                # A fin has many beats for one force, of which the core knows the cheapest.
-                most = plant_power[~lost].sum()
-                assert power <= most * (1.0 + 2e-3) + 1e-6
-                if not (robot.actuators["command_kind"] == FIN).any():
-                    assert power == pytest.approx(most, rel=2e-3, abs=1e-6)
-            assert not force[lost].any()
-            for i in np.flatnonzero(~lost).tolist():
-                law, _ = robot.force(i, np.ascontiguousarray(command[i]))
-                rows = law[1:] if robot.is_plane(i) else law[:2]
-                sign = (
-                    robot.actuators[i]["command_sign"]
-                    if robot.actuators[i]["command_kind"] == 0.0
-                    else 1.0
-                )
-                np.testing.assert_allclose(force[i], sign * rows, atol=1e-12)
+def least_power(robot: Robot, wrench: Array, starts: list[Array]) -> float:
+    """The least power [W] that SLSQP finds for a wrench (6,) from commands (n, 3)."""
+    plant = robot.plant
+    scale = robot.head["wrench_scale"]
+    used = plant.width > 0.0
+
+    def command_of(share: Array) -> Array:
+        command = plant.lower.copy()
+        command[used] += share * plant.width[used]
+        return command
+
+    def power(share: Array) -> tuple[float, Array]:
+        command = command_of(share)
+        gradient = plant.power_gradient(command)[used] * plant.width[used]
+        return float(plant.power(command).sum()), gradient
+
+    def miss(share: Array) -> Array:
+        return np.asarray((plant.wrench(command_of(share)) - wrench) / scale)
+
+    def slope(share: Array) -> Array:
+        _, jacobian = plant.linearize(command_of(share))
+        by_command = jacobian.reshape(6, *plant.width.shape)[:, used]
+        return np.asarray(by_command * plant.width[used] / scale[:, None])
+
+    least = np.inf
+    for start in starts:
+        share = (start[used] - plant.lower[used]) / plant.width[used]
+        optimum = minimize(
+            power,
+            share,
+            jac=True,
+            method="SLSQP",
+            bounds=[(0.0, 1.0)] * len(share),
+            constraints={"type": "eq", "fun": miss, "jac": slope},
+            options={"maxiter": 60, "ftol": 1e-8},
+        )
+        within = np.clip(optimum.x, 0.0, 1.0)
+        if np.linalg.norm(miss(within)) <= MISS:
+            least = min(least, power(within)[0])
+    return least
 
 
-@pytest.mark.parametrize("number", range(3))
-def test_foils_of_a_flow_cost_their_drag_at_the_speed_of_the_flow(number: int) -> None:
-    robot = robot_of("rudders", number)
-    rng = np.random.default_rng([2, number])
-    foils = robot.actuators["flow_speed"] > 0.0
-    assert foils.any()
+@pytest.mark.parametrize("number", sampled(range(6), every=3))
+def test_robots_with_stalled_foils_take_no_more_than_slsqp_finds(number: int) -> None:
+    robot = stalling_robot(number)
+    rng = np.random.default_rng([5, number])
     command = robot.plant.sample(rng, (1,))[0]
-    power, force = told(robot, command, np.zeros(robot.n, bool))
-    others, _ = told(robot, command, foils)
-    rest = robot.actuators["pressure_area"] * robot.actuators["zero_lift_drag"]
-    drag = robot.actuators["flow_speed"] * (force[:, 1] + rest)
-    assert power - others == pytest.approx(drag[foils].sum(), rel=1e-9)
+    wrench = robot.plant.wrench(command)
+    answer = robot.answer(wrench)
+    found = np.ascontiguousarray(answer["command"][: robot.n])
+    wrench_of_command = robot.plant.wrench(found)
+    assert np.linalg.norm((wrench_of_command - wrench) / robot.head["wrench_scale"]) <= 3e-5
+    starts = [found, command, *robot.plant.sample(rng, (STARTS,))]
+    least = least_power(robot, wrench, starts)
+    assert np.isfinite(least)
+    assert robot.plant.power(found).sum() <= least * (1.0 + SLACK)
+
+
+@cache
+def pods_and_rudders(number: int) -> Robot:
+    """Pods that turn all round, a thruster with a dead band, and rudders that stall, in a flow."""
+    rng = np.random.default_rng([9, number])
+
+    def place() -> tuple[float, float, float]:
+        x, y, z = rng.uniform(-0.6, 0.6, 3).tolist()
+        return x, y, z
+
+    law = PowerLaw(0.3)
+    pods = [
+        Azimuth(f"p{k}", place(), (0.0, 0.6 * (-1.0) ** k, 0.8), (1.0, 0.0, 0.0), (0.0, 30.0), law)
+        for k in range(2)
+    ]
+    heave = Thruster("t", place(), (0.0, 0.0, 1.0), (-30.0, 30.0), law, dead_band=3.0)
+    axes = ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (0.0, 0.8, 0.6))
+    rudders = [
+        Rudder(f"r{k}", place(), axis, (1.0, 0.0, 0.0), 0.04, (-0.9, 0.7), 3.0)
+        for k, axis in enumerate(axes)
+    ]
+    flow = np.array([1.5, 0.2, -0.1, 0.0, 0.0, 0.0])
+    return in_the_core(Layout("both", (*pods, heave, *rudders)), flow)
+
+
+@pytest.mark.parametrize("number", range(4))
+def test_robots_of_foils_and_pods_take_no_more_than_slsqp_finds(number: int) -> None:
+    robot = pods_and_rudders(number)
+    rng = np.random.default_rng([6, number])
+    for _ in range(2):
+        command = robot.plant.sample(rng, (1,))[0]
+        command[2, 0] = np.copysign(3.0 + abs(command[2, 0]) * 0.5, command[2, 0])
+        wrench = robot.plant.wrench(command)
+        answer = robot.answer(wrench)
+        found = np.ascontiguousarray(answer["command"][: robot.n])
+        given = robot.plant.wrench(found)
+        assert np.linalg.norm((given - wrench) / robot.head["wrench_scale"]) <= 3e-5
+        starts = [found, command, *robot.plant.sample(rng, (3,))]
+        known = float(robot.plant.power(command).sum())
+        least = min(known, least_power(robot, wrench, starts))
+        assert robot.plant.power(found).sum() <= least * (1.0 + SLACK)

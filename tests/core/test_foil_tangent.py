@@ -7,7 +7,7 @@ import pytest
 
 from finlab.arrays import Array
 from tests.core.internal_functions import REAL, Robot, Set, Tangent, at, functions, robot_of
-from tests.core.test_foil_power import stalling_robot
+from tests.core.test_foil_drag import stalling_robot
 
 STEP = 1e-6
 """Of differences [rad]."""

@@ -26,6 +26,8 @@ STRICT_FLAGS = [
     "-Werror",
 ]
 """Options of the C compiler: warnings that users of a library may have on."""
+MOST_COLUMNS = 100
+"""Columns of a line of C; clang-format wraps code there, but leaves comments as they are."""
 TWO_ROBOTS_PROGRAM = """
 #include "A/fl_a.h"
 #include "catamaran/fl_catamaran.h"
@@ -53,6 +55,17 @@ def test_no_compiler_warns(compiler: str, single: list[str]) -> None:
     for source in sorted((CORE_FOLDER / "src").glob("*.c")):
         words = [compiler, *STRICT_FLAGS, *single, "-fsyntax-only", f"-I{CORE_FOLDER}", str(source)]
         subprocess.run(words, check=True)
+
+
+def test_lines_of_c_end_at_100_columns() -> None:
+    sources = [*CORE_FOLDER.glob("*.h"), *CORE_FOLDER.glob("src/*.[ch]")]
+    too_long = []
+    for source in sources:
+        for number, line in enumerate(source.read_text(encoding="utf-8").splitlines(), start=1):
+            if len(line) > MOST_COLUMNS:
+                too_long.append(f"{source.name}:{number}")
+    assert len(sources) > 20
+    assert not too_long
 
 
 def _global_names(binary: Path) -> set[str]:

@@ -18,7 +18,7 @@ from finlab.swim.hull import Surface, hull_of
 from finlab.swim.hull.mesh_file import Mesh
 from webapp.markup.reach import reach_marks
 from webapp.scene import actuator_shapes as shapes
-from webapp.scene.actuator_node import TURNS_PER_S, motion
+from webapp.scene.actuator_node import TURNS_PER_S, motion, offered_mesh
 from webapp.scene.actuator_shapes import CHORD, NOTHING, TURN, force_arrow, unit_arrow, unit_ring
 from webapp.scene.force_nodes import WEDGES, ForceNodes, quaternion, turned_about_x, unit_wedge
 from webapp.scene.wrench_nodes import about_z, along_x, on_sphere, snapped
@@ -45,6 +45,12 @@ def test_closed_and_outward(mesh: Mesh) -> None:
     body = solid(mesh)
     assert body.is_watertight and body.volume > 0
     assert np.isfinite(mesh.vertices).all()
+
+
+def test_the_ghost_of_fins_that_are_offered_is_a_closed_mesh() -> None:
+    layout = load_layout(shipped_layouts()["ucat"])
+    ghost = solid(offered_mesh(layout.actuators, 1.0))
+    assert ghost.is_watertight and ghost.volume > 0
 
 
 def test_blade_trails_behind_its_thrust() -> None:

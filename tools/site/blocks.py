@@ -4,6 +4,8 @@ output.
 A block ```python or ```sh is run, after those before it on its page. One whose title begins with
 "Not run" is not, and its title says so to the reader. Another title names a file: a block of any
 language is written to it, and not run.
+
+`hooks.py` calls these functions; `tests/examples/test_site.py` holds them.
 """
 
 import base64

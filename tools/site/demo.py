@@ -1,5 +1,8 @@
 """The files of the page of six sliders: the core as WebAssembly, and robots as its blocks of
-numbers."""
+numbers.
+
+`hooks.py` adds them to the site; `tests/browser/test_six_sliders.py` holds them.
+"""
 
 import json
 import subprocess

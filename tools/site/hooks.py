@@ -1,5 +1,9 @@
 """What mkdocs does beside its own work: generated pages, blocks that run, formulas as MathML,
-checks."""
+checks.
+
+Of tests, `tests/examples/test_site.py` holds the numbers of formulas and the navigation; all else
+`make docs` alone runs.
+"""
 
 import html
 import io

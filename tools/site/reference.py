@@ -1,5 +1,9 @@
 """Pages of reference, made of what the code itself says: names, commands, file formats, shipped
-robots."""
+robots.
+
+`hooks.py` adds them to the site. Of tests, `tests/examples/test_site.py` holds the names that have
+pages; all else `make docs` alone runs.
+"""
 
 import io
 import json
@@ -153,6 +157,8 @@ def classes(module: Any) -> dict[str, dict[str, str]]:
     docstrings below them, or under Args in the docstring of the class."""
     found = {}
     for each in module.members.values():
+        # An imported name is read where it is defined, and griffe cannot say what an alias is
+        # whose target lies outside of the package.
         if each.is_alias:
             continue
         if each.is_class:

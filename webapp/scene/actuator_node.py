@@ -209,8 +209,13 @@ def _strut(end: Array, hull: Surface, radius: float) -> Mesh:
     return tube(np.array([end, anchor]), radius, 12)
 
 
-def moved_parts(actuators: tuple[Actuator, ...], size: float) -> Mesh:
-    """Several actuators in the body frame as one mesh, at rest."""
+def offered_mesh(actuators: tuple[Actuator, ...], size: float) -> Mesh:
+    """Actuators that a search would put elsewhere, as one mesh for the ghost beside the robot.
+
+    Args:
+        actuators: of the layout that is offered, drawn at rest.
+        size: of the shapes, as `part_size` of the layout has it.
+    """
     meshes = []
     for actuator in actuators:
         slenderness, scale = shape_of(actuator, size)

@@ -18,7 +18,7 @@ from webapp.board import Board
 from webapp.handles import set_properties
 from webapp.intents import Intents
 from webapp.markup.words import damage_words, missing_part
-from webapp.scene.actuator_node import ActuatorNode, Motion, motion, moved_parts
+from webapp.scene.actuator_node import ActuatorNode, Motion, motion, offered_mesh
 from webapp.scene.force_nodes import ForceNodes
 from webapp.scene.jet_nodes import JetNodes
 from webapp.scene.stage import Shape, Stage, aim_camera, arrow_size, hull_top, part_size, view_size
@@ -310,7 +310,7 @@ class RobotScene:
                     moved.append(actuator)
         set_properties(self._offered.node, visible=bool(moved))
         if moved:
-            self._offered.show(moved_parts, tuple(moved), part_size(layout))
+            self._offered.show(offered_mesh, tuple(moved), part_size(layout))
 
     def _clicked(self, index: int, also: bool) -> None:
         self._do(partial(self._select, index, also))

@@ -56,13 +56,20 @@ static int leave_gaps(const real *block, fl_work *work, const real *target_reduc
   return 1;
 }
 
-/* Forces for a wrench [N, N m], of which the wrench beside the forces is taken off already;
-   `lambda` are reduced multipliers to begin with [W], 0 for none. Out of reach a policy, where
-   there is one, gives another wrench in its place. */
-static void find_forces(const real *block, fl_work *work, const real *wrench,
+/* What of a wrench the forces have to give: all but the wrench beside them. */
+static void take_off_offset(const fl_span *span, const real *wrench, real *of_forces) {
+  for (int k = 0; k < 6; k++) of_forces[k] = wrench[k] - span->wrench_offset[k];
+}
+
+/* Forces for a wrench that the commands are to give [N, N m]; `lambda` are reduced multipliers to
+   begin with [W], 0 for none. Out of reach a policy, where there is one, gives another wrench in
+   its place: `out->wrench_served`, here without the wrench beside the forces. */
+static void find_forces(const real *block, fl_work *work, const real *wrench_wanted,
                         const fl_policy *policy, const real *lambda, fl_answer *out) {
   const fl_span *span = &work->span;
+  real wrench[6];
   real target_reduced[6];
+  take_off_offset(span, wrench_wanted, wrench);
   begin_answer(block, wrench, out);
   fl_reduce_wrench(work, wrench, target_reduced);
   if (span->rank == 0) {
@@ -74,13 +81,14 @@ static void find_forces(const real *block, fl_work *work, const real *wrench,
   int most_steps = FL_STEPS;
   if (has_kinks) most_steps = FL_STEPS_AT_KINK;
   const int status = fl_dual_newton(block, work, target_reduced, lambda, most_steps);
-  const int may_be_met = status == FL_MET || (status == FL_STUCK && has_kinks);
+  const int may_be_met = status == FL_MET || (status == FL_NO_PROGRESS && has_kinks);
   int within = may_be_met && is_in_range;
   out->newton_status = status;
   memcpy(out->lambda_reduced, work->state_found->lambda_reduced, sizeof out->lambda_reduced);
   copy_forces(block, work->state_found->force, out->force);
   if (work->has_drag) {
-    within = is_in_range && fl_answer_with_drag(block, work, target_reduced, status, out);
+    within = is_in_range &&
+             fl_answer_with_drag(block, work, wrench_wanted, target_reduced, status, out);
     if (within) copy_forces(block, work->best_force, out->force);
   } else if (fl_may_have_gaps(block, work, out->force)) {
     within = leave_gaps(block, work, target_reduced, status, within, out);
@@ -130,23 +138,15 @@ static void wrench_that_counts(const fl_span *span, const fl_question *q, real *
   }
 }
 
-/* What of a wrench the forces have to give: all but the wrench beside them. */
-static void take_off_offset(const fl_span *span, const real *wrench, real *of_forces) {
-  for (int k = 0; k < 6; k++) of_forces[k] = wrench[k] - span->wrench_offset[k];
-}
-
 /* Has drives that give nothing in a tick pass through their dead bands: each goes, within its band,
    towards the command that it would have if drives were as quick as can be. */
 static void pass_bands(const real *block, fl_work *work, const fl_question *q, real command[][3]) {
   const fl_box box = work->box;
   fl_answer later;
   real wrench[6];
-  real of_forces[6];
   fl_limits_without_tick(block, work);
   wrench_that_counts(&work->span, q, wrench);
-  take_off_offset(&work->span, wrench, of_forces);
-  memcpy(work->wrench_wanted, wrench, sizeof work->wrench_wanted);
-  find_forces(block, work, of_forces, q->policy, 0, &later);
+  find_forces(block, work, wrench, q->policy, 0, &later);
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
     const int k = fl_form_of(a)->force_number;
@@ -187,16 +187,13 @@ static void answer_question(const real *block, fl_work *work, const fl_question 
                             fl_answer *out) {
   const fl_span *span = &work->span;
   real wrench_desired[6];
-  real of_forces[6];
   wrench_that_counts(span, q, wrench_desired);
-  take_off_offset(span, wrench_desired, of_forces);
-  memcpy(work->wrench_wanted, wrench_desired, sizeof work->wrench_wanted);
   work->newton_steps = 0;
   work->is_truncated = 0;
   work->command_previous = q->previous;
 
   real lambda[6];
-  find_forces(block, work, of_forces, q->policy, first_multipliers(work, q, lambda), out);
+  find_forces(block, work, wrench_desired, q->policy, first_multipliers(work, q, lambda), out);
   for (int k = 0; k < 6; k++) {
     if (out->is_attainable) {
       out->wrench_served[k] = wrench_desired[k];

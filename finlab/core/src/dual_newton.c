@@ -331,7 +331,8 @@ static real mu_after_refused(real mu, real nu, const step_result *result) {
 }
 
 /* Newton's method from multipliers on, or from its own first ones where there are none.
-   work->state_found is the dual at the multipliers that it comes to, however it ends. Returns FL_MET, FL_BEYOND or FL_STUCK. */
+   work->state_found is the dual at the multipliers that it comes to, however it ends. Returns
+   FL_MET, FL_BEYOND or FL_NO_PROGRESS. */
 int fl_dual_newton(const real *block, fl_work *work, const real *target_reduced, const real *lambda,
                    int most_steps) {
   /* No forces cost more than C: a larger value proves that none add up to the target, Eq. 13. */
@@ -363,7 +364,7 @@ int fl_dual_newton(const real *block, fl_work *work, const real *target_reduced,
     const int has_diverged = !(mu <= 1 / ROUNDING); /* or is NaN */
     if (k >= most_steps || idle > IDLE || has_diverged) {
       if (at->residual_size <= ENOUGH) return FL_MET;
-      return FL_STUCK;
+      return FL_NO_PROGRESS;
     }
     idle++;
     work->newton_steps++;
@@ -380,7 +381,7 @@ int fl_dual_newton(const real *block, fl_work *work, const real *target_reduced,
       jumps++;
       if (jumps >= JUMPS) {
         jumps_between(block, work, at, trial, step, 1);
-        return FL_STUCK;
+        return FL_NO_PROGRESS;
       }
     }
     const step_result result = judged_step(step, at, trial);

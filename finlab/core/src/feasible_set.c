@@ -267,8 +267,8 @@ int fl_prepare(const real *block, fl_work *work) {
 
 void fl_usual_settings(fl_settings *settings) {
   settings->most_parts = FL_PARTS;
-  settings->tick_parts = TICK_PARTS;
-  settings->command_steps = LAST_STEPS;
+  settings->tick_parts = USUAL_TICK_PARTS;
+  settings->command_steps = USUAL_COMMAND_STEPS;
 }
 
 int fl_use_settings(fl_work *work, const fl_settings *settings) {

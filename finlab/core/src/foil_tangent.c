@@ -54,38 +54,3 @@ void fl_draw_tangent(const real *block, int i, const fl_box *box, real angle, co
   set->cost_at_min = most_cost;
   set->cost_at_max = most_cost;
 }
-
-/* Forces along the rows of commands, and their cost [W]. */
-real fl_power_of_commands(const real *block, const fl_work *work, real command[][3],
-                          real force[][2]) {
-  real cost = 0;
-  for (int i = 0; i < COUNT(block); i++) {
-    const fl_actuator *a = ACTUATOR(block, i);
-    force[i][0] = 0;
-    force[i][1] = 0;
-    if (work->span.is_lost[i]) continue;
-    real along[3];
-    fl_force_of_command(block, i, command[i], along, 0);
-    real size;
-    if (is_plane(a)) {
-      force[i][0] = along[1];
-      force[i][1] = along[2];
-      size = size_of(force[i]);
-    } else {
-      force[i][0] = a->command_sign * along[0];
-      size = force[i][0];
-    }
-    if (a->gauge_table > 0)
-      size /= fl_gauge_radius(block + (int)a->gauge_table, ATAN2(along[2], along[1]));
-    if (is_foil(a)) {
-      fl_tangent tangent;
-      fl_foil_at(block, i, command[i][0], &tangent);
-      force[i][1] = tangent.force[1];
-      cost += tangent.cost;
-      continue;
-    }
-    if (fl_is_in_reverse(a, command[i])) size = -size;
-    cost += fl_power_of_force(block, i, size);
-  }
-  return cost;
-}

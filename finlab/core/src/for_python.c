@@ -33,7 +33,7 @@ static const constant CONSTANTS[] = {
     CONSTANT(FL_BAD_ARGUMENT),
     CONSTANT(FL_MET),
     CONSTANT(FL_BEYOND),
-    CONSTANT(FL_STUCK),
+    CONSTANT(FL_NO_PROGRESS),
 };
 #undef FL_BEGIN
 #undef FL_FIELD

@@ -41,7 +41,7 @@ static int is_open(const real *block, fl_work *work, const real *target_reduced,
     keep_answer(block, work, target_reduced, best_cost);
     return 0;
   }
-  const int is_bound = status == FL_MET || (status == FL_STUCK && gap >= 0);
+  const int is_bound = status == FL_MET || (status == FL_NO_PROGRESS && gap >= 0);
   return is_bound && dual_value < *best_cost * (1 - CLOSE);
 }
 
@@ -83,9 +83,8 @@ static void dive(const real *block, fl_work *work, const real *target_reduced, i
 
 /* Solves both sides of a cut from the multipliers so far and stays at the cheaper one: of that
    are the sets, work->state_found, and the status of Newton's method that it returns. */
-static int cheaper_side(const real *block, fl_work *work, const real *target_reduced,
-                        fl_node *node) {
-  const int nearer = fl_nearer_side(block, node->actuator, &node->set_before, node->force);
+static int cheaper_side(const real *block, fl_work *work, const real *target_reduced, fl_cut *cut) {
+  const int nearer = fl_nearer_side(block, cut->actuator, &cut->set_before, cut->force);
   const int side[2] = {nearer, -nearer};
   real lambda_begin[6];
   real lambda[2][6];
@@ -93,7 +92,7 @@ static int cheaper_side(const real *block, fl_work *work, const real *target_red
   int status[2];
   memcpy(lambda_begin, work->state_found->lambda_reduced, sizeof lambda_begin);
   for (int k = 0; k < 2; k++) {
-    fl_take_side(block, work, node, side[k]);
+    fl_take_side(block, work, cut, side[k]);
     status[k] = fl_dual_newton(block, work, target_reduced, lambda_begin, FL_STEPS_AT_KINK);
     cost[k] = work->state_found->dual_value;
     if (status[k] == FL_BEYOND) cost[k] = INFEASIBLE_COST;
@@ -101,11 +100,11 @@ static int cheaper_side(const real *block, fl_work *work, const real *target_red
   }
   const int cheaper = cost[1] < cost[0];
   const int other = !cheaper;
-  node->first_side = side[cheaper];
-  node->score[0] = cost[other];
-  memcpy(node->lambda_reduced, lambda[other], sizeof node->lambda_reduced);
+  cut->first_side = side[cheaper];
+  cut->score[0] = cost[other];
+  memcpy(cut->lambda_reduced, lambda[other], sizeof cut->lambda_reduced);
   if (cheaper == 1) return status[1];
-  fl_take_side(block, work, node, side[0]);
+  fl_take_side(block, work, cut, side[0]);
   return fl_dual_newton(block, work, target_reduced, lambda[0], FL_STEPS_AT_KINK);
 }
 
@@ -129,13 +128,13 @@ static void dive_and_return(const real *block, fl_work *work, const real *target
 
 /* Goes back to the last cut whose other side may be cheaper than the best so far, and makes
    the bound no larger than those of the sides that are left out; 0 where there is none. */
-static fl_node *last_cheaper_cut(const real *block, fl_work *work, int *depth, real best_cost,
-                                 real *bound) {
+static fl_cut *last_cheaper_cut(const real *block, fl_work *work, int *depth, real best_cost,
+                                real *bound) {
   for (;;) {
-    fl_node *node = fl_last_open_cut(block, work, depth);
-    if (!node) return 0;
-    if (node->score[0] < best_cost * (1 - CLOSE)) return node;
-    *bound = smaller(*bound, node->score[0]);
+    fl_cut *cut = fl_last_open_cut(block, work, depth);
+    if (!cut) return 0;
+    if (cut->score[0] < best_cost * (1 - CLOSE)) return cut;
+    *bound = smaller(*bound, cut->score[0]);
   }
 }
 
@@ -175,21 +174,21 @@ int fl_search_gaps(const real *block, fl_work *work, const real *target_reduced,
       open = 0;
     }
     const int can_cut = open && !is_foil(ACTUATOR(block, gap));
-    fl_node *node = 0;
+    fl_cut *cut = 0;
     if (can_cut && parts < most_parts) {
-      node = fl_cut_set(block, work, &depth, gap, state->force[gap]);
+      cut = fl_cut_set(block, work, &depth, gap, state->force[gap]);
     }
-    if (node) {
-      status = cheaper_side(block, work, target_reduced, node);
+    if (cut) {
+      status = cheaper_side(block, work, target_reduced, cut);
       parts += 2;
       continue;
     }
     work->is_truncated |= can_cut;
     if (status != FL_BEYOND) least_bound = smaller(least_bound, dual_value);
-    node = last_cheaper_cut(block, work, &depth, best_cost, &least_bound);
-    if (!node) break;
-    fl_take_side(block, work, node, -node->first_side);
-    status = fl_dual_newton(block, work, target_reduced, node->lambda_reduced, FL_STEPS_AT_KINK);
+    cut = last_cheaper_cut(block, work, &depth, best_cost, &least_bound);
+    if (!cut) break;
+    fl_take_side(block, work, cut, -cut->first_side);
+    status = fl_dual_newton(block, work, target_reduced, cut->lambda_reduced, FL_STEPS_AT_KINK);
   }
   fl_restore_sets(block, work, work->set_before);
   *bound = least_bound;
@@ -203,11 +202,12 @@ real fl_gap_power_bound(const fl_work *work, real bound) {
   return bound * (1 - FINE);
 }
 
-/* Commands in `out` that give work->wrench_wanted, from what Newton's method came to; 0 where none
-   are found. work->state_found is not that of the commands afterwards: their multipliers are in
-   `out`. */
-int fl_answer_with_drag(const real *block, fl_work *work, const real *target_reduced, int status,
-                        fl_answer *out) {
+/* Commands in `out` that give `wrench_wanted` [N, N m], from what Newton's method came to for the
+   target of its forces; 0 where none are found. work->state_found is not that of the commands
+   afterwards: their multipliers are in `out`. */
+int fl_answer_with_drag(const real *block, fl_work *work, const real *wrench_wanted,
+                        const real *target_reduced, int status, fl_answer *out) {
+  memcpy(work->wrench_wanted, wrench_wanted, sizeof work->wrench_wanted);
   const real dual_value = work->state_found->dual_value;
   memcpy(out->lambda_reduced, work->state_found->lambda_reduced, sizeof out->lambda_reduced);
   const int is_sure = status == FL_MET && fl_are_forces_sure(block, work);

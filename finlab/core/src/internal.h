@@ -25,8 +25,8 @@ typedef fl_wide wide;
 /* The same where Newton's method stands still for IDLE steps; commands make up for it. */
 #define ENOUGH R(1e-4)
 #define IDLE 6
-#define ROUNDING R(1e-6)
-#define EXACT R(2e-6) /* error of commands, over the wrench scale, that needs no further step */
+#define ROUNDING R(1e-6) /* share of a sum that is rounding alone */
+#define EXACT R(2e-6)    /* error of commands, over the wrench scale, that needs no further step */
 #define TINY R(1e-30)
 #else
 #define R(x) x
@@ -42,20 +42,21 @@ typedef fl_wide wide;
 #define ENOUGH TOLERANCE
 #define IDLE FL_STEPS
 #define EXACT 1e-8
-#define ROUNDING 1e-12
+#define ROUNDING 1e-12 /* share of a sum that is rounding alone */
 #define TINY 1e-300
 #endif
 #define PI R(3.14159265358979323846)
 #define LARGEST_NUMBER R(1e30)  /* of a block or an answer */
 #define INFEASIBLE_COST R(1e30) /* [W] where no forces or commands meet a target */
-#define NOTHING R(1e-9)
-/* distance, over the wrench scale, up to which a point is the nearest one */
-#define CLOSE_BY NOTHING
-#define NEARLY R(1e-6)
-#define FINE R(1e-5)
-#define CLOSE R(1e-4)
-#define TICK_PARTS 60 /* the usual fl_settings.tick_parts */
-#define LAST_STEPS 36 /* the usual fl_settings.command_steps */
+
+/* From small to large: ROUNDING, NOTHING, NEARLY, FINE, CLOSE; docs/theory/numbers.md. */
+#define NOTHING R(1e-9)    /* share below which a number counts as 0: rounding that has added up */
+#define NEARLY R(1e-6)     /* share up to which two numbers count as equal */
+#define FINE R(1e-5)       /* share by which a table may be off between its points */
+#define CLOSE R(1e-4)      /* share of a cost that is not worth another search */
+#define SAME_POINT NOTHING /* distance, over the wrench scale, up to which a point is the nearest */
+#define USUAL_TICK_PARTS 60    /* fl_settings.tick_parts where nothing else is set */
+#define USUAL_COMMAND_STEPS 36 /* fl_settings.command_steps where nothing else is set */
 
 #define HEAD(block) ((const fl_head *)(block))
 #define ACTUATOR(block, i) ((const fl_actuator *)((block) + sizeof(fl_head) / sizeof(real)) + (i))
@@ -187,6 +188,8 @@ void fl_command_for_force(const real *block, int i, const fl_box *box, const rea
 force_range fl_force_range(const real *block, int i, const fl_box *box);
 void fl_commands_for_forces(const real *block, const fl_box *box, real force[][2],
                             const real *previous, real command[][3]);
+real fl_power_of_commands(const real *block, const fl_work *work, real command[][3],
+                          real force[][2]);
 
 /* command_refine.c: steps on the commands, Eq. 11 */
 real fl_refine_commands(const real *block, fl_work *work, const fl_box *box, const real *wrench,
@@ -224,24 +227,22 @@ real fl_gap_of(const real *block, const fl_work *work, int i, const real *force,
 real fl_largest_force(const real *block, real force[][2]);
 void fl_fix_at_least_force(const real *block, int i, fl_set *set, const real *force);
 void fl_narrow_set(const real *block, int i, fl_set *set, const real *force, int side);
-fl_node *fl_cut_set(const real *block, fl_work *work, int *depth, int cut, const real *force);
-void fl_take_side(const real *block, fl_work *work, const fl_node *node, int side);
-fl_node *fl_last_open_cut(const real *block, fl_work *work, int *depth);
+fl_cut *fl_cut_set(const real *block, fl_work *work, int *depth, int i, const real *force);
+void fl_take_side(const real *block, fl_work *work, const fl_cut *node, int side);
+fl_cut *fl_last_open_cut(const real *block, fl_work *work, int *depth);
 
 /* gap_search.c: least power where sets have gaps */
 int fl_search_gaps(const real *block, fl_work *work, const real *target_reduced, int status,
                    real *bound);
 real fl_gap_power_bound(const fl_work *work, real bound);
-int fl_answer_with_drag(const real *block, fl_work *work, const real *target_reduced, int status,
-                        fl_answer *out);
+int fl_answer_with_drag(const real *block, fl_work *work, const real *wrench_wanted,
+                        const real *target_reduced, int status, fl_answer *out);
 
 /* foil_tangent.c: a foil near to a command */
 const real *fl_lift_end(const real *block, const fl_actuator *a);
 void fl_foil_at(const real *block, int i, real angle, fl_tangent *tangent);
 void fl_draw_tangent(const real *block, int i, const fl_box *box, real angle, const real *s,
                      fl_tangent *tangent, fl_set *set);
-real fl_power_of_commands(const real *block, const fl_work *work, real command[][3],
-                          real force[][2]);
 
 /* foil_lattice.c: where searches for commands of foils may begin */
 enum { BRANCHES = 4 };    /* of a foil's lift */

@@ -248,22 +248,22 @@ static void cheapest_forces(const real *block, fl_work *work, real force[][2], c
 
 /* Serves both sides of a cut and stays at the one that does better. */
 static void better_side(const real *block, fl_work *work, const real *wrench,
-                        const fl_policy *policy, fl_node *node, real force[][2], real *score) {
+                        const fl_policy *policy, fl_cut *cut, real force[][2], real *score) {
   real force_other[FL_MOST][2];
-  node->first_side = fl_nearer_side(block, node->actuator, &node->set_before, node->force);
-  fl_take_side(block, work, node, -node->first_side);
-  serve(block, work, wrench, policy, force_other, node->score);
-  fl_take_side(block, work, node, node->first_side);
+  cut->first_side = fl_nearer_side(block, cut->actuator, &cut->set_before, cut->force);
+  fl_take_side(block, work, cut, -cut->first_side);
+  serve(block, work, wrench, policy, force_other, cut->score);
+  fl_take_side(block, work, cut, cut->first_side);
   serve(block, work, wrench, policy, force, score);
-  if (!is_better(node->score, score)) return;
+  if (!is_better(cut->score, score)) return;
   for (int k = 0; k < FL_SCORES; k++) {
     const real kept = score[k];
-    score[k] = node->score[k];
-    node->score[k] = kept;
+    score[k] = cut->score[k];
+    cut->score[k] = kept;
   }
   memcpy(force, force_other, (size_t)COUNT(block) * sizeof *force_other);
-  node->first_side = -node->first_side;
-  fl_take_side(block, work, node, node->first_side);
+  cut->first_side = -cut->first_side;
+  fl_take_side(block, work, cut, cut->first_side);
 }
 
 /* How many parts of sets with gaps a policy may look at: each takes a nearest point. */
@@ -274,10 +274,10 @@ static int most_parts_of(const real *block, const fl_work *work) {
 }
 
 /* The last cut whose other side may be better than a score; 0 where there is none. */
-static fl_node *last_better_cut(const real *block, fl_work *work, int *depth, const real *best) {
+static fl_cut *last_better_cut(const real *block, fl_work *work, int *depth, const real *best) {
   for (;;) {
-    fl_node *node = fl_last_open_cut(block, work, depth);
-    if (!node || is_better(node->score, best)) return node;
+    fl_cut *cut = fl_last_open_cut(block, work, depth);
+    if (!cut || is_better(cut->score, best)) return cut;
   }
 }
 
@@ -294,7 +294,7 @@ static void best_part(const real *block, fl_work *work, const real *wrench, cons
   int depth = 0;
   int has_found = 0; /* a part whose best answer lies in no gap */
   memcpy(work->set_before, work->set, sizeof work->set_before);
-  work->distance_enough = CLOSE_BY;
+  work->distance_enough = SAME_POINT;
   serve(block, work, wrench, policy, force_part, score);
   *most_ray_share = 1 - score[1];
   work->distance_enough = ROUGHLY;
@@ -306,21 +306,21 @@ static void best_part(const real *block, fl_work *work, const real *wrench, cons
       memcpy(work->best_set, work->set, sizeof work->best_set);
       has_found |= gap < 0;
     }
-    fl_node *node = 0;
+    fl_cut *cut = 0;
     if (gap >= 0 && parts < most_parts) {
-      node = fl_cut_set(block, work, &depth, gap, force_part[gap]);
+      cut = fl_cut_set(block, work, &depth, gap, force_part[gap]);
     }
-    if (node) {
-      better_side(block, work, wrench, policy, node, force_part, score);
+    if (cut) {
+      better_side(block, work, wrench, policy, cut, force_part, score);
       if (!has_found || is_better(score, best)) continue;
     }
-    node = last_better_cut(block, work, &depth, best);
-    if (!node || parts >= most_parts) break;
-    fl_take_side(block, work, node, -node->first_side);
+    cut = last_better_cut(block, work, &depth, best);
+    if (!cut || parts >= most_parts) break;
+    fl_take_side(block, work, cut, -cut->first_side);
     serve(block, work, wrench, policy, force_part, score);
   }
   fl_restore_sets(block, work, work->best_set);
-  work->distance_enough = CLOSE_BY;
+  work->distance_enough = SAME_POINT;
   if (!are_same(work->best_set, work->set_before, size_of_sets)) {
     serve(block, work, wrench, policy, force, best);
   }
@@ -385,9 +385,9 @@ void fl_out_of_reach(const real *block, fl_work *work, const real *wrench, const
     cheapen_by_parts(block, work, target_reduced, status, out);
     return;
   }
-  for (int k = 0; k < 6; k++)
-    work->wrench_wanted[k] = out->wrench_served[k] + work->span.wrench_offset[k];
-  const int is_met = fl_answer_with_drag(block, work, target_reduced, status, out);
+  real with_offset[6]; /* wrench that the commands are to give [N, N m] */
+  for (int k = 0; k < 6; k++) with_offset[k] = out->wrench_served[k] + work->span.wrench_offset[k];
+  const int is_met = fl_answer_with_drag(block, work, with_offset, target_reduced, status, out);
   if (!keeps_direction) return;
   const real found = (real)is_met * ray_share;
   fl_largest_ray_share(block, work, wrench, found, most_ray_share, out);

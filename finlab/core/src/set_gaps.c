@@ -198,16 +198,16 @@ static void narrow_by_angle(fl_set *set, const real *force, int side) {
     return;
   }
   const real angle = ATAN2(force[1], force[0]);
-  const real cut = fl_wrap_angle(angle - set->sector_center);
+  const real cut_angle = fl_wrap_angle(angle - set->sector_center);
   const int is_on_chord = set->force_min > 0 && set->sector_half_angle < PI / 2 &&
-                          FABS(cut) < ON_CHORD * set->sector_half_angle;
+                          FABS(cut_angle) < ON_CHORD * set->sector_half_angle;
   if (is_on_chord) {
     real from = -set->sector_half_angle;
     real to = set->sector_half_angle;
     if (side < 0)
-      to = cut;
+      to = cut_angle;
     else
-      from = cut;
+      from = cut_angle;
     set->sector_center = fl_wrap_angle(set->sector_center + (from + to) / 2);
     set->sector_half_angle = (to - from) / 2;
     set->turn_origin = set->sector_center + fl_wrap_angle(set->turn_origin - set->sector_center);
@@ -264,33 +264,33 @@ void fl_narrow_set(const real *block, int i, fl_set *set, const real *force, int
   fl_prepare_set(block, i, set);
 }
 
-/* Remembers a cut of the set of an actuator by its force; 0 where there are too many. */
-fl_node *fl_cut_set(const real *block, fl_work *work, int *depth, int cut, const real *force) {
+/* Remembers a cut of the set of actuator i by its force; 0 where there are too many. */
+fl_cut *fl_cut_set(const real *block, fl_work *work, int *depth, int i, const real *force) {
   if (*depth >= FL_DEPTH_OF(COUNT(block))) return 0;
-  fl_node *node = work->node + *depth;
+  fl_cut *cut = work->cut + *depth;
   ++*depth;
-  node->set_before = work->set[cut];
-  node->actuator = cut;
-  node->has_both_sides = 0;
-  node->force[0] = force[0];
-  node->force[1] = force[1];
-  return node;
+  cut->set_before = work->set[i];
+  cut->actuator = i;
+  cut->has_both_sides = 0;
+  cut->force[0] = force[0];
+  cut->force[1] = force[1];
+  return cut;
 }
 
-void fl_take_side(const real *block, fl_work *work, const fl_node *node, int side) {
-  work->set[node->actuator] = node->set_before;
-  fl_narrow_set(block, node->actuator, work->set + node->actuator, node->force, side);
+void fl_take_side(const real *block, fl_work *work, const fl_cut *cut, int side) {
+  work->set[cut->actuator] = cut->set_before;
+  fl_narrow_set(block, cut->actuator, work->set + cut->actuator, cut->force, side);
   fl_prepare_sets(block, work);
 }
 
 /* Goes back to the last cut whose other side was not taken; 0 where there is none. */
-fl_node *fl_last_open_cut(const real *block, fl_work *work, int *depth) {
+fl_cut *fl_last_open_cut(const real *block, fl_work *work, int *depth) {
   for (; *depth > 0; --*depth) {
-    fl_node *node = work->node + *depth - 1;
-    work->set[node->actuator] = node->set_before;
-    if (!node->has_both_sides) {
-      node->has_both_sides = 1;
-      return node;
+    fl_cut *cut = work->cut + *depth - 1;
+    work->set[cut->actuator] = cut->set_before;
+    if (!cut->has_both_sides) {
+      cut->has_both_sides = 1;
+      return cut;
     }
   }
   fl_prepare_sets(block, work);

@@ -2,8 +2,8 @@
 takes one.
 
 The function is handed what its parameters ask for by name: `targets` (N, 6) [N, N m] in the body
-frame, `layout` (a `finlab.Layout`), `sigma` (6,), what the allocator divides errors by, and
-`previous`, the command (n, 3) of the tick before or None. It returns commands (N, n, 3), as
+frame, `layout` (a `finlab.Layout`), `scale` (6,) [N, N m], what the allocator divides errors by,
+and `previous`, the command (n, 3) of the tick before or None. It returns commands (N, n, 3), as
 `finlab.Allocation` has them.
 """
 
@@ -37,7 +37,7 @@ PACKAGE_OF_METHOD = {"ipopt": "casadi"}
 PATIENCE_S = 60.0
 """Processor time [s] that a target may take where answers count and not times; starts and steps end
 every method long before."""
-FUNCTION_PARAMETERS = ("targets", "layout", "sigma", "previous")
+FUNCTION_PARAMETERS = ("targets", "layout", "scale", "previous")
 """Parameters that a user's function may ask for."""
 LIMIT_TOLERANCE = 1e-6
 """By how much a command may leave its limits, as a share of what they span and of one of its
@@ -188,7 +188,7 @@ class _FunctionMethod(Method):
         arguments = {
             "targets": question.targets,
             "layout": self.layout,
-            "sigma": self.scale,
+            "scale": self.scale,
             "previous": question.previous,
         }
         try:

@@ -147,13 +147,13 @@ def test_iterations_settle_in_few_steps_at_the_conditions_of_a_minimum() -> None
         plant = Plant(layout)
         dual = Allocator(layout)._whole.method
         for target in 0.6 * plant.wrench(plant.sample(rng, (3,))):
-            laws = dual.compiled.forces(target[None], CLOSEST, None, NOMINAL)
+            by_laws = dual.compiled.forces(target[None], CLOSEST, None, NOMINAL)
             ended = dual.coupled.iterate(
                 target,
-                laws.force[0],
+                by_laws.force[0],
                 ROUNDS,
                 core_policy(CLOSEST),
-                laws.multipliers[0],
+                by_laws.multipliers[0],
                 NOMINAL,
                 most_steps=1e6,
             )
@@ -165,10 +165,10 @@ def test_forces_without_an_iteration_come_with_no_answer_of_the_dual() -> None:
     layout = replace(parse_layout(bluerov2_heavy()), interaction=Jets())
     dual = Allocator(layout)._whole.method
     target = 0.5 * dual.scale
-    laws = dual.compiled.forces(target[None], CLOSEST, None, NOMINAL)
-    iterated = dual.coupled.iterate(target, laws.force[0], ROUNDS, core_policy(CLOSEST))
+    by_laws = dual.compiled.forces(target[None], CLOSEST, None, NOMINAL)
+    iterated = dual.coupled.iterate(target, by_laws.force[0], ROUNDS, core_policy(CLOSEST))
     assert iterated.answer is not None and iterated.answer.command.shape == (1, layout.n, 3)
-    only_steps = dual.coupled.iterate(target, laws.force[0], 0)
+    only_steps = dual.coupled.iterate(target, by_laws.force[0], 0)
     assert only_steps.answer is None
     assert only_steps.force.shape == (layout.n, 2)
 
@@ -189,11 +189,11 @@ class _ConstantIterations:
 def test_starts_that_make_nothing_cheaper_are_reversed_in_one_round_alone() -> None:
     n = 6
     coupled = _ConstantIterations()
-    laws = SimpleNamespace(
+    by_laws = SimpleNamespace(
         force=np.ones((1, n, 2)), multipliers=np.zeros((1, 6)), command=np.zeros((1, n, 3))
     )
     compiled = SimpleNamespace(
-        core=SimpleNamespace(answer_one=lambda *_: laws), is_line=np.zeros(n, bool)
+        core=SimpleNamespace(answer_one=lambda *_: by_laws), is_line=np.zeros(n, bool)
     )
     problem = SimpleNamespace(
         plant=SimpleNamespace(power=lambda command: np.full(command.shape[:-1], 1.0 / n))
@@ -259,11 +259,11 @@ def test_steps_of_all_starts_together_bound_how_many_are_followed(
     n = 4
     steps = share * MAX_WORK / n
     coupled = _CountedIterations(steps)
-    laws = SimpleNamespace(
+    by_laws = SimpleNamespace(
         force=np.ones((1, n, 2)), multipliers=np.zeros((1, 6)), command=np.zeros((1, n, 3))
     )
     compiled = SimpleNamespace(
-        core=SimpleNamespace(answer_one=lambda *_: laws), is_line=np.zeros(n, bool)
+        core=SimpleNamespace(answer_one=lambda *_: by_laws), is_line=np.zeros(n, bool)
     )
     problem = SimpleNamespace(
         plant=SimpleNamespace(power=lambda command: np.full(command.shape[:-1], 0.1 / n))

@@ -107,6 +107,7 @@ def candidate_points(
 
 
 def _printed(rows: Sequence[Row]) -> list[Row]:
+    """The figures that the paper prints for the variants of `rows`."""
     return [
         {
             "variant": variant,

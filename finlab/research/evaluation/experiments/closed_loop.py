@@ -64,6 +64,7 @@ def repeated(
 
 
 def _row(methods: Mapping[str, MethodSpec], row_of: Callable[[RunLog], Row], swim: SwimCase) -> Row:
+    """Runs one swim by its method and controller, and returns what `row_of` makes of its log."""
     allocator = methods[swim.method].on(swim.layout)
     law = make_controller(swim.controller, swim.layout)
     lost = [(name, swim.lost_s) for name in swim.lost]

@@ -95,6 +95,7 @@ def _models(
     seed: int,
     folder: Path,
 ) -> dict[str, Model]:
+    """All models by their names in the table; without `network` one is trained, in `folder`."""
     from finlab.research.interaction.surrogate_form import trained_surrogate
     from finlab.research.interaction.train import WEIGHTS_FILE, recipe, train
 
@@ -117,12 +118,14 @@ def _models(
 
 
 def _some(samples: Samples, count: int) -> Samples:
+    """The first `count` samples of a robot."""
     return samples._replace(command=samples.command[:count], wrench=samples.wrench[:count])
 
 
 def _row(
     oracle: WrenchOracle, model: Model, cases: list[tuple[Layout, Array, Samples]], name: str
 ) -> Row:
+    """Errors, by the oracle, of what `dual` answers with a model, over all robots."""
     each = list[tuple[float, float, float]]()
     for layout, wrenches, samples in progress(cases, "robot", name):
         scale = wrench_scale_of(layout)
@@ -188,9 +191,11 @@ class _ByDifferences(Interaction):
         self._function = function
 
     def offset(self, force: Array, inflow: Array | None = None) -> Array:
+        """The wrench (..., 6) [N, N m] at forces (..., n, 3) [N]; no flow changes it."""
         return self._function(force.reshape(-1, *force.shape[-2:])).reshape(*force.shape[:-2], 6)
 
     def effect(self, force: Array, inflow: Array | None = None) -> tuple[Array, Array]:
+        """The same, and its derivatives (..., n, 3, 6) by forward differences of 1e-4 N."""
         flat = force.reshape(-1, *force.shape[-2:])
         count = flat[0].size
         step = 1e-4
@@ -203,6 +208,7 @@ class _ByDifferences(Interaction):
         return here.reshape(*force.shape[:-2], 6), slope.reshape(*force.shape, 6)
 
     def deviation(self, force: Array) -> Array:
+        """No deviation (..., 6): the function is taken to be exact."""
         return np.zeros((*force.shape[:-2], 6))
 
 
@@ -216,6 +222,7 @@ class Ridge(_ByDifferences):
         unit = float(np.abs(force).max())
 
         def features(force: Array) -> Array:
+            """Forces (K, n, 3) as rows: 1, parts, sizes, and products of parts with sizes."""
             scaled = force / unit
             size = np.linalg.norm(scaled, axis=-1)
             flat = scaled.reshape(len(force), -1)

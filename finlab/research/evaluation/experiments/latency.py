@@ -182,7 +182,8 @@ def _wandering(rim: Array, tick: int) -> Array:
     return np.asarray(REACH_SHARE * ((1.0 - fraction) * begin + fraction * end))
 
 
-def _printed(rows: Sequence[Row]) -> list[Row]:
+def _printed(_: Sequence[Row]) -> list[Row]:
+    """The time of a cycle that the paper prints."""
     cycle_ms = paper_figures()["inference"]["cycle_s"] * 1e3
     return [
         {

@@ -108,6 +108,7 @@ def day_rows(day: HardDay, methods: Mapping[str, MethodSpec], seeds: Sequence[in
 def _swim(
     day: HardDay, methods: Mapping[str, MethodSpec], part: tuple[str, HardDaySwim, int]
 ) -> Row:
+    """Figures of one swim: of a method by its name, in a case, with a seed."""
     name, case, seed = part
     loop = day.swim(case, methods[name], seed)
     start = time.process_time()

@@ -97,6 +97,7 @@ def _draws(
 
 
 def _robot(robot: str, rng: np.random.Generator, seed: int, k: int) -> Layout:
+    """Draw k of a robot of `ROBOTS`, with all of its thrusters."""
     if robot == "random":
         return make_case("thrusters", 1, seed, k).layout
     layout = load_layout("bluerov2" if robot == "surveyed" else "bluerov2_heavy")
@@ -155,6 +156,7 @@ def misses_more(one: Array, other: Array) -> NDArray[np.bool_]:
 
 
 def _figures(scored: Sequence[dict[str, Array]]) -> Row:
+    """Figures of one method over all draws, from arrays (N,) of each of them."""
     by = {
         key: np.concatenate([np.asarray(each[key], float) for each in scored]) for key in scored[0]
     }

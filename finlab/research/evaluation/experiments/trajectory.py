@@ -103,6 +103,7 @@ def _picture(rows: Sequence[Row]) -> "Figure":
 
 
 def _printed(rows: Sequence[Row]) -> list[Row]:
+    """Errors that the paper prints for the layouts of `rows`, and those of its pool."""
     figures = paper_figures()
     layouts = {row["layout"] for row in rows}
     about = {"controller": "waypoint", "method": "paper's method, printed"}

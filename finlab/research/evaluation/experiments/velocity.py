@@ -89,7 +89,8 @@ def _row(log: RunLog) -> Row:
     }
 
 
-def _printed(rows: Sequence[Row]) -> list[Row]:
+def _printed(_: Sequence[Row]) -> list[Row]:
+    """Power and errors that the paper prints for its method and its baseline."""
     names = {"ours": "paper's method, printed", "baseline": "paper's baseline, printed"}
     about = {"layout": "in the pool", "lost": 0, "controller": "velocity"}
     figures = paper_figures()["velocity"]

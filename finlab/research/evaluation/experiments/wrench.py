@@ -145,6 +145,7 @@ def _row(split: str, method: str, fins: int | None, scores: Columns) -> Row:
 def _cases(
     layout: str | None, split: tuple[str, ...], layouts: int, targets: int, seed: int
 ) -> dict[str, list[Callable[[], SplitCase]]]:
+    """By the name of each split, or of the layout that is given, functions that make its cases."""
     if layout is None:
         names = list(SPLITS) if split == ("all",) else split
         for name in names:

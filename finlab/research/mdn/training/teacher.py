@@ -1,7 +1,8 @@
 """The teacher: descents from many random forces, the local minima of the effort that they find for
 each target, and their files.
 
-In files and batches the forces of minima are called `way`.
+In files and batches, `way` has the forces of the minima as roots of shares of the largest ones
+(`root_share`), complex in files, in two real parts in batches.
 """
 
 import io
@@ -50,7 +51,7 @@ class AnswerSettings:
     targets: int = 48
     """Targets for each robot."""
     sharpness: float = 0.03
-    """By how much dearer a way may be, as a share of the cost, for its weight to fall to a
+    """By how much dearer a minimum may be, as a share of the cost, for its weight to fall to a
     third."""
 
 
@@ -162,8 +163,8 @@ def _answers(
 
 
 def read_answers(path: Path) -> dict[int, dict[str, Array]]:
-    """The arrays of a file by number of fins; robots (R, ...), targets (R, T, ...), ways (R, T, L,
-    n)."""
+    """The arrays of a file by number of fins; robots (R, ...), targets (R, T, ...), `way` (R, T,
+    L, n) as roots of shares."""
     groups: dict[int, dict[str, Array]] = {}
     with np.load(path, allow_pickle=False) as file:
         for key in file.files:

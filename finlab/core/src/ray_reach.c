@@ -1,5 +1,5 @@
-/* The attainable set of wrenches of robots that Python describes by sets alone: how far rays
-   go in it, Eq. 12 and 14. */
+/* How far rays go in the attainable set of robots that Python describes by sets of forces alone,
+   for finlab/core/ray_reach.py. The method itself, Eqs. 12 and 14, is in nearest_point.c. */
 #include "internal.h"
 
 #define NUMBERS_OF_SET 16 /* of each actuator, in `sets` of fl_reach */
