@@ -308,6 +308,13 @@ class Actuator(Checked, ABC):
         return _row_of(rates, math.inf)
 
     @property
+    def ANGLE(self) -> int | None:
+        """Which number of the command is an angle that may turn all round, so that its change is
+        measured around the circle; None of kinds without: `KIND.aiming_number`, for programs that
+        watch commands and ask each actuator."""
+        return self.KIND.aiming_number
+
+    @property
     def frame(self) -> tuple[Vector3, Vector3, Vector3]:
         """Own axes, unit vectors in the body frame: those that `KIND.axes` names, and one across
         them. Of a kind with one axis the second is any that stands across it."""

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import finlab
 from finlab.actuators.azimuth import Azimuth, AzimuthLaw
 from finlab.actuators.fin.fin import Fin
 from finlab.actuators.law import ActuatorLaw
@@ -288,3 +289,13 @@ def test_angles_of_azimuths_wrap_and_other_commands_end_at_their_limits() -> Non
     brought = plant.feasible(np.array([[4.0, 50.0, 0.0], [4.0, 5.0, 0.0], [99.0, 0.0, 0.0]]))
     np.testing.assert_allclose(brought[:, 0], [4.0 - 2.0 * np.pi, 0.5, 51.0])
     assert brought[0, 1] == 40.0
+
+
+def test_an_actuator_says_which_number_turns_all_round() -> None:
+    """Programs that watch how far commands change ask it."""
+    around = {
+        actuator.type: actuator.ANGLE
+        for name in ("A", "catamaran", "bluerov2", "torpedo")
+        for actuator in finlab.load_layout(name).actuators
+    }
+    assert around == {"fin": 2, "azimuth": 0, "thruster": None, "rudder": None}
