@@ -14,8 +14,6 @@ END_SLACK = 1e-9
 """By how much a command may miss the end of a range that has no width."""
 MISSING_SHARE = 0.1
 """Share of what is missing along the worst axis from which on another axis is named."""
-NO_ANGLE = -1
-"""Index of the angle in commands that have none."""
 
 
 def limits_reached(layout: Layout, command: Array) -> tuple[str, ...]:
@@ -56,10 +54,12 @@ def at_limits(layout: Layout, command: Array) -> tuple[NDArray[np.bool_], NDArra
             if not is_full_turn(high[0] - low[0]):
                 at_end_of_arc[..., i] = (at_low | at_high)[..., 0]
             continue
-        angle = NO_ANGLE if actuator.KIND.aiming_number is None else actuator.KIND.aiming_number
-        sizes = np.arange(3) != angle
+        angle = actuator.KIND.aiming_number
+        sizes = np.ones(3, bool)
+        if angle is not None:
+            sizes[angle] = False
         at_full_thrust[..., i] = (at_high | (at_low & (low < 0.0)))[..., sizes].all(-1)
-        if angle != NO_ANGLE and not is_full_turn(high[angle] - low[angle]):
+        if angle is not None and not is_full_turn(high[angle] - low[angle]):
             is_at_rest = at_low[..., sizes].all(-1)
             at_end_of_arc[..., i] = ~is_at_rest & (at_low | at_high)[..., angle]
     return at_full_thrust, at_end_of_arc
