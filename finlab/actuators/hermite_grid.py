@@ -3,6 +3,9 @@ fins with tables, and the grids of laws that the core in C takes as rows of numb
 
 One grid answers for commands of any shape; n grids side by side answer for those of n fins, each by
 its own.
+
+The same interpolation is written in C in `finlab/core/src/command_law.c`, for the grids that
+`grid_numbers` makes; `tests/core/test_command_law.py` holds the two together.
 """
 
 from collections.abc import Callable, Sequence

@@ -21,7 +21,7 @@ import numpy as np
 from finlab.arrays import NOTHING, Array
 
 CELLS = 1024
-"""Intervals of price of a table; their ends are `top (j / CELLS)^4`."""
+"""Intervals of price of a table; their ends are `price_max (j / CELLS)^4`."""
 POINTS = 512
 """Directions around a circle, and sizes of a force, at which a fin is tabulated."""
 SAME_TABLE = 0.1
@@ -30,9 +30,9 @@ SAME_TABLE = 0.1
 _GRID = np.linspace(0.0, 1.0, CELLS + 1) ** 4
 
 
-def price_grid(top: float) -> Array:
-    """Returns prices (CELLS + 1,) [W/N] from 0 to `top`, the ends of a table's intervals."""
-    return np.asarray(top * _GRID)
+def price_grid(price_max: float) -> Array:
+    """Returns prices (CELLS + 1,) [W/N] from 0 to `price_max`, the ends of a table's intervals."""
+    return np.asarray(price_max * _GRID)
 
 
 class Origin(NamedTuple):
@@ -51,27 +51,26 @@ class RadialTable:
     """Force over price in one direction, cubic in each interval of price.
 
     Args:
-        top: price from which on the force is the largest one [W/N].
+        price_max: price from which on the force is the largest one [W/N].
         force: forces (CELLS + 1,) at the ends of the intervals, rising [N].
         slope: their derivatives by the price (CELLS + 1,) [N^2/W].
         power_at_least: power at the least force [W].
         base: table that this one is scaled of; None for one that is itself measured or computed.
     """
 
-    top: float
+    price_max: float
     force: Array
     slope: Array
     power_at_least: float
     base: Origin | None = None
 
     @classmethod
-    def of_forces(cls, top: float, force: Array, power_at_least: float) -> RadialTable:
-        """Returns a table of forces (CELLS + 1,) [N] at `price_grid(top)`, monotone cubic (Fritsch
-        and Carlson, 1980), with the power `power_at_least` [W] at the least force."""
+    def of_forces(cls, price_max: float, force: Array, power_at_least: float) -> RadialTable:
+        """Returns a table of forces (CELLS + 1,) [N] at `price_grid(price_max)`, monotone cubic
+        (Fritsch and Carlson, 1980), with the power `power_at_least` [W] at the least force."""
         force = np.maximum.accumulate(np.asarray(force, np.float64))
-        return cls(
-            float(top), force, monotone_slopes(price_grid(top), force), float(power_at_least)
-        )
+        slope = monotone_slopes(price_grid(price_max), force)
+        return cls(float(price_max), force, slope, float(power_at_least))
 
     @property
     def largest(self) -> float:
@@ -86,7 +85,7 @@ class RadialTable:
     @cached_property
     def price(self) -> Array:
         """Prices (CELLS + 1,) [W/N] of `force`."""
-        return price_grid(self.top)
+        return price_grid(self.price_max)
 
     def scaled(self, share: float, cost: float = 1.0) -> RadialTable:
         """Returns the table with `share` times the force, and `cost` times the power, at each
@@ -94,7 +93,7 @@ class RadialTable:
         force_per_power = share / cost
         table, force_scale, power_scale = self.origin
         return RadialTable(
-            top=self.top / force_per_power,
+            price_max=self.price_max / force_per_power,
             force=self.force * share,
             slope=self.slope * share * force_per_power,
             power_at_least=self.power_at_least * cost,
@@ -107,11 +106,12 @@ class RadialTable:
         return np.asarray(price * force - self.conjugate(price))
 
     def conjugate(self, price: Array) -> Array:
-        """Returns the convex conjugate c*(v) (...) [W] at prices v (...) [W/N] from 0 to `top`, the
-        integral of the force (Eq. 4)."""
-        cell = np.clip(np.searchsorted(_GRID, price / self.top, side="right") - 1, 0, CELLS - 1)
-        width = self.top * np.diff(_GRID)
-        share = price / self.top - _GRID[cell]
+        """Returns the convex conjugate c*(v) (...) [W] at prices v (...) [W/N] from 0 to
+        `price_max`, the integral of the force (Eq. 4)."""
+        interval = np.searchsorted(_GRID, price / self.price_max, side="right") - 1
+        cell = np.clip(interval, 0, CELLS - 1)
+        width = self.price_max * np.diff(_GRID)
+        share = price / self.price_max - _GRID[cell]
         t = share / np.diff(_GRID)[cell]
         first = self.force[cell]
         rise = self.force[cell + 1] - first
@@ -129,7 +129,7 @@ class RadialTable:
     def _slopes(self) -> Array:
         """Derivatives (2, CELLS) [N] of the force at both ends of each interval, by the price over
         the interval's width."""
-        width = self.top * np.diff(_GRID)
+        width = self.price_max * np.diff(_GRID)
         return np.stack([self.slope[:-1] * width, self.slope[1:] * width])
 
     @cached_property
@@ -137,7 +137,7 @@ class RadialTable:
         """Conjugates (CELLS + 1,) [W] at the ends of the intervals."""
         m0, m1 = self._slopes
         mean = 0.5 * (self.force[:-1] + self.force[1:]) + (m0 - m1) / 12.0
-        gains = self.top * np.diff(_GRID) * mean
+        gains = self.price_max * np.diff(_GRID) * mean
         return np.concatenate([[0.0], np.cumsum(gains)]) - self.power_at_least
 
     @cached_property
@@ -146,14 +146,16 @@ class RadialTable:
         step = CELLS
         while step > 1 and not self._keeps_values(step):
             step //= 2
-        return table_numbers(self.top, self.force[::step], self.slope[::step], self.power_at_least)
+        return table_numbers(
+            self.price_max, self.force[::step], self.slope[::step], self.power_at_least
+        )
 
     def _keeps_values(self, step: int) -> bool:
         """Whether the cubics between every `step`-th of the grid's prices pass through all
         forces."""
         price = _GRID[::step]
         force = self.force[::step]
-        slope = (self.top * self.slope)[::step]
+        slope = (self.price_max * self.slope)[::step]
         cell = np.minimum(np.arange(CELLS + 1) // step, CELLS // step - 1)
         width = np.diff(price)[cell]
         t = (_GRID - price[cell]) / width
@@ -168,29 +170,30 @@ class RadialTable:
         """Returns the table of the cost c(T) + `weight` T^2 [W]: at the price v + 2 weight T it
         responds as this one does at v."""
         price = self.price + 2.0 * weight * self.force
-        top = float(price[-1])
+        price_max = float(price[-1])
         power_at_least = self.power_at_least + weight * float(self.force[0]) ** 2
-        return self.of_forces(top, np.interp(price_grid(top), price, self.force), power_at_least)
+        force = np.interp(price_grid(price_max), price, self.force)
+        return self.of_forces(price_max, force, power_at_least)
 
 
-def table_numbers(top: float, force: Array, slope: Array, power_at_least: float) -> Array:
+def table_numbers(price_max: float, force: Array, slope: Array, power_at_least: float) -> Array:
     """Returns a table as the core takes it.
 
     Args:
-        top: price from which on the force is the largest one [W/N].
-        force: forces (k + 1,) [N] at prices top (j / k)^4.
+        price_max: price from which on the force is the largest one [W/N].
+        force: forces (k + 1,) [N] at prices price_max (j / k)^4.
         slope: their derivatives by the price (k + 1,) [N^2/W].
         power_at_least: power at the least force [W].
 
     Returns:
-        `top`, k, `power_at_least`, then force, its derivative and its conjugate at each price
+        `price_max`, k, `power_at_least`, then force, its derivative and its conjugate at each price
         (3 k + 6,).
     """
-    width = np.diff(top * np.linspace(0.0, 1.0, len(force)) ** 4)
+    width = np.diff(price_max * np.linspace(0.0, 1.0, len(force)) ** 4)
     mean = 0.5 * (force[:-1] + force[1:]) + width * (slope[:-1] - slope[1:]) / 12.0
     conjugate = np.concatenate([[0.0], np.cumsum(width * mean)]) - power_at_least
     knots = np.stack([force, slope, conjugate], axis=-1)
-    return np.concatenate([[top, len(force) - 1, power_at_least], knots.ravel()])
+    return np.concatenate([[price_max, len(force) - 1, power_at_least], knots.ravel()])
 
 
 def monotone_slopes(x: Array, y: Array) -> Array:
@@ -326,11 +329,12 @@ class Form(NamedTuple):
     """Axes (3, 3) of the law's forces in the actuator's own ones; None where they are the same."""
     law: Array | None = None
     """A grid of the law, see `finlab.actuators.hermite_grid.grid_numbers`."""
-    beat: Array | None = None
+    command_table: Array | None = None
     """Of a fin: amplitudes [rad] and frequencies [Hz] (K + 1, 2) at (j / K)^2 of its largest force.
     Of a foil: lift coefficients, rising [1], and angles [rad] (K, 2)."""
-    beat_count: int = 0
-    """K of `beat`, which the core reads before its rows: cells of a fin, points of a foil."""
+    command_table_count: int = 0
+    """K of `command_table`, which the core reads before its rows: cells of a fin, points of a
+    foil."""
     deflection: Array | None = None
     """Of a fin with a gauge: angles (POINTS,) [rad] from the command's direction to the force's."""
     turning_costs: bool = False
@@ -367,17 +371,22 @@ class Group(ABC):
         return self
 
     @property
-    def beside(self) -> Array:
+    def wrench_offset_at_rest(self) -> Array:
         """Wrench offsets (m, 6) [N, N m] at forces of 0, such as the drag of a rudder."""
         return np.zeros((len(self.responses), 6))
 
-    def beside_of(self, force: Array) -> Array:
+    def wrench_offset_of(self, force: Array) -> Array:
         """Returns the wrench offset (N, 6) [N, N m] at forces (N, m, 2) [N] of the responses."""
         return np.zeros((len(force), 6))
 
     def radial_conjugate_bound(self, price: Array, back: Array, ends: Array | None) -> Array | None:
         """Returns the conjugate of each actuator's power along its force, by the law itself
         (Eq. 4).
+
+        `power_bound` of `finlab/allocation/dual/bound.py` asks, by `Compiled.conjugates_by_laws`.
+        Thrusters, azimuths, tilts and fins by a formula answer: what they give has the directions
+        of their responses, and their laws tell the power at each size. Fins with measured tables
+        and rudders do not: theirs has other directions too, see `conjugate_bound`.
 
         Args:
             price: prices (N, m) [W/N] of that force, of lines signed.
@@ -394,6 +403,11 @@ class Group(ABC):
     def conjugate_bound(self, price: Array) -> Array | None:
         """Returns an upper bound of the conjugate of each actuator's power over all that it can
         give, the wrench offset left out (Eq. 4).
+
+        `power_bound` of `finlab/allocation/dual/bound.py` asks, after `radial_conjugate_bound`;
+        where both answer this one holds. Fins with measured tables answer, whose forces leave the
+        plane of the response, and rudders, whose lift and drag come together on a curve that the
+        table meets only at its knots. For all others `radial_conjugate_bound` is enough.
 
         Args:
             price: multipliers (N, 6) of the wrench [W/N, W/(N m)].

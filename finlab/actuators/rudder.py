@@ -339,11 +339,11 @@ class RudderGroup(Group):
         return np.asarray(self._flow.pressure * (largest - self._flow.speed * self._law.drag))
 
     @property
-    def beside(self) -> Array:
+    def wrench_offset_at_rest(self) -> Array:
         """See `Group`: the drag without lift."""
         return np.asarray((self._flow.pressure * self._law.drag)[:, None] * self._drag_wrench)
 
-    def beside_of(self, force: Array) -> Array:
+    def wrench_offset_of(self, force: Array) -> Array:
         """See `Group`: the drag at these lifts."""
         lift = np.abs(force[..., 0]) / np.maximum(self._flow.pressure, NOTHING)
         drag = []
@@ -378,8 +378,8 @@ class RudderGroup(Group):
                 "foil",
                 axes=np.array([lift_axis, drag_axis, [0.0, 0.0, 0.0]]),
                 law=self._grids[i],
-                beat=np.stack([curve.lift, curve.angle], axis=-1),
-                beat_count=len(curve.lift),
+                command_table=np.stack([curve.lift, curve.angle], axis=-1),
+                command_table_count=len(curve.lift),
                 lean_angle=course,
                 pressure_area=max(self._flow.pressure[i], NOTHING),
                 zero_lift_angle=self._no_lift[i],

@@ -249,38 +249,6 @@ class Method(ABC):
         return True
 
     @classmethod
-    def read_networks(cls, checkpoint: Checkpoint) -> Networks | None:
-        """Returns the networks that the method is made with.
-
-        Methods that need some inherit from `finlab.research.networks.learned_method.LearnedMethod`,
-        which reads them; any other is made with what it is given.
-        """
-        return None if isinstance(checkpoint, str | os.PathLike) else checkpoint
-
-    @classmethod
-    def networks_in(
-        cls, files: Mapping[str, bytes], source: str, name: str | None
-    ) -> Networks | None:
-        """Reads the networks that came with a bundle.
-
-        Args:
-            files: of the networks, by name; none where they come with finlab.
-            source: what errors call the bundle.
-            name: of the checkpoint; None for the shipped one.
-
-        Returns:
-            The networks; None for methods without.
-        """
-        return None
-
-    @classmethod
-    def networks_for_bundle(cls, networks: Networks | None) -> tuple[str | None, dict[str, bytes]]:
-        """Returns the SHA-256 of the networks' weights, and by name the files of those that a
-        bundle has to bring, since they do not come with finlab; None and no files for methods
-        without."""
-        return None, {}
-
-    @classmethod
     def option_names(cls) -> list[str]:
         """Returns the names of what can be set."""
         return [field.name for field in fields(cls.settings_class)]
@@ -396,6 +364,41 @@ class Method(ABC):
         """Sentences that the user should read before trusting any answer of the method for its
         robot."""
         return ()
+
+    # The rest is about networks. Methods with networks override it, by inheriting from
+    # `finlab.research.networks.learned_method.LearnedMethod`.
+
+    @classmethod
+    def read_networks(cls, checkpoint: Checkpoint) -> Networks | None:
+        """Returns the networks that the method is made with.
+
+        Methods that need some inherit from `finlab.research.networks.learned_method.LearnedMethod`,
+        which reads them; any other is made with what it is given.
+        """
+        return None if isinstance(checkpoint, str | os.PathLike) else checkpoint
+
+    @classmethod
+    def networks_in(
+        cls, files: Mapping[str, bytes], source: str, name: str | None
+    ) -> Networks | None:
+        """Reads the networks that came with a bundle.
+
+        Args:
+            files: of the networks, by name; none where they come with finlab.
+            source: what errors call the bundle.
+            name: of the checkpoint; None for the shipped one.
+
+        Returns:
+            The networks; None for methods without.
+        """
+        return None
+
+    @classmethod
+    def networks_for_bundle(cls, networks: Networks | None) -> tuple[str | None, dict[str, bytes]]:
+        """Returns the SHA-256 of the networks' weights, and by name the files of those that a
+        bundle has to bring, since they do not come with finlab; None and no files for methods
+        without."""
+        return None, {}
 
 
 class LeastErrorMethod(Method):

@@ -113,7 +113,8 @@ enum {
 enum {
   FL_CLOSEST,   /* the nearest wrench by the weights of the axes */
   FL_DIRECTION, /* the largest share of the wrench */
-  FL_PRIORITY   /* groups of axes, one after the other */
+  FL_PRIORITY,  /* groups of axes, one after the other */
+  FL_POLICIES   /* how many policies there are */
 };
 
 /* What functions return; fl_error_text has a sentence for each. */

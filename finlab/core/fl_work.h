@@ -142,8 +142,11 @@ struct fl_work {
   const fl_wide *ray; /* (6,) of which a mixture may take a share, in weighted axes; 0 for none */
 
   /* Sets with gaps. */
-  fl_cut cut[FL_DEPTH];             /* cuts on the way to the part that is looked at */
-  fl_set set_before[FL_MOST];       /* that a search began with */
+  fl_cut cut[FL_DEPTH]; /* cuts on the way to the part that is looked at */
+  /* Sets that a search began with. Two searches keep theirs here, never at the same time:
+     fl_search_gaps while it runs, and fl_out_of_reach until it has put its own back, after which it
+     may call fl_search_gaps. */
+  fl_set set_before[FL_MOST];
   fl_set best_set[FL_MOST];         /* of its best part */
   fl_real best_force[FL_MOST][2];   /* of that part [N] */
   fl_real best_command[FL_MOST][3]; /* of the best part where there are foils */

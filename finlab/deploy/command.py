@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from finlab.deploy.deployed_robot import DeployedRobot
 
 POLICIES = ("closest", "direction", "priority")
+"""As `POLICY_NAMES` of `finlab.allocation.policy`, which cannot be imported here: it loads numpy,
+before the number of its threads is set."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -145,9 +145,11 @@ def test_rudders_answer_with_a_lift_that_their_deflections_give(
         most = met.pressure * 0.03
         np.testing.assert_allclose((given * across).sum(-1), force[0, :, 0], atol=most.max() * 1e-2)
         drag = np.einsum("ma,maw->w", given - force[0, :, :1] * across, wrench)
-        np.testing.assert_allclose(group.beside_of(force)[0], drag, atol=most.max() * 1e-2)
+        np.testing.assert_allclose(group.wrench_offset_of(force)[0], drag, atol=most.max() * 1e-2)
     np.testing.assert_allclose(
-        group.beside.sum(axis=0), group.beside_of(np.zeros((1, 2, 2)))[0], atol=1e-12
+        group.wrench_offset_at_rest.sum(axis=0),
+        group.wrench_offset_of(np.zeros((1, 2, 2)))[0],
+        atol=1e-12,
     )
 
 
@@ -189,7 +191,7 @@ def test_a_rudder_at_rest_offers_nothing() -> None:
     group = RudderGroup(RUDDERS, effectiveness_of(RUDDERS))
     lines = [line for line in group.responses if isinstance(line, Line)]
     assert [(line.low, line.high) for line in lines] == [(0.0, 0.0)] * 2
-    assert not group.beside_of(np.zeros((3, 2, 2))).any()
+    assert not group.wrench_offset_of(np.zeros((3, 2, 2))).any()
 
 
 def test_an_azimuth_keeps_its_angle_where_no_force_is_asked_for() -> None:

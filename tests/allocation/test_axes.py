@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from finlab.allocation import Allocator, Policy
+from finlab.allocation.policy import POLICY_NAMES
 from finlab.axes import AXES
 from finlab.cli import main
 from finlab.errors import CommandError, LayoutError
@@ -18,11 +19,8 @@ from tests.oracle_optima import lower_bound
 from tests.oracle_plant import OraclePlant
 from tests.random_robots import layout_of
 
-POLICIES = ("closest", "direction", "priority")
-"""The kinds of policy."""
 
-
-@pytest.mark.parametrize("policy", POLICIES)
+@pytest.mark.parametrize("policy", POLICY_NAMES)
 @pytest.mark.parametrize(
     ("name", "surge"),
     [("bluerov2", 20.0), ("torpedo", 60.0), ("catamaran", 60.0), ("bluerov2", 0.2)],
@@ -34,7 +32,7 @@ def test_an_axis_that_nobody_commands_decides_nothing(name: str, surge: float, p
     assert not any("not reached" in note for note in answer.notes)
 
 
-@pytest.mark.parametrize("policy", POLICIES)
+@pytest.mark.parametrize("policy", POLICY_NAMES)
 def test_an_axis_is_freed_by_name_for_one_question(policy: str) -> None:
     layout = load_layout("bluerov2_heavy")
     allocator = Allocator(layout)
@@ -75,7 +73,7 @@ def _three_thrusters() -> list[dict[str, object]]:
     ]
 
 
-@pytest.mark.parametrize("policy", POLICIES)
+@pytest.mark.parametrize("policy", POLICY_NAMES)
 def test_a_batch_with_free_axes_is_answered_as_each_alone(policy: str) -> None:
     rng = np.random.default_rng(7)
     for name in ("bluerov2", "A", "catamaran"):

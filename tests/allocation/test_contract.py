@@ -21,6 +21,7 @@ import pytest
 
 from finlab.allocation import METHODS, Allocation, Allocator, BatchAllocation
 from finlab.allocation.methods import method_class
+from finlab.allocation.policy import POLICY_NAMES
 from finlab.allocation.solution import equal
 from finlab.arrays import Array
 from finlab.axes import AXES
@@ -35,8 +36,6 @@ SEED = 58
 """Of the robots; another one than that of the tests of the default method."""
 DAMAGE_KINDS = ("whole", "lost", "weak", "torn", "stuck", "running")
 """What may be wrong with an actuator, as the keywords of `Damage`, and "whole"."""
-POLICIES = ("closest", "direction", "priority")
-"""The kinds of policy."""
 REACHES = (0.0, 1.0, 30.0)
 """Sizes of the wrenches, as multiples of that of a command within limits: 0 is rest, 1 is within
 reach, 30 is beyond."""
@@ -164,7 +163,7 @@ def questions(
         command[lost] = np.nan
         return command
 
-    policies = POLICIES if "policy" in method_class(method).reads else POLICIES[:1]
+    policies = POLICY_NAMES if "policy" in method_class(method).reads else POLICY_NAMES[:1]
     for number, policy in enumerate(policies):
         arguments: dict[str, Any] = {"policy": policy, "damage": damage}
         for reach in REACHES:
@@ -223,7 +222,7 @@ def test_many_wrenches_get_the_answers_of_each(method: str, kind: str, damage_ki
     allocator = quick_allocator(method).on(robot.layout)
     wrenches_of_policy: dict[str, list[Array]] = {}
     for question in questions(method, allocator, robot, damage):
-        policy = question.arguments.get("policy", POLICIES[0])
+        policy = question.arguments.get("policy", POLICY_NAMES[0])
         wrenches_of_policy.setdefault(policy, []).append(question.wrench)
     for policy, wrenches in wrenches_of_policy.items():
         arguments: dict[str, Any] = {"policy": policy, "damage": damage, "flow": robot.flow}

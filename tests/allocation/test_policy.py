@@ -9,9 +9,10 @@ from scipy.optimize import least_squares
 
 from finlab.allocation import Allocation
 from finlab.allocation.binding import limits_reached
-from finlab.allocation.policy import CLOSEST, Policy, as_policy, policy_from
+from finlab.allocation.policy import CLOSEST, POLICY_NAMES, Policy, as_policy, policy_from
 from finlab.assets import shipped_layouts
 from finlab.axes import AXES
+from finlab.core.fields import constant
 from finlab.errors import AllocationError, CommandError
 from finlab.layout import Fin, Layout, Limits, load_layout
 from finlab.layout.effectiveness import layout_effectiveness
@@ -27,6 +28,11 @@ SHALLOW = (30.0, 0.0, 6.0, 0.0, 0.0, 0.0)
 """Its heave alone can be delivered, the whole cannot."""
 PATIENT = ("ipopt", "sqp")
 """Methods of the table that are left to their own tests here."""
+
+
+def test_the_core_knows_every_policy_and_no_other() -> None:
+    numbers = [constant(f"FL_{name.upper()}") for name in POLICY_NAMES]
+    assert sorted(numbers) == list(range(constant("FL_POLICIES")))
 
 
 def shipped(name: str) -> Layout:

@@ -28,15 +28,32 @@ CORE_FOLDER = Path(core.__path__[0])
 """Where the headers stand."""
 REAL = ctypes.c_double
 """`fl_real` and `fl_wide` of the library in this package."""
-MOST = 64
+MOST = constant("FL_MOST")
 """Most actuators of a robot."""
 FIN = constant("FL_FIN")
 """Form of a fin's command, FL_FIN."""
 POD = constant("FL_POD")
 """Form of a pod's command, FL_POD."""
-POINTS = 8
-"""Most points of a mixture, FL_POINTS."""
-_LENGTHS = {"FL_MOST": MOST, "FL_POINTS": POINTS, "FL_SCORES": 6, "FL_DEPTH": 16 + MOST}
+
+
+def _macro(name: str) -> int:
+    """A number that `fl_work.h` defines: those of work areas the library does not tell."""
+    text = (CORE_FOLDER / "fl_work.h").read_text(encoding="utf-8")
+    found = re.search(rf"^#define {name} (\d+)\b", text, re.MULTILINE)
+    assert found is not None, name
+    return int(found[1])
+
+
+POINTS = _macro("FL_POINTS")
+"""Most points of a mixture."""
+_DEPTH = 16 + MOST
+"""FL_DEPTH_OF(FL_MOST), a formula and no number in `fl_work.h`."""
+_LENGTHS = {
+    "FL_MOST": MOST,
+    "FL_POINTS": POINTS,
+    "FL_SCORES": _macro("FL_SCORES"),
+    "FL_DEPTH": _DEPTH,
+}
 """Lengths of arrays in the headers that are macros."""
 _KINDS: dict[str, Any] = {
     "fl_real": REAL,

@@ -12,9 +12,10 @@ import pytest
 
 import finlab
 from finlab.actuators.rudder import Rudder
+from finlab.allocation.policy import POLICY_NAMES
 from finlab.deploy import deployed_robot
 from finlab.deploy.bundle import Bundle, make_bundle
-from finlab.deploy.command import main
+from finlab.deploy.command import POLICIES, main
 from finlab.deploy.deployed_robot import (
     DeployedRobot,
     extremes,
@@ -142,6 +143,10 @@ def test_a_wrong_call_ends_with_usage_and_2(
     assert main(arguments) == 2
     told = capsys.readouterr().err
     assert told.startswith("usage: finlab-runtime ") and message in told
+
+
+def test_the_choice_of_policies_is_that_of_the_library() -> None:
+    assert POLICIES == POLICY_NAMES
 
 
 def test_every_page_of_help_has_an_example(capsys: Any, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -202,8 +202,8 @@ def _form(law: FinLaw, box: LawBox, beat: Array, directions: Directions) -> Form
     return Form(
         "fin",
         law=law.grid_numbers(box.lower, box.upper),
-        beat=beat,
-        beat_count=len(beat) - 1,
+        command_table=beat,
+        command_table_count=len(beat) - 1,
         deflection=None if is_even else directions.deflection,
         lean_angle=float(directions.deflection[0]) if is_even else float(law.offset),
         unevenness=e,

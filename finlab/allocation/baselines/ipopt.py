@@ -210,9 +210,9 @@ class _LineProgram:
         self.full_power = float(power.max())
         """Power [W] at full load."""
         force = np.zeros((len(grid), len(group.responses), 2))
-        offset_at_rest = group.beside_of(force)
+        offset_at_rest = group.wrench_offset_of(force)
         force[:, in_group, 0] = largest * grid
-        offset = group.beside_of(force) - offset_at_rest
+        offset = group.wrench_offset_of(force) - offset_at_rest
         self.wrench_offset: Any = 0.0
         """Wrench (6,) in CasADi that comes on top, such as the drag of a foil."""
         if offset.any():

@@ -193,7 +193,7 @@ class _Tables:
         """Returns the offsets of an actuator's tables."""
         gauge = response.gauge if isinstance(response, Plane) else None
         law = form.law
-        beat = form.beat
+        command_table = form.command_table
         return TableOffsets(
             force_table=self.radial(response.table),
             force_table_reverse=self.radial(response.reverse),
@@ -202,7 +202,10 @@ class _Tables:
             ),
             law_grid=self.offset(law, lambda: cast(Array, law)),
             command_table=self.offset(
-                beat, lambda: np.concatenate([[form.beat_count], cast(Array, beat).ravel()])
+                command_table,
+                lambda: np.concatenate(
+                    [[form.command_table_count], cast(Array, command_table).ravel()]
+                ),
             ),
         )
 
@@ -262,8 +265,8 @@ def _usual_price(response: Response) -> float:
     prices = []
     for table in filter(None, (response.table, response.reverse)):
         middle = 0.5 * (table.force[0] + table.force[-1])
-        price = float(np.sqrt(2.0) * np.interp(middle, table.force, price_grid(table.top)))
-        prices.append(min(max(price, CLOSE * table.top), table.top))
+        price = float(np.sqrt(2.0) * np.interp(middle, table.force, price_grid(table.price_max)))
+        prices.append(min(max(price, CLOSE * table.price_max), table.price_max))
     return max(prices)
 
 
@@ -276,6 +279,6 @@ def _needs_no_reverse(plane: Plane) -> bool:
         return False
     if back.largest > ahead.largest or back.power_at_least < ahead.power_at_least:
         return False
-    price = price_grid(back.top)
-    force_ahead = np.interp(price, price_grid(ahead.top), ahead.force)
+    price = price_grid(back.price_max)
+    force_ahead = np.interp(price, price_grid(ahead.price_max), ahead.force)
     return bool((force_ahead >= back.force * (1.0 - NEARLY)).all())

@@ -201,7 +201,7 @@ class Compiled:
         """Returns the wrench (6,) [N, N m] at forces of 0 of the actuators that work (n,)."""
         wrench = np.zeros(6)
         for indices, group in self.groups:
-            wrench = wrench + group.beside[works[indices]].sum(axis=0)
+            wrench = wrench + group.wrench_offset_at_rest[works[indices]].sum(axis=0)
         return wrench * self._counts
 
     def at(self, inflow: Array | None) -> "Compiled":

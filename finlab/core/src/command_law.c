@@ -1,5 +1,8 @@
 /* Laws of actuators by tables: the force of a command, its derivatives and its power, and a command
-   for a force. */
+   for a force.
+
+   The interpolation on grids is written in Python too, in finlab/actuators/hermite_grid.py;
+   tests/core/test_command_law.py holds the two together. */
 #include "internal.h"
 
 #define GAUGE_STEP R(1e-3) /* angle [rad] over which the derivative of a gauge is taken */
@@ -398,7 +401,7 @@ static void pod_command(const real *block, int i, const fl_box *box, const real 
   real size = size_of(force);
   if (a->gauge_table > 0) size /= fl_gauge_radius(block + (int)a->gauge_table, direction);
   real angle = 0;
-  if (before) angle = before[0];
+  if (before) angle = before[fl_form_of(a)->angle_number];
   if (size > 0) angle = direction;
   const pod_way ahead = pod_way_of(block, i, box, angle, size, 0);
   const pod_way back = pod_way_of(block, i, box, angle, size, 1);

@@ -126,26 +126,35 @@ static void begin_as_before(const real *block, fl_work *work, const real *previo
   work->has_lambda_begin = 1;
 }
 
-/* Whether rates leave a number of a command all of its range. */
+/* Whether rates leave number k of a command all of its range; unused numbers always have it. */
 static int has_full_range(const real *block, const fl_box *box, int i, int k) {
   const fl_actuator *a = ACTUATOR(block, i);
   return box->command_min[i][k] <= a->command_min[k] && box->command_max[i][k] >= a->command_max[k];
 }
 
 /* The forces that an actuator's box gives, within its limits. Where rates leave it all of its
-   sizes, or all of its commands, they are the robot's own, which the box gives but for rounding. */
+   commands, or of a grid all but the angle that wraps, they are the robot's own, which the box
+   gives but for rounding. */
 static force_range range_of_tick(const real *block, const fl_work *work, int i, int is_costly) {
   const fl_actuator *a = ACTUATOR(block, i);
   const fl_box *box = &work->box;
-  const int all_sizes = has_full_range(block, box, i, 0) && has_full_range(block, box, i, 1);
-  const int all_angles = has_full_range(block, box, i, 2);
-  if (all_sizes && all_angles && !is_costly) {
+  const command_form *form = fl_form_of(a);
+  int has_full_angle = 1;   /* of the number that is an angle and wraps, if there is one */
+  int has_full_numbers = 1; /* of all others */
+  for (int k = 0; k < form->numbers; k++) {
+    const int is_full = has_full_range(block, box, i, k);
+    if (k == form->angle_number)
+      has_full_angle = is_full;
+    else
+      has_full_numbers &= is_full;
+  }
+  if (has_full_numbers && has_full_angle && !is_costly) {
     const force_range whole = {a->force_min_needed, a->force_max, a->sector_center,
                                a->sector_half_angle};
     return whole;
   }
   force_range range = fl_force_range(block, i, box);
-  if (fl_form_of(a)->has_law_grid && all_sizes) { /* of a grid only samples are known */
+  if (form->has_law_grid && has_full_numbers) { /* of a grid only samples are known */
     range.low = a->force_min;
     range.high = a->force_max;
   }
@@ -219,7 +228,9 @@ void fl_limits_of_tick(const real *block, fl_work *work, const fl_question *q) {
       whole_set(block, work, i);
       continue;
     }
-    real angle = before[0];
+    const int angle_number = fl_form_of(ACTUATOR(block, i))->angle_number;
+    real angle = 0; /* asked for by turning costs alone, which take a number that is an angle */
+    if (angle_number != NO_NUMBER) angle = before[angle_number];
     const int is_wanted = q->angles_wanted &&
                           q->angles_wanted[i] == q->angles_wanted[i]; /* not NaN */
     if (is_wanted) angle = q->angles_wanted[i];

@@ -45,11 +45,12 @@ static int is_open(const real *block, fl_work *work, const real *target_reduced,
   return is_bound && dual_value < *best_cost * (1 - CLOSE);
 }
 
-/* Whether a force is so small that its actuator is frozen at its least one, where it is in a
-   gap. */
-static int is_restless(const real *block, int i, const fl_set *set, const real *force) {
-  const int turns_free = is_plane(ACTUATOR(block, i)) && set->turn_cost == 0;
-  return turns_free && size_of(force) < SHORTER * set->force_min;
+/* Whether the force of a plane is below its least one, at which it is then frozen. Pods whose
+   turning costs are left out: their response is that of the set itself and not of its convex hull,
+   so it is below the least force only where it jumps, and there the jump is to be cut. */
+static int is_below_least_force(const real *block, int i, const fl_set *set, const real *force) {
+  const int has_free_turns = is_plane(ACTUATOR(block, i)) && set->turn_cost == 0;
+  return has_free_turns && size_of(force) < SHORTER * set->force_min;
 }
 
 /* Leaves all gaps on their nearer sides, round after round, until there are none; forces
@@ -69,7 +70,7 @@ static void dive(const real *block, fl_work *work, const real *target_reduced, i
       const int is_cut = hollow ||
                          fl_gap_of(block, work, i, force, largest, state->lambda_reduced) > 0;
       if (!is_cut) continue;
-      if (hollow || is_restless(block, i, set, force))
+      if (hollow || is_below_least_force(block, i, set, force))
         fl_fix_at_least_force(block, i, set, force);
       else
         fl_narrow_set(block, i, set, force, fl_nearer_side(block, i, set, force));
@@ -109,7 +110,7 @@ static int cheaper_side(const real *block, fl_work *work, const real *target_red
 }
 
 /* How many parts a search may look at. */
-static int most_parts_of(const fl_work *work) {
+static int most_parts_of_search(const fl_work *work) {
   const fl_settings *settings = &work->settings;
   if (work->has_turn_cost && settings->tick_parts < settings->most_parts)
     return settings->tick_parts;
@@ -145,7 +146,7 @@ static fl_cut *last_cheaper_cut(const real *block, fl_work *work, int *depth, re
    the target. The sets are left as they were, work->state_found as that of the last part. */
 int fl_search_gaps(const real *block, fl_work *work, const real *target_reduced, int status,
                    real *bound) {
-  const int most_parts = most_parts_of(work);
+  const int most_parts = most_parts_of_search(work);
   const int status_begin = status;
   real best_cost = INFEASIBLE_COST;
   real least_bound = INFEASIBLE_COST;

@@ -45,6 +45,7 @@ typedef fl_wide wide;
 #define ROUNDING 1e-12 /* share of a sum that is rounding alone */
 #define TINY 1e-300
 #endif
+#define TINY_WIDE 1e-300 /* of `wide`, which is in double precision always */
 #define PI R(3.14159265358979323846)
 #define LARGEST_NUMBER R(1e30)  /* of a block or an answer */
 #define INFEASIBLE_COST R(1e30) /* [W] where no forces or commands meet a target */

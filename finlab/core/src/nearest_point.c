@@ -167,7 +167,7 @@ static wide step_to_edge(const fl_mixture *m, const wide *wanted, int *is_inside
   for (int k = 0; k < m->count; k++) {
     if (!(wanted[k] <= BARELY)) continue;
     *is_inside = 0;
-    const wide to_edge = m->weight[k] / larger_wide(m->weight[k] - wanted[k], 1e-300);
+    const wide to_edge = m->weight[k] / larger_wide(m->weight[k] - wanted[k], TINY_WIDE);
     if (!(step < to_edge)) step = to_edge;
   }
   return step;

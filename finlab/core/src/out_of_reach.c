@@ -17,6 +17,9 @@
 /* Scaled wrench by which an answer at the rim may be off: what it gives is then what is served. */
 #define AT_RIM (R(0.1) * NEARLY)
 
+/* Which number of a score of FL_DIRECTION is the share of the wrench that is not given. */
+enum { MISSING_RAY_SHARE = 1 };
+
 /* Whether so many bytes are the same, one of which was copied from the other. Not memcmp:
    WebAssembly has no library. */
 static int are_same(const void *one, const void *other, size_t size) {
@@ -91,13 +94,13 @@ static void serve_direction(const real *block, fl_work *work, const real *wrench
   wide ray_share =
       fl_farthest_along_ray(block, work, from, ray, 0, 1, work->distance_enough, m, plane);
   /* What misses along the ray is a smaller share; what is across it counts more. */
-  const wide less = dot_wide(m->miss, ray, 6) / (dot_wide(ray, ray, 6) + 1e-300);
+  const wide less = dot_wide(m->miss, ray, 6) / (dot_wide(ray, ray, 6) + TINY_WIDE);
   add_scaled(m->miss, -less, ray);
   score[0] = rounded((real)norm_wide(m->miss));
-  score[1] = (real)(1 - ray_share + less);
+  score[MISSING_RAY_SHARE] = (real)(1 - ray_share + less);
   if (ray_share > 0 || !(score[0] > 0)) return;
   ray_share = nearest_to_ray(block, work, from, ray, score);
-  score[1] = (real)(1 - ray_share);
+  score[MISSING_RAY_SHARE] = (real)(1 - ray_share);
 }
 
 /* Points of a mixture anew, in the axes that hold now. */
@@ -153,7 +156,15 @@ static void serve_priority(const real *block, fl_work *work, const real *wrench,
   }
 }
 
-/* Serves a policy within the sets of a part; how badly, the first number counting most. */
+/* Serves a policy within the sets of a part; how badly, the first number counting most, the
+   numbers that a policy does not use 0:
+
+   - closest: score[0] is the distance from the wrench, by the weights of the axes;
+   - direction: score[0] is what misses across the ray, score[MISSING_RAY_SHARE] the share of the
+     wrench that is not given, Eqs. 14 and 15;
+   - priority: score[g] is what group g lacks.
+
+   All but the share are distances over the wrench scale, rounded. */
 static void serve(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,
                   real force[][2], real *score) {
   memset(score, 0, FL_SCORES * sizeof *score);
@@ -267,7 +278,7 @@ static void better_side(const real *block, fl_work *work, const real *wrench,
 }
 
 /* How many parts of sets with gaps a policy may look at: each takes a nearest point. */
-static int most_parts_of(const real *block, const fl_work *work) {
+static int most_parts_of_policy(const real *block, const fl_work *work) {
   const int most = REACH_PARTS + REACH_PARTS_EACH * COUNT(block);
   if (most < work->settings.most_parts) return most;
   return work->settings.most_parts;
@@ -287,7 +298,7 @@ static fl_cut *last_better_cut(const real *block, fl_work *work, int *depth, con
 static void best_part(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,
                       real force[][2], real *ray_share, real *most_ray_share) {
   const size_t size_of_sets = (size_t)COUNT(block) * sizeof *work->set_before;
-  const int most_parts = most_parts_of(block, work);
+  const int most_parts = most_parts_of_policy(block, work);
   real score[FL_SCORES];
   real best[FL_SCORES] = {0};
   real force_part[FL_MOST][2];
@@ -296,7 +307,7 @@ static void best_part(const real *block, fl_work *work, const real *wrench, cons
   memcpy(work->set_before, work->set, sizeof work->set_before);
   work->distance_enough = SAME_POINT;
   serve(block, work, wrench, policy, force_part, score);
-  *most_ray_share = 1 - score[1];
+  *most_ray_share = 1 - score[MISSING_RAY_SHARE];
   work->distance_enough = ROUGHLY;
   for (int parts = 0;; parts += 2) {
     const int gap = fl_worst_gap(block, work, force_part, 0);
@@ -324,7 +335,7 @@ static void best_part(const real *block, fl_work *work, const real *wrench, cons
   if (!are_same(work->best_set, work->set_before, size_of_sets)) {
     serve(block, work, wrench, policy, force, best);
   }
-  *ray_share = 1 - best[1];
+  *ray_share = 1 - best[MISSING_RAY_SHARE];
 }
 
 /* What a policy wants of forces: their wrench, but exactly the one that was asked for in the

@@ -105,7 +105,7 @@ class RobotFit:
     def undetermined(self) -> tuple[str, ...]:
         """What the data cannot tell of the robot: nearly as doubtful as before."""
         unknowns = self.fitted.unknowns
-        error = self.standard_errors
+        error = self.standard_errors.copy()
         error[unknowns.slice_of("delay")] = 0.0  # of the sensors, and no part of a layout
         is_undetermined = (error > UNDETERMINED).tolist()
         return tuple(compress(unknowns.labels, is_undetermined))

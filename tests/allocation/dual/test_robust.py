@@ -39,7 +39,7 @@ def test_a_table_with_a_square_answers_as_the_cost_says() -> None:
     dearer = table.with_square(weight)
     force = np.linspace(2.0, 7.0, 20_001)
     cost = 2.0 * (force - 2.0) ** 1.5 / np.sqrt(5.0) + weight * force**2
-    for price, found in zip(price_grid(dearer.top)[::64], dearer.force[::64], strict=True):
+    for price, found in zip(price_grid(dearer.price_max)[::64], dearer.force[::64], strict=True):
         best = force[np.argmax(price * force - cost)]
         assert abs(found - best) < 1e-3, price
     assert (

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from finlab.allocation import Allocation, Allocator
+from finlab.allocation.policy import POLICY_NAMES
 from finlab.allocation.question import MAX_WRENCH
 from finlab.arrays import Array
 from finlab.axes import AXES
@@ -29,8 +30,6 @@ from tests.sampled_cases import sampled
 
 PERIOD_S = 0.1
 """Length of a tick [s]."""
-POLICIES = ("closest", "direction", "priority")
-"""The kinds of policy."""
 
 
 def beyond_what_is_allowed(robot: Layout, before: Array, after: Array) -> float:
@@ -80,7 +79,7 @@ def ride(robot: Layout, rng: np.random.Generator, flow: Array | None, ticks: int
         answer = allocator.allocate(
             jump(robot, allocator, rng),
             previous=previous,
-            policy=str(rng.choice(POLICIES)),
+            policy=str(rng.choice(POLICY_NAMES)),
             lost=lost,
             free=free,
             flow=flow,
@@ -118,7 +117,7 @@ def limited(robot: Layout, previous: Array) -> Layout:
     return replace(robot, actuators=tuple(parts))
 
 
-@pytest.mark.parametrize("policy", POLICIES)
+@pytest.mark.parametrize("policy", POLICY_NAMES)
 def test_a_policy_of_a_tick_is_that_of_a_robot_with_such_limits(policy: str) -> None:
     robot = parse_layout(with_rates(bluerov2_heavy()))
     allocator = Allocator(robot, period_s=PERIOD_S)
