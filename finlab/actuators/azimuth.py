@@ -108,10 +108,14 @@ class AzimuthGroup(Group):
     def forms(self) -> list[Form]:
         return [form_of("pod", limits, turning_costs=True) for limits in self._limits]
 
-    def radial_conjugate_bound(self, price: Array, back: Array, ends: Array | None) -> Array:
-        least, most = (self._limits if ends is None else ends).T
+    def radial_conjugate_bound(
+        self, price: Array, price_reverse: Array, force_limits: Array | None
+    ) -> Array:
+        least, most = (self._limits if force_limits is None else force_limits).T
         ahead = self._power.conjugate(price, np.maximum(least, 0.0), np.maximum(most, 0.0))
-        astern = self._power.conjugate(-back, np.minimum(least, 0.0), np.minimum(most, 0.0))
+        astern = self._power.conjugate(
+            -price_reverse, np.minimum(least, 0.0), np.minimum(most, 0.0)
+        )
         either = np.maximum(ahead, astern)
         return np.where(least >= 0.0, ahead, np.where(most < 0.0, astern, either))
 

@@ -379,7 +379,9 @@ class Group(ABC):
         """Returns the wrench offset (N, 6) [N, N m] at forces (N, m, 2) [N] of the responses."""
         return np.zeros((len(force), 6))
 
-    def radial_conjugate_bound(self, price: Array, back: Array, ends: Array | None) -> Array | None:
+    def radial_conjugate_bound(
+        self, price: Array, price_reverse: Array, force_limits: Array | None
+    ) -> Array | None:
         """Returns the conjugate of each actuator's power along its force, by the law itself
         (Eq. 4).
 
@@ -390,10 +392,10 @@ class Group(ABC):
 
         Args:
             price: prices (N, m) [W/N] of that force, of lines signed.
-            back: the same of a force in reverse, of planes that push either way.
-            ends: least and largest force (m, 2) [N], of planes below 0 in reverse; None for all
-                that the limits allow. What a law may give beyond them makes the bound weaker, not
-                wrong.
+            price_reverse: the same of a force in reverse, of planes that push either way.
+            force_limits: least and largest force (m, 2) [N], of planes below 0 in reverse; None
+                for all that the limits allow. What a law may give beyond them makes the bound
+                weaker, not wrong.
 
         Returns:
             (N, m) [W]; NaN, or None, where the conjugate of the tables holds.

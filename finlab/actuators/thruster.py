@@ -89,10 +89,12 @@ class ThrusterGroup(Group):
             forms.append(form_of("thruster", limits, sign))
         return forms
 
-    def radial_conjugate_bound(self, price: Array, back: Array, ends: Array | None) -> Array:
-        if ends is None:
+    def radial_conjugate_bound(
+        self, price: Array, price_reverse: Array, force_limits: Array | None
+    ) -> Array:
+        if force_limits is None:
             return self._power.conjugate(self._sign * price, *self._limits.T)
-        low, high = np.sort(self._sign[:, None] * ends, axis=1).T
+        low, high = np.sort(self._sign[:, None] * force_limits, axis=1).T
         return self._power.conjugate(self._sign * price, low, high)
 
 

@@ -247,7 +247,7 @@ def check_previous(previous: ArrayLike, layout: Layout) -> Array:
     # The bound is NaN where an actuator is lost: then each number is looked at.
     if not _size_bound(array) < math.inf and np.isinf(array).any():
         raise CommandError(
-            "previous: expected finite commands (NaN only for lost fins), got infinity"
+            "previous: expected finite commands (NaN only for lost actuators), got infinity"
         )
     if array.shape != (layout.n, 3):
         raise CommandError(

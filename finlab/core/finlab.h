@@ -227,7 +227,8 @@ int fl_conjugates(const fl_real *block, fl_work *work, const fl_question *questi
                   angle of a sector [N, rad]; then the wrench per newton along both directions
    @param from    (count, 6) where the rays begin
    @param ray     (count, 6)
-   @param close   to which share a length is a bound
+   @param close   distance from the end of a ray up to which a point is there, in the unit of
+                  `from` and `ray`; the largest number for one step
    @param size    (count,) lengths over those of the rays
    @param normal  (count, 6) of the supporting planes
    @param force   (count, n, 2) at the ends [N] */

@@ -80,7 +80,9 @@ FL_FIELD(fl_reals, previous, , "address",
 FL_FIELD(fl_bytes, lost, , "address", "(n,) which actuators do not work; 0 for none")
 FL_FIELD(fl_bytes, free, , "address",
          "(6,) which axes may take any wrench, beside those not commanded; 0 for none")
-FL_FIELD(fl_real, calm, , "1", "what turning costs in a tick: 0 nothing, 2 usual, up to 10")
+FL_FIELD(fl_real, calm, , "1",
+         "what turning costs in a tick: 0 nothing, 2 usual; users may set up to 10, turning ahead "
+         "makes that up to 100, and 1000 is the most that is answered")
 FL_FIELD(int, ticks, , "1",
          "how many ticks after `previous` the commands are for; 0 or 1 for the next")
 FL_FIELD(fl_reals, angles_wanted, , "address",

@@ -73,7 +73,7 @@ typedef struct {
   fl_wide force[FL_POINTS][FL_MOST][2]; /* of each point [N] */
   fl_wide point[FL_POINTS][6];          /* wrenches in weighted axes, over the wrench scale */
   fl_wide weight[FL_POINTS];            /* of each point, their sum 1 */
-  fl_wide miss[6];                      /* m, mixture less target */
+  fl_wide miss[6];                      /* m, target less mixture, in weighted axes */
   fl_wide ray_share[FL_POINTS];         /* of each point, how much of the ray (0 or 1) it takes */
   fl_wide q[FL_POINTS][6];         /* orthonormal basis of the differences, Q of their QR factors */
   fl_wide r[FL_POINTS][FL_POINTS]; /* R of these; on the diagonal its inverse, 0 where a point
@@ -147,8 +147,8 @@ struct fl_work {
      fl_search_gaps while it runs, and fl_out_of_reach until it has put its own back, after which it
      may call fl_search_gaps. */
   fl_set set_before[FL_MOST];
-  fl_set best_set[FL_MOST];         /* of its best part */
-  fl_real best_force[FL_MOST][2];   /* of that part [N] */
+  fl_set best_set[FL_MOST];         /* of the best part, of fl_out_of_reach alone */
+  fl_real best_force[FL_MOST][2];   /* of the best part [N] */
   fl_real best_command[FL_MOST][3]; /* of the best part where there are foils */
   fl_real best_lambda[6];           /* reduced multipliers near these commands [W] */
 

@@ -1,8 +1,9 @@
 """The maker of random robots: of fins, as in training, and of actuators of each kind.
 
-For training data, the splits of experiments, and tests. The numbers that define the training
-distribution (box, fin counts, spread of limits) are here and nowhere else. A robot is a function of
-the generator that is handed in: whoever changes the order of draws changes every split.
+For training data (of the teacher in `mdn/training/teacher.py`, and of `paper/training/samples.py`),
+the splits of experiments, and tests. The numbers that define the training distribution (box, fin
+counts, spread of limits) are here and nowhere else. A robot is a function of the generator that is
+handed in: whoever changes the order of draws changes every split.
 """
 
 import math
@@ -335,6 +336,9 @@ def random_fin_kinds(rng: np.random.Generator, count: int) -> tuple[list[FinKind
     half of the soft ones push alike in all directions. Few, since compiling one takes as long as
     many answers."""
     models = [random_fin_model(rng, None, WIDE) for _ in range(2 * count)]
+    # Half of the soft ones have no unevenness (`e` = 0, see `Soft`): fins that push alike in all
+    # directions, which a uniform draw of `e` would never give. A change here makes other data of
+    # the teacher, see `write_answers` in `mdn/training/teacher.py`.
     for k, model in enumerate(models):
         if model.type == "soft" and rng.random() < 0.5:
             models[k] = FinModelSpec("soft", tuple({**dict(model.parameters), "e": 0.0}.items()))

@@ -121,7 +121,9 @@ class FinGroup(Group):
     def forms(self) -> list[Form]:
         return [table.form for table in self._tables]
 
-    def radial_conjugate_bound(self, price: Array, back: Array, ends: Array | None) -> Array:
+    def radial_conjugate_bound(
+        self, price: Array, price_reverse: Array, force_limits: Array | None
+    ) -> Array:
         """See `Group`: from the commands of the table on both sides of each price, by the law; NaN
         for fins that were measured. Where a price is below 0, or the force is not largest at the
         largest command, also from a grid of commands."""

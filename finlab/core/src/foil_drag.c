@@ -351,9 +351,12 @@ void fl_improve_from_starts(const real *block, fl_work *work, const real *target
   }
 }
 
-/* Commands for forces that the dual is sure of: no foil drags more than its lift does, and
-   none is in doubt. */
-int fl_are_forces_sure(const real *block, fl_work *work) {
+/* Takes the forces of work->state_found as the best ones where the dual is sure of them (no foil is
+   at the end of its table of lifts, no cost is uncertain, no force is in a gap): writes them to
+   work->best_force, and commands for them to work->best_command. Returns whether the dual is sure
+   and the commands come to give work->wrench_wanted; where not, what was written counts for
+   nothing. */
+int fl_take_sure_forces(const real *block, fl_work *work) {
   fl_state *state = work->state_found;
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);

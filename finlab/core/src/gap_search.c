@@ -32,17 +32,16 @@ static void keep_answer(const real *block, fl_work *work, const real *target_red
   memcpy(work->best_force, work->state_found->force, sizeof work->best_force);
 }
 
-/* Remembers an answer without a gap; whether one with a gap (of actuator `gap`, or -1) could
-   still be cheaper. */
-static int is_open(const real *block, fl_work *work, const real *target_reduced, int status,
-                   int gap, real *best_cost) {
-  const real dual_value = work->state_found->dual_value;
-  if (status == FL_MET && gap < 0 && !any_hollow(block, work)) {
-    keep_answer(block, work, target_reduced, best_cost);
-    return 0;
-  }
+/* Whether the forces of work->state_found are an answer: they meet the target, and none of them is
+   in a gap (`gap` is the actuator of the worst one, or -1). */
+static int is_without_gap(const real *block, const fl_work *work, int status, int gap) {
+  return status == FL_MET && gap < 0 && !any_hollow(block, work);
+}
+
+/* Whether forces of a part that has no answer yet could still be cheaper than the best answer. */
+static int may_be_cheaper(const fl_work *work, int status, int gap, real best_cost) {
   const int is_bound = status == FL_MET || (status == FL_NO_PROGRESS && gap >= 0);
-  return is_bound && dual_value < *best_cost * (1 - CLOSE);
+  return is_bound && work->state_found->dual_value < best_cost * (1 - CLOSE);
 }
 
 /* Whether the force of a plane is below its least one, at which it is then frozen. Pods whose
@@ -62,7 +61,11 @@ static void dive(const real *block, fl_work *work, const real *target_reduced, i
     fl_state *state = work->state_found;
     const real largest = fl_largest_force(block, state->force);
     const int gap = fl_worst_gap(block, work, state->force, state->lambda_reduced);
-    if (!is_open(block, work, target_reduced, status, gap, best_cost)) return;
+    if (is_without_gap(block, work, status, gap)) {
+      keep_answer(block, work, target_reduced, best_cost);
+      return;
+    }
+    if (!may_be_cheaper(work, status, gap, *best_cost)) return;
     for (int i = 0; i < COUNT(block); i++) {
       fl_set *set = work->set + i;
       const real *force = state->force[i];
@@ -167,14 +170,18 @@ int fl_search_gaps(const real *block, fl_work *work, const real *target_reduced,
     fl_state *state = work->state_found;
     const real dual_value = state->dual_value;
     const int gap = fl_worst_gap(block, work, state->force, state->lambda_reduced);
-    int open = is_open(block, work, target_reduced, status, gap, &best_cost);
-    if (open && gap < 0) { /* hollow: at their least forces */
+    int is_open = 0;
+    if (is_without_gap(block, work, status, gap))
+      keep_answer(block, work, target_reduced, &best_cost);
+    else
+      is_open = may_be_cheaper(work, status, gap, best_cost);
+    if (is_open && gap < 0) { /* hollow: at their least forces */
       dive_and_return(block, work, target_reduced, status, &best_cost);
       least_bound = smaller(least_bound, dual_value);
       status = FL_BEYOND;
-      open = 0;
+      is_open = 0;
     }
-    const int can_cut = open && !is_foil(ACTUATOR(block, gap));
+    const int can_cut = is_open && !is_foil(ACTUATOR(block, gap));
     fl_cut *cut = 0;
     if (can_cut && parts < most_parts) {
       cut = fl_cut_set(block, work, &depth, gap, state->force[gap]);
@@ -211,7 +218,7 @@ int fl_answer_with_drag(const real *block, fl_work *work, const real *wrench_wan
   memcpy(work->wrench_wanted, wrench_wanted, sizeof work->wrench_wanted);
   const real dual_value = work->state_found->dual_value;
   memcpy(out->lambda_reduced, work->state_found->lambda_reduced, sizeof out->lambda_reduced);
-  const int is_sure = status == FL_MET && fl_are_forces_sure(block, work);
+  const int is_sure = status == FL_MET && fl_take_sure_forces(block, work);
   if (!is_sure) {
     real bound;
     if (!fl_search_gaps(block, work, target_reduced, status, &bound)) return 0;

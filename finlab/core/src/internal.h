@@ -229,7 +229,7 @@ real fl_largest_force(const real *block, real force[][2]);
 void fl_fix_at_least_force(const real *block, int i, fl_set *set, const real *force);
 void fl_narrow_set(const real *block, int i, fl_set *set, const real *force, int side);
 fl_cut *fl_cut_set(const real *block, fl_work *work, int *depth, int i, const real *force);
-void fl_take_side(const real *block, fl_work *work, const fl_cut *node, int side);
+void fl_take_side(const real *block, fl_work *work, const fl_cut *cut, int side);
 fl_cut *fl_last_open_cut(const real *block, fl_work *work, int *depth);
 
 /* gap_search.c: least power where sets have gaps */
@@ -274,10 +274,11 @@ void fl_commands_of_point(const real *block, const fl_work *work, const foil_lat
                           real command[][3]);
 
 /* foil_drag.c: commands of robots whose foils drag */
-void fl_improve_commands(const real *block, fl_work *work, const real *target_reduced, real *best);
+void fl_improve_commands(const real *block, fl_work *work, const real *target_reduced,
+                         real *best_cost);
 void fl_improve_from_starts(const real *block, fl_work *work, const real *target_reduced,
-                            real *best);
-int fl_are_forces_sure(const real *block, fl_work *work);
+                            real *best_cost);
+int fl_take_sure_forces(const real *block, fl_work *work);
 void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, real found,
                           real most, fl_answer *out);
 
@@ -294,7 +295,7 @@ static inline wide norm_wide(const wide *a) { return sqrt(dot_wide(a, a, 6)); }
 static inline void add_scaled(wide *to, wide times, const wide *other) {
   for (int k = 0; k < 6; k++) to[k] += times * other[k];
 }
-wide fl_out_of_range(const real *block, const fl_work *work, const real *inner, int axis);
+wide fl_normalized_axis(const real *block, const fl_work *work, const real *reduced, int axis);
 void fl_weigh_axes(const real *block, fl_work *work, const wide *weight);
 void fl_point_of_forces(const real *block, const fl_work *work, wide force[][2], wide *point);
 wide fl_nearest_point(const real *block, const fl_work *work, const wide *target_weighted,

@@ -22,8 +22,8 @@ static wide larger_wide(wide a, wide b) {
   return b;
 }
 
-/* An axis of a scaled wrench in the basis, over the wrench scale. */
-wide fl_out_of_range(const real *block, const fl_work *work, const real *reduced, int axis) {
+/* One axis of a reduced wrench (6,) as a normalized wrench has it, over the wrench scale. */
+wide fl_normalized_axis(const real *block, const fl_work *work, const real *reduced, int axis) {
   const fl_span *span = &work->span;
   wide sum = 0;
   for (int j = 0; j < 6; j++) sum += (wide)span->basis[axis][j] * (wide)reduced[j];
@@ -37,7 +37,7 @@ void fl_weigh_axes(const real *block, fl_work *work, const wide *weight) {
     for (int q = 0; q < 2; q++) {
       const real *row = work->span.effectiveness_reduced[i][q];
       for (int k = 0; k < 6; k++) {
-        work->effectiveness_weighted[i][q][k] = weight[k] * fl_out_of_range(block, work, row, k);
+        work->effectiveness_weighted[i][q][k] = weight[k] * fl_normalized_axis(block, work, row, k);
       }
     }
   }

@@ -62,7 +62,7 @@ static void ray_of(const real *block, const fl_work *work, const real *wrench, w
   for (int k = 0; k < 6; k++) {
     ray[k] = 0;
     /* What rounding has put beside the range is left out. */
-    if (is_in_range) ray[k] = fl_out_of_range(block, work, target_reduced, k);
+    if (is_in_range) ray[k] = fl_normalized_axis(block, work, target_reduced, k);
   }
 }
 

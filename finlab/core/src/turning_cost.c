@@ -23,8 +23,9 @@
 #define CELL R(0.12)
 #define MOST_CELLS 48
 #define ROOT_STEPS 60 /* of a root of h' in a cell */
-/* [rad]: what such a step leaves out beyond first order is rounding. */
-#define SHORT_STEP (SQRT(ROUNDING))
+/* Of a step of Newton's method on the angle [rad]: what so short a turn leaves out beyond first
+   order is rounding. */
+#define SHORT_TURN (SQRT(ROUNDING))
 #define SIDE R(1e-3) /* of the largest force: a change of sides that is no rounding around rest */
 
 /* One pod at one price. */
@@ -112,7 +113,7 @@ static void go_to_root(const pod_at_price *x, at_angle *o, real low, real high, 
       }
     }
     const real step = next - o->alpha;
-    if (FABS(step) <= SHORT_STEP) {
+    if (FABS(step) <= SHORT_TURN) {
       turn_a_little(o, step);
       o->alpha = next;
       return;
