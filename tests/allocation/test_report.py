@@ -19,9 +19,11 @@ from finlab.allocation.report import (
     command_record,
     doubts,
     fin_notes,
+    missing_words,
     next_measurement,
     plain_target,
     remarks,
+    share_words,
     summary,
 )
 from finlab.display import Table
@@ -235,3 +237,34 @@ def test_a_fin_that_always_pushes_is_told_of(least: float, is_restless: bool) ->
         return
     smallest, largest = numbers_in(note)
     assert smallest / largest == pytest.approx(least, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("share", "words"),
+    [
+        (0.0, ["0 % of the wrench is delivered"]),
+        (0.426, ["43 % of the wrench is delivered"]),
+        (0.994, ["99 % of the wrench is delivered"]),
+        (0.9951, []),
+        (1.0, []),
+        (1.7, []),
+        (-0.2, []),
+    ],
+)
+def test_how_much_is_delivered_is_said_between_nothing_and_all(
+    share: float, words: list[str]
+) -> None:
+    assert share_words(answer(share=share)) == words
+
+
+def test_what_is_missing_is_said_by_the_size_that_counts() -> None:
+    """Along z 3 N of 30 N are missing, and 2 N m come along that nobody asked for."""
+    result = answer(
+        unallocated=np.array([0.0, 0.0, 3.0, 0.0, -2.0, 1e-4]),
+        target=np.array([0.0, 0.0, 30.0, 0.0, 0.0, 1.0]),
+        scale=np.array([10.0, 10.0, 10.0, 2.0, 2.0, 2.0]),
+    )
+    words = missing_words(result)
+    undone, _, unasked = words.partition(";")
+    assert numbers_in(undone) == [3.0] and "heave is left undone" in undone
+    assert numbers_in(unasked) == [2.0] and "pitch comes along unasked" in unasked

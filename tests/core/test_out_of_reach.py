@@ -11,7 +11,7 @@ from finlab.allocation import Policy
 from finlab.allocation.dual.compiled import core_policy
 from finlab.arrays import Array
 from finlab.layout.load import parse_layout
-from tests.core.internal_functions import Robot, in_the_core
+from tests.core.internal_functions import Robot, in_the_core, robot_of
 from tests.core.test_actuator_response import forces_of
 from tests.random_robots import random_robot
 
@@ -117,3 +117,22 @@ def test_priority_serves_the_first_group_with_the_least_error(number: int) -> No
         least = np.linalg.norm(by_force @ nearest.x - target)
         error = np.linalg.norm(((wrench_served - wrench) / scale)[first])
         assert error == pytest.approx(least, rel=1e-4, abs=1e-6)
+
+
+@pytest.mark.parametrize(("name", "robots"), [("rudders", 6), ("all", 2)])
+def test_direction_leaves_no_share_of_a_wrench_where_foils_drag(name: str, robots: int) -> None:
+    """By the answers of the core itself: a hundredth more of the wrench is not attainable."""
+    asked = 0
+    for number in range(robots):
+        robot = robot_of(name, number)
+        scale = robot.head["wrench_scale"]
+        for wrench in targets(robot, number):
+            given = served(robot, wrench, "direction")
+            ray = wrench / scale
+            share = float(given / scale @ ray / (ray @ ray))
+            if share > 0.999:
+                continue
+            assert np.linalg.norm((given - share * wrench) / scale) <= 1e-4
+            assert not robot.answer(1.01 * share * wrench)["is_attainable"]
+            asked += 1
+    assert asked > 2 * robots
