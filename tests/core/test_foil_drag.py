@@ -175,3 +175,47 @@ def test_steps_on_commands_end_where_no_step_of_slsqp_is_cheaper() -> None:
     assert len(gains) > 30
     # A least power nearby is not the least of all: seldom SLSQP leaves its valley for a lower one.
     assert np.mean(np.array(gains) > SLACK) <= 0.1
+
+
+@cache
+def many_rudders(number: int) -> Robot:
+    """Nine rudders that stall, more than the lattice of starts has room for, and a thruster."""
+    rng = np.random.default_rng([10, number])
+
+    def place() -> tuple[float, float, float]:
+        x, y, z = rng.uniform(-0.6, 0.6, 3).tolist()
+        return x, y, z
+
+    rudders = []
+    for k in range(9):
+        _, y, z = rng.normal(size=3)
+        length = float(np.hypot(y, z))
+        axis = (0.0, y / length, z / length)
+        rudders.append(Rudder(f"r{k}", place(), axis, (1.0, 0.0, 0.0), 0.02, (-0.9, 0.7), 3.0))
+    surge = Thruster("t", place(), (1.0, 0.0, 0.0), (-60.0, 60.0), PowerLaw(0.3))
+    flow = np.array([1.5, 0.2, -0.1, 0.0, 0.0, 0.0])
+    return in_the_core(Layout("many", (surge, *rudders)), flow)
+
+
+def test_wrenches_that_need_stalled_foils_are_mostly_met_and_at_no_more_power() -> None:
+    """Of robots with many foils, most of which stood at an end of their angles."""
+    met = 0
+    asked = 0
+    for number in range(6):
+        robot = many_rudders(number)
+        rng = np.random.default_rng([11, number])
+        for _ in range(4):
+            share = rng.random(robot.plant.lower.shape)
+            at_an_end = rng.random(share.shape) < 0.6
+            share = np.where(at_an_end, np.round(share), share)
+            command = robot.plant.lower + share * robot.plant.width
+            wrench = robot.plant.wrench(command)
+            answer = robot.answer(wrench)
+            asked += 1
+            if not answer["is_attainable"]:
+                continue
+            met += 1
+            found = np.ascontiguousarray(answer["command"][: robot.n])
+            known = robot.plant.power(command).sum()
+            assert robot.plant.power(found).sum() <= 1.1 * known
+    assert met >= 0.7 * asked
