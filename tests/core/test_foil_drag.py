@@ -92,24 +92,33 @@ def test_robots_with_stalled_foils_take_no_more_than_slsqp_finds(number: int) ->
     assert robot.plant.power(found).sum() <= least * (1.0 + SLACK)
 
 
+def random_position(rng: np.random.Generator) -> tuple[float, float, float]:
+    """Where an actuator stands [m]."""
+    x, y, z = rng.uniform(-0.6, 0.6, 3).tolist()
+    return x, y, z
+
+
 @cache
 def pods_and_rudders(number: int) -> Robot:
     """Pods that turn all round, a thruster with a dead band, and rudders that stall, in a flow."""
     rng = np.random.default_rng([9, number])
 
-    def place() -> tuple[float, float, float]:
-        x, y, z = rng.uniform(-0.6, 0.6, 3).tolist()
-        return x, y, z
-
     law = PowerLaw(0.3)
     pods = [
-        Azimuth(f"p{k}", place(), (0.0, 0.6 * (-1.0) ** k, 0.8), (1.0, 0.0, 0.0), (0.0, 30.0), law)
+        Azimuth(
+            f"p{k}",
+            random_position(rng),
+            (0.0, 0.6 * (-1.0) ** k, 0.8),
+            (1.0, 0.0, 0.0),
+            (0.0, 30.0),
+            law,
+        )
         for k in range(2)
     ]
-    heave = Thruster("t", place(), (0.0, 0.0, 1.0), (-30.0, 30.0), law, dead_band=3.0)
+    heave = Thruster("t", random_position(rng), (0.0, 0.0, 1.0), (-30.0, 30.0), law, dead_band=3.0)
     axes = ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (0.0, 0.8, 0.6))
     rudders = [
-        Rudder(f"r{k}", place(), axis, (1.0, 0.0, 0.0), 0.04, (-0.9, 0.7), 3.0)
+        Rudder(f"r{k}", random_position(rng), axis, (1.0, 0.0, 0.0), 0.04, (-0.9, 0.7), 3.0)
         for k, axis in enumerate(axes)
     ]
     flow = np.array([1.5, 0.2, -0.1, 0.0, 0.0, 0.0])
@@ -182,17 +191,15 @@ def many_rudders(number: int) -> Robot:
     """Nine rudders that stall, more than the lattice of starts has room for, and a thruster."""
     rng = np.random.default_rng([10, number])
 
-    def place() -> tuple[float, float, float]:
-        x, y, z = rng.uniform(-0.6, 0.6, 3).tolist()
-        return x, y, z
-
     rudders = []
     for k in range(9):
         _, y, z = rng.normal(size=3)
         length = float(np.hypot(y, z))
         axis = (0.0, y / length, z / length)
-        rudders.append(Rudder(f"r{k}", place(), axis, (1.0, 0.0, 0.0), 0.02, (-0.9, 0.7), 3.0))
-    surge = Thruster("t", place(), (1.0, 0.0, 0.0), (-60.0, 60.0), PowerLaw(0.3))
+        rudders.append(
+            Rudder(f"r{k}", random_position(rng), axis, (1.0, 0.0, 0.0), 0.02, (-0.9, 0.7), 3.0)
+        )
+    surge = Thruster("t", random_position(rng), (1.0, 0.0, 0.0), (-60.0, 60.0), PowerLaw(0.3))
     flow = np.array([1.5, 0.2, -0.1, 0.0, 0.0, 0.0])
     return in_the_core(Layout("many", (surge, *rudders)), flow)
 

@@ -28,6 +28,11 @@ SHARES = {
     "torn": ("Force left [%]", "A torn fin or foil gives less at every command."),
 }
 """Faults that leave a share of an actuator -> label and hint of their slider."""
+KEPT_COMMANDS = {
+    "stuck": ("Stuck", "It no longer turns from where it is; a thruster hangs at its force."),
+    "running": ("Runs on", "It no longer listens: it keeps the command that it has."),
+}
+"""Faults that keep a command of an actuator -> label and hint of their switch."""
 LOST_COLORS = (css(DEAD), "#fff")
 """Background and text of the button of a lost actuator."""
 HELD_COLORS = ("transparent", "inherit")
@@ -173,22 +178,11 @@ def _add_shares(page: Page, faults: _Faults) -> None:
 
 def _add_switches(page: Page, faults: _Faults) -> None:
     """Switches of faults that keep a command."""
-    stuck = page.gui.add_checkbox(
-        "Stuck",
-        False,
-        hint="It no longer turns from where it is; a thruster hangs at its force.",
-        visible=False,
-    )
-    page.bind(stuck, faults.jam, _has("stuck"))
-    page.board.show(stuck, visible=_may_have("stuck"))
-    running = page.gui.add_checkbox(
-        "Runs on",
-        False,
-        hint="It no longer listens: it keeps the command that it has.",
-        visible=False,
-    )
-    page.bind(running, faults.run_on, _has("running"))
-    page.board.show(running, visible=_may_have("running"))
+    acts: dict[str, Callable[[bool], object]] = {"stuck": faults.jam, "running": faults.run_on}
+    for kind, (label, hint) in KEPT_COMMANDS.items():
+        switch = page.gui.add_checkbox(label, False, hint=hint, visible=False)
+        page.bind(switch, acts[kind], _has(kind))
+        page.board.show(switch, visible=_may_have(kind))
 
 
 def _add_stuck_value(page: Page, faults: _Faults) -> None:

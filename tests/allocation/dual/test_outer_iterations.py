@@ -186,9 +186,9 @@ class _ConstantIterations:
         return OuterResult(None, force, power=2.0, penalty=1.0, error=0.0, steps=0.0)
 
 
-def test_starts_that_make_nothing_cheaper_are_reversed_in_one_round_alone() -> None:
-    n = 6
-    coupled = _ConstantIterations()
+def search_from_all_starts(coupled: "_ConstantIterations", n: int, power_by_laws: float) -> None:
+    """Has the best of all starts looked for, of a robot of n actuators without lines, whose answer
+    by the laws alone takes a power [W]."""
     by_laws = SimpleNamespace(
         force=np.ones((1, n, 2)), multipliers=np.zeros((1, 6)), command=np.zeros((1, n, 3))
     )
@@ -196,7 +196,7 @@ def test_starts_that_make_nothing_cheaper_are_reversed_in_one_round_alone() -> N
         core=SimpleNamespace(answer_one=lambda *_: by_laws), is_line=np.zeros(n, bool)
     )
     problem = SimpleNamespace(
-        plant=SimpleNamespace(power=lambda command: np.full(command.shape[:-1], 1.0 / n))
+        plant=SimpleNamespace(power=lambda command: np.full(command.shape[:-1], power_by_laws / n))
     )
     _best_of_starts(
         cast("CoupledCore", coupled),
@@ -207,6 +207,12 @@ def test_starts_that_make_nothing_cheaper_are_reversed_in_one_round_alone() -> N
         NOMINAL,
         None,
     )
+
+
+def test_starts_that_make_nothing_cheaper_are_reversed_in_one_round_alone() -> None:
+    n = 6
+    coupled = _ConstantIterations()
+    search_from_all_starts(coupled, n, power_by_laws=1.0)
     rotated = len(WALSH) + 1 + RANDOM_STARTS
     assert coupled.starts_without_iteration == n + rotated
 
@@ -259,24 +265,7 @@ def test_steps_of_all_starts_together_bound_how_many_are_followed(
     n = 4
     steps = share * MAX_WORK / n
     coupled = _CountedIterations(steps)
-    by_laws = SimpleNamespace(
-        force=np.ones((1, n, 2)), multipliers=np.zeros((1, 6)), command=np.zeros((1, n, 3))
-    )
-    compiled = SimpleNamespace(
-        core=SimpleNamespace(answer_one=lambda *_: by_laws), is_line=np.zeros(n, bool)
-    )
-    problem = SimpleNamespace(
-        plant=SimpleNamespace(power=lambda command: np.full(command.shape[:-1], 0.1 / n))
-    )
-    _best_of_starts(
-        cast("CoupledCore", coupled),
-        cast("Compiled", compiled),
-        cast("CommandProblem", problem),
-        np.zeros(6),
-        CLOSEST,
-        NOMINAL,
-        None,
-    )
+    search_from_all_starts(coupled, n, power_by_laws=0.1)
     assert coupled.followed == followed
     left = MAX_WORK / n - steps * np.arange(followed)
     np.testing.assert_allclose(coupled.allowed, left)
