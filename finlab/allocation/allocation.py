@@ -4,7 +4,7 @@
 """
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, NamedTuple, Self, TypeVar
 
@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.actuators.actuator import Command
-from finlab.allocation.policy import CLOSEST, Policy
+from finlab.allocation.policy import Policy
+from finlab.allocation.question import MethodQuestion
 from finlab.allocation.report import allocation_blocks, answer_notes, doubts, next_measurement
 from finlab.allocation.solution import CANDIDATE_ARRAYS, Candidates, PlainData, Solution
 from finlab.arrays import Array
@@ -39,13 +40,18 @@ def read_only(array: Array) -> Array:
     return array
 
 
+def _none() -> None:
+    """Default of fields that are set when they are first read: a default value itself would be
+    found in the class."""
+
+
 class LazyFigures(NamedTuple):
     """The figures that a result computes when they are first read."""
 
     state: "RobotState"
     """Of the robot that was asked."""
-    flow: Array | None
-    """Velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at rest."""
+    question: MethodQuestion
+    """What its method was asked."""
     wrenches: Array
     """Desired wrenches as they came, (6,) or (N, 6) [N, N m]."""
     solution: Solution
@@ -55,7 +61,34 @@ class LazyFigures(NamedTuple):
     def plant(self) -> Plant:
         """Judge of commands: the laws of all actuators, lost ones included, in the question's
         flow."""
-        return self.state.plant.at(self.flow)
+        return self.state.plant.at(self.question.flow)
+
+    def fields(self) -> dict[str, Any]:
+        """Returns the fields of a result that follow from the question, by name."""
+        state = self.state
+        method = state.method
+        networks = method.networks
+        return {
+            "layout": state.layout,
+            "damage": state.damage,
+            "scale": method.scale,
+            "method": method.name,
+            "checkpoint": None if networks is None else networks.name,
+            "policy": self.question.policy,
+            "flow": self.question.flow,
+            "seed": self.question.seed,
+            "unknown_fins": method.unknown_fins,
+        }
+
+    def fields_of_one(self) -> dict[str, Any]:
+        """Returns the same of a single answer, with those that follow from the solution."""
+        expected = self.solution.wrench
+        multipliers = self.solution.multipliers
+        return self.fields() | {
+            "wrench_expected": None if expected is None else read_only(expected[0]),
+            "multipliers": None if multipliers is None else read_only(multipliers[0]),
+            "settings": vars(self.state.method.settings).copy(),
+        }
 
     def notes(self) -> tuple[str, ...]:
         """Returns sentences about the robot and the method, not about single answers."""
@@ -64,7 +97,8 @@ class LazyFigures(NamedTuple):
         if state.free is not None:
             # What was asked of an axis that the layout does not command stays: a note tells of it.
             asked = np.where(state.free & state.layout.commanded, 0.0, asked)
-        return answer_notes(state.healthy, state.method, self.flow, asked, self.solution.notes)
+        of_solution = () if self.solution.notes is None else self.solution.notes()
+        return answer_notes(state.healthy, state.method, self.question.flow, asked, of_solution)
 
     def candidates(self) -> Candidates | None:
         """Returns the refined candidates of all n actuators; None where the method has none."""
@@ -120,7 +154,7 @@ class Answer(PlainData, Generic[Number]):
 
     layout: Layout
     """The whole layout, lost actuators included, with the limits that damage has left."""
-    damage: Damage = Damage()
+    damage: Damage = field(default_factory=Damage)
     """What was known of damaged actuators; the lost ones were left out."""
     target: Array
     """Desired wrench (6,) or (N, 6), [N, N m], body frame; NaN along axes that do not count."""
@@ -130,17 +164,17 @@ class Answer(PlainData, Generic[Number]):
     """Wrench scale (6,) of the error [N, N m]; see `finlab.physics.objective`."""
     method: str
     """Name of the method that answered."""
-    checkpoint: str | None = None
+    checkpoint: str | None = field(default_factory=_none)
     """Name of the checkpoint that was used, if any."""
-    policy: Policy = CLOSEST
+    policy: Policy = field(default_factory=Policy)
     """What was to be done if a target was out of reach."""
-    flow: Array | None = None
+    flow: Array | None = field(default_factory=_none)
     """Velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at rest."""
-    seed: int = 0
+    seed: int = field(default_factory=int)
     """Seed that makes the answer repeatable."""
-    wrench_expected: Array | None = None
+    wrench_expected: Array | None = field(default_factory=_none)
     """Wrench (6,) or (N, 6) that the method itself expected, if it used a model of its own."""
-    unknown_fins: tuple[str, ...] = ()
+    unknown_fins: tuple[str, ...] = field(default_factory=tuple)
     """Names of fins whose model the method's networks have not learned; answers for them are
     wrong."""
     answered: LazyFigures | None = field(default=None, compare=False)
@@ -155,13 +189,11 @@ class Answer(PlainData, Generic[Number]):
     def of(cls, **values: Any) -> Self:
         """Makes an answer, see `PlainData`; its arrays, which nobody else may write to, are made
         read-only."""
-        made = super().of(**values)
-        # By their names rather than by a search: every tick pays for it.
         for name in cls.ARRAYS:
             value = values.get(name)
             if value is not None:
                 value.setflags(write=False)
-        return made
+        return super().of(**values)
 
     @property
     def lost(self) -> tuple[str, ...]:
@@ -345,11 +377,56 @@ class Allocation(Answer[float]):
     """Time spent solving [ms], judging not included."""
     settings: Mapping[str, Any] = field(default_factory=dict)
     """Settings of the method, by name."""
-    previous: Array | None = None
+    previous: Array | None = field(default_factory=_none)
     """Command (n, 3) of the previous tick, if it was given."""
-    multipliers: Array | None = field(default=None, compare=False)
+    multipliers: Array | None = field(default_factory=_none, compare=False)
     """Multipliers (6,) [W/N, W/(N m)] of the wrench, what one more unit of each axis costs; None
     where the method has none."""
+
+    @classmethod
+    def to_read(
+        cls,
+        command: Array,
+        target: Array,
+        previous: Array | None,
+        solve_ms: float,
+        answered: LazyFigures,
+    ) -> Self:
+        """Makes an answer whose other fields are set when the first of them is read: a control loop
+        reads the command alone.
+
+        Args:
+            command: (n, 3), read-only, as all arrays.
+            target: (6,) [N, N m], NaN along free axes.
+            previous: command (n, 3) of the previous tick, if there is one.
+            solve_ms: time spent solving [ms].
+            answered: what the other fields follow from.
+
+        Returns:
+            The answer.
+        """
+        made = object.__new__(cls)
+        known = {
+            "command": command,
+            "target": target,
+            "previous": previous,
+            "solve_ms": solve_ms,
+            "answered": answered,
+        }
+        object.__setattr__(made, "__dict__", known)
+        return made
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            """Sets the fields that follow from the question, when the first of them is read."""
+            values = self.__dict__
+            answered = values.get("answered")
+            if answered is not None and "layout" not in values:
+                values.update(answered.fields_of_one())
+            if name in values:
+                return values[name]
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
 
     @property
     def commands(self) -> dict[str, Command | None]:
@@ -437,7 +514,8 @@ class Allocation(Answer[float]):
         Returns:
             The same answer with these.
         """
-        return self.of(**{**self.__dict__, "candidates": candidates, "samples": samples})
+        values = {each.name: getattr(self, each.name) for each in fields(self)}
+        return self.of(**{**self.__dict__, **values, "candidates": candidates, "samples": samples})
 
     def __repr__(self) -> str:
         lost = f", lost={', '.join(self.lost)!r:.60}" if self.lost else ""

@@ -17,7 +17,6 @@ from finlab.allocation.allocation import Allocation, BatchAllocation, LazyFigure
 from finlab.allocation.method import Checkpoint, Method, Networks, Settings
 from finlab.allocation.policy import CLOSEST, Policy, PolicyName, as_policy
 from finlab.allocation.question import (
-    MethodQuestion,
     check_flow,
     check_layout,
     check_previous,
@@ -38,6 +37,8 @@ from finlab.layout.layout import Layout
 from finlab.physics.objective import wrench_scale_of
 from finlab.physics.plant import plant_of
 
+_NAME_LISTS = (tuple, list)
+"""Types of lists of names that are compared with those of the last question."""
 MAX_STATES = 32
 """States of the robot, other than undamaged with all axes, that an allocator keeps prepared."""
 
@@ -139,6 +140,8 @@ class Allocator:
         self._whole = self._make_state(NO_DAMAGE)
         self._states: dict[object, RobotState] = {}
         """States that were asked for, by damage and free axes; the one asked for last is last."""
+        self._last_names: tuple[tuple[object, ...], RobotState] | None = None
+        """What the last question said of damage and free axes, if anything, and its state."""
 
     def __getstate__(self) -> dict[str, Any]:
         return {"layout": self._layout, "choice": self._choice}
@@ -239,16 +242,17 @@ class Allocator:
             DataError: a fin's force table cannot be read.
         """
         wrench_asked = check_target(wrench)
-        all_damage = damage_of(damage, lost)
+        state = self._state_of_question(damage, lost, free)
         checked_policy = as_policy(policy)
         checked_seed = check_seed(seed)
         checked_flow = check_flow(flow)
-        state = self._state(all_damage, free)
         multipliers: Array | None = None
-        if isinstance(previous, Allocation):
-            multipliers = previous.multipliers
-            previous = previous.command
-        checked_previous = None if previous is None else check_previous(previous, state.layout)
+        checked_previous: Array | None = None
+        if previous is not None:
+            if isinstance(previous, Allocation):
+                multipliers = previous.multipliers
+                previous = previous.command
+            checked_previous = check_previous(previous, state.layout)
 
         start = time.perf_counter()
         target = wrench_asked
@@ -268,16 +272,12 @@ class Allocator:
         solution = state.solve(question)
         solve_ms = (time.perf_counter() - start) * 1e3
 
-        target_shown = state.with_free_axes(target, np.nan).copy()
-        return Allocation.of(
-            **self._common_fields(state, question, target_shown, wrench_asked, solution),
-            command=state.among_all(solution.command)[0].copy(),
-            solve_ms=solve_ms,
-            settings=vars(self.settings).copy(),
-            previous=checked_previous,
-            wrench_expected=None if solution.wrench is None else solution.wrench[0],
-            multipliers=None if solution.multipliers is None else solution.multipliers[0],
-        )
+        target_shown = state.shown(target)
+        target_shown.setflags(write=False)
+        command = state.among_all(solution.command)[0]
+        command.setflags(write=False)
+        answered = LazyFigures(state, question, wrench_asked, solution)
+        return Allocation.to_read(command, target_shown, checked_previous, solve_ms, answered)
 
     def refinement(self, result: Allocation) -> tuple[Candidates, ...]:
         """Returns what a network proposes for the question of a result, step by step.
@@ -333,11 +333,10 @@ class Allocator:
             DataError: a fin's force table cannot be read.
         """
         wrenches_asked = check_wrenches(wrenches)
-        all_damage = damage_of(damage, lost)
+        state = self._state_of_question(damage, lost, free)
         checked_policy = as_policy(policy)
         checked_seed = check_seed(seed)
         checked_flow = check_flow(flow)
-        state = self._state(all_damage, free)
         start = time.perf_counter()
         question = state.question(wrenches_asked, checked_policy, checked_flow, checked_seed)
 
@@ -346,48 +345,17 @@ class Allocator:
                 yield rows, state.solve(question.part(rows))
 
         solution = joined(parts(), len(wrenches_asked), state.works)
-        targets_shown = state.with_free_axes(wrenches_asked, np.nan)
+        targets_shown = state.shown(wrenches_asked)
         elapsed_ms = (time.perf_counter() - start) * 1e3
         count = len(targets_shown)
+        answered = LazyFigures(state, question, wrenches_asked, solution)
         return BatchAllocation.of(
-            **self._common_fields(state, question, targets_shown, wrenches_asked, solution),
+            **answered.fields(),
+            target=targets_shown,
             command=solution.command,
             solve_ms=np.broadcast_to(elapsed_ms / max(count, 1), count),
             wrench_expected=solution.wrench,
-        )
-
-    def _common_fields(
-        self,
-        state: RobotState,
-        question: MethodQuestion,
-        target: Array,
-        wrenches: Array,
-        solution: Solution,
-    ) -> dict[str, Any]:
-        """Fields that answers to one target and to many share.
-
-        Args:
-            state: of the robot that was asked.
-            question: to its method.
-            target: what was answered (6,) or (N, 6), NaN along free axes.
-            wrenches: what was asked, of the same shape.
-            solution: of the method.
-
-        Returns:
-            Values by the names of the fields.
-        """
-        return dict(
-            layout=state.layout,
-            damage=state.damage,
-            target=target,
-            scale=self._scale,
-            method=state.method.name,
-            checkpoint=self.checkpoint,
-            policy=question.policy,
-            flow=question.flow,
-            seed=question.seed,
-            unknown_fins=state.method.unknown_fins,
-            answered=LazyFigures(state, question.flow, wrenches, solution),
+            answered=answered,
         )
 
     def _state_of(self, result: Allocation) -> RobotState:
@@ -398,6 +366,23 @@ class Allocator:
                 f"this answer is of layout {result.layout.name!r:.60}, and this allocator is for "
                 f"{self._layout.name!r:.60} as it was made; ask the allocator that answered"
             )
+        return state
+
+    def _state_of_question(
+        self, damage: Damage | None, lost: Sequence[str], free: Sequence[str]
+    ) -> RobotState:
+        """Returns the robot that a question is about; its arguments are those of `allocate`."""
+        if damage is None and not len(lost) and not len(free):
+            return self._whole
+        # A control loop names the same in each tick, as tuples or lists.
+        names = None
+        if type(lost) in _NAME_LISTS and type(free) in _NAME_LISTS:
+            names = damage, tuple(lost), tuple(free)
+            if self._last_names is not None and names == self._last_names[0]:
+                return self._last_names[1]
+        state = self._state(damage_of(damage, lost), free)
+        if names is not None:
+            self._last_names = names, state
         return state
 
     def _state(self, damage: Damage, free: Sequence[str] = ()) -> RobotState:

@@ -198,6 +198,9 @@ class Method(ABC):
     reads: ClassVar[frozenset[Reads]] = frozenset({"policy"})
     """What `solve` reads of a question that not every method does: of policies, losses, multipliers
     and a reference. What is not named here, it is not given."""
+    keeps_limits: ClassVar[bool] = False
+    """Whether its commands already are what a robot takes: within the rates in a tick, at rest
+    inside a dead band outside of ticks. Those of any other method are brought there."""
     needs_networks: ClassVar[bool] = False
     """Whether it is made with trained networks, of a checkpoint."""
     networks: Networks | None

@@ -28,6 +28,9 @@ MAX_FLOW = 100.0
 """Largest magnitude of a component of the flow [m/s, rad/s]; beyond it something is wrong
 upstream."""
 
+_FLOAT64 = np.dtype(np.float64)
+"""Type of the numbers that methods take."""
+
 MAX_SIZE_IN_PYTHON = 100
 """Arrays of up to so many numbers are measured by Python's own functions, which is quicker than
 numpy's calls are for them; every tick pays for it."""
@@ -81,6 +84,8 @@ def check_seed(seed: object) -> int:
     Raises:
         AllocationError: it is none.
     """
+    if type(seed) is int and seed >= 0:
+        return seed
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
         raise AllocationError(f"seed: expected a whole number from 0, got {seed!r}")
     return int(seed)
@@ -145,9 +150,14 @@ def check_target(wrench: ArrayLike) -> Array:
     Raises:
         CommandError: it is not six finite numbers of at most `MAX_WRENCH`.
     """
-    array = _numbers(wrench, "wrench", _ONE_WRENCH)
+    if type(wrench) is np.ndarray and wrench.dtype is _FLOAT64 and wrench.shape == (6,):
+        array = wrench.copy()
+    else:
+        array = _numbers(wrench, "wrench", _ONE_WRENCH)
     if array.shape != (6,):
         raise _wrong_shape("wrench", _ONE_WRENCH, array)
+    if math.hypot(*array.tolist()) <= MAX_WRENCH:  # quicker than numpy for six numbers
+        return array
     return _within_limit(array, "wrench")
 
 
@@ -211,7 +221,7 @@ def check_flow(flow: ArrayLike | None) -> Array | None:
         flow: (6,) [m/s, rad/s], body frame; None at rest.
 
     Returns:
-        The same (6,) as finite float64; None at rest.
+        The same (6,) as finite float64, a read-only copy; None at rest.
 
     Raises:
         CommandError: it is not six finite numbers of at most `MAX_FLOW`.
@@ -227,7 +237,10 @@ def check_flow(flow: ArrayLike | None) -> Array | None:
             f"flow: each component must be finite and at most {MAX_FLOW:g} in size, got "
             f"{flow!r:.100}"
         )
-    return array if array.any() else None
+    if not array.any():
+        return None
+    array.setflags(write=False)
+    return array
 
 
 def check_previous(previous: ArrayLike, layout: Layout) -> Array:
@@ -238,7 +251,7 @@ def check_previous(previous: ArrayLike, layout: Layout) -> Array:
         layout: the robot of n actuators.
 
     Returns:
-        The same (n, 3) as float64, a copy.
+        The same (n, 3) as float64, a read-only copy.
 
     Raises:
         CommandError: it has another shape, or holds infinity or what is no number.
@@ -254,6 +267,7 @@ def check_previous(previous: ArrayLike, layout: Layout) -> Array:
             f"previous: expected a command of shape ({layout.n}, 3) for layout {layout.name!r}, "
             f"got shape {array.shape}; pass the `command` of the last allocation"
         )
+    array.setflags(write=False)
     return array
 
 

@@ -87,19 +87,26 @@ class RobotState:
     def among_all(self, command: Array) -> Array:
         """Returns commands (..., m, 3) of the actuators that work as those (..., n, 3) of all, NaN
         for the lost ones."""
-        return among_all(command, self.works)
+        return among_all(command, self.works) if self.damage.lost else command
 
-    def with_free_axes(self, wrench: Array, value: float) -> Array:
-        """Marks the free axes of wrenches.
+    @cached_property
+    def _counts(self) -> Array:
+        """1 along the axes (6,) that are commanded, 0 along the free ones."""
+        free = np.zeros(6, bool) if self.free is None else self.free
+        return np.where(free, 0.0, 1.0)
 
-        Args:
-            wrench: (..., 6) [N, N m].
-            value: along the free axes: methods take 0 there, results show NaN.
+    @cached_property
+    def _not_asked(self) -> Array:
+        """0 along the axes (6,) that are commanded, NaN along the free ones."""
+        return np.where(self._counts == 0.0, np.nan, 0.0)
 
-        Returns:
-            Wrenches (..., 6); the same array where no axis is free.
-        """
-        return wrench if self.free is None else np.where(self.free, value, wrench)
+    def without_free_axes(self, wrench: Array) -> Array:
+        """Returns wrenches (..., 6) [N, N m] with 0 along the free axes, as methods take them."""
+        return wrench if self.free is None else wrench * self._counts
+
+    def shown(self, wrench: Array) -> Array:
+        """Returns wrenches (..., 6) [N, N m] with NaN along the free axes, as results show them."""
+        return wrench if self.free is None else wrench + self._not_asked
 
     def question(
         self,
@@ -128,23 +135,24 @@ class RobotState:
         Raises:
             AllocationError: the method does not know the policy.
         """
-        self.method.check_policy(policy)
-        reads = self.method.reads
-        reads_losses = "losses" in reads
-        if previous is not None and not reads_losses:
+        method = self.method
+        method.check_policy(policy)
+        reads = method.reads
+        lost: NDArray[np.bool_] | None = None
+        free: NDArray[np.bool_] | None = None
+        if "losses" in reads:
+            lost = self.lost
+            free = self.free
+        elif previous is not None:
             previous = previous[self.works]
         if reference is not None:
-            reference = self.with_free_axes(reference, 0.0) if "reference" in reads else None
+            reference = self.without_free_axes(reference) if "reference" in reads else None
+        if "multipliers" not in reads:
+            multipliers = None
+        targets = self.without_free_axes(wrenches)
+        # By position, in the order of the fields: every tick pays for it.
         return MethodQuestion(
-            targets=self.with_free_axes(wrenches, 0.0),
-            policy=policy,
-            previous=previous,
-            flow=flow,
-            seed=seed,
-            lost=self.lost if reads_losses else None,
-            free=self.free if reads_losses else None,
-            multipliers=multipliers if "multipliers" in reads else None,
-            reference=reference,
+            targets, policy, previous, flow, seed, lost, free, multipliers, reference
         )
 
     def solve(self, question: MethodQuestion) -> Solution:
@@ -159,7 +167,11 @@ class RobotState:
         """
         method = self.method
         solution = method.solve(question)
+        if method.keeps_limits:
+            return solution
         if question.previous is None:
-            return solution._replace(command=method.plant.rested(solution.command))
-        box = method.rates.box(question.previous)
-        return solution._replace(command=box.clip_feasible(solution.command, method.plant))
+            command = method.plant.rested(solution.command)
+        else:
+            box = method.rates.box(question.previous)
+            command = box.clip_feasible(solution.command, method.plant)
+        return solution._replace(command=command)

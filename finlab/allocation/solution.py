@@ -36,7 +36,7 @@ class PlainData:
         """Makes one of the values of all its fields, by name, in a fifth of the constructor's time;
         nothing is checked."""
         made = object.__new__(cls)
-        made.__dict__.update(values)
+        object.__setattr__(made, "__dict__", values)
         return made
 
 
@@ -139,8 +139,8 @@ class Solution(NamedTuple):
     multipliers: Array | None = None
     """Multipliers (N, 6) [W/N, W/(N m)] of the wrenches, what one more unit of each axis costs;
     None where the method has none."""
-    notes: tuple[str, ...] = ()
-    """Sentences about these answers."""
+    notes: Callable[[], tuple[str, ...]] | None = None
+    """Gives sentences about these answers; None for methods that have none."""
 
 
 def among_all(command: Array, works: NDArray[np.bool_]) -> Array:
@@ -182,11 +182,12 @@ def joined(
     parts_have_all = True
     bounds: list[tuple[Rows, Callable[[Array], Array]]] = []
     wrench: Array | None = None
-    notes: dict[str, None] = {}
+    notes_of_parts: list[Callable[[], tuple[str, ...]]] = []
     for rows, part in parts:
         parts_have_all = part.command.shape[-2] == len(works)
         command[rows] = among_all(part.command, works)
-        notes |= dict.fromkeys(part.notes)
+        if part.notes is not None:
+            notes_of_parts.append(part.notes)
         if part.bound is not None:
             bounds.append((rows, part.bound))
         if part.wrench is not None:
@@ -202,4 +203,10 @@ def joined(
             result[rows] = bound_of_part(command_of_part)
         return result
 
-    return Solution(command, bound if bounds else None, wrench=wrench, notes=tuple(notes))
+    def notes() -> tuple[str, ...]:
+        sentences: dict[str, None] = {}
+        for notes_of_part in notes_of_parts:
+            sentences |= dict.fromkeys(notes_of_part())
+        return tuple(sentences)
+
+    return Solution(command, bound if bounds else None, wrench=wrench, notes=notes)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from finlab.errors import FinlabError
 
-VERSION = 9
+VERSION = 10
 """What `fl_version()` of the C files returns; both rise together where a signature or a struct
 changes."""
 SIGNATURES = {
@@ -19,8 +19,10 @@ SIGNATURES = {
     "fl_check": "ipi",
     "fl_prepare": "ipp",
     "fl_answer_one": "ipppp",
+    "fl_answer_into_row": "ippprp",
     "fl_answer_many": "ippppipppppppp",
     "fl_commands": "vpppipp",
+    "fl_forces_of_commands": "vppip",
     "fl_conjugates": "ippppip",
     "fl_reach": "vpppppirppp",
     "fl_jets": "vppipppp",

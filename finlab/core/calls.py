@@ -7,13 +7,14 @@ commands that give their forces. The structs are those of finlab/core/fl_fields.
 import ctypes
 from collections.abc import Sequence
 from threading import Lock
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finlab.arrays import Array
 from finlab.core import library
+from finlab.core.answer_rows import ROWS, AnswerMemory, AnswerRow
 from finlab.core.fields import Record, constant, struct
 from finlab.errors import CommandError, DataError
 
@@ -41,6 +42,20 @@ class CoreAnswer(NamedTuple):
     grids of the laws."""
     is_truncated: bool
     """Whether a search for one of them ended at its limit of steps before it was done."""
+
+    @classmethod
+    def of_row(cls, row: AnswerRow) -> Self:
+        """Returns the answer of a row, with N = 1, in arrays of its own."""
+        return cls(
+            force=row.force.copy(),
+            multipliers=row.multipliers.copy(),
+            wrench_served=row.wrench_served.copy(),
+            gap_power_bound=row.gap_power_bound.copy(),
+            is_attainable=row.is_attainable.copy(),
+            command=row.command.copy(),
+            error=row.error.copy(),
+            is_truncated=row.is_truncated,
+        )
 
 
 class Conjugates(NamedTuple):
@@ -131,6 +146,11 @@ class QuestionRecord:
 
         self._policy: Record | None = None
         """At which the question points, so that it lives as long."""
+        self._has_multipliers = False
+        """Whether the question points at multipliers."""
+        self._constant_conditions: Conditions | None = None
+        """Those that are written, where they are not of a single tick: the object, which nobody
+        changes."""
         self._multipliers = np.zeros(6)
         self._previous = np.zeros((n, 3))
         self._lost = np.zeros(n, np.uint8)
@@ -158,16 +178,21 @@ class QuestionRecord:
                 own.
             conditions: what holds.
         """
-        self._policy = policy
-        self._policy_pointer[0] = 0 if policy is None else policy.ctypes.data
-        self._multipliers_pointer[0] = 0
+        if policy is not self._policy:
+            self._policy = policy
+            self._policy_pointer[0] = 0 if policy is None else policy.ctypes.data
         if multipliers is not None:
             self._multipliers[:] = multipliers
             self._multipliers_pointer[0] = self._multipliers_address
+        elif self._has_multipliers:
+            self._multipliers_pointer[0] = 0
+        self._has_multipliers = multipliers is not None
         self.write_conditions(conditions)
 
     def write_conditions(self, conditions: Conditions) -> None:
         """Writes what holds of the robot."""
+        if conditions is self._constant_conditions:
+            return  # as they were written for the last question: most are, outside of ticks
         self._calm[0] = conditions.calm
         self._ticks[0] = conditions.ticks
         self._angles_wanted_pointer[0] = 0
@@ -186,6 +211,7 @@ class QuestionRecord:
         if conditions.free is not None:
             self._free[:] = conditions.free
             self._free_pointer[0] = self._free_address
+        self._constant_conditions = conditions if conditions.previous is None else None
 
 
 class AnswerRecord:
@@ -259,8 +285,59 @@ class Core:
         """Held during a call: work area, question and answer are the same for all threads."""
         self._block_address = block.ctypes.data
         self._work_address = ctypes.addressof(self._work)
+        self._answer_into_row = self._core.fl_answer_into_row
+        self._unfinished = constant("FL_UNFINISHED")
+        self._beyond_reach = constant("FL_BEYOND_REACH")
         self._question = QuestionRecord(n)
-        self._answer = AnswerRecord(n)
+        self._memory = AnswerMemory(n)
+        self._rows_used = 0
+        """Rows of the memory that hold answers."""
+
+    def answer_row(
+        self,
+        wrench: Array,
+        policy: Record | None,
+        multipliers: Array | None,
+        conditions: Conditions,
+        most_error: float,
+    ) -> AnswerRow:
+        """Answers one wrench, as `answer_one` does; what it found is read when it is asked for.
+
+        Args:
+            wrench: as in `answer_one`, as are all but the last.
+            policy: what to give out of reach.
+            multipliers: lambda (6,) at which Newton's method begins.
+            conditions: what holds of the robot.
+            most_error: error up to which commands are exact [1].
+
+        Returns:
+            The answer.
+
+        Raises:
+            CommandError: the core cannot work with these numbers.
+        """
+        with self._lock:
+            row = self._rows_used
+            if row == ROWS:
+                self._memory = AnswerMemory(self._n)
+                row = 0
+            memory = self._memory
+            self._rows_used = row + 1
+            question = self._question
+            question.write_wrench(wrench)
+            question.write(policy, multipliers, conditions)
+            code = self._answer_into_row(
+                self._block_address,
+                self._work_address,
+                question.address,
+                most_error,
+                memory.addresses[row],
+            )
+        if code == 0:
+            return AnswerRow(memory, row, True, True)
+        if code != self._unfinished and code != self._beyond_reach:
+            raise_refusal(code)
+        return AnswerRow(memory, row, code == self._beyond_reach, False)
 
     def answer_one(
         self,
@@ -285,17 +362,8 @@ class Core:
         Raises:
             CommandError: the core cannot work with these numbers.
         """
-        with self._lock:
-            self._question.write_wrench(wrench)
-            self._question.write(policy, multipliers, conditions)
-            code = self._core.fl_answer_one(
-                self._block_address,
-                self._work_address,
-                self._question.address,
-                self._answer.address,
-            )
-            raise_refusal(code)
-            return self._answer.read()
+        row = self.answer_row(wrench, policy, multipliers, conditions, 0.0)
+        return CoreAnswer.of_row(row)
 
     def answer_many(
         self, wrenches: Array, policy: Record | None, conditions: Conditions = NOMINAL
@@ -379,6 +447,22 @@ class Core:
                 command.ctypes.data,
             )
         return command
+
+    def forces_of(self, command: Array) -> Array:
+        """Evaluates the laws of the actuators, as far as the core's grids say them.
+
+        Args:
+            command: (N, n, 3).
+
+        Returns:
+            Forces (N, n, 3) [N] along the axes of the laws.
+        """
+        command = np.ascontiguousarray(command)
+        force = np.empty(command.shape)
+        self._core.fl_forces_of_commands(
+            self._block_address, command.ctypes.data, len(command), force.ctypes.data
+        )
+        return force
 
     def conjugates(self, multipliers: Array, conditions: Conditions = NOMINAL) -> Conjugates:
         """Evaluates the conjugates of all costs (Eq. 4), by the core's tables.

@@ -68,7 +68,7 @@ typedef double fl_wide; /* where differences of large numbers matter, in single 
 #define FL_FOILS (FL_FOIL_STEPS * FL_STEPS_AT_KINK * 2 * (FL_STARTS + FL_RAY_SHARES))
 #define FL_BOUND (2 * (FL_FORCES + FL_FOILS))
 
-#define FL_VERSION 9   /* of all structs and functions here */
+#define FL_VERSION 10  /* of all structs and functions here */
 #define FL_MAGIC 41721 /* first number of a block */
 
 /* The structs that cross the border of the library. */
@@ -126,6 +126,9 @@ enum {
   FL_BAD_ARGUMENT, /* of a question or of settings: the same */
   FL_ERRORS        /* how many codes there are */
 };
+
+/* What else fl_answer_into_row returns, without an error. */
+enum { FL_UNFINISHED = FL_ERRORS, FL_BEYOND_REACH };
 
 /* Everything that changes while a question is answered; see fl_work.h. */
 typedef struct fl_work fl_work;
@@ -185,6 +188,19 @@ int fl_use_settings(fl_work *work, const fl_settings *settings);
 int fl_answer_one(const fl_real *block, fl_work *work, const fl_question *question,
                   fl_answer *answer);
 
+/* Finds commands for one wrench, and writes the answer as a row of numbers: an fl_answer_row, then
+   commands (n, 3) and forces (n, 2) [N].
+
+   @param most_error  error up to which commands are exact; below 0 where the grids of the laws
+                      cannot tell
+   @param row         becomes the answer
+   @return            FL_OK where the wrench is within reach, and the commands are exact;
+                      FL_BEYOND_REACH where they are the best beyond reach, commands of lost
+                      actuators being NaN in both cases; FL_UNFINISHED where steps by the laws
+                      themselves may be better, or the search ended early; else as fl_answer_one */
+int fl_answer_into_row(const fl_real *block, fl_work *work, const fl_question *question,
+                       fl_real most_error, fl_real *row);
+
 /* Finds commands for many wrenches, all else as in a question. The outputs are those of fl_answer.
 
    @param wrench           (count, 6) desired [N, N m]
@@ -210,6 +226,13 @@ int fl_answer_many(const fl_real *block, fl_work *work, const fl_question *quest
    @param command   (count, n, 3) */
 void fl_commands(const fl_real *block, fl_work *work, const fl_real *force, int count,
                  const fl_real *previous, fl_real *command);
+
+/* Evaluates the laws of all actuators, as far as tables say them.
+
+   @param command  (count, n, 3)
+   @param force    becomes the forces (count, n, 3) along the axes of the laws [N] */
+void fl_forces_of_commands(const fl_real *block, const fl_real *command, int count,
+                           fl_real *force);
 
 /* Evaluates the conjugates of all costs at multipliers of the wrench, Eq. 4, for proofs of a lower
    bound of the power.

@@ -109,6 +109,16 @@ FL_FIELD(int, is_truncated, , "1",
 FL_FIELD(int, has_foil_commands, , "1", "1 where the commands are those of a search, for foils")
 FL_END(fl_answer)
 
+FL_BEGIN(fl_answer_row)
+FL_FIELD(fl_real, error, , "1", "as of fl_answer")
+FL_FIELD(fl_real, gap_power_bound, , "W", "as of fl_answer")
+FL_FIELD(fl_real, is_attainable, , "1", "1 where the target is within reach, else 0")
+FL_FIELD(fl_real, is_truncated, , "1", "1 where a search ended at its bound, else 0")
+FL_FIELD(fl_real, multipliers, [6], "W/N, W/(N m)", "as of fl_answer")
+FL_FIELD(fl_real, wrench_served, [6], "N, N m",
+         "as of fl_answer; commands (n, 3), NaN if lost, and forces (n, 2) stand behind it")
+FL_END(fl_answer_row)
+
 FL_BEGIN(fl_actuator_conjugate)
 FL_FIELD(fl_real, price_ahead, , "W/N",
          "along the force of an actuator, ahead; 0 where it pushes in reverse")

@@ -18,6 +18,7 @@ from finlab.allocation.dual.block import BlockContents, block_of
 from finlab.allocation.method import USUAL_PERIOD_S
 from finlab.allocation.policy import Policy
 from finlab.arrays import NOTHING, Array
+from finlab.core.answer_rows import AnswerRow
 from finlab.core.calls import NOMINAL, Conditions, Conjugates, Core, CoreAnswer, policy_record
 from finlab.core.fields import Record
 from finlab.layout.layout import Layout
@@ -150,6 +151,10 @@ class Compiled:
         """The numbers that the core reads; see finlab/core/fl_fields.h."""
         self.core = Core(self.block, self.count)
         """The robot in the core."""
+        self._last_policy: Policy | None = None
+        """Of the last single target."""
+        self._last_record: Record | None = None
+        """The same as the core reads it."""
 
     def _uncertainty_cost(self, i: int, response: Response) -> float:
         """What a squared force of actuator i costs beside its power [W/N^2]."""
@@ -251,6 +256,20 @@ class Compiled:
         if len(targets) == 1:
             return self.core.answer_one(targets[0], record, multipliers, conditions)
         return self.core.answer_many(targets, record, conditions)
+
+    def answer_row(
+        self,
+        target: Array,
+        policy: Policy | None,
+        multipliers: Array | None,
+        conditions: Conditions,
+        most_error: float,
+    ) -> AnswerRow:
+        """Asks the core for one target, as `forces` does; see `Core.answer_row`."""
+        if policy is not self._last_policy:
+            self._last_record = None if policy is None else core_policy(policy)
+            self._last_policy = policy
+        return self.core.answer_row(target, self._last_record, multipliers, conditions, most_error)
 
     @cached_property
     def _directions(self) -> Array:

@@ -16,19 +16,22 @@ from numpy.typing import NDArray
 
 from finlab.allocation.dual.bound import TABLE_ERROR, bound_by_laws, bound_by_measured_tables
 from finlab.allocation.dual.compiled import Compiled
-from finlab.allocation.levenberg_marquardt import CommandProblem, exact_commands, norms
+from finlab.allocation.levenberg_marquardt import EXACT, CommandProblem, exact_commands, norms
 from finlab.allocation.method import Method, Settings, number
 from finlab.allocation.policy import CLOSEST, Policy
 from finlab.allocation.question import MethodQuestion
 from finlab.allocation.solution import Solution
 from finlab.arrays import NEARLY, NOTHING, ROUNDING, Array
 from finlab.axes import axes_in
-from finlab.core.calls import NOMINAL, Conditions
+from finlab.core.answer_rows import AnswerRow
+from finlab.core.calls import NOMINAL, Conditions, CoreAnswer
 from finlab.layout.effectiveness import wrench_of_forces
 
 if TYPE_CHECKING:
     from finlab.core.coupled_core import CoupledCore
 
+LAW_SAMPLES = 64
+"""Random commands of each actuator at which the core's grids are compared with the laws."""
 MAX_BASES = 32
 """States of losses and free axes of which the basis of what is driven is kept."""
 _TRUNCATED = (
@@ -63,6 +66,7 @@ class Dual(Method):
     # one may only push it on.
     policy_under_way = "direction"
     reads = frozenset({"policy", "losses", "multipliers", "reference"})
+    keeps_limits = True
     settings_class = DualSettings
     settings: DualSettings
 
@@ -83,6 +87,8 @@ class Dual(Method):
         self._flow_key = b""
         """Bytes of the flow that this method is for; none at rest."""
         self._bases: dict[bytes, Array] = {}
+        self._conditions = NOMINAL
+        """Those of the last question outside of ticks."""
 
     @cached_property
     def problem(self) -> CommandProblem:
@@ -123,8 +129,13 @@ class Dual(Method):
             return Solution(np.empty((0, self.layout.n, 3)), lambda _: np.empty(0))
         previous = question.previous
         reference = question.reference
-        calm = 0.0 if previous is None else self.settings.calm
-        conditions = Conditions(previous, question.lost, question.free, calm)
+        calm = self.settings.calm
+        conditions = self._conditions
+        if previous is not None:
+            conditions = Conditions(previous, question.lost, question.free, calm)
+        elif question.lost is not conditions.lost or question.free is not conditions.free:
+            conditions = Conditions(None, question.lost, question.free)
+            self._conditions = conditions  # those of the next question, mostly
         method = self.at(question.flow)
         if reference is not None and len(reference) and method.turns_ahead and previous is not None:
             from finlab.allocation.dual.ahead import conditions_ahead
@@ -174,22 +185,67 @@ class Dual(Method):
         """
         if self.plant.interaction is not None:
             return self._solve_coupled(conditions, targets, policy, multipliers)
-        answer = self.compiled.forces(targets, policy, multipliers, conditions)
+        if len(targets) == 1:
+            row = self.compiled.answer_row(
+                targets[0], policy, multipliers, conditions, self._most_core_error
+            )
+            if row.is_finished:
+                return self._solution_of_row(row, targets, conditions)
+            answer = CoreAnswer.of_row(row)
+        else:
+            answer = self.compiled.forces(targets, policy, None, conditions)
         problem = self.problem_under(conditions)
         command = exact_commands(problem, answer)
         # A search of bytes takes a third of the time of numpy's `all`, and every tick pays for it.
         all_reachable = 0 not in answer.is_attainable.tobytes()
         wrench_served = targets if all_reachable else answer.wrench_served
-        notes = {_TRUNCATED} if answer.is_truncated else set()
-        if not all_reachable:
-            if policy.kind == "direction":
-                from finlab.allocation.dual.ray import keep_on_rays
+        sentences = {_TRUNCATED} if answer.is_truncated else set()
+        if not all_reachable and policy.kind == "direction":
+            from finlab.allocation.dual.ray import keep_on_rays
 
-                notes |= keep_on_rays(self.compiled, problem, conditions, targets, answer, command)
-            notes |= self.undriven_notes(targets[~answer.is_attainable], conditions)
+            sentences |= keep_on_rays(self.compiled, problem, conditions, targets, answer, command)
         return self.solution(
-            command, wrench_served, answer.multipliers, answer.gap_power_bound, notes, conditions
+            command,
+            wrench_served,
+            answer.multipliers,
+            answer.gap_power_bound,
+            partial(self.notes_of, sentences, targets[~answer.is_attainable], conditions),
+            conditions,
         )
+
+    def _solution_of_row(self, row: AnswerRow, targets: Array, conditions: Conditions) -> Solution:
+        """The solution for one of the targets (1, 6), whose command is the best as the core gives
+        it."""
+        bound = None if self.has_no_bound else partial(self._bound_of_row, row, conditions)
+        calm_power = partial(self.calm_power, conditions) if conditions.calm > 0.0 else None
+        notes = None if row.is_met else partial(self.notes_of, set(), targets, conditions)
+        # By position, in the order of the fields: every tick pays for it.
+        return Solution(row.command, bound, calm_power, None, None, None, row.multipliers, notes)
+
+    def _bound_of_row(self, row: AnswerRow, conditions: Conditions, command: Array) -> Array:
+        """Proves the bound (1,) [W] for the command (1, n, 3) of a row; see `bound`."""
+        return self.bound(
+            row.wrench_served, row.multipliers, row.gap_power_bound, conditions, command
+        )
+
+    @cached_property
+    def _most_core_error(self) -> float:
+        """Error by the core's grids of the laws up to which it is at most `EXACT` by the laws
+        themselves; below 0 where grids are too coarse to say so.
+
+        What a grid is off is measured at random commands, and doubled.
+        """
+        rng = np.random.default_rng(0)
+        command = self.plant.sample(rng, (LAW_SAMPLES,))
+        by_grids = np.einsum(
+            "knf,nfa->kna", self.compiled.core.forces_of(command), self.compiled.axes
+        )
+        off_force = self.plant.force(command) - by_grids
+        off_wrench = np.einsum("kna,naw->knw", off_force, self.plant.effectiveness)
+        for i, is_this in enumerate(np.eye(self.layout.n, dtype=bool)):
+            off_wrench[:, i] -= self.compiled.wrench_offset_of(is_this)
+        largest_off = np.abs(off_wrench / self.scale).max(axis=0).sum(axis=0)
+        return EXACT - 2.0 * float(np.linalg.norm(largest_off))
 
     def _solve_coupled(
         self, conditions: Conditions, targets: Array, policy: Policy, multipliers: Array | None
@@ -201,9 +257,7 @@ class Dual(Method):
         answer = outer_answers(
             self.coupled, self.compiled, problem, targets, policy, conditions, multipliers
         )
-        notes: set[str] = set()
-        for target in targets[~answer.is_attainable]:
-            notes |= self.undriven_notes(target[None], conditions)
+        notes = partial(self.notes_of, set(), targets[~answer.is_attainable], conditions)
         return self.solution(
             answer.command,
             answer.wrench_served,
@@ -219,22 +273,27 @@ class Dual(Method):
         wrench_served: Array,
         multipliers: Array,
         gap_power_bound: Array,
-        notes: set[str],
+        notes: Callable[[], tuple[str, ...]],
         conditions: Conditions,
     ) -> Solution:
         """Puts an answer together.
 
         Args:
-            command: (N, n, 3); its rows of lost actuators become NaN.
+            command: (N, n, 3), which the drives may not follow yet; its rows of lost actuators
+                become NaN.
             wrench_served: (N, 6) [N, N m] that the commands give.
             multipliers: lambda (N, 6) [W/N, W/(N m)], which prove the bound.
             gap_power_bound: power (N,) [W] that gaps are proved to need.
-            notes: sentences, of which empty ones are left out.
+            notes: gives sentences about the answer.
             conditions: under which the commands were found.
 
         Returns:
             The solution, whose bound is computed when it is asked for.
         """
+        if conditions.previous is None:
+            command = self.plant.rested(command)
+        else:
+            command = self.rates.box(conditions.previous).clip_feasible(command, self.plant)
         if conditions.lost is not None:
             command[:, conditions.lost] = np.nan
         bound: Callable[[Array], Array] = partial(
@@ -245,8 +304,23 @@ class Dual(Method):
             bound=None if self.has_no_bound else bound,
             calm_power=partial(self.calm_power, conditions) if conditions.calm > 0.0 else None,
             multipliers=multipliers,
-            notes=tuple(sorted(notes - {""})),
+            notes=notes,
         )
+
+    def notes_of(
+        self, sentences: set[str], unreached: Array, conditions: Conditions
+    ) -> tuple[str, ...]:
+        """Returns what there is to say of answers.
+
+        Args:
+            sentences: about how they were found.
+            unreached: targets (N, 6) [N, N m] that are out of reach.
+            conditions: under which they were.
+        """
+        of_axes: set[str] = set()
+        for target in unreached:
+            of_axes |= self.undriven_notes(target[None], conditions)
+        return tuple(sorted(sentences | of_axes))
 
     def calm_power(self, conditions: Conditions, command: Array) -> Array:
         """Returns the power that commands take beyond those that give the same wrenches where

@@ -32,6 +32,8 @@ static const constant CONSTANTS[] = {
     CONSTANT(FL_BAD_VERSION),
     CONSTANT(FL_BAD_NUMBER),
     CONSTANT(FL_BAD_ARGUMENT),
+    CONSTANT(FL_UNFINISHED),
+    CONSTANT(FL_BEYOND_REACH),
     CONSTANT(FL_MET),
     CONSTANT(FL_BEYOND),
     CONSTANT(FL_NO_PROGRESS),
@@ -67,6 +69,67 @@ const char *fl_fields(void) {
 #undef FL_BEGIN
 #undef FL_FIELD
 #undef FL_END
+
+/* Writes an answer as a row of numbers; returns its commands. */
+static real *write_row(const real *block, const fl_answer *out, real *row) {
+  const size_t n = (size_t)COUNT(block);
+  fl_answer_row *head = (fl_answer_row *)row;
+  real *command = row + sizeof *head / sizeof *row;
+  real *force = command + 3 * n;
+  head->error = out->error;
+  head->gap_power_bound = out->gap_power_bound;
+  head->is_attainable = (real)out->is_attainable;
+  head->is_truncated = (real)out->is_truncated;
+  memcpy(head->multipliers, out->multipliers, sizeof out->multipliers);
+  memcpy(head->wrench_served, out->wrench_served, sizeof out->wrench_served);
+  memcpy(command, out->command, 3 * n * sizeof *command);
+  memcpy(force, out->force, 2 * n * sizeof *force);
+  return command;
+}
+
+/* Whether an answer in place of a wrench beyond reach gives a share of it, over the wrench scale. */
+static int is_on_ray(const real *block, const fl_work *work, const real *wrench,
+                     const fl_answer *out) {
+  const real *sigma = HEAD(block)->wrench_scale;
+  real ray[6];
+  real served[6];
+  for (int k = 0; k < 6; k++) {
+    ray[k] = 0;
+    if (work->span.axis_counts[k]) ray[k] = wrench[k] / sigma[k];
+    served[k] = out->wrench_served[k] / sigma[k];
+  }
+  const real share = dot(served, ray, 6) / larger(dot(ray, ray, 6), TINY);
+  for (int k = 0; k < 6; k++) {
+    if (!(FABS(served[k] - share * ray[k]) <= NEARLY)) return 0;
+  }
+  return out->error <= NEARLY;
+}
+
+/* Whether nothing is left to do for a wrench beyond reach. */
+static int is_best_beyond_reach(const real *block, const fl_work *work, const fl_question *q,
+                                const fl_answer *out) {
+  if (!q->policy || q->policy->kind != FL_DIRECTION) return 1;
+  /* In a tick what the rates leave is the nearest to the ray, Eq. 15. */
+  return q->previous || is_on_ray(block, work, q->wrench, out);
+}
+
+int fl_answer_into_row(const real *block, fl_work *work, const fl_question *question,
+                       real most_error, real *row) {
+  fl_answer out;
+  const int code = fl_answer_one(block, work, question, &out);
+  if (code) return code;
+  real *command = write_row(block, &out, row);
+  if (out.is_truncated || !(most_error >= 0)) return FL_UNFINISHED;
+  if (out.is_attainable && !(out.error <= most_error)) return FL_UNFINISHED;
+  if (!out.is_attainable && !is_best_beyond_reach(block, work, question, &out)) {
+    return FL_UNFINISHED;
+  }
+  for (int i = 0; question->lost && i < COUNT(block); i++) {
+    if (!work->span.is_lost[i]) continue;
+    for (int k = 0; k < 3; k++) command[3 * i + k] = (real)NAN;
+  }
+  return out.is_attainable ? FL_OK : FL_BEYOND_REACH;
+}
 
 int fl_answer_many(const real *block, fl_work *work, const fl_question *question,
                    const real *wrench, int count, real *force, real *multipliers,
@@ -145,6 +208,19 @@ int fl_conjugates(const real *block, fl_work *work, const fl_question *question,
     }
   }
   return FL_OK;
+}
+
+void fl_forces_of_commands(const real *block, const real *command, int count, real *force) {
+  const int n = COUNT(block);
+  for (int k = 0; k < count * n; k++) {
+    const int i = k % n;
+    const real *own_command = command + 3 * k;
+    real *own_force = force + 3 * k;
+    fl_force_of_command(block, i, own_command, own_force, 0);
+    if (fl_is_in_dead_band(ACTUATOR(block, i), own_command)) {
+      memset(own_force, 0, 3 * sizeof *own_force);
+    }
+  }
 }
 
 void fl_commands(const real *block, fl_work *work, const real *force, int count,
