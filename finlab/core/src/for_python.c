@@ -87,7 +87,7 @@ static real *write_row(const real *block, const fl_answer *out, real *row) {
   return command;
 }
 
-/* Whether an answer in place of a wrench beyond reach gives a share of it, over the wrench scale. */
+/* Whether an answer in place of a wrench beyond reach gives a share of it. */
 static int is_on_ray(const real *block, const fl_work *work, const real *wrench,
                      const fl_answer *out) {
   const real *sigma = HEAD(block)->wrench_scale;
