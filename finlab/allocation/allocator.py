@@ -410,7 +410,9 @@ class Allocator:
         commanded = self._layout.commanded if free is None else self._layout.commanded & ~free
         free_axes = None if commanded.all() else ~commanded
         if "losses" in choice.kind.reads and (damage.lost or free is not None):
-            without_loss = self._state(replace(damage, lost=()))
+            without_loss = self._whole
+            if damage.faults_by_kind:
+                without_loss = self._state(replace(damage, lost=()))
             return RobotState(
                 damaged, damage, works, without_loss.method, without_loss.plant, free_axes
             )

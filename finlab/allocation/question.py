@@ -105,14 +105,12 @@ def damage_of(damage: Damage | None, lost: Sequence[str]) -> Damage:
         AllocationError: `damage` is no `Damage`, or `lost` is no list of names.
     """
     if damage is None:
-        known = NO_DAMAGE
-    elif isinstance(damage, Damage):
-        known = damage
-    else:
-        raise AllocationError(f"damage: expected a Damage, got {damage!r:.100}")
-    if not len(lost):
-        return known
-    return replace(known, lost=[*known.lost, *lost_names(lost)])
+        return Damage(lost=lost) if len(lost) else NO_DAMAGE
+    if isinstance(damage, Damage):
+        if not len(lost):
+            return damage
+        return replace(damage, lost=[*damage.lost, *lost_names(lost)])
+    raise AllocationError(f"damage: expected a Damage, got {damage!r:.100}")
 
 
 def free_mask(layout: Layout, free: Sequence[str]) -> NDArray[np.bool_] | None:

@@ -35,11 +35,15 @@ def working_actuators(damaged: Layout, damage: Damage) -> NDArray[np.bool_]:
     Raises:
         LayoutError: an actuator that is lost is unknown, or none is left.
     """
+    works = np.ones(damaged.n, bool)
+    if not damage.lost:
+        return works
+    names = damaged.names
     lost = set(damage.lost)
-    works = np.array([name not in lost for name in damaged.names])
-    lost_here = damaged.n - int(works.sum())
-    if lost and (not works.any() or len(lost) > lost_here):
+    indices = [i for i, name in enumerate(names) if name in lost]
+    if len(indices) == len(names) or len(indices) < len(lost):
         damaged.without(damage.lost, "lost")  # raises the error that says what is wrong
+    works[indices] = False
     return works
 
 

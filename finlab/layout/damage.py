@@ -42,7 +42,8 @@ def lost_names(lost: Sequence[str]) -> tuple[str, ...]:
         raise AllocationError(
             f"lost: expected a list of names, got the text {lost!r}; write [{lost!r}]"
         )
-    if not isinstance(lost, Sequence) or not all(isinstance(name, str) for name in lost):
+    is_list = type(lost) in (tuple, list) or isinstance(lost, Sequence)  # most are: quicker to see
+    if not is_list or not all(isinstance(name, str) for name in lost):
         raise AllocationError(f"lost: expected a list of names, got {lost!r}")
     return tuple(lost)
 
@@ -83,6 +84,8 @@ class Damage:
         object.__setattr__(self, "lost", lost_names(self.lost))
         for kind, value_type in FAULT_VALUE_TYPES.items():
             faults = getattr(self, kind)
+            if type(faults) is dict and not faults:
+                continue  # losses alone are asked for in the middle of a control loop
             unchecked = checked(faults, dict[str, Any], AllocationError, f"damage: {kind}")
             by_name = {}
             for name, fault in unchecked.items():
