@@ -18,8 +18,15 @@ from finlab.allocation.dual.block import BlockContents, block_of
 from finlab.allocation.method import USUAL_PERIOD_S
 from finlab.allocation.policy import Policy
 from finlab.arrays import NOTHING, Array
-from finlab.core.answer_rows import AnswerRow
-from finlab.core.calls import NOMINAL, Conditions, Conjugates, Core, CoreAnswer, policy_record
+from finlab.core.calls import (
+    NOMINAL,
+    AnswerRow,
+    Conditions,
+    Conjugates,
+    Core,
+    CoreAnswer,
+    policy_record,
+)
 from finlab.core.fields import Record
 from finlab.layout.layout import Layout
 from finlab.physics.objective import wrench_scale_of

@@ -23,8 +23,7 @@ from finlab.allocation.question import MethodQuestion
 from finlab.allocation.solution import Solution
 from finlab.arrays import NEARLY, NOTHING, ROUNDING, Array
 from finlab.axes import axes_in
-from finlab.core.answer_rows import AnswerRow
-from finlab.core.calls import NOMINAL, Conditions, CoreAnswer
+from finlab.core.calls import NOMINAL, AnswerRow, Conditions, CoreAnswer
 from finlab.layout.effectiveness import wrench_of_forces
 
 if TYPE_CHECKING:
