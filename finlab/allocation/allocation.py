@@ -15,7 +15,7 @@ from finlab.actuators.actuator import Command
 from finlab.allocation.policy import Policy
 from finlab.allocation.question import MethodQuestion
 from finlab.allocation.report import allocation_blocks, answer_notes, doubts, next_measurement
-from finlab.allocation.solution import CANDIDATE_ARRAYS, Candidates, PlainData, Solution
+from finlab.allocation.solution import CANDIDATE_ARRAYS, Candidates, PlainData, Solved
 from finlab.arrays import Array
 from finlab.display import html, text
 from finlab.layout.damage import Damage
@@ -54,7 +54,7 @@ class LazyFigures(NamedTuple):
     """What its method was asked."""
     wrenches: Array
     """Desired wrenches as they came, (6,) or (N, 6) [N, N m]."""
-    solution: Solution
+    solution: Solved
     """What the method answered."""
 
     @property
@@ -85,6 +85,7 @@ class LazyFigures(NamedTuple):
         expected = self.solution.wrench
         multipliers = self.solution.multipliers
         return self.fields() | {
+            "target": read_only(self.state.shown(self.question.targets[0])),
             "wrench_expected": None if expected is None else read_only(expected[0]),
             "multipliers": None if multipliers is None else read_only(multipliers[0]),
             "settings": vars(self.state.method.settings).copy(),
@@ -387,7 +388,6 @@ class Allocation(Answer[float]):
     def to_read(
         cls,
         command: Array,
-        target: Array,
         previous: Array | None,
         solve_ms: float,
         answered: LazyFigures,
@@ -397,7 +397,6 @@ class Allocation(Answer[float]):
 
         Args:
             command: (n, 3), read-only, as all arrays.
-            target: (6,) [N, N m], NaN along free axes.
             previous: command (n, 3) of the previous tick, if there is one.
             solve_ms: time spent solving [ms].
             answered: what the other fields follow from.
@@ -408,7 +407,6 @@ class Allocation(Answer[float]):
         made = object.__new__(cls)
         known = {
             "command": command,
-            "target": target,
             "previous": previous,
             "solve_ms": solve_ms,
             "answered": answered,

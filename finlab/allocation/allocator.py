@@ -28,7 +28,7 @@ from finlab.allocation.question import (
     free_mask,
 )
 from finlab.allocation.robot_state import RobotState, without_lost, working_actuators
-from finlab.allocation.solution import Candidates, Rows, Solution, joined
+from finlab.allocation.solution import Candidates, Rows, Solved, joined
 from finlab.arrays import Array
 from finlab.axes import Axis, axes_in
 from finlab.errors import AllocationError
@@ -243,9 +243,9 @@ class Allocator:
         """
         wrench_asked = check_target(wrench)
         state = self._state_of_question(damage, lost, free)
-        checked_policy = as_policy(policy)
+        checked_policy = policy if policy is CLOSEST else as_policy(policy)
         checked_seed = check_seed(seed)
-        checked_flow = check_flow(flow)
+        checked_flow = None if flow is None else check_flow(flow)
         multipliers: Array | None = None
         checked_previous: Array | None = None
         if previous is not None:
@@ -272,12 +272,9 @@ class Allocator:
         solution = state.solve(question)
         solve_ms = (time.perf_counter() - start) * 1e3
 
-        target_shown = state.shown(target)
-        target_shown.setflags(write=False)
         command = state.among_all(solution.command)[0]
-        command.setflags(write=False)
         answered = LazyFigures(state, question, wrench_asked, solution)
-        return Allocation.to_read(command, target_shown, checked_previous, solve_ms, answered)
+        return Allocation.to_read(command, checked_previous, solve_ms, answered)
 
     def refinement(self, result: Allocation) -> tuple[Candidates, ...]:
         """Returns what a network proposes for the question of a result, step by step.
@@ -340,7 +337,7 @@ class Allocator:
         start = time.perf_counter()
         question = state.question(wrenches_asked, checked_policy, checked_flow, checked_seed)
 
-        def parts() -> Iterator[tuple[Rows, Solution]]:
+        def parts() -> Iterator[tuple[Rows, Solved]]:
             for rows in chunks(len(wrenches_asked)):
                 yield rows, state.solve(question.part(rows))
 

@@ -20,7 +20,7 @@ import numpy as np
 
 from finlab.allocation.policy import Policy, PolicyName
 from finlab.allocation.question import MethodQuestion
-from finlab.allocation.solution import Candidates, Solution
+from finlab.allocation.solution import Candidates, Solution, Solved
 from finlab.arrays import Array
 from finlab.errors import AllocationError, LayoutError
 from finlab.layout.layout import Layout
@@ -257,7 +257,7 @@ class Method(ABC):
         return [field.name for field in fields(cls.settings_class)]
 
     @abstractmethod
-    def solve(self, question: MethodQuestion) -> Solution:
+    def solve(self, question: MethodQuestion) -> Solved:
         """Solves for the targets of a question.
 
         Args:

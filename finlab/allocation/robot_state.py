@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.method import Method
-from finlab.allocation.policy import Policy
+from finlab.allocation.policy import CLOSEST, Policy
 from finlab.allocation.question import MethodQuestion
-from finlab.allocation.solution import Solution, among_all
+from finlab.allocation.solution import Solution, Solved, among_all
 from finlab.arrays import Array
 from finlab.layout.damage import Damage
 from finlab.layout.layout import Layout
@@ -90,8 +90,12 @@ class RobotState:
 
     def among_all(self, command: Array) -> Array:
         """Returns commands (..., m, 3) of the actuators that work as those (..., n, 3) of all, NaN
-        for the lost ones."""
-        return among_all(command, self.works) if self.damage.lost else command
+        for the lost ones; read-only."""
+        if not self.damage.lost:
+            return command
+        command = among_all(command, self.works)
+        command.setflags(write=False)
+        return command
 
     @cached_property
     def _counts(self) -> Array:
@@ -140,7 +144,8 @@ class RobotState:
             AllocationError: the method does not know the policy.
         """
         method = self.method
-        method.check_policy(policy)
+        if policy is not CLOSEST:  # which every method knows
+            method.check_policy(policy)
         reads = method.reads
         lost: NDArray[np.bool_] | None = None
         free: NDArray[np.bool_] | None = None
@@ -159,7 +164,7 @@ class RobotState:
             targets, policy, previous, flow, seed, lost, free, multipliers, reference
         )
 
-    def solve(self, question: MethodQuestion) -> Solution:
+    def solve(self, question: MethodQuestion) -> Solved:
         """Asks the method.
 
         Args:
@@ -178,4 +183,5 @@ class RobotState:
         else:
             box = method.rates.box(question.previous)
             command = box.clip_feasible(solution.command, method.plant)
-        return solution._replace(command=command)
+        command.setflags(write=False)
+        return Solution.with_command(solution, command)

@@ -5,7 +5,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -119,28 +119,71 @@ class Candidates(PlainData):
         return Candidates(**arrays, source=self.source + others.source)
 
 
+class Solved(Protocol):
+    """What a method answers to N targets with the n actuators of its layout: a `Solution`, or what
+    finds the same when it is read."""
+
+    @property
+    def command(self) -> Array:
+        """Chosen commands (N, n, 3)."""
+
+    @property
+    def bound(self) -> Callable[[Array], Array] | None:
+        """Gives the power (N,) [W] that no answer can undercut which gives the wrenches of the
+        chosen commands (N, n, 3); None for methods that prove none."""
+
+    @property
+    def calm_power(self) -> Callable[[Array], Array] | None:
+        """Gives the part (N,) of the power [W] of the chosen commands (N, n, 3) that goes into less
+        turning; None for methods that weigh no turning, and outside of ticks."""
+
+    @property
+    def wrench(self) -> Array | None:
+        """Wrench (N, 6) that the method itself expects, where it has a model of its own."""
+
+    @property
+    def candidates(self) -> Callable[[], Candidates] | None:
+        """Gives the refined candidates, for a single target."""
+
+    @property
+    def samples(self) -> Callable[[], Candidates] | None:
+        """Gives the raw candidates before refinement, for a single target."""
+
+    @property
+    def multipliers(self) -> Array | None:
+        """Multipliers (N, 6) [W/N, W/(N m)] of the wrenches, what one more unit of each axis costs;
+        None where the method has none."""
+
+    @property
+    def notes(self) -> Callable[[], tuple[str, ...]] | None:
+        """Gives sentences about these answers; None for methods that have none."""
+
+
 class Solution(NamedTuple):
-    """What a method answers to N targets with the n actuators of its layout."""
+    """A `Solved` whose parts are known, or functions."""
 
     command: Array
-    """Chosen commands (N, n, 3)."""
     bound: Callable[[Array], Array] | None = None
-    """Gives the power (N,) [W] that no answer can undercut which gives the wrenches of the chosen
-    commands (N, n, 3); None for methods that prove none."""
     calm_power: Callable[[Array], Array] | None = None
-    """Gives the part (N,) of the power [W] of the chosen commands (N, n, 3) that goes into less
-    turning; None for methods that weigh no turning, and outside of ticks."""
     wrench: Array | None = None
-    """Wrench (N, 6) that the method itself expects, where it has a model of its own."""
     candidates: Callable[[], Candidates] | None = None
-    """Gives the refined candidates, for a single target."""
     samples: Callable[[], Candidates] | None = None
-    """Gives the raw candidates before refinement, for a single target."""
     multipliers: Array | None = None
-    """Multipliers (N, 6) [W/N, W/(N m)] of the wrenches, what one more unit of each axis costs;
-    None where the method has none."""
     notes: Callable[[], tuple[str, ...]] | None = None
-    """Gives sentences about these answers; None for methods that have none."""
+
+    @classmethod
+    def with_command(cls, solved: Solved, command: Array) -> Self:
+        """Returns a solution with another command (N, n, 3) for the same wrenches."""
+        return cls(
+            command,
+            solved.bound,
+            solved.calm_power,
+            solved.wrench,
+            solved.candidates,
+            solved.samples,
+            solved.multipliers,
+            solved.notes,
+        )
 
 
 def among_all(command: Array, works: NDArray[np.bool_]) -> Array:
@@ -164,9 +207,7 @@ Rows = slice | NDArray[np.intp]
 """Indices of targets."""
 
 
-def joined(
-    parts: Iterable[tuple[Rows, Solution]], count: int, works: NDArray[np.bool_]
-) -> Solution:
+def joined(parts: Iterable[tuple[Rows, Solved]], count: int, works: NDArray[np.bool_]) -> Solution:
     """Joins solutions for parts of the targets.
 
     Args:

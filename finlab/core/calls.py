@@ -7,7 +7,7 @@ commands that give their forces. The structs are those of finlab/core/fl_fields.
 import ctypes
 from collections.abc import Sequence
 from threading import Lock
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,41 +53,31 @@ class AnswerMemory:
 
 
 class AnswerRow:
-    """One answer of the core. What each number is, `CoreAnswer` says."""
+    """One answer of the core, in a row of memory. What each number is, `CoreAnswer` says."""
 
-    __slots__ = ("_memory", "_row", "is_finished", "is_met")
+    __slots__ = ("_memory", "_row", "command", "is_finished", "is_met")
 
-    def __init__(self, memory: AnswerMemory, row: int, is_finished: bool, is_met: bool) -> None:
+    def __init__(self, memory: AnswerMemory, row: int, is_met: bool, is_finished: bool) -> None:
         """Takes a row that the core has written.
 
         Args:
             memory: of the row.
             row: its index.
-            is_finished: whether no steps by the laws themselves can better it.
-            is_met: whether it is finished, and the wrench is within reach.
+            is_met: whether the wrench is within reach, and the commands are exact.
+            is_finished: whether it is met, or no step by the laws themselves can better it.
         """
         self._memory = memory
         self._row = row
-        self.is_finished = is_finished
         self.is_met = is_met
-
-    @property
-    def command(self) -> Array:
-        """Command (1, n, 3), read-only; NaN of lost actuators."""
-        command: Array = self._memory.command[self._row]
-        return command
+        self.is_finished = is_finished
+        self.command: Array = memory.command[row]
+        """Command (1, n, 3), read-only; NaN of lost actuators where it is finished."""
 
     @property
     def multipliers(self) -> Array:
         """(1, 6) [W/N, W/(N m)], read-only."""
         multipliers: Array = self._memory.multipliers[self._row]
         return multipliers
-
-    @property
-    def force(self) -> Array:
-        """Forces (1, n, 2) [N] along each actuator's directions, read-only."""
-        force: Array = self._memory.force[self._row]
-        return force
 
     @property
     def wrench_served(self) -> Array:
@@ -99,21 +89,19 @@ class AnswerRow:
         """Power (1,) [W] that gaps are proved to need, read-only."""
         return self._head["gap_power_bound"]
 
-    @property
-    def error(self) -> Array:
-        """Distance (1,) of what the command gives from the wrench served, over the wrench scale,
-        by the grids of the laws, read-only."""
-        return self._head["error"]
-
-    @property
-    def is_attainable(self) -> NDArray[np.bool_]:
-        """Whether the wrench (1,) that was asked for is within reach."""
-        return np.asarray(self._head["is_attainable"] != 0.0)
-
-    @property
-    def is_truncated(self) -> bool:
-        """Whether a search ended at its limit of steps before it was done."""
-        return bool(self._head["is_truncated"][0])
+    def copied(self) -> "CoreAnswer":
+        """Returns the answer with N = 1, in arrays of its own."""
+        head = self._head
+        return CoreAnswer(
+            force=self._memory.force[self._row].copy(),
+            multipliers=self.multipliers.copy(),
+            wrench_served=head["wrench_served"].copy(),
+            gap_power_bound=head["gap_power_bound"].copy(),
+            is_attainable=head["is_attainable"] != 0.0,
+            command=self.command.copy(),
+            error=head["error"].copy(),
+            is_truncated=bool(head["is_truncated"][0]),
+        )
 
     @property
     def _head(self) -> Record:
@@ -144,20 +132,6 @@ class CoreAnswer(NamedTuple):
     grids of the laws."""
     is_truncated: bool
     """Whether a search for one of them ended at its limit of steps before it was done."""
-
-    @classmethod
-    def of_row(cls, row: AnswerRow) -> Self:
-        """Returns the answer of a row, with N = 1, in arrays of its own."""
-        return cls(
-            force=row.force.copy(),
-            multipliers=row.multipliers.copy(),
-            wrench_served=row.wrench_served.copy(),
-            gap_power_bound=row.gap_power_bound.copy(),
-            is_attainable=row.is_attainable.copy(),
-            command=row.command.copy(),
-            error=row.error.copy(),
-            is_truncated=row.is_truncated,
-        )
 
 
 class Conjugates(NamedTuple):
@@ -419,11 +393,12 @@ class Core:
             CommandError: the core cannot work with these numbers.
         """
         with self._lock:
+            memory = self._memory
             row = self._rows_used
             if row == ROWS:
-                self._memory = AnswerMemory(self._n)
+                memory = AnswerMemory(self._n)
+                self._memory = memory
                 row = 0
-            memory = self._memory
             self._rows_used = row + 1
             question = self._question
             question.write_wrench(wrench)
@@ -439,7 +414,7 @@ class Core:
             return AnswerRow(memory, row, True, True)
         if code != self._unfinished and code != self._beyond_reach:
             raise_refusal(code)
-        return AnswerRow(memory, row, code == self._beyond_reach, False)
+        return AnswerRow(memory, row, False, code == self._beyond_reach)
 
     def answer_one(
         self,
@@ -464,8 +439,7 @@ class Core:
         Raises:
             CommandError: the core cannot work with these numbers.
         """
-        row = self.answer_row(wrench, policy, multipliers, conditions, 0.0)
-        return CoreAnswer.of_row(row)
+        return self.answer_row(wrench, policy, multipliers, conditions, -1.0).copied()
 
     def answer_many(
         self, wrenches: Array, policy: Record | None, conditions: Conditions = NOMINAL

@@ -20,10 +20,10 @@ from finlab.allocation.levenberg_marquardt import EXACT, CommandProblem, exact_c
 from finlab.allocation.method import Method, Settings, number
 from finlab.allocation.policy import CLOSEST, Policy
 from finlab.allocation.question import MethodQuestion
-from finlab.allocation.solution import Solution
+from finlab.allocation.solution import Solution, Solved
 from finlab.arrays import NEARLY, NOTHING, ROUNDING, Array
 from finlab.axes import axes_in
-from finlab.core.calls import NOMINAL, AnswerRow, Conditions, CoreAnswer
+from finlab.core.calls import NOMINAL, AnswerRow, Conditions
 from finlab.layout.effectiveness import wrench_of_forces
 
 if TYPE_CHECKING:
@@ -55,6 +55,75 @@ class DualSettings(Settings):
     calm: float = number(
         2.0, 0.0, 10.0, "what turning costs in a tick: 0 nothing, 2 some power for half the turning"
     )
+
+
+class FinishedSolution:
+    """A `Solved` of one target, whose command is the best as the core gives it; all else is found
+    when it is read."""
+
+    __slots__ = ("_conditions", "_method", "_row", "_targets", "command")
+
+    def __init__(
+        self, method: "Dual", conditions: Conditions, targets: Array, row: AnswerRow
+    ) -> None:
+        """Takes what the core has answered.
+
+        Args:
+            method: in the flow of the question.
+            conditions: under which it was asked.
+            targets: (1, 6) [N, N m].
+            row: the answer, which is finished.
+        """
+        self._method = method
+        self._conditions = conditions
+        self._targets = targets
+        self._row = row
+        self.command = row.command
+        """Command (1, n, 3)."""
+
+    @property
+    def bound(self) -> Callable[[Array], Array] | None:
+        """Proves the lower bound of the power, see `Dual.bound`; None where it proves none."""
+        if self._method.has_no_bound:
+            return None
+        row = self._row
+        return partial(
+            self._method.bound,
+            row.wrench_served,
+            row.multipliers,
+            row.gap_power_bound,
+            self._conditions,
+        )
+
+    @property
+    def calm_power(self) -> Callable[[Array], Array] | None:
+        """Gives what less turning takes, see `Dual.calm_power`; None outside of ticks."""
+        if self._conditions.calm == 0.0:
+            return None
+        return partial(self._method.calm_power, self._conditions)
+
+    @property
+    def multipliers(self) -> Array:
+        """Multipliers (1, 6) [W/N, W/(N m)]."""
+        return self._row.multipliers
+
+    def notes(self) -> tuple[str, ...]:
+        """Returns sentences about the answer."""
+        if self._row.is_met:
+            return ()
+        return self._method.notes_of(set(), self._targets, self._conditions)
+
+    @property
+    def wrench(self) -> None:
+        """The method has no model of its own."""
+
+    @property
+    def candidates(self) -> None:
+        """It has no candidates."""
+
+    @property
+    def samples(self) -> None:
+        """It draws none."""
 
 
 class Dual(Method):
@@ -118,7 +187,7 @@ class Dual(Method):
             self._in_last_flow = other
         return other
 
-    def solve(self, question: MethodQuestion) -> Solution:
+    def solve(self, question: MethodQuestion) -> Solved:
         """Solves for targets; see `Method.solve`. In a tick pods turn in time for the reference.
 
         Returns:
@@ -169,7 +238,7 @@ class Dual(Method):
         targets: Array,
         policy: Policy,
         multipliers: Array | None = None,
-    ) -> Solution:
+    ) -> Solved:
         """Solves for targets in the flow of this method.
 
         Args:
@@ -189,8 +258,8 @@ class Dual(Method):
                 targets[0], policy, multipliers, conditions, self._most_core_error
             )
             if row.is_finished:
-                return self._solution_of_row(row, targets, conditions)
-            answer = CoreAnswer.of_row(row)
+                return FinishedSolution(self, conditions, targets, row)
+            answer = row.copied()
         else:
             answer = self.compiled.forces(targets, policy, None, conditions)
         problem = self.problem_under(conditions)
@@ -210,21 +279,6 @@ class Dual(Method):
             answer.gap_power_bound,
             partial(self.notes_of, sentences, targets[~answer.is_attainable], conditions),
             conditions,
-        )
-
-    def _solution_of_row(self, row: AnswerRow, targets: Array, conditions: Conditions) -> Solution:
-        """The solution for one of the targets (1, 6), whose command is the best as the core gives
-        it."""
-        bound = None if self.has_no_bound else partial(self._bound_of_row, row, conditions)
-        calm_power = partial(self.calm_power, conditions) if conditions.calm > 0.0 else None
-        notes = None if row.is_met else partial(self.notes_of, set(), targets, conditions)
-        # By position, in the order of the fields: every tick pays for it.
-        return Solution(row.command, bound, calm_power, None, None, None, row.multipliers, notes)
-
-    def _bound_of_row(self, row: AnswerRow, conditions: Conditions, command: Array) -> Array:
-        """Proves the bound (1,) [W] for the command (1, n, 3) of a row; see `bound`."""
-        return self.bound(
-            row.wrench_served, row.multipliers, row.gap_power_bound, conditions, command
         )
 
     @cached_property
@@ -295,6 +349,7 @@ class Dual(Method):
             command = self.rates.box(conditions.previous).clip_feasible(command, self.plant)
         if conditions.lost is not None:
             command[:, conditions.lost] = np.nan
+        command.setflags(write=False)
         bound: Callable[[Array], Array] = partial(
             self.bound, wrench_served, multipliers, gap_power_bound, conditions
         )
