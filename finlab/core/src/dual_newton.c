@@ -24,9 +24,7 @@
        l       share of the slope that is left at the end of a step                Eq. 10 */
 #include "internal.h"
 
-/* Share c of M, and first mu where an actuator may be at its limit; NEARLY elsewhere. */
-#define SATURATED R(1e-1)
-#define NEAR_LIMIT R(0.8)  /* share of the largest force from which an actuator may be there */
+#define SATURATED R(1e-1)  /* share c of M */
 #define FELL R(0.9)        /* a residual above this share of the last one has not improved */
 #define JUMPS 4            /* trials with a jump after which Newton's method stands still */
 #define JUMP_STEP R(1e-3)  /* squared step, over squared multipliers, too long to judge */
@@ -121,7 +119,7 @@ void fl_prepare_sets(const real *block, fl_work *work) {
 }
 
 void fl_restore_sets(const real *block, fl_work *work, const fl_set *set) {
-  memcpy(work->set, set, sizeof work->set);
+  copy_sets(block, set, work->set);
   fl_prepare_sets(block, work);
 }
 
@@ -174,58 +172,6 @@ void fl_dual_start(const real *block, fl_work *work, const real *target_reduced,
                    const real *lambda) {
   work->state_found = work->state;
   fl_dual_at(block, work, target_reduced, lambda, work->state);
-}
-
-/* Largest force [N] of a line at prices of this sign, and its secant there [N^2/W]. */
-static void secant_of_line(const real *block, const fl_actuator *a, real s, real *most,
-                           real *secant) {
-  const real *table = block + (int)a->force_table;
-  if (s < 0 && a->force_table_reverse > 0) table = block + (int)a->force_table_reverse;
-  const real price_max = table[0];
-  const int cells = (int)table[1];
-  const real force_max = table[3 + 3 * cells];
-  *most = a->force_scale * force_max;
-  *secant = *most * a->force_scale / (price_max * a->power_scale);
-}
-
-/* Multipliers to begin with: those at which actuators whose costs are ~ T^1.5 give a target,
-   each with its force over price at what it gives where costs are quadratic. Also the first
-   mu. */
-void fl_first_lambda(const real *block, const fl_work *work, const real *target_reduced,
-                     real *lambda, real *mu) {
-  /* Multipliers of quadratic costs without limits. C99 cannot pass the factor as const; it
-     is only read. */
-  real lambda_quadratic[6];
-  fl_solve((real(*)[6])work->hessian_factor, target_reduced, lambda_quadratic);
-  real H[6][6] = {{0}};
-  *mu = NEARLY;
-  for (int i = 0; i < COUNT(block); i++) {
-    const fl_actuator *a = ACTUATOR(block, i);
-    real s[2];
-    actuator_price(work, i, lambda_quadratic, s);
-    real size_s = FABS(s[0]); /* of a foil its lift alone counts */
-    if (is_plane(a)) size_s = size_of(s);
-    const real size_y = a->secant[0] * size_s;
-    real most = a->row_force_max[0];
-    real secant[2] = {a->secant[0], a->secant[1]};
-    if (a->rows == 1) secant_of_line(block, a, s[0], &most, &secant[0]);
-
-    const real share = size_y / most;
-    if (share > NEAR_LIMIT) *mu = SATURATED;
-    /* Force over price of a cost ~ T^1.5 is the root of the share; at a limit the force stays. */
-    real weight = SQRT(clipped(share, CLOSE, 1));
-    if (share > 1 && !work->has_drag) weight = 1 / share;
-    for (int row = 0; row < (int)a->rows; row++) {
-      fl_add_square(H, work->span.effectiveness_reduced[i][row], weight * secant[row]);
-    }
-  }
-  const real trace = fl_trace(H);
-  for (int j = 0; j < 6; j++) H[j][j] += NOTHING * trace; /* regular behind the range, too */
-  if (fl_factor(H)) {
-    fl_solve(H, target_reduced, lambda);
-    return;
-  }
-  for (int j = 0; j < 6; j++) lambda[j] = target_reduced[j] / trace;
 }
 
 /* Adds B D B' to the lower triangle of H, of a plane: B = (bx, by), D = (xx, xy; xy, yy). */
