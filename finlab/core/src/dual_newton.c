@@ -183,10 +183,16 @@ static void add_plane(real H[6][6], const real *bx, const real *by, real xx, rea
   }
 }
 
+/* c of Eq. 8. */
+static real share_of_metric(const fl_work *work) {
+  if (work->has_drag) return 1; /* S is left out there */
+  return SATURATED;
+}
+
 /* Solves (G_mu + mu c max(tr G_mu, tau) M) step = r with G_mu = G + mu S, Eq. 8; 0 where that is
-   singular to rounding. */
+   singular to rounding. Also max(tr G_mu, tau). */
 static int newton_step(const real *block, const fl_work *work, const fl_state *at, real mu,
-                       real *step) {
+                       real *step, real *trace) {
   real H[6][6] = {{0}}; /* G_mu */
   for (int i = 0; i < COUNT(block); i++) {
     const real(*B)[6] = work->span.effectiveness_reduced[i];
@@ -199,16 +205,33 @@ static int newton_step(const real *block, const fl_work *work, const fl_state *a
     else if (xx > 0)
       fl_add_square(H, B[0], xx);
   }
-  real c = SATURATED;
-  if (work->has_drag) c = 1; /* S is left out there */
-  const real trace = larger(fl_trace(H), work->trace_min);
-  const real weight = c * mu * trace; /* of M */
+  *trace = larger(fl_trace(H), work->trace_min);
+  const real weight = share_of_metric(work) * mu * *trace; /* of M */
   for (int row = 0; row < 6; row++) {
     for (int col = 0; col <= row; col++) H[row][col] += weight * work->metric[row][col];
   }
   if (!fl_factor(H)) return 0;
   fl_solve(H, at->residual, step);
   return 1;
+}
+
+/* d'(S + c max(tr G_mu, tau) M) d of a step d: what mu weighs in the curvature along it. */
+static real damping_along(const real *block, const fl_work *work, const fl_state *at, real trace,
+                          const real *step) {
+  real sum = 0;
+  for (int i = 0; i < COUNT(block); i++) {
+    real s[2];
+    actuator_price(work, i, step, s);
+    sum += at->secant[i] * (s[0] * s[0] + s[1] * s[1]);
+  }
+  real of_metric = 0;
+  for (int row = 0; row < 6; row++) {
+    of_metric += work->metric[row][row] * step[row] * step[row];
+    for (int col = 0; col < row; col++) {
+      of_metric += 2 * work->metric[row][col] * step[row] * step[col];
+    }
+  }
+  return sum + share_of_metric(work) * trace * of_metric;
 }
 
 /* How many responses jump between two states a step apart; where wanted they are marked as
@@ -264,25 +287,30 @@ static real mu_after_kept(real mu, const step_result *result) {
   return larger(mu * factor, ROUNDING);
 }
 
-/* Divides mu by the share of the step where the cubic along it, of both values and slopes,
-   is largest. */
-static real mu_after_refused(real mu, real nu, const step_result *result) {
+/* The mu at which the step, were it as long along its direction as its curvature says, would be the
+   share of itself where the cubic along it, of both values and slopes, is largest. `damping` is
+   what mu weighs in that curvature. */
+static real mu_after_refused(real mu, real nu, const step_result *result, real damping) {
   const real a = 3 * (result->slope_begin + result->slope_end - 2 * result->rise);
   const real b = result->slope_end - result->slope_begin - a;
   const real discriminant = b * b - 4 * a * result->slope_begin;
   real share = R(0.5);
   if (discriminant > 0) share = 2 * result->slope_begin / (SQRT(discriminant) - b);
-  const real factor = larger(nu, 1 / clipped(share, SHARE_LEAST, SHARE_MOST));
-  return larger(mu * factor, ROUNDING);
+  const real shorter = 1 / clipped(share, SHARE_LEAST, SHARE_MOST);
+  /* Along the step its curvature is its slope at the beginning. */
+  const real more = (shorter - 1) * result->slope_begin / larger(damping, TINY);
+  return larger(larger(mu * nu, mu + more), ROUNDING);
 }
 
 /* Newton's method from multipliers on, or from its own first ones where there are none.
    work->state_found is the dual at the multipliers that it comes to, however it ends. Returns
-   FL_MET, FL_BEYOND or FL_NO_PROGRESS. */
+   FL_MET, FL_BEYOND (also where all answers take more than work->power_of_use) or
+   FL_NO_PROGRESS. */
 int fl_dual_newton(const real *block, fl_work *work, const real *target_reduced, const real *lambda,
                    int most_steps) {
   /* No forces cost more than C: a larger value proves that none add up to the target, Eq. 13. */
-  const real beyond = work->power_cost_max * (1 + NOTHING) + NOTHING;
+  const real most_power = work->power_cost_max * (1 + NOTHING) + NOTHING;
+  const real beyond = smaller(most_power, work->power_of_use);
   real mu = NEARLY;
   real nu = 2; /* growth of mu after a refused step; doubles with each in a row (Nielsen) */
   real lambda_first[6];
@@ -316,7 +344,8 @@ int fl_dual_newton(const real *block, fl_work *work, const real *target_reduced,
     work->newton_steps++;
 
     real step[6];
-    if (!newton_step(block, work, at, mu, step)) {
+    real trace;
+    if (!newton_step(block, work, at, mu, step, &trace)) {
       mu *= MU_SINGULAR;
       continue;
     }
@@ -338,7 +367,8 @@ int fl_dual_newton(const real *block, fl_work *work, const real *target_reduced,
       trial = at;
       at = work->state_found;
     } else {
-      mu = mu_after_refused(mu, nu, &result);
+      const real damping = damping_along(block, work, at, trace, step);
+      mu = mu_after_refused(mu, nu, &result, damping);
       nu *= 2;
       /* A refused step does not count as idle: its growing mu ends the loop. */
       idle--;

@@ -310,12 +310,9 @@ static void cheapest_forces(const real *block, fl_work *work, real force[][2], c
       real unused;
       fl_first_lambda(block, work, target_reduced, lambda, &unused);
     }
-    if (trial == INSIDE) {
-      /* What the dual proves there already may be more than the forces have to save. */
-      fl_dual_start(block, work, target_reduced, lambda);
-      if (work->state_found->dual_value > most_power) return;
-    }
+    work->power_of_use = most_power;
     fl_dual_newton(block, work, target_reduced, lambda, FL_STEPS_AT_KINK);
+    work->power_of_use = INFEASIBLE_COST;
     const real dual_value = work->state_found->dual_value;
     const int has_met = !(work->state_found->residual_size > larger(AT_RIM, ENOUGH));
     if (!has_met || dual_value > most_power) continue;
