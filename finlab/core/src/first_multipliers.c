@@ -39,8 +39,23 @@ static quadratic_cost quadratic_of(const real *block, const fl_actuator *a, real
   return cost;
 }
 
-/* Adds to H the forces over prices that an actuator whose cost is ~ T^1.5 has at the force that it
-   gives to multipliers where costs are quadratic. Returns that force over its largest one. */
+/* Force over price at a share of the largest force, over the secant of that [1]. Where the cost is
+   ~ T^1.5, as of all laws nearly, it is the root of the share; the table of a line whose cost is
+   another one says it. */
+static real secant_at(const real *block, int i, real price, real share, const quadratic_cost *cost) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  const int has_cells = table_for(block, a, price)[1] > 1;
+  if (a->rows != 1 || !has_cells) return SQRT(share);
+  const real size = share * cost->most;
+  real force = size;
+  if (price < 0) force = -size;
+  real price_of_force;
+  fl_power_and_price(block, i, force, &price_of_force);
+  return size / larger(price_of_force * cost->secant[0], TINY);
+}
+
+/* Adds to H the forces over prices that an actuator has at the force that it gives to multipliers
+   where costs are quadratic. Returns that force over its largest one. */
 static real add_secants(const real *block, const fl_work *work, int i, const real *lambda_quadratic,
                         real H[6][6]) {
   const fl_actuator *a = ACTUATOR(block, i);
@@ -51,9 +66,8 @@ static real add_secants(const real *block, const fl_work *work, int i, const rea
   const real size_y = a->secant[0] * size_s;
   const quadratic_cost cost = quadratic_of(block, a, s[0]);
   const real share = size_y / cost.most;
-  /* Force over price of a cost ~ T^1.5 is the root of the share; at a limit the force stays. */
-  real weight = SQRT(clipped(share, CLOSE, 1));
-  if (share > 1 && !work->has_drag) weight = 1 / share;
+  real weight = secant_at(block, i, s[0], clipped(share, CLOSE, 1), &cost);
+  if (share > 1 && !work->has_drag) weight = 1 / share; /* at a limit the force stays */
   for (int row = 0; row < (int)a->rows; row++) {
     fl_add_square(H, work->span.effectiveness_reduced[i][row], weight * cost.secant[row]);
   }
@@ -72,9 +86,8 @@ static void solve_regular(real H[6][6], real ridge_share, const real *target_red
   for (int j = 0; j < 6; j++) lambda[j] = target_reduced[j] / trace;
 }
 
-/* Multipliers to begin with: those at which actuators whose costs are ~ T^1.5 give a target,
-   each with its force over price at what it gives where costs are quadratic. Also the first
-   mu. */
+/* Multipliers to begin with: those at which actuators give a target, each with its force over price
+   at what it gives where costs are quadratic. Also the first mu. */
 void fl_first_lambda(const real *block, const fl_work *work, const real *target_reduced,
                      real *lambda, real *mu) {
   /* Multipliers of quadratic costs without limits. C99 cannot pass the factor as const; it
