@@ -207,21 +207,32 @@ void fl_first_lambda_at_rim(const real *block, fl_work *work, const real *target
 
 /* Multipliers to begin with at a target that lies so far `inside` of the rim along its normal n, of
    those of a target at the rim, which become them: t n + nu with a smaller t. What forces lose along
-   n by nu grows about as 1 / t^2, by those that are no longer the largest it grows faster. */
+   n by nu grows about as 1 / t^2, by those that are no longer the largest it grows faster: t is
+   looked for at which they lose about as much as the target does. */
 void fl_first_lambda_inside(const real *block, fl_work *work, const real *target_reduced,
                             const real *normal, real inside, real *lambda) {
   const real squared = dot(normal, normal, 6);
-  real t = dot(normal, lambda, 6) / larger(squared, TINY);
+  const real t_rim = dot(normal, lambda, 6) / larger(squared, TINY);
+  if (!(t_rim > 0 && inside > 0)) return;
   real nu[6];
-  for (int j = 0; j < 6; j++) nu[j] = lambda[j] - t * normal[j];
-  real lost = lost_along(block, work, target_reduced, normal, nu, t, inside);
-  if (!(t > 0 && inside > 0)) return;
-  if (lost > 0 && lost < inside) t *= SQRT(lost / inside);
+  for (int j = 0; j < 6; j++) nu[j] = lambda[j] - t_rim * normal[j];
+  real lost = lost_along(block, work, target_reduced, normal, nu, t_rim, inside);
+  real high = t_rim; /* where they lose less than the target */
+  real low = 0;      /* where they lose more */
+  real t = t_rim / SEARCH_FACTOR;
+  if (lost > 0 && lost < inside) t = smaller(t, t_rim * SQRT(lost / inside));
   for (int k = 0; k < SEARCH_STEPS; k++) {
     lost = lost_along(block, work, target_reduced, normal, nu, t, inside);
-    if (lost > inside / SEARCH_FACTOR) break;
-    t /= SEARCH_FACTOR;
+    const real most = SEARCH_FACTOR * inside;
+    if (lost > most) {
+      low = t;
+    } else if (lost < inside / SEARCH_FACTOR) {
+      high = t;
+    } else {
+      break;
+    }
+    t = high / SEARCH_FACTOR;
+    if (low > 0) t = SQRT(low * high);
   }
-  t *= SQRT(clipped(lost / inside, R(1.0) / SEARCH_FACTOR, SEARCH_FACTOR * SEARCH_FACTOR));
   for (int j = 0; j < 6; j++) lambda[j] = t * normal[j] + nu[j];
 }
