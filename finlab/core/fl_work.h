@@ -127,6 +127,7 @@ struct fl_work {
   fl_real hessian_factor[6][6]; /* of quadratic costs, L D L' */
   fl_real trace_min;            /* trace below which G_mu of Eq. 8 is singular */
   fl_real power_cost_max;       /* C of Eq. 13 [W] */
+  fl_real residual_enough;      /* of scaled wrenches, at which a target is met */
   fl_real power_of_use;         /* dual value above which an answer is of no use [W] */
   int is_convex;                /* whether no set has a gap or a kink */
   int has_forks;                /* whether one is forked, or pushes either way */

@@ -34,7 +34,8 @@
 #define MU_SINGULAR 10        /* mu grows by this where the step's matrix is singular to rounding */
 #define MU_KEPT_LEAST R(0.05) /* mu after a kept step, over that before: at least */
 #define MU_KEPT_EARLY R(0.3)  /* the same where more than half of the slope is left at its end */
-#define SHARE_LEAST R(1e-3)   /* of a refused step, the least share that is tried next */
+#define SHARE_LEAST R(0.02)   /* of a refused step, the least share that is tried next */
+#define SHARE_LEAST_DRAG R(1e-3) /* the same where foils drag, whose kinks are many */
 #define SHARE_MOST R(0.7)     /* the largest one */
 #define WRENCH_MIN R(1e-3)    /* what a scaled wrench counts at least, in rounding of its range */
 
@@ -290,13 +291,14 @@ static real mu_after_kept(real mu, const step_result *result) {
 /* The mu at which the step, were it as long along its direction as its curvature says, would be the
    share of itself where the cubic along it, of both values and slopes, is largest. `damping` is
    what mu weighs in that curvature. */
-static real mu_after_refused(real mu, real nu, const step_result *result, real damping) {
+static real mu_after_refused(real mu, real nu, const step_result *result, real damping,
+                             real share_least) {
   const real a = 3 * (result->slope_begin + result->slope_end - 2 * result->rise);
   const real b = result->slope_end - result->slope_begin - a;
   const real discriminant = b * b - 4 * a * result->slope_begin;
   real share = R(0.5);
   if (discriminant > 0) share = 2 * result->slope_begin / (SQRT(discriminant) - b);
-  const real shorter = 1 / clipped(share, SHARE_LEAST, SHARE_MOST);
+  const real shorter = 1 / clipped(share, share_least, SHARE_MOST);
   /* Along the step its curvature is its slope at the beginning. */
   const real more = (shorter - 1) * result->slope_begin / larger(damping, TINY);
   return larger(larger(mu * nu, mu + more), ROUNDING);
@@ -318,6 +320,8 @@ int fl_dual_newton(const real *block, fl_work *work, const real *target_reduced,
     fl_first_lambda(block, work, target_reduced, lambda_first, &mu);
     lambda = lambda_first;
   }
+  real share_least = SHARE_LEAST;
+  if (work->has_drag) share_least = SHARE_LEAST_DRAG;
   fl_dual_start(block, work, target_reduced, lambda);
   fl_state *at = work->state;
   fl_state *trial = work->state + 1;
@@ -327,7 +331,7 @@ int fl_dual_newton(const real *block, fl_work *work, const real *target_reduced,
   int jumps = 0;
   for (int i = 0; work->has_turn_cost && i < COUNT(block); i++) work->set[i].has_jumped = 0;
   for (int k = 0;; k++) {
-    if (at->residual_size <= TOLERANCE) return FL_MET;
+    if (at->residual_size <= work->residual_enough) return FL_MET;
     if (at->dual_value > beyond) return FL_BEYOND;
     const int has_risen = at->dual_value > best_value + ROUNDING * FABS(best_value);
     if (has_risen || at->residual_size < FELL * best_size) {
@@ -368,7 +372,7 @@ int fl_dual_newton(const real *block, fl_work *work, const real *target_reduced,
       at = work->state_found;
     } else {
       const real damping = damping_along(block, work, at, trace, step);
-      mu = mu_after_refused(mu, nu, &result, damping);
+      mu = mu_after_refused(mu, nu, &result, damping, share_least);
       nu *= 2;
       /* A refused step does not count as idle: its growing mu ends the loop. */
       idle--;

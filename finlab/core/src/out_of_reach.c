@@ -204,6 +204,8 @@ static void serve_priority(const real *block, fl_work *work, const real *wrench,
     }
     score[g] = rounded((real)missed);
   }
+  /* The normal is that of axes of very different weights, by which rounding counts as a price. */
+  if (fl_has_lines_alone(block)) work->is_rim_exact = 0;
 }
 
 /* Serves a policy within the sets of a part; how badly, the first number counting most, the
@@ -311,8 +313,10 @@ static void cheapest_forces(const real *block, fl_work *work, real force[][2], c
       fl_first_lambda(block, work, target_reduced, lambda, &unused);
     }
     work->power_of_use = most_power;
+    if (!work->is_rim_exact) work->residual_enough = larger(SAME_POINT, TOLERANCE);
     fl_dual_newton(block, work, target_reduced, lambda, FL_STEPS_AT_KINK);
     work->power_of_use = INFEASIBLE_COST;
+    work->residual_enough = TOLERANCE;
     const real dual_value = work->state_found->dual_value;
     const int has_met = !(work->state_found->residual_size > larger(AT_RIM, ENOUGH));
     if (!has_met || dual_value > most_power) continue;
@@ -458,7 +462,9 @@ void fl_out_of_reach(const real *block, fl_work *work, const real *wrench, const
   real target_reduced[6];
   fl_reduce_wrench(work, out->wrench_served, target_reduced);
   /* Another part of the sets may give it for less. */
-  const int status = fl_dual_newton(block, work, target_reduced, 0, FL_STEPS);
+  real lambda[6];
+  memcpy(lambda, out->lambda_reduced, sizeof lambda);
+  const int status = fl_dual_newton(block, work, target_reduced, lambda, FL_STEPS);
   if (!work->has_drag) {
     cheapen_by_parts(block, work, target_reduced, status, out);
     return;
