@@ -127,6 +127,8 @@ struct fl_work {
   fl_real hessian_factor[6][6]; /* of quadratic costs, L D L' */
   fl_real trace_min;            /* trace below which G_mu of Eq. 8 is singular */
   fl_real power_cost_max;       /* C of Eq. 13 [W] */
+  fl_real residual_enough;      /* of scaled wrenches, at which a target is met */
+  fl_real power_of_use;         /* dual value above which an answer is of no use [W] */
   int is_convex;                /* whether no set has a gap or a kink */
   int has_forks;                /* whether one is forked, or pushes either way */
   int has_drag;                 /* whether a foil drags */
@@ -137,7 +139,10 @@ struct fl_work {
   /* Points of the attainable set near to a wrench out of reach. */
   fl_mixture mixture;                            /* that comes nearest */
   fl_wide effectiveness_weighted[FL_MOST][2][6]; /* wrench per newton of each row, weighted axes */
+  fl_wide axis_weight[6];                        /* of these axes [1] */
   int polygon_offset[FL_MOST];                   /* of polygons that stand for sets; 0 for none */
+  fl_real rim_normal[6];   /* outer normal of the attainable set there, in the basis */
+  int is_rim_exact;        /* whether point and normal are known to rounding */
   fl_wide distance_enough; /* over the wrench scale, up to which a point is the nearest one */
   const fl_wide *ray; /* (6,) of which a mixture may take a share, in weighted axes; 0 for none */
 

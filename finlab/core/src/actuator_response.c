@@ -289,11 +289,13 @@ static push_direction farthest_direction(const fl_set *set, const real *gauge, c
 
 /* The force of a set that is worth most at a price (2,), whatever its power: what of it adds to the
    support function of Eq. 12. Returns the price along it [W/N], of planes that push either way
-   along what they push ahead. */
-real fl_support_of_set(const real *block, int i, const fl_set *set, const real *price,
-                       wide *force) {
+   along what they push ahead. `slope` (3,) becomes the derivative of the force by the price, xx, xy
+   and yy [N^2/W], of planes alone; 0 for none. */
+real fl_support_of_set(const real *block, int i, const fl_set *set, const real *price, wide *force,
+                       real *slope) {
   const fl_actuator *a = ACTUATOR(block, i);
   force[1] = 0;
+  if (slope) memset(slope, 0, 3 * sizeof *slope);
   if (a->rows == 1) {
     force[0] = set->force_min;
     if (price[0] > 0) force[0] = set->force_max;
@@ -315,13 +317,20 @@ real fl_support_of_set(const real *block, int i, const fl_set *set, const real *
   const wide times = size / 2 * (3 - length_squared);
   force[0] *= times;
   force[1] *= times;
+  if (slope) {
+    slope[0] = size * g.xx;
+    slope[1] = size * g.xy;
+    slope[2] = size * g.yy;
+  }
   if (set->force_max_reverse > 0) {
     const fl_set reversed = fl_reversed_set(set);
     wide other[2];
-    const real v = fl_support_of_set(block, i, &reversed, price, other);
+    real other_slope[3];
+    const real v = fl_support_of_set(block, i, &reversed, price, other, other_slope);
     if (v > 0 && reversed.force_max * v > size * g.v) {
       force[0] = other[0];
       force[1] = other[1];
+      if (slope) memcpy(slope, other_slope, sizeof other_slope);
     }
   }
   return g.v;

@@ -15,14 +15,6 @@
 
 int fl_version(void) { return FL_VERSION; }
 
-static void copy_forces(const real *block, real force[][2], real to[][2]) {
-  memcpy(to, force, (size_t)COUNT(block) * sizeof force[0]);
-}
-
-static void copy_commands(const real *block, real command[][3], real to[][3]) {
-  memcpy(to, command, (size_t)COUNT(block) * sizeof command[0]);
-}
-
 /* An answer before anything is known: no forces. */
 static void begin_answer(const real *block, const real *wrench, fl_answer *out) {
   out->gap_power_bound = 0;

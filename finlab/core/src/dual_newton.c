@@ -24,9 +24,7 @@
        l       share of the slope that is left at the end of a step                Eq. 10 */
 #include "internal.h"
 
-/* Share c of M, and first mu where an actuator may be at its limit; NEARLY elsewhere. */
-#define SATURATED R(1e-1)
-#define NEAR_LIMIT R(0.8)  /* share of the largest force from which an actuator may be there */
+#define SATURATED R(1e-1)  /* share c of M */
 #define FELL R(0.9)        /* a residual above this share of the last one has not improved */
 #define JUMPS 4            /* trials with a jump after which Newton's method stands still */
 #define JUMP_STEP R(1e-3)  /* squared step, over squared multipliers, too long to judge */
@@ -36,7 +34,8 @@
 #define MU_SINGULAR 10        /* mu grows by this where the step's matrix is singular to rounding */
 #define MU_KEPT_LEAST R(0.05) /* mu after a kept step, over that before: at least */
 #define MU_KEPT_EARLY R(0.3)  /* the same where more than half of the slope is left at its end */
-#define SHARE_LEAST R(1e-3)   /* of a refused step, the least share that is tried next */
+#define SHARE_LEAST R(0.02)   /* of a refused step, the least share that is tried next */
+#define SHARE_LEAST_DRAG R(1e-3) /* the same where foils drag, whose kinks are many */
 #define SHARE_MOST R(0.7)     /* the largest one */
 #define WRENCH_MIN R(1e-3)    /* what a scaled wrench counts at least, in rounding of its range */
 
@@ -121,7 +120,7 @@ void fl_prepare_sets(const real *block, fl_work *work) {
 }
 
 void fl_restore_sets(const real *block, fl_work *work, const fl_set *set) {
-  memcpy(work->set, set, sizeof work->set);
+  copy_sets(block, set, work->set);
   fl_prepare_sets(block, work);
 }
 
@@ -176,58 +175,6 @@ void fl_dual_start(const real *block, fl_work *work, const real *target_reduced,
   fl_dual_at(block, work, target_reduced, lambda, work->state);
 }
 
-/* Largest force [N] of a line at prices of this sign, and its secant there [N^2/W]. */
-static void secant_of_line(const real *block, const fl_actuator *a, real s, real *most,
-                           real *secant) {
-  const real *table = block + (int)a->force_table;
-  if (s < 0 && a->force_table_reverse > 0) table = block + (int)a->force_table_reverse;
-  const real price_max = table[0];
-  const int cells = (int)table[1];
-  const real force_max = table[3 + 3 * cells];
-  *most = a->force_scale * force_max;
-  *secant = *most * a->force_scale / (price_max * a->power_scale);
-}
-
-/* Multipliers to begin with: those at which actuators whose costs are ~ T^1.5 give a target,
-   each with its force over price at what it gives where costs are quadratic. Also the first
-   mu. */
-void fl_first_lambda(const real *block, const fl_work *work, const real *target_reduced,
-                     real *lambda, real *mu) {
-  /* Multipliers of quadratic costs without limits. C99 cannot pass the factor as const; it
-     is only read. */
-  real lambda_quadratic[6];
-  fl_solve((real(*)[6])work->hessian_factor, target_reduced, lambda_quadratic);
-  real H[6][6] = {{0}};
-  *mu = NEARLY;
-  for (int i = 0; i < COUNT(block); i++) {
-    const fl_actuator *a = ACTUATOR(block, i);
-    real s[2];
-    actuator_price(work, i, lambda_quadratic, s);
-    real size_s = FABS(s[0]); /* of a foil its lift alone counts */
-    if (is_plane(a)) size_s = size_of(s);
-    const real size_y = a->secant[0] * size_s;
-    real most = a->row_force_max[0];
-    real secant[2] = {a->secant[0], a->secant[1]};
-    if (a->rows == 1) secant_of_line(block, a, s[0], &most, &secant[0]);
-
-    const real share = size_y / most;
-    if (share > NEAR_LIMIT) *mu = SATURATED;
-    /* Force over price of a cost ~ T^1.5 is the root of the share; at a limit the force stays. */
-    real weight = SQRT(clipped(share, CLOSE, 1));
-    if (share > 1 && !work->has_drag) weight = 1 / share;
-    for (int row = 0; row < (int)a->rows; row++) {
-      fl_add_square(H, work->span.effectiveness_reduced[i][row], weight * secant[row]);
-    }
-  }
-  const real trace = fl_trace(H);
-  for (int j = 0; j < 6; j++) H[j][j] += NOTHING * trace; /* regular behind the range, too */
-  if (fl_factor(H)) {
-    fl_solve(H, target_reduced, lambda);
-    return;
-  }
-  for (int j = 0; j < 6; j++) lambda[j] = target_reduced[j] / trace;
-}
-
 /* Adds B D B' to the lower triangle of H, of a plane: B = (bx, by), D = (xx, xy; xy, yy). */
 static void add_plane(real H[6][6], const real *bx, const real *by, real xx, real xy, real yy) {
   for (int row = 0; row < 6; row++) {
@@ -237,10 +184,16 @@ static void add_plane(real H[6][6], const real *bx, const real *by, real xx, rea
   }
 }
 
+/* c of Eq. 8. */
+static real share_of_metric(const fl_work *work) {
+  if (work->has_drag) return 1; /* S is left out there */
+  return SATURATED;
+}
+
 /* Solves (G_mu + mu c max(tr G_mu, tau) M) step = r with G_mu = G + mu S, Eq. 8; 0 where that is
-   singular to rounding. */
+   singular to rounding. Also max(tr G_mu, tau). */
 static int newton_step(const real *block, const fl_work *work, const fl_state *at, real mu,
-                       real *step) {
+                       real *step, real *trace) {
   real H[6][6] = {{0}}; /* G_mu */
   for (int i = 0; i < COUNT(block); i++) {
     const real(*B)[6] = work->span.effectiveness_reduced[i];
@@ -253,16 +206,33 @@ static int newton_step(const real *block, const fl_work *work, const fl_state *a
     else if (xx > 0)
       fl_add_square(H, B[0], xx);
   }
-  real c = SATURATED;
-  if (work->has_drag) c = 1; /* S is left out there */
-  const real trace = larger(fl_trace(H), work->trace_min);
-  const real weight = c * mu * trace; /* of M */
+  *trace = larger(fl_trace(H), work->trace_min);
+  const real weight = share_of_metric(work) * mu * *trace; /* of M */
   for (int row = 0; row < 6; row++) {
     for (int col = 0; col <= row; col++) H[row][col] += weight * work->metric[row][col];
   }
   if (!fl_factor(H)) return 0;
   fl_solve(H, at->residual, step);
   return 1;
+}
+
+/* d'(S + c max(tr G_mu, tau) M) d of a step d: what mu weighs in the curvature along it. */
+static real damping_along(const real *block, const fl_work *work, const fl_state *at, real trace,
+                          const real *step) {
+  real sum = 0;
+  for (int i = 0; i < COUNT(block); i++) {
+    real s[2];
+    actuator_price(work, i, step, s);
+    sum += at->secant[i] * (s[0] * s[0] + s[1] * s[1]);
+  }
+  real of_metric = 0;
+  for (int row = 0; row < 6; row++) {
+    of_metric += work->metric[row][row] * step[row] * step[row];
+    for (int col = 0; col < row; col++) {
+      of_metric += 2 * work->metric[row][col] * step[row] * step[col];
+    }
+  }
+  return sum + share_of_metric(work) * trace * of_metric;
 }
 
 /* How many responses jump between two states a step apart; where wanted they are marked as
@@ -318,25 +288,31 @@ static real mu_after_kept(real mu, const step_result *result) {
   return larger(mu * factor, ROUNDING);
 }
 
-/* Divides mu by the share of the step where the cubic along it, of both values and slopes,
-   is largest. */
-static real mu_after_refused(real mu, real nu, const step_result *result) {
+/* The mu at which the step, were it as long along its direction as its curvature says, would be the
+   share of itself where the cubic along it, of both values and slopes, is largest. `damping` is
+   what mu weighs in that curvature. */
+static real mu_after_refused(real mu, real nu, const step_result *result, real damping,
+                             real share_least) {
   const real a = 3 * (result->slope_begin + result->slope_end - 2 * result->rise);
   const real b = result->slope_end - result->slope_begin - a;
   const real discriminant = b * b - 4 * a * result->slope_begin;
   real share = R(0.5);
   if (discriminant > 0) share = 2 * result->slope_begin / (SQRT(discriminant) - b);
-  const real factor = larger(nu, 1 / clipped(share, SHARE_LEAST, SHARE_MOST));
-  return larger(mu * factor, ROUNDING);
+  const real shorter = 1 / clipped(share, share_least, SHARE_MOST);
+  /* Along the step its curvature is its slope at the beginning. */
+  const real more = (shorter - 1) * result->slope_begin / larger(damping, TINY);
+  return larger(larger(mu * nu, mu + more), ROUNDING);
 }
 
 /* Newton's method from multipliers on, or from its own first ones where there are none.
    work->state_found is the dual at the multipliers that it comes to, however it ends. Returns
-   FL_MET, FL_BEYOND or FL_NO_PROGRESS. */
+   FL_MET, FL_BEYOND (also where all answers take more than work->power_of_use) or
+   FL_NO_PROGRESS. */
 int fl_dual_newton(const real *block, fl_work *work, const real *target_reduced, const real *lambda,
                    int most_steps) {
   /* No forces cost more than C: a larger value proves that none add up to the target, Eq. 13. */
-  const real beyond = work->power_cost_max * (1 + NOTHING) + NOTHING;
+  const real most_power = work->power_cost_max * (1 + NOTHING) + NOTHING;
+  const real beyond = smaller(most_power, work->power_of_use);
   real mu = NEARLY;
   real nu = 2; /* growth of mu after a refused step; doubles with each in a row (Nielsen) */
   real lambda_first[6];
@@ -344,6 +320,8 @@ int fl_dual_newton(const real *block, fl_work *work, const real *target_reduced,
     fl_first_lambda(block, work, target_reduced, lambda_first, &mu);
     lambda = lambda_first;
   }
+  real share_least = SHARE_LEAST;
+  if (work->has_drag) share_least = SHARE_LEAST_DRAG;
   fl_dual_start(block, work, target_reduced, lambda);
   fl_state *at = work->state;
   fl_state *trial = work->state + 1;
@@ -353,7 +331,7 @@ int fl_dual_newton(const real *block, fl_work *work, const real *target_reduced,
   int jumps = 0;
   for (int i = 0; work->has_turn_cost && i < COUNT(block); i++) work->set[i].has_jumped = 0;
   for (int k = 0;; k++) {
-    if (at->residual_size <= TOLERANCE) return FL_MET;
+    if (at->residual_size <= work->residual_enough) return FL_MET;
     if (at->dual_value > beyond) return FL_BEYOND;
     const int has_risen = at->dual_value > best_value + ROUNDING * FABS(best_value);
     if (has_risen || at->residual_size < FELL * best_size) {
@@ -370,7 +348,8 @@ int fl_dual_newton(const real *block, fl_work *work, const real *target_reduced,
     work->newton_steps++;
 
     real step[6];
-    if (!newton_step(block, work, at, mu, step)) {
+    real trace;
+    if (!newton_step(block, work, at, mu, step, &trace)) {
       mu *= MU_SINGULAR;
       continue;
     }
@@ -392,7 +371,8 @@ int fl_dual_newton(const real *block, fl_work *work, const real *target_reduced,
       trial = at;
       at = work->state_found;
     } else {
-      mu = mu_after_refused(mu, nu, &result);
+      const real damping = damping_along(block, work, at, trace, step);
+      mu = mu_after_refused(mu, nu, &result, damping, share_least);
       nu *= 2;
       /* A refused step does not count as idle: its growing mu ends the loop. */
       idle--;

@@ -261,6 +261,8 @@ int fl_prepare(const real *block, fl_work *work) {
   work->ray = 0;
   work->refine_steps = 0;
   work->has_lambda_begin = 0;
+  work->residual_enough = TOLERANCE;
+  work->power_of_use = INFEASIBLE_COST;
   fl_usual_settings(&work->settings);
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);

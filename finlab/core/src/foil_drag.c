@@ -144,7 +144,7 @@ static real cheapen(const real *block, fl_work *work, const fl_box *box, const r
     }
     real stepped[FL_MOST][3];
     real force_stepped[FL_MOST][2];
-    memcpy(stepped, command, sizeof stepped);
+    copy_commands(block, command, stepped);
     take_step(block, work, box, force, share, stepped);
     real gain = -INFEASIBLE_COST;
     if (come_to_give(block, work, box, stepped, EXACT_STEPS, most_error)) {
@@ -152,8 +152,8 @@ static real cheapen(const real *block, fl_work *work, const fl_box *box, const r
     }
     has_moved = gain > 0;
     if (has_moved) {
-      memcpy(command, stepped, sizeof stepped);
-      memcpy(force, force_stepped, sizeof force_stepped);
+      copy_commands(block, stepped, command);
+      copy_forces(block, force_stepped, force);
       cost -= gain;
     } else {
       share *= STEP_SHORTER;
@@ -170,7 +170,7 @@ static real meet_and_cheapen(const real *block, fl_work *work, const real *targe
                              real most_error, real *lambda, real command[][3], real force[][2]) {
   fl_box box = work->box;
   fl_set before[FL_MOST];
-  memcpy(before, work->set, sizeof before);
+  copy_sets(block, work->set, before);
   fl_power_of_commands(block, work, command, force);
   take_sides(block, work, &box, command, force);
   real cost = INFEASIBLE_COST;
@@ -193,8 +193,8 @@ static void improve_from(const real *block, fl_work *work, const real *target_re
       meet_and_cheapen(block, work, target_reduced, most_error, lambda_near, command, force);
   if (!(cost < *best_cost)) return;
   *best_cost = cost;
-  memcpy(work->best_command, command, sizeof work->best_command);
-  memcpy(work->best_force, force, sizeof force);
+  copy_commands(block, command, work->best_command);
+  copy_forces(block, force, work->best_force);
   memcpy(work->best_lambda, lambda_near, sizeof lambda_near);
 }
 
@@ -317,9 +317,9 @@ static void improve_from_stalls(const real *block, fl_work *work, const real *ta
       real angle;
       if (!may_stall(block, work, i, end, &angle)) continue;
       if (*best_cost < INFEASIBLE_COST)
-        memcpy(command, work->best_command, sizeof command);
+        copy_commands(block, work->best_command, command);
       else
-        memcpy(command, start, sizeof command);
+        copy_commands(block, start, command);
       command[i][0] = angle;
       improve_from(block, work, target_reduced, lambda, command, best_cost);
     }
@@ -366,7 +366,7 @@ int fl_take_sure_forces(const real *block, fl_work *work) {
     if (FABS(state->force[i][0]) >= largest_lift) return 0;
   }
   if (fl_worst_gap(block, work, state->force, state->lambda_reduced) >= 0) return 0;
-  memcpy(work->best_force, state->force, sizeof work->best_force);
+  copy_forces(block, state->force, work->best_force);
   fl_commands_for_forces(block, &work->box, work->best_force, work->command_previous,
                          work->best_command);
   const real most_error = error_allowed(block, work, &work->box);
@@ -412,9 +412,9 @@ void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, 
     for (int attempt = 0; attempt < 2 && !is_met; attempt++) {
       if (attempt == 0 && !has_found) continue;
       if (attempt == 0)
-        memcpy(command, out->command, sizeof command);
+        copy_commands(block, out->command, command);
       else
-        memcpy(command, start, sizeof command);
+        copy_commands(block, start, command);
       memcpy(lambda, out->lambda_reduced, sizeof lambda);
       real force[FL_MOST][2];
       is_met = meet_and_cheapen(block, work, target_reduced, EXACT, lambda, command, force) <
@@ -427,7 +427,7 @@ void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, 
     }
     found = ray_share;
     out->has_foil_commands = 1;
-    memcpy(out->command, command, sizeof command);
+    copy_commands(block, command, out->command);
     memcpy(out->lambda_reduced, lambda, sizeof lambda);
     memcpy(out->wrench_served, wrench_served, sizeof wrench_served);
   }

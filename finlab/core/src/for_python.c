@@ -173,7 +173,7 @@ real fl_dual_value(const real *block, fl_work *work, const real *wrench, const r
 static fl_actuator_conjugate conjugate_at(const real *block, int i, const fl_set *set,
                                           const real *s) {
   wide unused[2];
-  const real along_force = fl_support_of_set(block, i, set, s, unused);
+  const real along_force = fl_support_of_set(block, i, set, s, unused, 0);
   fl_actuator_conjugate result = {0};
   if (set->is_flipped) {
     result.price_reverse = along_force;
@@ -186,7 +186,7 @@ static fl_actuator_conjugate conjugate_at(const real *block, int i, const fl_set
   }
   if (set->force_max_reverse > 0) {
     const fl_set back = fl_reversed_set(set);
-    result.price_reverse = fl_support_of_set(block, i, &back, s, unused);
+    result.price_reverse = fl_support_of_set(block, i, &back, s, unused, 0);
     result.force_min = -set->force_max_reverse;
   }
   result.conjugate = fl_response(block, i, set, s).conjugate;

@@ -29,7 +29,7 @@ static void keep_answer(const real *block, fl_work *work, const real *target_red
   }
   if (!(work->state_found->dual_value < *best_cost)) return;
   *best_cost = work->state_found->dual_value;
-  memcpy(work->best_force, work->state_found->force, sizeof work->best_force);
+  copy_forces(block, work->state_found->force, work->best_force);
 }
 
 /* Whether the forces of work->state_found are an answer: they meet the target, and none of them is
@@ -125,9 +125,9 @@ static int most_parts_of_search(const fl_work *work) {
 static void dive_and_return(const real *block, fl_work *work, const real *target_reduced,
                             int status, real *best_cost) {
   fl_set before[FL_MOST];
-  memcpy(before, work->set, sizeof before);
+  copy_sets(block, work->set, before);
   dive(block, work, target_reduced, status, best_cost);
-  memcpy(work->set, before, sizeof before);
+  copy_sets(block, before, work->set);
 }
 
 /* Goes back to the last cut whose other side may be cheaper than the best so far, and makes
@@ -156,7 +156,7 @@ int fl_search_gaps(const real *block, fl_work *work, const real *target_reduced,
   real lambda_begin[6];
   int depth = 0;
   int parts = 0;
-  memcpy(work->set_before, work->set, sizeof work->set_before);
+  copy_sets(block, work->set, work->set_before);
   memcpy(lambda_begin, work->state_found->lambda_reduced, sizeof lambda_begin);
   if (work->has_drag) {
     fl_improve_from_starts(block, work, target_reduced, &best_cost);
@@ -228,7 +228,7 @@ int fl_answer_with_drag(const real *block, fl_work *work, const real *wrench_wan
         memcpy(out->lambda_reduced, work->best_lambda, sizeof out->lambda_reduced);
     }
   }
-  memcpy(out->command, work->best_command, (size_t)COUNT(block) * sizeof out->command[0]);
+  copy_commands(block, work->best_command, out->command);
   out->has_foil_commands = 1;
   return 1;
 }

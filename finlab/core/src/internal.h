@@ -100,6 +100,19 @@ static inline int is_foil(const fl_actuator *a) { return a->flow_speed > 0; }
 /* Whether an actuator pushes in a plane. */
 static inline int is_plane(const fl_actuator *a) { return a->rows == 2 && !is_foil(a); }
 
+/* Copies of what all n actuators have, and no more of an array of FL_MOST. */
+static inline void copy_forces(const real *block, real force[][2], real to[][2]) {
+  memcpy(to, force, (size_t)COUNT(block) * sizeof force[0]);
+}
+
+static inline void copy_commands(const real *block, real command[][3], real to[][3]) {
+  memcpy(to, command, (size_t)COUNT(block) * sizeof command[0]);
+}
+
+static inline void copy_sets(const real *block, const fl_set *from, fl_set *to) {
+  memcpy(to, from, (size_t)COUNT(block) * sizeof *to);
+}
+
 /* Prices s = B' lambda of an actuator's force along its rows [W/N], Eq. 4. */
 static inline void actuator_price(const fl_work *work, int i, const real *lambda, real *s) {
   s[0] = dot(work->span.effectiveness_reduced[i][0], lambda, 6);
@@ -139,7 +152,8 @@ typedef struct {
   real angle;      /* at which it pushes, where turning costs [rad] */
 } response;
 response fl_response(const real *block, int i, const fl_set *set, const real *price);
-real fl_support_of_set(const real *block, int i, const fl_set *set, const real *price, wide *force);
+real fl_support_of_set(const real *block, int i, const fl_set *set, const real *price, wide *force,
+                       real *slope);
 real fl_drag_of_lift(const real *block, int i, real force);
 int fl_undecided(const real *block, int i, const fl_set *set, const real *price, real *off);
 
@@ -201,6 +215,14 @@ void fl_limits_without_tick(const real *block, fl_work *work);
 void fl_limits_of_tick(const real *block, fl_work *work, const fl_question *q);
 int fl_prepare_question(const real *block, fl_work *work, const fl_question *q);
 
+/* first_multipliers.c: where Newton's method on the dual begins */
+void fl_first_lambda(const real *block, const fl_work *work, const real *target_reduced,
+                     real *lambda, real *mu);
+void fl_first_lambda_at_rim(const real *block, fl_work *work, const real *target_reduced,
+                            const real *normal, real *lambda);
+void fl_first_lambda_inside(const real *block, fl_work *work, const real *target_reduced,
+                            const real *normal, real inside, real *lambda);
+
 /* dual_newton.c: Newton's method on the dual, Eq. 8 */
 void fl_prepare_sets(const real *block, fl_work *work);
 void fl_restore_sets(const real *block, fl_work *work, const fl_set *set);
@@ -208,8 +230,6 @@ void fl_dual_start(const real *block, fl_work *work, const real *target_reduced,
                    const real *lambda);
 void fl_dual_at(const real *block, const fl_work *work, const real *target_reduced,
                 const real *lambda, fl_state *state);
-void fl_first_lambda(const real *block, const fl_work *work, const real *target_reduced,
-                     real *lambda, real *mu);
 int fl_dual_newton(const real *block, fl_work *work, const real *target_reduced, const real *lambda,
                    int most_steps);
 void fl_reduce_wrench(const fl_work *work, const real *wrench, real *target_reduced);
@@ -283,10 +303,17 @@ void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, 
                           real most, fl_answer *out);
 
 /* nearest_point.c: points near to a wrench beyond reach */
+/* Rounding of shares and misses, which are in double precision always. */
+#define BARELY ((wide)NEARLY * NEARLY)
 static inline wide dot_wide(const wide *a, const wide *b, int n) {
   wide sum = 0;
   for (int k = 0; k < n; k++) sum += a[k] * b[k];
   return sum;
+}
+
+static inline wide larger_wide(wide a, wide b) {
+  if (a > b) return a;
+  return b;
 }
 
 static inline wide norm_wide(const wide *a) { return sqrt(dot_wide(a, a, 6)); }
@@ -304,6 +331,13 @@ wide fl_farthest_along_ray(const real *block, const fl_work *work, const wide *f
                            const wide *ray, wide least, wide most, wide close, fl_mixture *m,
                            wide *plane);
 void fl_mixed_forces(const real *block, const fl_mixture *m, real force[][2]);
+
+/* support_newton.c: the same by normals of the set */
+int fl_nearest_by_normal(const real *block, const fl_work *work, const wide *target_weighted,
+                         const wide *normal, wide close, fl_mixture *m);
+int fl_has_lines_alone(const real *block);
+int fl_end_of_ray_by_normal(const real *block, const fl_work *work, const wide *from,
+                            const wide *ray, const wide *normal, wide close, fl_mixture *m);
 
 /* out_of_reach.c: what a policy gives beyond reach */
 void fl_out_of_reach(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,

@@ -9,18 +9,11 @@
    the same way. */
 #include "internal.h"
 
-/* Rounding of shares and misses, which are in double precision always. */
-#define BARELY ((wide)NEARLY * NEARLY)
 #define MOST_POINTS 400
 #define MOST_SHARES 60 /* shares of a ray that are tried, each a point nearest to it */
 /* of a point's length, less than which is left: orthogonalized again */
 #define NEARLY_DEPENDENT 0.1
 #define PROOF_OF_SHARE 0.5 /* of a miss that is to be proved, for a plane across a ray */
-
-static wide larger_wide(wide a, wide b) {
-  if (a > b) return a;
-  return b;
-}
 
 /* One axis of a reduced wrench (6,) as a normalized wrench has it, over the wrench scale. */
 wide fl_normalized_axis(const real *block, const fl_work *work, const real *reduced, int axis) {
@@ -32,6 +25,7 @@ wide fl_normalized_axis(const real *block, const fl_work *work, const real *redu
 
 /* Sets the wrench over the wrench scale, in weighted axes, that each force gives per newton. */
 void fl_weigh_axes(const real *block, fl_work *work, const wide *weight) {
+  memcpy(work->axis_weight, weight, sizeof work->axis_weight);
   for (int i = 0; i < COUNT(block); i++) {
     work->polygon_offset[i] = 0;
     for (int q = 0; q < 2; q++) {
@@ -79,7 +73,7 @@ static void append_farthest(const real *block, const fl_work *work, const wide *
     if (work->polygon_offset[i] > 0)
       farthest_corner(block + work->polygon_offset[i], s, force[i]);
     else
-      fl_support_of_set(block, i, work->set + i, s, force[i]);
+      fl_support_of_set(block, i, work->set + i, s, force[i], 0);
   }
   fl_point_of_forces(block, work, force, m->point[last]);
   m->ray_share[last] = 0;
@@ -242,18 +236,20 @@ wide fl_nearest_point(const real *block, const fl_work *work, const wide *target
 
 /* The point of the set that is farthest along a ray (6,) from a point (6,), at sizes from
    `least` to `most`. A plane across the miss of a size bounds it from above, and is kept;
-   the next try is that bound (Dinkelbach), until it is as `close`. Returns the bound, Eq.
-   14; where no size is in the set, the least one, and the point is the nearest to it. */
+   the next try is that bound (Dinkelbach), until it is as `close`. It begins at the mixture and
+   the normal m->miss, where that has points. Returns the bound, Eq. 14; where no size is in the
+   set, the least one, and the point is the nearest to it. */
 wide fl_farthest_along_ray(const real *block, const fl_work *work, const wide *from,
                            const wide *ray, wide least, wide most, wide close, fl_mixture *m,
                            wide *plane) {
   wide size = most;
   wide last_size = 1e300;
-  memcpy(m->miss, ray, sizeof m->miss);
-  m->count = 0;
-  m->basis_count = 0;
-  m->weight[0] = 1;
-  append_farthest(block, work, ray, m);
+  if (m->count == 0) {
+    memcpy(m->miss, ray, sizeof m->miss);
+    m->basis_count = 0;
+    m->weight[0] = 1;
+  }
+  append_farthest(block, work, m->miss, m);
   for (int k = 0; k < MOST_SHARES; k++) {
     const wide *normal = m->miss;
     const wide across = dot_wide(normal, ray, 6);

@@ -37,6 +37,45 @@ static wide over_wrench_scale(const real *block, const real *wrench, int k) {
   return (wide)wrench[k] / (wide)HEAD(block)->wrench_scale[k];
 }
 
+/* Keeps a normal (6,) in weighted axes as that of the rim, in the basis. */
+static void keep_normal(const real *block, fl_work *work, const wide *weight, const wide *normal) {
+  const fl_span *span = &work->span;
+  for (int j = 0; j < 6; j++) {
+    wide sum = 0;
+    for (int k = 0; k < 6; k++) {
+      const wide scale = (wide)span->axis_scale[k] / (wide)HEAD(block)->wrench_scale[k];
+      sum += (wide)span->basis[k][j] * scale * weight[k] * normal[k];
+    }
+    work->rim_normal[j] = (real)sum;
+  }
+}
+
+/* The normal of the rim that was found last, in the weighted axes of now, where the prices of all
+   are the same. */
+static void take_normal(const real *block, const fl_work *work, wide *normal) {
+  const fl_span *span = &work->span;
+  for (int k = 0; k < 6; k++) {
+    normal[k] = 0;
+    if (!(work->axis_weight[k] > 0)) continue;
+    const wide scale = (wide)span->axis_scale[k] / (wide)HEAD(block)->wrench_scale[k];
+    for (int j = 0; j < 6; j++) {
+      normal[k] += (wide)span->basis[k][j] * (wide)work->rim_normal[j] /
+                   (scale * work->axis_weight[k]);
+    }
+  }
+}
+
+/* Makes work->mixture the point nearest to a target (6,) in weighted axes. Returns the miss. */
+static wide nearest_point(const real *block, fl_work *work, const wide *target_weighted) {
+  fl_mixture *m = &work->mixture;
+  wide normal[6];
+  take_normal(block, work, normal);
+  work->is_rim_exact =
+      fl_nearest_by_normal(block, work, target_weighted, normal, work->distance_enough, m) ||
+      fl_has_lines_alone(block);
+  return fl_nearest_point(block, work, target_weighted, work->distance_enough, 0, m);
+}
+
 static void serve_closest(const real *block, fl_work *work, const real *wrench,
                           const fl_policy *policy, real *score) {
   wide weight[6];
@@ -47,8 +86,8 @@ static void serve_closest(const real *block, fl_work *work, const real *wrench,
   }
   fl_weigh_axes(block, work, weight);
   work->mixture.count = 0;
-  const wide miss =
-      fl_nearest_point(block, work, target_weighted, work->distance_enough, 0, &work->mixture);
+  const wide miss = nearest_point(block, work, target_weighted);
+  keep_normal(block, work, weight, work->mixture.miss);
   score[0] = rounded((real)miss);
 }
 
@@ -87,12 +126,19 @@ static void serve_direction(const real *block, fl_work *work, const real *wrench
   const wide weight[6] = {1, 1, 1, 1, 1, 1};
   wide from[6];
   wide ray[6];
-  wide plane[6];
+  wide plane[6] = {0};
   for (int k = 0; k < 6; k++) from[k] = -over_wrench_scale(block, work->span.wrench_offset, k);
   ray_of(block, work, wrench, ray);
   fl_weigh_axes(block, work, weight);
+  wide normal[6];
+  take_normal(block, work, normal);
+  m->count = 0;
+  work->is_rim_exact =
+      fl_end_of_ray_by_normal(block, work, from, ray, normal, work->distance_enough, m) ||
+      fl_has_lines_alone(block);
   wide ray_share =
       fl_farthest_along_ray(block, work, from, ray, 0, 1, work->distance_enough, m, plane);
+  keep_normal(block, work, weight, plane);
   /* What misses along the ray is a smaller share; what is across it counts more. */
   const wide less = dot_wide(m->miss, ray, 6) / (dot_wide(ray, ray, 6) + TINY_WIDE);
   add_scaled(m->miss, -less, ray);
@@ -100,6 +146,8 @@ static void serve_direction(const real *block, fl_work *work, const real *wrench
   score[MISSING_RAY_SHARE] = (real)(1 - ray_share + less);
   if (ray_share > 0 || !(score[0] > 0)) return;
   ray_share = nearest_to_ray(block, work, from, ray, score);
+  work->is_rim_exact = fl_has_lines_alone(block);
+  keep_normal(block, work, weight, m->miss);
   score[MISSING_RAY_SHARE] = (real)(1 - ray_share);
 }
 
@@ -129,11 +177,13 @@ static wide serve_group(const real *block, fl_work *work, const wide *wanted,
     }
     fl_weigh_axes(block, work, weight);
     remake_points(block, work, m);
-    fl_nearest_point(block, work, target_weighted, work->distance_enough, 0, m);
+    nearest_point(block, work, target_weighted);
     for (int k = 0; k < 6; k++) {
       if (group[k]) missing[k] = m->miss[k] / weight[k];
     }
     missed = norm_wide(missing);
+    /* What a group misses by rounding has no direction: the rim is that of the one before. */
+    if (is_first || missed > NEARLY) keep_normal(block, work, weight, m->miss);
   }
   return missed;
 }
@@ -154,6 +204,8 @@ static void serve_priority(const real *block, fl_work *work, const real *wrench,
     }
     score[g] = rounded((real)missed);
   }
+  /* The normal is that of axes of very different weights, by which rounding counts as a price. */
+  if (fl_has_lines_alone(block)) work->is_rim_exact = 0;
 }
 
 /* Serves a policy within the sets of a part; how badly, the first number counting most, the
@@ -215,7 +267,7 @@ static void take_answer(const real *block, const fl_work *work, const real *wren
                         fl_answer *out) {
   const fl_state *state = work->state_found;
   memcpy(out->lambda_reduced, state->lambda_reduced, sizeof out->lambda_reduced);
-  memcpy(out->force, state->force, (size_t)COUNT(block) * sizeof out->force[0]);
+  copy_forces(block, work->state_found->force, out->force);
   memcpy(out->wrench_served, wrench, sizeof out->wrench_served);
   if (TOLERANCE < AT_RIM && state->residual_size > TOLERANCE) {
     fl_wrench_of_forces(block, work, out->force, out->wrench_served);
@@ -230,10 +282,13 @@ static void cheapest_forces(const real *block, fl_work *work, real force[][2], c
   enum { WANTED, GIVEN, INSIDE, TRIALS };
   real given[6];
   fl_wrench_of_forces(block, work, force, given);
-  memcpy(out->force, force, (size_t)COUNT(block) * sizeof out->force[0]);
+  copy_forces(block, force, out->force);
   memcpy(out->wrench_served, given, sizeof given);
   const real distance_inside = scaled_distance(work, given, inside);
   real most_power = INFEASIBLE_COST;
+  real lambda[6];
+  real target_given[6];
+  fl_reduce_wrench(work, given, target_given);
   int first = WANTED;
   if (are_same(wanted, given, sizeof given)) first = GIVEN;
   for (int trial = first; trial < TRIALS; trial++) {
@@ -245,7 +300,23 @@ static void cheapest_forces(const real *block, fl_work *work, real force[][2], c
       if (trial == WANTED) wrench[k] = wanted[k];
     }
     fl_reduce_wrench(work, wrench, target_reduced);
-    fl_dual_newton(block, work, target_reduced, 0, FL_STEPS_AT_KINK);
+    if (trial == INSIDE && most_power < INFEASIBLE_COST && work->is_rim_exact) {
+      real moved[6]; /* inside, from the rim */
+      for (int j = 0; j < 6; j++) moved[j] = target_given[j] - target_reduced[j];
+      memcpy(lambda, out->lambda_reduced, sizeof lambda);
+      fl_first_lambda_inside(block, work, target_reduced, work->rim_normal,
+                             dot(work->rim_normal, moved, 6), lambda);
+    } else if (work->is_rim_exact) {
+      fl_first_lambda_at_rim(block, work, target_reduced, work->rim_normal, lambda);
+    } else {
+      real unused;
+      fl_first_lambda(block, work, target_reduced, lambda, &unused);
+    }
+    work->power_of_use = most_power;
+    if (!work->is_rim_exact) work->residual_enough = larger(SAME_POINT, TOLERANCE);
+    fl_dual_newton(block, work, target_reduced, lambda, FL_STEPS_AT_KINK);
+    work->power_of_use = INFEASIBLE_COST;
+    work->residual_enough = TOLERANCE;
     const real dual_value = work->state_found->dual_value;
     const int has_met = !(work->state_found->residual_size > larger(AT_RIM, ENOUGH));
     if (!has_met || dual_value > most_power) continue;
@@ -272,7 +343,7 @@ static void better_side(const real *block, fl_work *work, const real *wrench,
     score[k] = cut->score[k];
     cut->score[k] = kept;
   }
-  memcpy(force, force_other, (size_t)COUNT(block) * sizeof *force_other);
+  copy_forces(block, force_other, force);
   cut->first_side = -cut->first_side;
   fl_take_side(block, work, cut, cut->first_side);
 }
@@ -304,7 +375,7 @@ static void best_part(const real *block, fl_work *work, const real *wrench, cons
   real force_part[FL_MOST][2];
   int depth = 0;
   int has_found = 0; /* a part whose best answer lies in no gap */
-  memcpy(work->set_before, work->set, sizeof work->set_before);
+  copy_sets(block, work->set, work->set_before);
   work->distance_enough = SAME_POINT;
   serve(block, work, wrench, policy, force_part, score);
   *most_ray_share = 1 - score[MISSING_RAY_SHARE];
@@ -313,8 +384,8 @@ static void best_part(const real *block, fl_work *work, const real *wrench, cons
     const int gap = fl_worst_gap(block, work, force_part, 0);
     if (gap < 0 || !has_found) { /* of parts with a gap the last one, until there is one without */
       memcpy(best, score, sizeof best);
-      memcpy(force, force_part, sizeof force_part);
-      memcpy(work->best_set, work->set, sizeof work->best_set);
+      copy_forces(block, force_part, force);
+      copy_sets(block, work->set, work->best_set);
       has_found |= gap < 0;
     }
     fl_cut *cut = 0;
@@ -354,18 +425,17 @@ static void wrench_wanted_of(const real *block, const fl_work *work, const real 
 static void cheapen_by_parts(const real *block, fl_work *work, const real *target_reduced,
                              int status, fl_answer *out) {
   if (status == FL_BEYOND) return;
-  const size_t size = (size_t)COUNT(block) * sizeof out->force[0];
   fl_state *state = work->state_found;
   /* those of all sets prove more than those of a part */
   memcpy(out->lambda_reduced, state->lambda_reduced, sizeof out->lambda_reduced);
   const int gap = fl_worst_gap(block, work, state->force, state->lambda_reduced);
   if (gap < 0) {
-    if (status == FL_MET) memcpy(out->force, state->force, size);
+    if (status == FL_MET) copy_forces(block, state->force, out->force);
     return;
   }
   real bound;
   if (!fl_search_gaps(block, work, target_reduced, status, &bound)) return;
-  memcpy(out->force, work->best_force, size);
+  copy_forces(block, work->best_force, out->force);
   out->gap_power_bound = fl_gap_power_bound(work, bound);
 }
 
@@ -375,6 +445,7 @@ void fl_out_of_reach(const real *block, fl_work *work, const real *wrench, const
   real force[FL_MOST][2];
   real ray_share;
   real most_ray_share;
+  memcpy(work->rim_normal, work->state_found->lambda_reduced, sizeof work->rim_normal);
   best_part(block, work, wrench, policy, force, &ray_share, &most_ray_share);
   real inside[6] = {0};
   if (!keeps_direction) {
@@ -391,7 +462,9 @@ void fl_out_of_reach(const real *block, fl_work *work, const real *wrench, const
   real target_reduced[6];
   fl_reduce_wrench(work, out->wrench_served, target_reduced);
   /* Another part of the sets may give it for less. */
-  const int status = fl_dual_newton(block, work, target_reduced, 0, FL_STEPS);
+  real lambda[6];
+  memcpy(lambda, out->lambda_reduced, sizeof lambda);
+  const int status = fl_dual_newton(block, work, target_reduced, lambda, FL_STEPS);
   if (!work->has_drag) {
     cheapen_by_parts(block, work, target_reduced, status, out);
     return;

@@ -28,6 +28,7 @@ void fl_reach(const real *block, fl_work *work, const real *sets, const wide *fr
   const wide farthest = 1e30;
   for (int k = 0; k < count; k++) {
     for (int i = 0; i < n; i++) take_set(block, work, i, sets + NUMBERS_OF_SET * i);
+    work->mixture.count = 0;
     size[k] = fl_farthest_along_ray(block, work, from, ray, -farthest, farthest, close,
                                     &work->mixture, normal);
     fl_mixed_forces(block, &work->mixture, (real(*)[2])force);
