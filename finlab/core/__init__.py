@@ -27,6 +27,12 @@ SIGNATURES = {
     "fl_reach": "vpppppirppp",
     "fl_jets": "vppipppp",
     "fl_outer_iterations": "ipppppppp",
+    "fl_body_rates": "vpppp",
+    "fl_body_fastest_rate": "rpp",
+    "fl_body_steps": "ippirp",
+    "fl_body_coarse_step": "ipprp",
+    "fl_follow_fins": "vppip",
+    "fl_move_fins": "vppiripp",
 }
 """What each function returns and takes: i int, r real, p pointer, s text, v nothing."""
 _TYPES = {

@@ -292,6 +292,59 @@ int fl_outer_iterations(const fl_coupled_robot *robot, fl_real *block, fl_work *
 void fl_jets(const fl_real *constants, const fl_real *force, int count, const fl_real *inflow,
              fl_real *change, fl_real *offset, fl_real *slope);
 
+/* A body that swims, and fins that follow their commands: what a simulation steps many times, and
+   no allocation needs. finlab/swim/vehicle has the equations; a state of a body is position (3) in
+   the world, quaternion (4), velocity and angular rates (6) in the body frame. */
+
+/* @param body   numbers of a body in water; finlab/core/src/vehicle.c has their order
+   @param state  (13,)
+   @param tau    wrench (6,) in the body frame [N, N m]
+   @param rates  becomes the rate of change (13,) of the state */
+void fl_body_rates(const fl_real *body, const fl_real *state, const fl_real *tau, fl_real *rates);
+
+/* @param body   as for fl_body_rates
+   @param state  (13,)
+   @return       the fastest rate at which damping, Munk's moments or turning change the motion
+                 [1/s] */
+fl_real fl_body_fastest_rate(const fl_real *body, const fl_real *state);
+
+/* Moves a body over steps by Runge-Kutta of order 4, each cut into as many parts as stay stable.
+
+   @param body    as for fl_body_rates
+   @param wrench  (count, 6) in the body frame, which the body carries along in each step [N, N m]
+   @param step    length of a step [s]
+   @param states  (count + 1, 13): the first is where it begins; the others become those after
+                  each step
+   @return        how many steps were taken: fewer than count where the motion is too fast */
+int fl_body_steps(const fl_real *body, const fl_real *wrench, int count, fl_real step,
+                  fl_real *states);
+
+/* Moves a body over one step by the midpoint rule; the quaternion keeps the length it comes to.
+
+   @param body    as for fl_body_rates
+   @param wrench  (6,) [N, N m]
+   @param step    length of the step [s]
+   @param state   (13,), becomes that after the step
+   @return        1, or 0 where the motion is too fast */
+int fl_body_coarse_step(const fl_real *body, const fl_real *wrench, fl_real step, fl_real *state);
+
+/* Moves fins over one step of their lags, without what happens within the beat.
+
+   @param fins     numbers of `count` fins; finlab/core/src/fin_motion.c has their order
+   @param command  (count, 3) [rad, Hz, rad]; a fin whose row is NaN stops at once
+   @param states   of the fins, in the order of fin_motion.c; become those after the step */
+void fl_follow_fins(const fl_real *fins, const fl_real *command, int count, fl_real *states);
+
+/* Moves fins over steps much shorter than a beat.
+
+   @param fins, command, states  as for fl_follow_fins
+   @param step   length of a step [s]
+   @param steps  how many
+   @param moves  (steps, count, 7) become mean amplitude, frequency and zero direction of a step,
+                 and angle, phase, speed and acceleration at its end [rad, Hz, rad/s, rad/s^2] */
+void fl_move_fins(const fl_real *fins, const fl_real *command, int count, fl_real step, int steps,
+                  fl_real *states, fl_real *moves);
+
 /* @param i      which actuator
    @param force  along its direction; of planes its size, below 0 in reverse [N]
    @return       the least power for it, Eq. 2 [W] */

@@ -70,9 +70,11 @@ def rotation_of_angles(angles: Array) -> tuple[Array, ...]:
     return (*x_axis, *y_axis, *z_axis)
 
 
-def tilt_of(rotation: tuple[float, ...]) -> tuple[float, float]:
-    """Roll and pitch of a rotation [rad]."""
-    _, _, r31, _, _, r32, _, _, r33 = rotation
+def tilt_of_quaternion(w: float, x: float, y: float, z: float) -> tuple[float, float]:
+    """Roll and pitch [rad] of a quaternion of unit length."""
+    r31 = 2 * (x * z - w * y)
+    r32 = 2 * (y * z + w * x)
+    r33 = 1 - 2 * (x * x + y * y)
     return math.atan2(r32, r33), math.asin(min(max(-r31, -1.0), 1.0))
 
 

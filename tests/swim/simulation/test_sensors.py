@@ -21,7 +21,7 @@ STATE[7] = 0.2
 def seen(settings: SensorSettings, steps: int, seed: int = 0) -> list[Measurement]:
     """What sensors say of a robot that stays as it is, every 0.01 s."""
     sensors = Sensors(settings, np.random.default_rng(seed))
-    return [sensors.measure(0.01 * k, STATE) for k in range(steps)]
+    return [sensors.measure(0.01 * k, STATE.tolist()) for k in range(steps)]
 
 
 def new(values: list[float] | Array) -> int:
@@ -41,7 +41,7 @@ def test_perfect_sensors_say_what_is_true_at_once() -> None:
     for _ in range(20):
         state = rng.standard_normal(13)
         state[3:7] /= np.linalg.norm(state[3:7])
-        found = Sensors(NO_NOISE, rng).measure(0.0, state)
+        found = Sensors(NO_NOISE, rng).measure(0.0, state.tolist())
         np.testing.assert_allclose(
             found.as_array(), [*state[:3], *euler(state[3:7]), *state[7:]], rtol=1e-12, atol=1e-12
         )
@@ -53,7 +53,7 @@ def test_what_is_late_is_of_a_while_ago() -> None:
     state = STATE.copy()
     for k in range(100):
         state[:3] = 0.02 * k
-        found = sensors.measure(0.02 * k, state)
+        found = sensors.measure(0.02 * k, state.tolist())
         assert found.position[0] == pytest.approx(0.02 * max(k - 5, 0)), (
             "at rest before the beginning"
         )
