@@ -33,6 +33,7 @@ SIGNATURES = {
     "fl_body_coarse_step": "ipprp",
     "fl_follow_fins": "vppip",
     "fl_move_fins": "vppiripp",
+    "fl_follow_lags": "vppirip",
 }
 """What each function returns and takes: i int, r real, p pointer, s text, v nothing."""
 _TYPES = {

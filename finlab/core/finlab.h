@@ -340,10 +340,22 @@ void fl_follow_fins(const fl_real *fins, const fl_real *command, int count, fl_r
    @param fins, command, states  as for fl_follow_fins
    @param step   length of a step [s]
    @param steps  how many
-   @param moves  (steps, count, 7) become mean amplitude, frequency and zero direction of a step,
-                 and angle, phase, speed and acceleration at its end [rad, Hz, rad/s, rad/s^2] */
+   @param moves  (steps, count, 8) become mean amplitude, frequency and zero direction of a step,
+                 whether that beats, and angle, phase, speed and acceleration at its end
+                 [rad, Hz, rad/s, rad/s^2] */
 void fl_move_fins(const fl_real *fins, const fl_real *command, int count, fl_real step, int steps,
                   fl_real *states, fl_real *moves);
+
+/* Moves numbers of commands over steps by lags of first order with a largest rate.
+
+   @param lags     of `count` numbers; finlab/core/src/first_order_lag.c has their order
+   @param command  (count,); NaN for a number whose actuator stops
+   @param step     length of a step [s]
+   @param steps    how many
+   @param values   (steps + 1, count): the first are those at the beginning; the others become
+                   those after each step */
+void fl_follow_lags(const fl_real *lags, const fl_real *command, int count, fl_real step, int steps,
+                    fl_real *values);
 
 /* @param i      which actuator
    @param force  along its direction; of planes its size, below 0 in reverse [N]

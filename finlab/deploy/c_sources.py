@@ -38,6 +38,7 @@ FILES_LEFT_OUT = (
     "for_python.c",
     "vehicle.c",
     "fin_motion.c",
+    "first_order_lag.c",
 )
 """Files of the core that an export does not need: `interaction`, attainable sets, what Python
 alone calls, and what swims in a simulation."""

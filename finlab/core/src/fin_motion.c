@@ -33,7 +33,8 @@ typedef struct {
 
 /* What one fin did in a step. */
 typedef struct {
-  real mean_value[3]; /* mean of fin_state.value over the step */
+  real mean_value[3]; /* mean of fin_state.value over the step, the zero direction wrapped */
+  real beats;         /* 1 where that mean beats, else 0 */
   real angle;         /* at its end [rad] */
   real phase;         /* at its end [rad] */
   real speed;         /* at its end [rad/s] */
@@ -125,6 +126,8 @@ static void move(const fin_numbers *fin, const real *command, real step, fin_sta
   const real phase = before.phase + FULL_TURN * step * made->mean_value[1];
   state->phase = phase - FULL_TURN * FLOOR(phase / FULL_TURN);
   made->phase = state->phase;
+  made->mean_value[2] = fl_wrap_angle(made->mean_value[2]);
+  made->beats = made->mean_value[0] > 0 && made->mean_value[1] > 0;
   differentiate(&before, state, step, made);
 }
 

@@ -403,7 +403,7 @@ class ClosedLoop:
         dt = self.period_s / n_steps
         sent = command if self.learner is None else command * self.learner.factor
         wrenches, power = self._swim(self._for_drives(sent), dt, n_steps, time)
-        mean = wrenches.mean(axis=0)
+        mean = wrenches.sum(axis=0) / n_steps
         beliefs = (self._no_beliefs,) * 3 if self.verdict is None else self.verdict[1:]
         return Tick(
             time=time,
@@ -468,11 +468,13 @@ class ClosedLoop:
         for k in range(1, n_steps):  # the sample at the end belongs to the next period
             self._sensors.sample(time + k * dt, states[k - 1])
         if len(parts) == 1:
-            power = output.inertial_power.mean(axis=0), output.driving_power.mean(axis=0)
-            return by_actuator, power
-        inertial = np.concatenate([each.inertial_power for each in outputs])
-        driving = np.concatenate([each.driving_power for each in outputs])
-        return np.concatenate(wrenches), (inertial.mean(axis=0), driving.mean(axis=0))
+            inertial = output.inertial_power
+            driving = output.driving_power
+        else:
+            by_actuator = np.concatenate(wrenches)
+            inertial = np.concatenate([each.inertial_power for each in outputs])
+            driving = np.concatenate([each.driving_power for each in outputs])
+        return by_actuator, (inertial.sum(axis=0) / n_steps, driving.sum(axis=0) / n_steps)
 
 
 def _constant(values: NDArray[Any]) -> NDArray[Any]:

@@ -13,7 +13,6 @@ from typing import NamedTuple
 import numpy as np
 
 from finlab.arrays import Array
-from finlab.axes import wrapped
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.layout.effectiveness import own_effectiveness
@@ -340,8 +339,5 @@ class ActuatorForce:
     def of_fins(self, steps: FinSteps, dt: float) -> Array:
         """Forces (K, n_fins, 3) of the fins in their own frames [N], means over steps of `dt`
         [s]."""
-        command = steps.mean_command.copy()
-        command[..., 2] = wrapped(command[..., 2])
         # One that does not beat gives nothing, whatever its law.
-        beats = (command[..., 0] > 0.0) & (command[..., 1] > 0.0)
-        return np.asarray(self._fins.force(command) * beats[..., None])
+        return np.asarray(self._fins.force(steps.mean_command) * steps.beats[..., None])

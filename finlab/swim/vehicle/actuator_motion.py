@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.arrays import AnyArray, Array
-from finlab.axes import TURN, is_full_turn
+from finlab.axes import is_full_turn
+from finlab.core import library
+from finlab.core.shared_array import SharedArray
 from finlab.layout import Actuator, Layout
 from finlab.swim.vehicle.fin_motion import FinLag
 
@@ -30,29 +32,26 @@ class FirstOrderLag:
     def __init__(self, actuators: Sequence[Actuator]) -> None:
         """Starts at rest: no force, angles as near to 0 as their arcs allow."""
         m = len(actuators)
-        self._rate = np.minimum(
+        # Of each number of a command, in the order of `lag_numbers` in the core's
+        # first_order_lag.c: largest rate, time constant, whether it is an angle, or on a circle.
+        lags = np.zeros((m, 3, 4))
+        lags[..., 0] = np.minimum(
             np.array([each.rates for each in actuators]).reshape(m, 3), UNLIMITED_RATE
         )
-        self._time_constant = np.full((m, 3), NO_LAG_S)
-        self._circles = np.zeros((m, 3), bool)
-        self._angles = np.zeros((m, 3), bool)
+        lags[..., 1] = NO_LAG_S
         self.value = np.zeros((m, 3))
         """What they do now (m, 3); angles are counted on over the seam."""
         for i, each in enumerate(actuators):
-            self._time_constant[i, each.KIND.lagging_number] = getattr(
-                each, "time_constant", NO_LAG_S
-            )
+            lags[i, each.KIND.lagging_number, 1] = getattr(each, "time_constant", NO_LAG_S)
             if not each.KIND.sticks_at_angle:
                 continue
             low = each.lower[0]
             high = each.upper[0]
-            self._angles[i, 0] = True
-            self._circles[i, 0] = is_full_turn(high - low)
+            lags[i, 0, 2] = 1.0
+            lags[i, 0, 3] = is_full_turn(high - low)
             self.value[i, 0] = min(max(0.0, low), high)
-        self._corner = self._rate * self._time_constant
-        self._some_circle = bool(self._circles.any())
-        self._steps = (0.0, 0)
-        self._step_ends = np.zeros((0, 1, 1))
+        self._lags = SharedArray(lags)
+        self._command = SharedArray(np.zeros((m, 3)))
 
     def step(self, command: Array, dt: float) -> None:
         """Follows a command over a step.
@@ -71,31 +70,19 @@ class FirstOrderLag:
             dt: length of a step [s].
             count: how many, K.
         """
-        value = self.value
-        error = command - value
-        if self._some_circle:
-            error = np.where(self._circles, error - TURN * np.rint(error / TURN), error)
-        time = self._times(dt, count)
-        size = np.abs(error)
-        # At the largest rate down to the corner, then exponentially for what is left of the time.
-        time_at_rate = np.minimum(np.maximum(size - self._corner, 0.0) / self._rate, time)
-        size_at_corner = size - time_at_rate * self._rate
-        size_after = size_at_corner * np.exp((time_at_rate - time) / self._time_constant)
-        values = np.empty((count + 1, *value.shape))
-        values[0] = value
-        values[1:] = value + np.sign(error) * (size - size_after)
-        is_stopped = np.isnan(command)
-        if is_stopped.any():
-            values[1:] = np.where(is_stopped, np.where(self._angles, value, 0.0), values[1:])
+        self._command.array[:] = command
+        values = np.empty((count + 1, *self.value.shape))
+        values[0] = self.value
+        library().fl_follow_lags(
+            self._lags.address,
+            self._command.address,
+            self.value.size,
+            dt,
+            count,
+            values.ctypes.data,
+        )
         self.value = values[-1]
         return values
-
-    def _times(self, dt: float, count: int) -> Array:
-        """The times (K, 1, 1) [s] at the ends of K steps."""
-        if self._steps != (dt, count):
-            self._steps = (dt, count)
-            self._step_ends = dt * np.arange(1.0, count + 1.0)[:, None, None]
-        return self._step_ends
 
 
 class ActuatorMotion:
@@ -192,12 +179,13 @@ class ActuatorMotion:
     def direction(self) -> Array:
         """Where each actuator (n,) would stay if it stuck: a fin's zero direction, another one's
         angle [rad], or a force [N]; a copy."""
-        of_fins = self.fins.value[2].copy()
+        of_fins: Array = self.fins.value[2].copy()
         if self._fins_work_alone:
             return of_fins
         rows = np.arange(len(self.other_indices))
         of_others = self.others.value[rows, self._held_columns[self.other_indices]]
-        return self.joined(of_fins, of_others)
+        direction: Array = self.joined(of_fins, of_others)
+        return direction
 
     def held_part(self, command: Array) -> Array:
         """The parts (..., n) of commands (..., n, 3) that stay where an actuator sticks."""

@@ -134,7 +134,9 @@ class FinSteps(NamedTuple):
     """What n fins did in K steps much shorter than a beat."""
 
     mean_command: Array
-    """Their command (K, n, 3) [rad, Hz, rad] as a mean over each step."""
+    """Their command (K, n, 3) [rad, Hz, rad] as a mean over each step, zero directions wrapped."""
+    beats: Array
+    """1 where a fin (K, n) beats by that, 0 where it does not."""
     angle: Array
     """Angles (K, n) at the end of each step [rad]: theta = A sin(phase) + zero direction (the
     paper's Eq. 1)."""
@@ -175,7 +177,7 @@ class FinMotion(FinLag):
         """
         self._take(command, dt)
         n = len(command)
-        moves = np.empty((count, n, 7))
+        moves = np.empty((count, n, 8))
         library().fl_move_fins(
             self._fins.address,
             self._command.address,
@@ -187,10 +189,11 @@ class FinMotion(FinLag):
         )
         return FinSteps(
             mean_command=moves[..., :3],
-            angle=moves[..., 3],
-            phase=moves[..., 4],
-            speed=moves[..., 5],
-            acceleration=moves[..., 6],
+            beats=moves[..., 3],
+            angle=moves[..., 4],
+            phase=moves[..., 5],
+            speed=moves[..., 6],
+            acceleration=moves[..., 7],
         )
 
 
