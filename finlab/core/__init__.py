@@ -34,6 +34,8 @@ SIGNATURES = {
     "fl_follow_fins": "vppip",
     "fl_move_fins": "vppiripp",
     "fl_follow_lags": "vppirip",
+    "fl_kalman_predict": "vppip",
+    "fl_kalman_correct": "vppiiipp",
 }
 """What each function returns and takes: i int, r real, p pointer, s text, v nothing."""
 _TYPES = {

@@ -231,8 +231,7 @@ void fl_commands(const fl_real *block, fl_work *work, const fl_real *force, int 
 
    @param command  (count, n, 3)
    @param force    becomes the forces (count, n, 3) along the axes of the laws [N] */
-void fl_forces_of_commands(const fl_real *block, const fl_real *command, int count,
-                           fl_real *force);
+void fl_forces_of_commands(const fl_real *block, const fl_real *command, int count, fl_real *force);
 
 /* Evaluates the conjugates of all costs at multipliers of the wrench, Eq. 4, for proofs of a lower
    bound of the power.
@@ -356,6 +355,26 @@ void fl_move_fins(const fl_real *fins, const fl_real *command, int count, fl_rea
                    those after each step */
 void fl_follow_lags(const fl_real *lags, const fl_real *command, int count, fl_real step, int steps,
                     fl_real *values);
+
+/* Predicts the covariance of a filter over a step: P <- F P F^T + Q.
+
+   @param transition  F (size, size)
+   @param noise       diagonal of Q (size,)
+   @param size        how many states, at most 16
+   @param covariance  P (size, size), symmetric */
+void fl_kalman_predict(const fl_real *transition, const fl_real *noise, int size,
+                       fl_real *covariance);
+
+/* Corrects a filter by measurements of the states `first` to `last - 1`, whose noise is
+   independent.
+
+   @param variance    of the noise, by state
+   @param innovation  what was measured less the states, by state
+   @param size        how many states, at most 16
+   @param state       (size,)
+   @param covariance  P (size, size), symmetric */
+void fl_kalman_correct(const fl_real *variance, const fl_real *innovation, int first, int last,
+                       int size, fl_real *state, fl_real *covariance);
 
 /* @param i      which actuator
    @param force  along its direction; of planes its size, below 0 in reverse [N]

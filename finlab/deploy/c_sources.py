@@ -39,6 +39,7 @@ FILES_LEFT_OUT = (
     "vehicle.c",
     "fin_motion.c",
     "first_order_lag.c",
+    "kalman_filter.c",
 )
 """Files of the core that an export does not need: `interaction`, attainable sets, what Python
 alone calls, and what swims in a simulation."""

@@ -48,8 +48,9 @@ class Measurement(NamedTuple):
     def as_array(self) -> Array:
         """Position, roll, pitch, yaw, velocity and rates side by side (12,), as a log keeps
         them."""
-        pose = [*self.position[:2], -self.depth, self.roll, self.pitch, self.yaw]
-        return np.array([*pose, *self.velocity, *self.rates])
+        x, y, _ = self.position.tolist()
+        pose = (x, y, -self.depth, self.roll, self.pitch, self.yaw)
+        return np.array([*pose, *self.velocity.tolist(), *self.rates.tolist()])
 
 
 class Setpoint(NamedTuple):

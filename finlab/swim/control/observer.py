@@ -17,6 +17,8 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.axes import wrapped_angle
+from finlab.core import library
+from finlab.core.shared_array import SharedArray
 from finlab.layout import Layout
 from finlab.physics import plant_of
 from finlab.swim.control.contract import Measurement, Setpoint
@@ -30,8 +32,6 @@ MOTION = slice(0, 4)
 """Surge, sway and heave speed and yaw rate in the state."""
 UNKNOWN = slice(4, 7)
 """The accelerations that the model does not explain in the state."""
-CURRENT = slice(7, 9)
-"""The horizontal velocity of the water in the state."""
 DRIVEN = [0, 2, 3]
 """Which of the motions the unknown accelerations (3,) change: surge, heave and yaw."""
 FORCE_NOISE = 0.006
@@ -147,21 +147,22 @@ class MotionObserver:
             [CURRENT_DRIFT**2] * 2,
         ]
         noise = period_s * np.concatenate(variances)
-        self._noise = np.diag(noise)  # Q (9, 9)
+        self._noise = SharedArray(noise)  # diagonal of Q (9,)
         sensor_noise = np.array([VELOCITY_NOISE] * 3 + [RATE_NOISE]) ** 2
-        self._sensor_noise = np.diag(sensor_noise)  # R (4, 4)
-        self._transition = np.eye(9)
-        self._transition[DRIVEN, range(4, 7)] = period_s
+        self._sensor_noise = SharedArray(sensor_noise)  # diagonal of R (4,)
+        self._transition = SharedArray(np.eye(9))
+        self._transition.array[DRIVEN, range(4, 7)] = period_s
+        self._innovation = SharedArray(np.zeros(4))
         times = np.array([POSE_S, POSE_S, POSE_S, TILT_S, TILT_S, POSE_S])
         self._pose_gain: list[float] = (1.0 - np.exp(-period_s / times)).tolist()
         # Poses (position, roll, pitch and yaw) and motions of the last periods, the newest first.
         self._poses: deque[Sequence[float]] = deque(maxlen=max(1, math.ceil(MAX_AGE_S / period_s)))
         self._motions: deque[Sequence[float]] = deque(maxlen=self._poses.maxlen)
-        self._state = [0.0] * 9
+        self._state = SharedArray(np.zeros(9))
         self._covariance_at_start = np.diag(
             [*sensor_noise, *noise[UNKNOWN] * 100.0, *[CURRENT_SPEED**2] * 2]
         )
-        self._covariance = self._covariance_at_start
+        self._covariance = SharedArray(self._covariance_at_start)
         self._last_velocity: Array | None = None
         self._estimate: MotionEstimate | None = None
 
@@ -179,20 +180,22 @@ class MotionObserver:
         motion = [*m.velocity.tolist(), r]
         pose = [x, y, -m.depth, m.roll, m.pitch, m.yaw]
         if before is None:
-            self._state[MOTION] = motion
+            self._state.array[MOTION] = motion
+            state: list[float] = self._state.array.tolist()
         else:
-            self._predict(before, wrench)
-            self._correct(motion, m)
-            pose = self._corrected_pose(before, p, q, pose, m)
+            predicted = self._predict(before, wrench)
+            state = self._corrected(predicted, motion, m)
+            pose = self._corrected_pose(before, state, p, q, pose, m)
         self._poses.appendleft(pose)
-        self._motions.appendleft(self._state[MOTION])
+        self._motions.appendleft(state[MOTION])
         self._last_velocity = m.velocity
-        self._estimate = self._estimate_of(p, q, pose)
+        self._estimate = self._estimate_of(state, p, q, pose)
         return self._estimate
 
     def _corrected_pose(
         self,
         before: MotionEstimate,
+        state: list[float],
         roll_rate: float,
         pitch_rate: float,
         measured: list[float],
@@ -203,13 +206,14 @@ class MotionObserver:
 
         Args:
             before: the estimate a period ago.
+            state: of the filter now (9).
             roll_rate: measured [rad/s].
             pitch_rate: measured [rad/s].
             measured: pose (6).
             m: the measurement, for the ages of its samples.
         """
         dt = self._dt
-        u, v, w, r = self._state[MOTION]
+        u, v, w, r = state[MOTION]
         x, y, z = before.position
         roll = before.roll + dt * roll_rate
         pitch = before.pitch + dt * pitch_rate
@@ -245,6 +249,9 @@ class MotionObserver:
         oldest = len(past)
         values = []
         for column, age in enumerate(ages):
+            if age == 0.0:
+                values.append(newest[column])
+                continue
             periods_ago = min(age / self._dt, oldest)
             row = min(int(periods_ago), oldest - 1)
             after = known[row][column]
@@ -306,18 +313,19 @@ class MotionObserver:
             rows[k][5] = yaw.inertia * (turning_rate + yaw.rate(turning) * turning)
         return np.array(rows)
 
-    def _predict(self, before: MotionEstimate, wrench: Array) -> None:
-        """The filter over one period: x <- f(x), P <- F P F^T + Q.
+    def _predict(self, before: MotionEstimate, wrench: Array) -> list[float]:
+        """The filter over one period: x <- f(x), P <- F P F^T + Q; returns x (9).
 
         Args:
             before: the estimate at its beginning.
             wrench: (6,) over the period [N, N m].
         """
         dt = self._dt
-        F = self._transition
+        F = self._transition.array
         cosine = math.cos(before.yaw)
         sine = math.sin(before.yaw)
-        surge, sway, heave, yaw, _, _, _, current_x, current_y = self._state
+        state: list[float] = self._state.array.tolist()
+        surge, sway, heave, yaw, _, _, _, current_x, current_y = state
         surge_in_water = surge - (cosine * current_x + sine * current_y)
         sway_in_water = sway - (cosine * current_y - sine * current_x)
         nu_r = (surge_in_water, sway_in_water, heave, yaw)
@@ -336,49 +344,61 @@ class MotionObserver:
         tau = wrench.tolist()
         for k, axis in enumerate(AXES):
             thrust = tau[axis] / self.damping[k].inertia
-            self._state[k] += dt * (before.drift[k] + thrust)
-        self._covariance = F @ self._covariance @ F.T + self._noise
+            state[k] += dt * (before.drift[k] + thrust)
+        library().fl_kalman_predict(
+            self._transition.address, self._noise.address, len(state), self._covariance.address
+        )
+        return state
 
-    def _correct(self, measured: list[float], m: Measurement) -> None:
-        """Corrects the state by the sensors: K = P H^T (H P H^T + R)^-1, x <- x + K innovation.
+    def _corrected(
+        self, predicted: list[float], measured: list[float], m: Measurement
+    ) -> list[float]:
+        """The state (9) corrected by the sensors: K = P H^T (H P H^T + R)^-1, x <- x + K
+        innovation.
 
         A velocity counts where it is a new one.
 
         Args:
+            predicted: the state (9).
             measured: surge, sway and heave speed and yaw rate (4) [m/s, rad/s].
             m: the measurement that they come from.
         """
         _, _, dvl, imu = m.ages
-        expected = self._when_sampled(self._motions, self._state[MOTION], (dvl, dvl, dvl, imu))
+        expected = self._when_sampled(self._motions, predicted[MOTION], (dvl, dvl, dvl, imu))
         innovation = [a - b for a, b in zip(measured, expected, strict=True)]
+        state = self._state.array
         if not max(map(abs, innovation)) < DIVERGED:
-            self._state = [*measured, 0.0, 0.0, 0.0, 0.0, 0.0]
-            self._covariance = self._covariance_at_start
-            return
-        P = self._covariance
-        if m.velocity is self._last_velocity:  # the yaw rate alone is new
-            variance = P[3, 3] + self._sensor_noise[3, 3]
-            K = P[3] / variance
-            change = K * innovation[3]
-            self._covariance = P - K[:, None] * P[3]
+            state[:] = 0.0
+            state[MOTION] = measured
+            self._covariance.array[:] = self._covariance_at_start
         else:
-            S = P[MOTION, MOTION] + self._sensor_noise
-            K = np.linalg.solve(S, P[MOTION]).T
-            change = K @ innovation
-            self._covariance = P - K @ P[MOTION]
-        self._state = [a + b for a, b in zip(self._state, change.tolist(), strict=True)]
+            state[:] = predicted
+            self._innovation.array[:] = innovation
+            is_velocity_old = m.velocity is self._last_velocity
+            library().fl_kalman_correct(
+                self._sensor_noise.address,
+                self._innovation.address,
+                3 if is_velocity_old else 0,
+                4,
+                len(predicted),
+                self._state.address,
+                self._covariance.address,
+            )
+        corrected: list[float] = state.tolist()
+        return corrected
 
     def _estimate_of(
-        self, roll_rate: float, pitch_rate: float, pose: Sequence[float]
+        self, state: list[float], roll_rate: float, pitch_rate: float, pose: Sequence[float]
     ) -> MotionEstimate:
         """The estimate by the filter's state and a pose.
 
         Args:
+            state: of the filter (9).
             roll_rate: measured, as the filter does not hold it [rad/s].
             pitch_rate: likewise [rad/s].
             pose: position in the world [m], roll, pitch, yaw [rad] (6).
         """
-        u, v, w, r, by_surge, by_heave, by_yaw, current_x, current_y = self._state
+        u, v, w, r, by_surge, by_heave, by_yaw, current_x, current_y = state
         x, y, z, roll, pitch, yaw_counted_on = pose
         yaw = wrapped_angle(yaw_counted_on)
         attitude = quaternion_of(roll, pitch, yaw)

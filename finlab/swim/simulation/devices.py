@@ -120,60 +120,96 @@ class NormalNumbers:
 class SensorChannel:
     """One sensor at work: samples at its rate, held until the next one arrives."""
 
-    def __init__(self, sensor: Sensor, rng: np.random.Generator, normals: NormalNumbers) -> None:
+    def __init__(
+        self,
+        sensor: Sensor,
+        read: Callable[[list[float]], list[float]],
+        rng: np.random.Generator,
+        normals: NormalNumbers,
+    ) -> None:
         """Makes a sensor at the beginning of a run.
 
         Args:
             sensor: the sensor.
+            read: from a state (13) to the true values.
             rng: of the run; the bias and what is lost come from a stream of their own, so that a
                 run has the same noise with and without these.
             normals: the numbers of that generator, which all sensors share.
         """
-        self._sensor = sensor
+        self._read = read
         self._period = 1.0 / sensor.rate_hz
+        self._delay_s = sensor.delay_s
+        self._dropout = sensor.dropout
         self._normals = normals
         self._loss_rng = rng.spawn(1)[0]
         self._noise = sensor.noise
+        self._size = len(sensor.noise)
         bias = np.array(sensor.bias) * self._loss_rng.standard_normal(len(sensor.bias))
-        self.bias: list[float] = bias.tolist()
-        """What each value is off for the whole run."""
-        self._next_time = 0.0
-        # When a sample arrives, when it was taken, and its values.
-        self._in_transit: deque[tuple[float, float, list[float]]] = deque()
+        self._bias: list[float] = bias.tolist()  # what each value is off for the whole run
+        self.next_time = 0.0
+        """When it samples next [s]."""
+        # When a sample arrives, when it was taken, of which state, and its noise.
+        self._in_transit: deque[tuple[float, float, list[float], list[float]]] = deque()
         self._first = True
         self._newest: Array = bias
         self.taken = 0.0
         """When the newest sample that has arrived was taken [s]."""
 
-    def is_due(self, time: float) -> bool:
-        """Whether it samples now."""
-        return time >= self._next_time - 1e-9
-
-    def take(self, time: float, true: list[float]) -> None:
-        """Samples the true values at a time [s]."""
-        self._next_time = max(self._next_time + self._period, time)
-        sensor = self._sensor
-        normals = self._normals.take(len(true))
-        sample = []
-        for value, bias, noise, normal in zip(true, self.bias, self._noise, normals, strict=True):
-            sample.append(value + bias + noise * normal)
-        lost = sensor.dropout > 0.0 and self._loss_rng.random() < sensor.dropout
+    def take(self, time: float, state: list[float]) -> None:
+        """Samples a state (13) at a time [s]; the list is kept, and must not change."""
+        self.next_time = max(self.next_time + self._period, time)
+        noise = self._normals.take(self._size)
+        lost = self._dropout > 0.0 and self._loss_rng.random() < self._dropout
         # The robot has waited at rest for its first samples.
-        if self._first or not lost:
-            arrival = time if self._first else time + sensor.delay_s
-            self._in_transit.append((arrival, time, sample))
-        self._first = False
+        if self._first:
+            self._in_transit.append((time, time, state, noise))
+            self._first = False
+        elif not lost:
+            self._in_transit.append((time + self._delay_s, time, state, noise))
 
     def value(self, time: float) -> Array:
         """The newest sample that has arrived; the same array as before where there is no new
         one."""
         in_transit = self._in_transit
-        newest = None
+        arrived = None
         while in_transit and in_transit[0][0] <= time + 1e-9:
-            _, self.taken, newest = in_transit.popleft()
-        if newest is not None:
-            self._newest = np.array(newest)
+            arrived = in_transit.popleft()
+        if arrived is not None:
+            _, self.taken, state, normals = arrived
+            true = self._read(state)
+            values = zip(true, self._bias, self._noise, normals, strict=True)
+            self._newest = np.array([x + bias + std * normal for x, bias, std, normal in values])
         return self._newest
+
+
+def _marker(state: list[float]) -> list[float]:
+    """Position [m] and heading [rad] of a state (13)."""
+    x, y, z, qw, qx, qy, qz, *_ = state
+    return [x, y, z, math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))]
+
+
+def _pressure(state: list[float]) -> list[float]:
+    """Depth [m] of a state (13)."""
+    return [-state[2]]
+
+
+def _dvl(state: list[float]) -> list[float]:
+    """Velocity [m/s] of a state (13)."""
+    return state[7:10]
+
+
+def _imu(state: list[float]) -> list[float]:
+    """Roll, pitch [rad] and angular rates [rad/s] of a state (13)."""
+    return [*tilt_of_quaternion(*state[3:7]), *state[10:]]
+
+
+READINGS: dict[str, Callable[[list[float]], list[float]]] = {
+    "marker": _marker,
+    "pressure": _pressure,
+    "dvl": _dvl,
+    "imu": _imu,
+}
+"""What each of `SENSORS` reads of a state (13)."""
 
 
 class Sensors:
@@ -182,10 +218,12 @@ class Sensors:
     def __init__(self, settings: SensorSettings, rng: np.random.Generator) -> None:
         """Draws the biases of this run."""
         normals = NormalNumbers(rng)
-        self._channels = [SensorChannel(getattr(settings, name), rng, normals) for name in SENSORS]
+        self._channels = [
+            SensorChannel(getattr(settings, name), READINGS[name], rng, normals) for name in SENSORS
+        ]
 
     def measure(self, time: float, state: list[float]) -> Measurement:
-        """The newest samples at `time` [s] for a state (13,); to be called in order of time."""
+        """The newest samples at `time` [s] for a state (13); to be called in order of time."""
         self.sample(time, state)
         marker, pressure, dvl, imu = self._channels
         pose = marker.value(time)
@@ -206,18 +244,10 @@ class Sensors:
         )
 
     def sample(self, time: float, state: list[float]) -> None:
-        """Let the sensors sample a state (13,) whose measurement is not needed yet."""
-        marker, pressure, dvl, imu = self._channels
-        if marker.is_due(time):
-            qw, qx, qy, qz = state[3:7]
-            yaw = math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))
-            marker.take(time, [*state[:3], yaw])
-        if pressure.is_due(time):
-            pressure.take(time, [-state[2]])
-        if dvl.is_due(time):
-            dvl.take(time, state[7:10])
-        if imu.is_due(time):
-            imu.take(time, [*tilt_of_quaternion(*state[3:7]), *state[10:]])
+        """Let the sensors sample a state (13) whose measurement is not needed yet."""
+        for channel in self._channels:
+            if time >= channel.next_time - 1e-9:
+                channel.take(time, state)
 
 
 STEP_S = 0.02
