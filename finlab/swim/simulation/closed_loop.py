@@ -5,7 +5,7 @@ import math
 from collections import deque
 from collections.abc import Sequence
 from itertools import islice
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +30,7 @@ from finlab.swim.control import (
     TrackingController,
 )
 from finlab.swim.control.contract import NO_WRENCH
-from finlab.swim.simulation.devices import ActuatorForce, Sensors, SensorSettings
+from finlab.swim.simulation.devices import ActuatorForce, ActuatorOutput, Sensors, SensorSettings
 from finlab.swim.simulation.log import RunLog, Tick, log_of_ticks
 from finlab.swim.simulation.task import Trajectory
 from finlab.swim.simulation.truth import Fault, checked_truth, damage_of
@@ -376,8 +376,9 @@ class ClosedLoop:
     def _for_drives(self, command: Array) -> Array:
         """What drives make of a command (n, 3): a lost actuator is not moved, a stuck one does not
         turn."""
-        result = command.copy()
-        result[~self._alive] = np.nan
+        result = command
+        if self.broken:
+            result = np.where(self._alive[:, None], command, np.nan)
         return self.motion.turned_to(result, self._stuck_at) if self._is_stuck else result
 
     def _simulate(
@@ -402,8 +403,7 @@ class ClosedLoop:
         n_steps = max(1, math.ceil(self.period_s / self._forces.step_s - 1e-9))
         dt = self.period_s / n_steps
         sent = command if self.learner is None else command * self.learner.factor
-        wrenches, power = self._swim(self._for_drives(sent), dt, n_steps, time)
-        mean = wrenches.sum(axis=0) / n_steps
+        mean = self._swim(self._for_drives(sent), dt, n_steps, time)
         beliefs = (self._no_beliefs,) * 3 if self.verdict is None else self.verdict[1:]
         return Tick(
             time=time,
@@ -416,12 +416,12 @@ class ClosedLoop:
             reference_surge=setpoint.surge,
             asked=wrench,
             allocated=self._plant.wrench(command, flow=self._flow),
-            delivered=mean.sum(axis=0),
+            delivered=mean.wrench,
             command=sent,
             fin_motion=self.motion.command,
-            force=mean[:, :3].copy(),
-            inertial_power=power[0],
-            driving_power=power[1],
+            force=mean.force,
+            inertial_power=mean.inertial_power,
+            driving_power=mean.driving_power,
             alive=self._alive,
             fault_probability=beliefs[0],
             strength=beliefs[1],
@@ -429,52 +429,66 @@ class ClosedLoop:
             solve_ms=solve_ms,
         )
 
-    def _swim(
-        self, command: Array, dt: float, n_steps: int, time: float
-    ) -> tuple[Array, tuple[Array, Array]]:
-        """Moves actuators and body over K steps, and lets the sensors sample on the way.
+    def _swim(self, command: Array, dt: float, n_steps: int, time: float) -> "MeanOutput":
+        """Moves actuators and body over K steps, lets the sensors sample on the way, and returns
+        what the actuators gave.
 
         Args:
             command: of the drives (n, 3); NaN rows are lost.
             dt: length of a step [s].
             n_steps: how many, K.
             time: at the beginning [s].
-
-        Returns:
-            Wrenches (K, n, 6) of the actuators [N, N m], and their mean inertial and driving power
-            (n,) [W].
         """
         forces = self._forces
         vehicle = self.vehicle
         moved = forces.move(command, dt, n_steps)
-        # Where nothing depends on how the body moves through the water, all steps are one call.
-        parts = [moved]
-        if forces.feels_flow:
-            parts = [moved.at(k) for k in range(n_steps)]
-        state = self.state
-        wrenches = []
-        outputs = []
-        states: list[list[float]] = []
-        for part in parts:
-            water = vehicle.velocity_in_water(state) if forces.feels_flow else None
-            output = forces.output(part, dt, self._share, water)
-            by_actuator = forces.wrenches(output.force, water)
-            after = vehicle.steps(state, by_actuator.sum(axis=1), dt)
-            state = after[-1]
-            states.extend(after[1:].tolist())
-            wrenches.append(by_actuator)
-            outputs.append(output)
-        self.state = state.copy()
-        for k in range(1, n_steps):  # the sample at the end belongs to the next period
-            self._sensors.sample(time + k * dt, states[k - 1])
-        if len(parts) == 1:
-            inertial = output.inertial_power
-            driving = output.driving_power
+        if not forces.feels_flow:
+            # Nothing depends on how the body moves through the water: all steps are one call.
+            output = forces.output(moved, dt, self._share, None)
+            wrench = forces.wrench(output.force, None)
+            states = vehicle.steps(self.state, wrench, dt)[1:]
         else:
-            by_actuator = np.concatenate(wrenches)
-            inertial = np.concatenate([each.inertial_power for each in outputs])
-            driving = np.concatenate([each.driving_power for each in outputs])
-        return by_actuator, (inertial.sum(axis=0) / n_steps, driving.sum(axis=0) / n_steps)
+            states = np.empty((n_steps, STATE_SIZE))
+            wrench = np.empty((n_steps, 6))
+            outputs = []
+            state = self.state
+            for k in range(n_steps):
+                water = vehicle.velocity_in_water(state)
+                in_step = forces.output(moved.at(k), dt, self._share, water)
+                wrench[k] = forces.wrench(in_step.force, water)[0]
+                state = vehicle.step(state, wrench[k], dt)
+                states[k] = state
+                outputs.append(in_step)
+            output = ActuatorOutput(*(np.concatenate(each) for each in zip(*outputs, strict=True)))
+        self.state = states[-1].copy()
+        for k, state_then in enumerate(states[:-1].tolist(), start=1):
+            # The sample at the end belongs to the next period.
+            self._sensors.sample(time + k * dt, state_then)
+        delivered = _mean(wrench)
+        return MeanOutput(
+            delivered,
+            forces.in_body(_mean(output.force), delivered),
+            _mean(output.inertial_power),
+            _mean(output.driving_power),
+        )
+
+
+class MeanOutput(NamedTuple):
+    """What n actuators gave in a period, on average."""
+
+    wrench: Array
+    """(6,) [N, N m]."""
+    force: Array
+    """Forces (n, 3) in the body frame [N], with a share of what the actuators do to each other."""
+    inertial_power: Array
+    """(n,) [W]."""
+    driving_power: Array
+    """(n,) [W]."""
+
+
+def _mean(values: Array) -> Array:
+    """The mean (...) of values (K, ...) over the steps of a period."""
+    return np.asarray(np.add.reduce(values) / len(values))
 
 
 def _constant(values: NDArray[Any]) -> NDArray[Any]:

@@ -15,7 +15,7 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.errors import FinlabError
 from finlab.layout import Layout
-from finlab.layout.effectiveness import own_effectiveness
+from finlab.layout.effectiveness import body_force, own_effectiveness
 from finlab.physics import plant_of
 from finlab.swim.control import Measurement
 from finlab.swim.vehicle.actuator_motion import ActuatorMotion
@@ -292,8 +292,9 @@ class ActuatorForce:
         self._plant = plant_of(layout)
         self.feels_flow = self._plant.feels_flow
         """Whether what the actuators give depends on how the robot moves through the water."""
-        n = layout.n
-        self._effectiveness = own_effectiveness(layout).reshape(n, 3, 6)
+        self._frames = layout.frames
+        # The wrench (3 n, 6) of 1 N along each own axis of each actuator.
+        self._effectiveness = own_effectiveness(layout).reshape(-1, 6)
         others = tuple(layout.actuators[i] for i in self.motion.other_indices)
         self._n_others = len(others)
         if len(self.motion.fin_indices):
@@ -357,14 +358,27 @@ class ActuatorForce:
         power = self._others.power(command, flow=water) * works
         return ActuatorOutput(force, np.zeros_like(power), power)
 
-    def wrenches(self, force: Array, water: Array | None) -> Array:
-        """Returns the wrenches (K, n, 6) [N, N m] of each actuator's forces (K, n, 3) [N], with an
-        equal share of what they do to each other; `water` as of `output`."""
-        by_actuator: Array = (force[:, :, None, :] @ self._effectiveness)[:, :, 0]
+    def wrench(self, force: Array, water: Array | None) -> Array:
+        """Returns the wrenches (K, 6) [N, N m] of forces (K, n, 3) [N], with what the actuators do
+        to each other; `water` as of `output`."""
+        wrench: Array = force.reshape(len(force), -1) @ self._effectiveness
         if self._plant.interaction is None:
-            return by_actuator
-        offset = self._plant.offset(force, flow=water) / force.shape[1]
-        return np.asarray(by_actuator + offset[:, None])
+            return wrench
+        return np.asarray(wrench + self._plant.offset(force, flow=water))
+
+    def in_body(self, force: Array, delivered: Array) -> Array:
+        """Returns forces in the body frame (n, 3) [N], with an equal share of what the actuators do
+        to each other.
+
+        Args:
+            force: in own frames (n, 3) [N].
+            delivered: the wrench (6,) of all [N, N m].
+        """
+        by_actuator = body_force(force, self._frames)
+        if self._plant.interaction is None:
+            return np.asarray(by_actuator)
+        of_interaction = delivered[:3] - by_actuator.sum(axis=0)
+        return np.asarray(by_actuator + of_interaction / len(force))
 
     def of_fins(self, steps: FinSteps, dt: float) -> Array:
         """Forces (K, n_fins, 3) of the fins in their own frames [N], means over steps of `dt`
