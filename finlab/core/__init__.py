@@ -34,6 +34,7 @@ SIGNATURES = {
     "fl_follow_fins": "vppip",
     "fl_move_fins": "vppiripp",
     "fl_follow_lags": "vppirip",
+    "fl_path_wrenches": "vpppiprrp",
     "fl_kalman_predict": "vppip",
     "fl_kalman_correct": "vppiiipp",
 }

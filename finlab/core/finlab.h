@@ -356,6 +356,19 @@ void fl_move_fins(const fl_real *fins, const fl_real *command, int count, fl_rea
 void fl_follow_lags(const fl_real *lags, const fl_real *command, int count, fl_real step, int steps,
                     fl_real *values);
 
+/* Says which wrenches move a robot along a path, nose ahead.
+
+   @param axes          linear and quadratic damping, inertia; of surge, sway, heave and yaw (4, 3)
+   @param velocity      of the path in the world (count, 3), at least two points [m/s]
+   @param acceleration  of the path in the world (count, 3) [m/s^2]
+   @param current       horizontal velocity of the water in the world (2,) [m/s]
+   @param slow          speed through the water below which turning counts less and less [m/s]
+   @param period        time from one point to the next [s]
+   @param wrenches      become those at the points (count, 6), body frame [N, N m] */
+void fl_path_wrenches(const fl_real *axes, const fl_real *velocity, const fl_real *acceleration,
+                      int count, const fl_real *current, fl_real slow, fl_real period,
+                      fl_real *wrenches);
+
 /* Predicts the covariance of a filter over a step: P <- F P F^T + Q.
 
    @param transition  F (size, size)

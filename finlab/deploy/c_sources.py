@@ -40,6 +40,7 @@ FILES_LEFT_OUT = (
     "fin_motion.c",
     "first_order_lag.c",
     "kalman_filter.c",
+    "path_wrench.c",
 )
 """Files of the core that an export does not need: `interaction`, attainable sets, what Python
 alone calls, and what swims in a simulation."""

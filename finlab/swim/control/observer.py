@@ -138,6 +138,8 @@ class MotionObserver:
             for k, mass in zip(AXES, self.inertia.tolist(), strict=True)
         )
         """Damping along surge, sway, heave and yaw."""
+        self._axes = SharedArray(self.damping)
+        self._current = SharedArray(np.zeros(2))
         strength = strongest_wrench(layout)[AXES] / self.inertia
         force_noise = FORCE_NOISE_OF_RUDDERS if layout.flow_driven else FORCE_NOISE
         drift_share = force_noise * FORCE_DRIFT / FORCE_NOISE
@@ -288,30 +290,22 @@ class MotionObserver:
             current: horizontal velocity (2) of the water in the world [m/s].
             slow: speed through the water [m/s] below which turning counts less and less.
         """
-        current_x, current_y = current
-        surge, _, heave, yaw = self.damping
-        turnings = []
-        rows = []
-        for setpoint in setpoints:
-            vx, vy, vz = setpoint.velocity.tolist()
-            ax, ay, az = setpoint.acceleration.tolist()
-            x = vx - current_x
-            y = vy - current_y
-            speed_squared = x * x + y * y
-            speed = math.sqrt(speed_squared)
-            surge_rate = (x * ax + y * ay) / max(speed, 1e-3)
-            turnings.append((x * ay - y * ax) / max(speed_squared, slow * slow))
-            force_ahead = surge.inertia * (surge_rate + surge.rate(speed) * speed)
-            force_up = heave.inertia * (az + heave.rate(vz) * vz)
-            rows.append([force_ahead, 0.0, force_up, 0.0, 0.0, 0.0])
-        last = len(turnings) - 1
-        for k, turning in enumerate(turnings):
-            # Central differences, and one-sided ones at the ends.
-            after = min(k + 1, last)
-            before = max(k - 1, 0)
-            turning_rate = (turnings[after] - turnings[before]) / ((after - before) * self._dt)
-            rows[k][5] = yaw.inertia * (turning_rate + yaw.rate(turning) * turning)
-        return np.array(rows)
+        count = len(setpoints)
+        velocity = np.concatenate([each.velocity for each in setpoints], dtype=np.float64)
+        acceleration = np.concatenate([each.acceleration for each in setpoints], dtype=np.float64)
+        self._current.array[:] = current
+        wrenches = np.empty((count, 6))
+        library().fl_path_wrenches(
+            self._axes.address,
+            velocity.ctypes.data,
+            acceleration.ctypes.data,
+            count,
+            self._current.address,
+            slow,
+            self._dt,
+            wrenches.ctypes.data,
+        )
+        return wrenches
 
     def _predict(self, before: MotionEstimate, wrench: Array) -> list[float]:
         """The filter over one period: x <- f(x), P <- F P F^T + Q; returns x (9).

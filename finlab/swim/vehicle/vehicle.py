@@ -32,7 +32,7 @@ MAX_SUBSTEPS = 500
 
 
 class Vehicle:
-    """The dynamics of one vehicle; it holds no state."""
+    """The dynamics of one vehicle; it keeps nothing from one call to the next."""
 
     def __init__(self, body: Body, current: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
         """Makes the dynamics of a body in water.
@@ -71,6 +71,10 @@ class Vehicle:
                 *velocity,
             ]
         )
+        # Where the core reads the arguments of one call and writes what it returns.
+        self._state = SharedArray(np.zeros(STATE_SIZE))
+        self._wrench = SharedArray(np.zeros(6))
+        self._rates = SharedArray(np.zeros(STATE_SIZE))
 
     @property
     def current(self) -> tuple[float, ...]:
@@ -95,9 +99,10 @@ class Vehicle:
         Raises:
             LayoutError: even `MAX_SUBSTEPS` would not do.
         """
-        state = np.zeros(STATE_SIZE)
-        state[7:] = nu
-        fastest_rate: float = library().fl_body_fastest_rate(self._body.address, state.ctypes.data)
+        self._state.array[7:] = nu
+        fastest_rate: float = library().fl_body_fastest_rate(
+            self._body.address, self._state.address
+        )
         max_rate = MAX_SUBSTEPS * STABLE_STEP / dt
         if not fastest_rate <= max_rate:  # nor where it is no number any more
             got = "beyond all bounds"
@@ -110,20 +115,19 @@ class Vehicle:
             )
         return max(1, math.ceil(fastest_rate * dt / STABLE_STEP))
 
-    def derivative(self, state: ArrayLike, wrench: ArrayLike) -> Array:
+    def derivative(self, state: Sequence[float] | Array, wrench: Sequence[float] | Array) -> Array:
         """Returns the rate of change (13,) of a state.
 
         Args:
             state: see the head of this file (13,).
             wrench: tau (6,) in the body frame [N, N m].
         """
-        y = np.array(state, dtype=np.float64)
-        tau = np.array(wrench, dtype=np.float64)
-        rates = np.empty(STATE_SIZE)
+        self._state.array[:] = state
+        self._wrench.array[:] = wrench
         library().fl_body_rates(
-            self._body.address, y.ctypes.data, tau.ctypes.data, rates.ctypes.data
+            self._body.address, self._state.address, self._wrench.address, self._rates.address
         )
-        return rates
+        return self._rates.array.copy()
 
     def velocity_in_water(self, state: Array) -> Array:
         """Returns nu_r (6,) of a state (13,): velocity relative to the water and angular rates,
@@ -163,13 +167,15 @@ class Vehicle:
         after: Array = self.steps(state, np.reshape(wrench, (1, 6)), dt)[1]
         return after
 
-    def coarse_step(self, state: ArrayLike, wrench: ArrayLike, dt: float) -> Array:
+    def coarse_step(
+        self, state: Sequence[float] | Array, wrench: Sequence[float] | Array, dt: float
+    ) -> Array:
         """As `step`, by the midpoint rule, in half the time; the quaternion keeps the length that
         it comes to."""
-        y = np.array(state, dtype=np.float64)
-        tau = np.array(wrench, dtype=np.float64)
+        self._state.array[:] = state
+        self._wrench.array[:] = wrench
         if not library().fl_body_coarse_step(
-            self._body.address, tau.ctypes.data, dt, y.ctypes.data
+            self._body.address, self._wrench.address, dt, self._state.address
         ):
-            self.n_steps(y[7:], dt)  # says what is wrong
-        return y
+            self.n_steps(self._state.array[7:].copy(), dt)  # says what is wrong
+        return self._state.array.copy()
