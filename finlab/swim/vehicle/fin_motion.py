@@ -59,13 +59,6 @@ class LagStep(NamedTuple):
             rate_by_rate=(1.0 - pole * dt) * decay,
         )
 
-    def follow(self, value: Array, rate: Array, target: Array) -> tuple[Array, Array]:
-        """Returns values and rates after the step, all arguments of the poles' shape."""
-        error = value - target
-        value_after = target + self.error_by_error * error + self.error_by_rate * rate
-        rate_after = self.rate_by_error * error + self.rate_by_rate * rate
-        return value_after, rate_after
-
 
 class FinLag:
     """What the n fins of one layout do if they follow as they should: enough for whoever watches

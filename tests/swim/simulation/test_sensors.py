@@ -9,7 +9,7 @@ from finlab.arrays import Array
 from finlab.errors import FinlabError
 from finlab.swim.control import Measurement
 from finlab.swim.simulation import NO_NOISE, NOISE_ALONE, SensorSettings
-from finlab.swim.simulation.devices import Sensor, Sensors
+from finlab.swim.simulation.devices import NORMALS_AT_ONCE, NormalNumbers, Sensor, Sensors
 from finlab.swim.vehicle.attitude import euler
 
 STATE = np.zeros(13)
@@ -72,3 +72,14 @@ def test_what_no_sensor_has_is_refused() -> None:
     for wrong in ({"rate_hz": 0.0}, {"delay_s": -0.1}, {"dropout": 1.0}, {"noise": (np.nan,) * 3}):
         with pytest.raises(FinlabError, match="sensors: dvl: expected"):
             SensorSettings(dvl=replace(usual, **wrong))
+
+
+def test_noise_comes_in_the_order_of_its_generator() -> None:
+    numbers = NormalNumbers(np.random.default_rng(3))
+    taken = []
+    for count in (1, 5, 4, 3) * 200:
+        few = numbers.take(count)
+        assert len(few) == count
+        taken += few
+    assert len(taken) > 4 * NORMALS_AT_ONCE
+    assert taken == np.random.default_rng(3).standard_normal(len(taken)).tolist()

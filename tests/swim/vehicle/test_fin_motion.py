@@ -133,6 +133,22 @@ def test_mean_power_is_what_a_sinusoid_has(pair: Layout) -> None:
     assert np.mean(driving) == pytest.approx(Blade().power(amplitude, frequency) + heat, rel=0.01)
 
 
+def test_steps_at_once_are_as_many_single_ones(pair: Layout) -> None:
+    """Fins of which one stops on the way."""
+    together = flapping(pair, 0.3, 1.2, 0.4)
+    single = flapping(pair, 0.3, 1.2, 0.4)
+    for command in ([[0.5, 1.7, 2.9], [0.2, 0.6, -3.0]], [[0.5, 1.0, 1.0], [math.nan] * 3]):
+        steps = together.steps(np.array(command), STEP_S, 9)
+        for k in range(9):
+            alone = single.steps(np.array(command), STEP_S, 1)
+            for values, value in zip(steps, alone, strict=True):
+                np.testing.assert_array_equal(values[k], value[0])
+        np.testing.assert_array_equal(together.command, single.command)
+    assert steps.beats[:, 0].all() and not steps.beats[:, 1].any()
+    assert (together.command[1, :2] == 0.0).all() and (together.rate[:, 1] == 0.0).all()
+    assert (np.abs(steps.mean_command[..., 2]) <= math.pi).all()
+
+
 def test_one_step_per_period_follows_as_the_small_steps_do(layout_a: Layout) -> None:
     rng = np.random.default_rng(5)
     slow = Servo(amplitude_pole=3.0, frequency_pole=2.0, direction_pole=1.5)
