@@ -155,7 +155,7 @@ class MotionModel:
         # A damping that is strong over a period brings to rest, not beyond it.
         decay = np.expm1(damping) + self._tilt_decay
         by_flow[3:, 3:] = 0.0
-        by_flow[range(6), range(6)] = decay
+        by_flow.reshape(-1)[::7] = decay  # its diagonal
         return by_flow
 
     def _wrenches(
