@@ -75,6 +75,11 @@ def wrapped(angle: ArrayLike) -> Array:
     return np.asarray(np.mod(np.asarray(angle) + math.pi, TURN) - math.pi)
 
 
+def wrapped_angle(angle: float) -> float:
+    """Returns one angle [rad] modulo a turn, within [-pi, pi), as `wrapped` does many."""
+    return (angle + math.pi) % TURN - math.pi
+
+
 def feasible(
     command: AnyArray, lower: Array, upper: Array, is_angle: NDArray[np.bool_]
 ) -> AnyArray:

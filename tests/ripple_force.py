@@ -10,7 +10,7 @@ from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.swim.simulation import ClosedLoop
 from finlab.swim.simulation.devices import ActuatorForce
-from finlab.swim.vehicle.fin_motion import FinMotion
+from finlab.swim.vehicle.fin_motion import FinMotion, FinSteps
 
 
 class RippleForce(ActuatorForce):
@@ -29,18 +29,18 @@ class RippleForce(ActuatorForce):
         super().__init__(layout, fins)
         self._momentum = np.zeros((layout.n_fins, 2))
 
-    def of_fins(self, dt: float) -> Array:
+    def of_fins(self, steps: FinSteps, dt: float) -> Array:
         """See `ActuatorForce`."""
-        motion = self._beat
         length = self.blade.length
-        force = super().of_fins(dt) * (1.0 - np.cos(2 * motion.phase))[:, None]
-        angle = motion.angle + math.pi
-        speed = motion.speed_and_acceleration()[0]
+        force = super().of_fins(steps, dt) * (1.0 - np.cos(2 * steps.phase))[..., None]
+        angle = steps.angle + math.pi
         normal = np.stack([-np.sin(angle), np.cos(angle)], axis=-1)
-        momentum = 0.5 * self.blade.virtual_mass * length**2 * speed[:, None] * normal
+        speed = steps.speed[..., None]
+        momentum = 0.5 * self.blade.virtual_mass * length**2 * speed * normal
         drag = self.blade.drag_per_length * length**3 / 3.0 * speed * np.abs(speed)
-        force[:, 1:] -= (momentum - self._momentum) / dt + drag[:, None] * normal
-        self._momentum = momentum
+        change = np.diff(momentum, axis=0, prepend=self._momentum[None])
+        force[..., 1:] -= change / dt + drag * normal
+        self._momentum = momentum[-1]
         return force
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from finlab.errors import FinlabError
 
-VERSION = 10
+VERSION = 11
 """What `fl_version()` of the C files returns; both rise together where a signature or a struct
 changes."""
 SIGNATURES = {
@@ -27,6 +27,16 @@ SIGNATURES = {
     "fl_reach": "vpppppirppp",
     "fl_jets": "vppipppp",
     "fl_outer_iterations": "ipppppppp",
+    "fl_body_rates": "vpppp",
+    "fl_body_fastest_rate": "rpp",
+    "fl_body_steps": "ippirp",
+    "fl_body_coarse_step": "ipprp",
+    "fl_follow_fins": "vppip",
+    "fl_move_fins": "vppiripp",
+    "fl_follow_lags": "vppirip",
+    "fl_path_wrenches": "vpppiprrp",
+    "fl_kalman_predict": "vppip",
+    "fl_kalman_correct": "vppiiipp",
 }
 """What each function returns and takes: i int, r real, p pointer, s text, v nothing."""
 _TYPES = {

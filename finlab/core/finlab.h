@@ -68,7 +68,7 @@ typedef double fl_wide; /* where differences of large numbers matter, in single 
 #define FL_FOILS (FL_FOIL_STEPS * FL_STEPS_AT_KINK * 2 * (FL_STARTS + FL_RAY_SHARES))
 #define FL_BOUND (2 * (FL_FORCES + FL_FOILS))
 
-#define FL_VERSION 10  /* of all structs and functions here */
+#define FL_VERSION 11  /* of all structs and functions here */
 #define FL_MAGIC 41721 /* first number of a block */
 
 /* The structs that cross the border of the library. */
@@ -231,8 +231,7 @@ void fl_commands(const fl_real *block, fl_work *work, const fl_real *force, int 
 
    @param command  (count, n, 3)
    @param force    becomes the forces (count, n, 3) along the axes of the laws [N] */
-void fl_forces_of_commands(const fl_real *block, const fl_real *command, int count,
-                           fl_real *force);
+void fl_forces_of_commands(const fl_real *block, const fl_real *command, int count, fl_real *force);
 
 /* Evaluates the conjugates of all costs at multipliers of the wrench, Eq. 4, for proofs of a lower
    bound of the power.
@@ -291,6 +290,104 @@ int fl_outer_iterations(const fl_coupled_robot *robot, fl_real *block, fl_work *
    @param constants  of the water, then of each actuator; finlab/core/src/jets.c has their order */
 void fl_jets(const fl_real *constants, const fl_real *force, int count, const fl_real *inflow,
              fl_real *change, fl_real *offset, fl_real *slope);
+
+/* A body that swims, and fins that follow their commands: what a simulation steps many times, and
+   no allocation needs. finlab/swim/vehicle has the equations; a state of a body is position (3) in
+   the world, quaternion (4), velocity and angular rates (6) in the body frame. */
+
+/* @param body   numbers of a body in water; finlab/core/src/vehicle.c has their order
+   @param state  (13,)
+   @param tau    wrench (6,) in the body frame [N, N m]
+   @param rates  becomes the rate of change (13,) of the state */
+void fl_body_rates(const fl_real *body, const fl_real *state, const fl_real *tau, fl_real *rates);
+
+/* @param body   as for fl_body_rates
+   @param state  (13,)
+   @return       the fastest rate at which damping, Munk's moments or turning change the motion
+                 [1/s] */
+fl_real fl_body_fastest_rate(const fl_real *body, const fl_real *state);
+
+/* Moves a body over steps by Runge-Kutta of order 4, each cut into as many parts as stay stable.
+
+   @param body    as for fl_body_rates
+   @param wrench  (count, 6) in the body frame, which the body carries along in each step [N, N m]
+   @param step    length of a step [s]
+   @param states  (count + 1, 13): the first is where it begins; the others become those after
+                  each step
+   @return        how many steps were taken: fewer than count where the motion is too fast */
+int fl_body_steps(const fl_real *body, const fl_real *wrench, int count, fl_real step,
+                  fl_real *states);
+
+/* Moves a body over one step by the midpoint rule; the quaternion keeps the length it comes to.
+
+   @param body    as for fl_body_rates
+   @param wrench  (6,) [N, N m]
+   @param step    length of the step [s]
+   @param state   (13,), becomes that after the step
+   @return        1, or 0 where the motion is too fast */
+int fl_body_coarse_step(const fl_real *body, const fl_real *wrench, fl_real step, fl_real *state);
+
+/* Moves fins over one step of their lags, without what happens within the beat.
+
+   @param fins     numbers of `count` fins; finlab/core/src/fin_motion.c has their order
+   @param command  (count, 3) [rad, Hz, rad]; a fin whose row is NaN stops at once
+   @param states   of the fins, in the order of fin_motion.c; become those after the step */
+void fl_follow_fins(const fl_real *fins, const fl_real *command, int count, fl_real *states);
+
+/* Moves fins over steps much shorter than a beat.
+
+   @param fins, command, states  as for fl_follow_fins
+   @param step   length of a step [s]
+   @param steps  how many
+   @param moves  (steps, count, 8) become mean amplitude, frequency and zero direction of a step,
+                 whether that beats, and angle, phase, speed and acceleration at its end
+                 [rad, Hz, rad/s, rad/s^2] */
+void fl_move_fins(const fl_real *fins, const fl_real *command, int count, fl_real step, int steps,
+                  fl_real *states, fl_real *moves);
+
+/* Moves numbers of commands over steps by lags of first order with a largest rate.
+
+   @param lags     of `count` numbers; finlab/core/src/first_order_lag.c has their order
+   @param command  (count,); NaN for a number whose actuator stops
+   @param step     length of a step [s]
+   @param steps    how many
+   @param values   (steps + 1, count): the first are those at the beginning; the others become
+                   those after each step */
+void fl_follow_lags(const fl_real *lags, const fl_real *command, int count, fl_real step, int steps,
+                    fl_real *values);
+
+/* Says which wrenches move a robot along a path, nose ahead.
+
+   @param axes          linear and quadratic damping, inertia; of surge, sway, heave and yaw (4, 3)
+   @param velocity      of the path in the world (count, 3), at least two points [m/s]
+   @param acceleration  of the path in the world (count, 3) [m/s^2]
+   @param current       horizontal velocity of the water in the world (2,) [m/s]
+   @param slow          speed through the water below which turning counts less and less [m/s]
+   @param period        time from one point to the next [s]
+   @param wrenches      become those at the points (count, 6), body frame [N, N m] */
+void fl_path_wrenches(const fl_real *axes, const fl_real *velocity, const fl_real *acceleration,
+                      int count, const fl_real *current, fl_real slow, fl_real period,
+                      fl_real *wrenches);
+
+/* Predicts the covariance of a filter over a step: P <- F P F^T + Q.
+
+   @param transition  F (size, size)
+   @param noise       diagonal of Q (size,)
+   @param size        how many states, at most 16
+   @param covariance  P (size, size), symmetric */
+void fl_kalman_predict(const fl_real *transition, const fl_real *noise, int size,
+                       fl_real *covariance);
+
+/* Corrects a filter by measurements of the states `first` to `last - 1`, whose noise is
+   independent.
+
+   @param variance    of the noise, by state
+   @param innovation  what was measured less the states, by state
+   @param size        how many states, at most 16
+   @param state       (size,)
+   @param covariance  P (size, size), symmetric */
+void fl_kalman_correct(const fl_real *variance, const fl_real *innovation, int first, int last,
+                       int size, fl_real *state, fl_real *covariance);
 
 /* @param i      which actuator
    @param force  along its direction; of planes its size, below 0 in reverse [N]

@@ -114,7 +114,15 @@ class Plant:
         linear = body_velocity[..., :3]
         angular = body_velocity[..., 3:]
         # v_i = v + omega x r_i
-        return np.asarray(linear + np.cross(angular, self.layout.position))
+        turning = angular @ self._velocity_by_turning
+        return np.asarray(linear + turning.reshape(*turning.shape[:-2], self.n, 3))
+
+    @cached_property
+    def _velocity_by_turning(self) -> Array:
+        """Velocities (3, 3 n) of the actuators' points [m/s] by turning about each axis at 1
+        rad/s."""
+        by_axis = np.cross(np.eye(3)[:, None], self.layout.position)
+        return np.asarray(by_axis.reshape(3, -1))
 
     def wrench(self, command: ArrayLike, *, flow: Array | None = None) -> Array:
         """Returns the wrench of a command.

@@ -20,6 +20,7 @@ typedef fl_wide wide;
 #define EXP expf
 #define TANH tanhf
 #define FLOOR floorf
+#define RINT rintf
 #define FABS fabsf
 #define TOLERANCE R(1e-6) /* scaled wrench that may be left of a target */
 /* The same where Newton's method stands still for IDLE steps; commands make up for it. */
@@ -37,6 +38,7 @@ typedef fl_wide wide;
 #define EXP exp
 #define TANH tanh
 #define FLOOR floor
+#define RINT rint
 #define FABS fabs
 #define TOLERANCE 1e-10
 #define ENOUGH TOLERANCE

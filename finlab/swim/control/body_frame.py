@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from finlab.arrays import Array
-from finlab.axes import wrapped
+from finlab.axes import wrapped_angle
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.swim.control.contract import Completion, Controller, Measurement, Setpoint, axes_of
@@ -112,7 +112,7 @@ class WaypointController:
         lead = setpoint.velocity * self.lead_s + setpoint.acceleration * (0.5 * self.lead_s**2)
         dx, dy, dz = (setpoint.position + lead - estimate.position).tolist()
         distance = math.hypot(dx, dy)
-        yaw_error = float(wrapped(math.atan2(dy, dx) - estimate.yaw))
+        yaw_error = wrapped_angle(math.atan2(dy, dx) - estimate.yaw)
         e = yaw_error * min(1.0, distance / HEADING_RADIUS_M)
         error = distance * max(0.0, math.cos(e)), dz, e
         rate = estimate.velocity[0], estimate.world_velocity[2], estimate.yaw_rate

@@ -48,8 +48,9 @@ class Measurement(NamedTuple):
     def as_array(self) -> Array:
         """Position, roll, pitch, yaw, velocity and rates side by side (12,), as a log keeps
         them."""
-        pose = [*self.position[:2], -self.depth, self.roll, self.pitch, self.yaw]
-        return np.array([*pose, *self.velocity, *self.rates])
+        x, y, _ = self.position.tolist()
+        pose = (x, y, -self.depth, self.roll, self.pitch, self.yaw)
+        return np.array([*pose, *self.velocity.tolist(), *self.rates.tolist()])
 
 
 class Setpoint(NamedTuple):
@@ -167,10 +168,12 @@ class Completion:
         self.matrix = np.zeros((6, 6))
         """Wrench with the wanted axes filled in, to the whole wrench (6, 6)."""
         self.matrix[:, chosen] = np.where(np.abs(scaled) < 1e-9, 0.0, scaled)
+        self._transposed = np.ascontiguousarray(self.matrix.T)
 
     def __call__(self, wrench: Array) -> Array:
         """Wrenches (..., 6) whose wanted axes are asked for, whole."""
-        return np.asarray(wrench @ self.matrix.T)
+        whole: Array = wrench @ self._transposed
+        return whole
 
 
 def axes_of(layout: Layout) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ from finlab.allocation.rates import Rates
 from finlab.arrays import Array
 from finlab.axes import TURN
 from finlab.layout import Layout
-from finlab.layout.damage import Damage
+from finlab.layout.damage import NO_DAMAGE, Damage
 from finlab.physics import plant_of
 from finlab.swim.control.contract import Measurement
 from finlab.swim.control.hypotheses import LEVELS, OPPOSED, Hypotheses, MonitorSettings
@@ -95,6 +95,8 @@ class FaultMonitor:
         self._stuck_at = np.full(n, np.nan)
         self._direction_at_event = self._model.motion.direction.copy()
         self._reported_strength = np.ones(n)
+        self._told_faults: tuple[list[str], dict[str, float], dict[str, float]] = ([], {}, {})
+        self._told_damage = NO_DAMAGE
         self._tables = [fin for fin in layout.fins if fin.model.type == "table"]
         self._velocity: Array | None = None
 
@@ -171,9 +173,11 @@ class FaultMonitor:
         probed = self._probe.added(command, lost, direction)
         is_probed = (np.isfinite(probed[:, :1]) & ~(probed == command)).any(axis=1)
         is_limited = is_probed | self._is_returning
-        is_idle = np.isnan(self._sent[:, :1])
-        box = self._rates.box(np.where(is_idle, self._model.motion.command, self._sent))
-        result = np.where(is_limited[:, None], box.clip(probed), probed)
+        result = probed
+        if is_limited.any():
+            is_idle = np.isnan(self._sent[:, :1])
+            box = self._rates.box(np.where(is_idle, self._model.motion.command, self._sent))
+            result = np.where(is_limited[:, None], box.clip(probed), probed)
         self._is_returning = (np.isfinite(result) & ~(result == command)).any(axis=1)
         self._sent = result
         return result
@@ -185,7 +189,7 @@ class FaultMonitor:
         by_kind = hypotheses.probability
         probability = hypotheses.changed
         stuck = ~np.isnan(self._stuck_at)
-        damage = Damage()
+        damage = NO_DAMAGE
         broken = self._is_lost | self._is_torn | stuck
         if True in broken.tolist():
             # The last but one hypothesis is a whole fin, the last one of a stuck fin that it turns
@@ -206,12 +210,16 @@ class FaultMonitor:
         self._reported_strength = np.where(is_far, rounded, self._reported_strength)
         torn = [k for k in np.flatnonzero(self._is_torn) if parts[k] not in self._tables]
         stuck = np.flatnonzero(~np.isnan(self._stuck_at) & ~self._is_lost)
-        return Damage.representing(
-            self.layout,
+        faults = (
             [names[k] for k in np.flatnonzero(self._is_lost)],
             {names[k]: float(self._reported_strength[k]) for k in torn},
             {names[k]: float(self._stuck_at[k]) for k in stuck},
         )
+        # The same damage for as long as nothing changes: making one takes time.
+        if faults != self._told_faults:
+            self._told_faults = faults
+            self._told_damage = Damage.representing(self.layout, *faults)
+        return self._told_damage
 
     def _other_direction(self, new_share: Array) -> Array:
         """Where actuators (n,) are by the hypotheses that they stick: where they were when it may

@@ -17,7 +17,12 @@ from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.physics import plant_of
 from finlab.swim.vehicle.actuator_motion import ActuatorMotion
-from finlab.swim.vehicle.attitude import quaternion_of, rotation_of_quaternion, tilt_of, to_body
+from finlab.swim.vehicle.attitude import (
+    quaternion_of,
+    rotation_of_quaternion,
+    tilt_of_quaternion,
+    to_body,
+)
 from finlab.swim.vehicle.fossen import complete_body, jacobian
 from finlab.swim.vehicle.vehicle import Vehicle
 
@@ -122,11 +127,11 @@ class MotionModel:
         tau = state[STRENGTH] @ wrenches
         tau[3:] += state[TORQUE]
         vehicle_state = self._vehicle.coarse_step(
-            [0.0, 0.0, 0.0, *quaternion, *motion], tau.tolist(), self._dt
+            [0.0, 0.0, 0.0, *quaternion, *motion], tau, self._dt
         )
         after = state.copy()
-        tilt = tilt_of(rotation_of_quaternion(*vehicle_state[3:7]))
-        after[:8] = (*vehicle_state[7:], *tilt)
+        after[MOTION] = vehicle_state[7:]
+        after[TILT] = tilt_of_quaternion(*vehicle_state[3:7].tolist())
         transition = self._constant_transition.copy()
         by_flow = self._by_flow(flow)
         transition[MOTION, MOTION] += by_flow
@@ -150,7 +155,7 @@ class MotionModel:
         # A damping that is strong over a period brings to rest, not beyond it.
         decay = np.expm1(damping) + self._tilt_decay
         by_flow[3:, 3:] = 0.0
-        by_flow[range(6), range(6)] = decay
+        by_flow.reshape(-1)[::7] = decay  # its diagonal
         return by_flow
 
     def _wrenches(

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from finlab.arrays import Array
-from finlab.axes import wrapped
+from finlab.axes import wrapped_angle
 from finlab.layout import Layout
 from finlab.swim.control.contract import Measurement, Setpoint, axes_of
 from finlab.swim.control.observer import (
@@ -22,6 +22,7 @@ from finlab.swim.control.observer import (
     CRUISE,
     MotionEstimate,
     MotionObserver,
+    Vector3,
     strongest_wrench,
 )
 from finlab.swim.vehicle.fossen import complete_body, dynamics_of
@@ -121,7 +122,7 @@ class TrackingController:
         self.axes = axes_of(layout)
         self._sways = "Fy" in self.axes
         self._dives = "Ty" in self.axes
-        self._commanded = np.array([axis in self.axes for axis in ("Fx", "Fy", "Fz", "Tz")])
+        self._commanded = [axis in self.axes for axis in ("Fx", "Fy", "Fz", "Tz")]
         self.free: tuple[str, ...] = ("Fy",)
         if self._sways:
             self.free = ()
@@ -130,6 +131,7 @@ class TrackingController:
         self._wrench_of_rudders = WRENCH_SHARE_MAX * (
             strongest_wrench(layout) - strongest_wrench(layout, 0.0)
         )
+        self._has_rudders = bool(self._wrench_of_rudders.any())
         self._max_wrench = np.array(self.gains.max_wrench)
         self.reset()
 
@@ -138,7 +140,7 @@ class TrackingController:
         self._observer = MotionObserver(self.layout, self.period_s)
         self._transient_sway = 0.0
         self._vertical_slip = 0.0
-        self._path_error: Array | None = None
+        self._path_error: Vector3 | None = None
         self._path_filter_gain = 1.0 - math.exp(-self.period_s / PATH_FILTER_S)
         self._wrench = np.zeros(6)
         self._wrench_bound = self._max_wrench
@@ -152,40 +154,43 @@ class TrackingController:
             setpoint: of now.
             delivered: wrench (6,) of the actuators since the last call [N, N m].
         """
-        g = self.gains
+        bandwidth = self.gains.velocity
         estimate = self._observer.step(measurement, delivered)
         self.estimate = estimate
         velocity = self._velocity(estimate, setpoint)
         surge, yaw_rate = self._surge_and_turn(estimate, velocity, setpoint)
         cy = math.cos(estimate.yaw)
         sy = math.sin(estimate.yaw)
+        vx, vy, vz = velocity
         ax, ay, az = setpoint.acceleration.tolist()
-        nu_error = np.array(
-            [
-                surge - estimate.velocity[0],
-                cy * velocity[1] - sy * velocity[0] - estimate.velocity[1],
-                velocity[2] - estimate.world_velocity[2],
-                yaw_rate - estimate.yaw_rate,
-            ]
+        u, v, _ = estimate.velocity
+        nu_error = (
+            surge - u,
+            cy * vy - sy * vx - v,
+            vz - estimate.world_velocity[2],
+            yaw_rate - estimate.yaw_rate,
         )
-        feedforward = np.array([cy * ax + sy * ay, cy * ay - sy * ax, az, 0.0])
-        drift = estimate.drift.copy()
+        feedforward = (cy * ax + sy * ay, cy * ay - sy * ax, az, 0.0)
         # Damping in yaw counts at the rate that is wanted: one that the body does not have would
         # spin it.
-        rates = np.zeros((2, 4))
-        rates[:, 3] = estimate.yaw_rate, yaw_rate
-        measured, planned = self._observer.deceleration(rates)[:, 3]
-        drift[3] += measured - planned
-        acceleration = feedforward + g.velocity * nu_error - drift
+        damping = self._observer.damping
+        in_yaw = damping[3]
+        measured = in_yaw.rate(estimate.yaw_rate) * estimate.yaw_rate
+        planned = in_yaw.rate(yaw_rate) * yaw_rate
+        drift = [*estimate.drift[:3], estimate.drift[3] + (measured - planned)]
         result = np.zeros(6)
-        result[AXES] = self._observer.inertia * acceleration * self._commanded
+        for k, axis in enumerate(AXES):
+            if self._commanded[k]:
+                acceleration = feedforward[k] + bandwidth * nu_error[k] - drift[k]
+                result[axis] = damping[k].inertia * acceleration
         if self._dives:
             pitch_error = self._pitch_rate_error(estimate, velocity)
-            result[4] = estimate.pitch_inertia * (g.velocity * pitch_error - estimate.pitch_drift)
-        # The force of rudders grows with the square of the speed.
-        missing_share = max(1.0 - (float(estimate.velocity[0]) / CRUISE) ** 2, -RUDDER_GAIN_MAX)
-        self._wrench_bound = self._max_wrench - missing_share * self._wrench_of_rudders
-        self._wrench = result.clip(-self._wrench_bound, self._wrench_bound)
+            result[4] = estimate.pitch_inertia * (bandwidth * pitch_error - estimate.pitch_drift)
+        if self._has_rudders:
+            # The force of rudders grows with the square of the speed.
+            missing_share = max(1.0 - (u / CRUISE) ** 2, -RUDDER_GAIN_MAX)
+            self._wrench_bound = self._max_wrench - missing_share * self._wrench_of_rudders
+        self._wrench = np.minimum(np.maximum(result, -self._wrench_bound), self._wrench_bound)
         return self._wrench
 
     def ahead(self, setpoints: Sequence[Setpoint]) -> Array:
@@ -198,49 +203,64 @@ class TrackingController:
         Returns:
             Wrenches (K, 6) at those after the first [N, N m].
         """
-        current = np.zeros(2) if self.estimate is None else self.estimate.current
+        current = (0.0, 0.0) if self.estimate is None else self.estimate.current
         # Turning is looked ahead to more cautiously: in a current it is steep where the robot
         # hardly moves through the water, and there the estimated current decides it.
         along = self._observer.wrenches_along(setpoints, current, 2.0 * SLOW)
         expected = self._wrench + along[1:] - along[0]
-        return np.asarray(expected.clip(-self._wrench_bound, self._wrench_bound))
+        bound = self._wrench_bound
+        return np.asarray(np.minimum(np.maximum(expected, -bound), bound))
 
-    def _velocity(self, estimate: MotionEstimate, setpoint: Setpoint) -> Array:
-        """The path loop: the desired velocity over ground (3,) in the world [m/s]."""
-        error = setpoint.position - estimate.position
+    def _velocity(self, estimate: MotionEstimate, setpoint: Setpoint) -> Vector3:
+        """The path loop: the desired velocity over ground in the world [m/s]."""
+        x_wanted, y_wanted, z_wanted = setpoint.position.tolist()
+        x, y, z = estimate.position
+        error = (x_wanted - x, y_wanted - y, z_wanted - z)
         if self._path_error is None:
             self._path_error = error
         else:
-            change = error - self._path_error
-            self._path_error = self._path_error + change * self._path_filter_gain
-        velocity: Array = setpoint.velocity + self.gains.path * self._path_error
-        speed = math.sqrt(velocity @ velocity)
-        return velocity * min(1.0, self.gains.max_speed / max(speed, 1e-9))
+            gain = self._path_filter_gain
+            ex, ey, ez = self._path_error
+            self._path_error = (
+                ex + (error[0] - ex) * gain,
+                ey + (error[1] - ey) * gain,
+                ez + (error[2] - ez) * gain,
+            )
+        ex, ey, ez = self._path_error
+        path = self.gains.path
+        path_x, path_y, path_z = setpoint.velocity.tolist()
+        vx = path_x + path * ex
+        vy = path_y + path * ey
+        vz = path_z + path * ez
+        speed = math.sqrt(vx * vx + vy * vy + vz * vz)
+        share = min(1.0, self.gains.max_speed / max(speed, 1e-9))
+        return vx * share, vy * share, vz * share
 
-    def _pitch_rate_error(self, estimate: MotionEstimate, velocity: Array) -> float:
+    def _pitch_rate_error(self, estimate: MotionEstimate, velocity: Vector3) -> float:
         """How much faster to turn in pitch, nose down, for a vertical speed [rad/s].
 
         Counts with the vertical slip that there is, by a filter of `SLIP_FILTER_S`.
 
         Args:
             estimate: of now.
-            velocity: desired, over ground in the world (3,) [m/s].
+            velocity: desired, over ground in the world [m/s].
         """
-        speed = max(float(estimate.velocity[0]), SLOW)
-        slip = math.atan(float(estimate.velocity[2]) / speed)
+        u, _, w = estimate.velocity
+        speed = max(u, SLOW)
+        slip = math.atan(w / speed)
         self._vertical_slip += self.period_s / SLIP_FILTER_S * (slip - self._vertical_slip)
-        climb = math.asin(min(max(float(velocity[2]) / speed, -CLIMB_MAX), CLIMB_MAX))
+        climb = math.asin(min(max(velocity[2] / speed, -CLIMB_MAX), CLIMB_MAX))
         rate = self.gains.heading * (self._vertical_slip - climb - estimate.pitch)
         return min(max(rate, -TURN_RATE_MAX), TURN_RATE_MAX) - estimate.pitch_rate
 
     def _surge_and_turn(
-        self, estimate: MotionEstimate, velocity: Array, setpoint: Setpoint
+        self, estimate: MotionEstimate, velocity: Vector3, setpoint: Setpoint
     ) -> tuple[float, float]:
         """The heading loop: what surge and yaw bring the robot to a velocity.
 
         Args:
             estimate: of now.
-            velocity: desired, over ground in the world (3,) [m/s].
+            velocity: desired, over ground in the world [m/s].
             setpoint: of now.
 
         Returns:
@@ -248,18 +268,21 @@ class TrackingController:
         """
         cosine = math.cos(estimate.yaw)
         sine = math.sin(estimate.yaw)
-        current_x, current_y = (0.0, 0.0) if self._sways else estimate.current.tolist()
+        current_x, current_y = (0.0, 0.0) if self._sways else estimate.current
+        vx, vy, _ = velocity
+        u, v, _ = estimate.velocity
         # Desired velocity through the water, and the path's.
-        x = float(velocity[0]) - current_x
-        y = float(velocity[1]) - current_y
+        x = vx - current_x
+        y = vy - current_y
         speed = math.hypot(x, y)
-        path_x = float(setpoint.velocity[0]) - current_x
-        path_y = float(setpoint.velocity[1]) - current_y
+        path_vx, path_vy, _ = setpoint.velocity.tolist()
+        path_x = path_vx - current_x
+        path_y = path_vy - current_y
         ax, ay, _ = setpoint.acceleration.tolist()
         path_speed_squared = path_x * path_x + path_y * path_y
         path_turn_rate = (path_x * ay - path_y * ax) / max(path_speed_squared, SLOW**2)
-        surge_in_water = float(estimate.velocity[0]) - (cosine * current_x + sine * current_y)
-        sway_in_water = float(estimate.velocity[1]) - (cosine * current_y - sine * current_x)
+        surge_in_water = u - (cosine * current_x + sine * current_y)
+        sway_in_water = v - (cosine * current_y - sine * current_x)
         # Slip that comes from turning otherwise than the path does: to head against it would ring.
         excess_turn_rate = estimate.yaw_rate - path_turn_rate
         self._transient_sway = self._observer.sway_after(
@@ -267,9 +290,9 @@ class TrackingController:
         )
         slip_sine = (sway_in_water - self._transient_sway) / max(speed, SLOW)
         slip = 0.0 if self._sways else math.asin(min(max(slip_sine, -SLIP_MAX), SLIP_MAX))
-        surge = cosine * float(velocity[0]) + sine * float(velocity[1])
+        surge = cosine * vx + sine * vy
         if self._dives:  # rudders need steerage way
-            surge = max(surge, STEERAGE_SHARE * math.hypot(float(velocity[0]), float(velocity[1])))
+            surge = max(surge, STEERAGE_SHARE * math.hypot(vx, vy))
         elif speed >= SLOW:
             surge = max(surge, cosine * current_x + sine * current_y)
         # At rest it turns to where the path goes on, or stays as it is; a bit off its place it
@@ -279,5 +302,5 @@ class TrackingController:
         toward_x = x + missing_speed * math.cos(onward)
         toward_y = y + missing_speed * math.sin(onward)
         heading = math.atan2(toward_y, toward_x) - slip
-        yaw_rate = path_turn_rate + self.gains.heading * float(wrapped(heading - estimate.yaw))
+        yaw_rate = path_turn_rate + self.gains.heading * wrapped_angle(heading - estimate.yaw)
         return surge, min(max(yaw_rate, -TURN_RATE_MAX), TURN_RATE_MAX)

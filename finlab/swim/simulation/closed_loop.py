@@ -4,6 +4,8 @@ time."""
 import math
 from collections import deque
 from collections.abc import Sequence
+from itertools import islice
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +30,7 @@ from finlab.swim.control import (
     TrackingController,
 )
 from finlab.swim.control.contract import NO_WRENCH
-from finlab.swim.simulation.devices import ActuatorForce, Sensors, SensorSettings
+from finlab.swim.simulation.devices import ActuatorForce, ActuatorOutput, Sensors, SensorSettings
 from finlab.swim.simulation.log import RunLog, Tick, log_of_ticks
 from finlab.swim.simulation.task import Trajectory
 from finlab.swim.simulation.truth import Fault, checked_truth, damage_of
@@ -40,6 +42,8 @@ from finlab.swim.vehicle.vehicle import STATE_SIZE, Vehicle
 
 LOOKAHEAD_TICKS = 10
 """Ticks whose wrenches the allocator is given in advance."""
+SETPOINTS_AT_ONCE = 50
+"""Ticks whose setpoints are computed at once: one at a time costs more."""
 
 
 class ClosedLoop:
@@ -137,6 +141,8 @@ class ClosedLoop:
         """What is true: the actuators that are not whole now, by name."""
         self._announced_faults: dict[str, Fault] = {}
         self._stuck_at = np.full(n, np.nan)
+        self._note_faults()
+        self._no_beliefs = _constant(np.full(n, np.nan))
         self.verdict: Diagnosis | None = None
         """What the monitor believed at the last step; None without one."""
         self._completion: dict[tuple[str, ...], Completion] = {}
@@ -201,9 +207,7 @@ class ClosedLoop:
     @property
     def damage(self) -> Damage:
         """What the allocator is given: what was announced, or what the monitor has found."""
-        if self.verdict is not None:
-            return self.verdict.damage
-        return damage_of(self.layout, self._announced_faults, self._stuck_at)
+        return self._announced_damage if self.verdict is None else self.verdict.damage
 
     def fail(
         self,
@@ -236,9 +240,24 @@ class ClosedLoop:
             known.pop(name, None)
             if kind != "whole":
                 known[name] = fault
+        self._note_faults()
         if tells and self.monitor is not None:
             strength = {"lost": 0.0, "torn": share}.get(kind, 1.0)
             self.verdict = self.monitor.tell(name, strength, self._stuck_at[index])
+
+    def _note_faults(self) -> None:
+        """What follows from the faults that there are and those that were announced, which hardly
+        ever change."""
+        names = self.layout.names
+        lost = self.lost
+        self._alive = _constant(np.array([name not in lost for name in names]))
+        share = np.ones(len(names))
+        for fault in self.broken.values():
+            if fault.kind == "torn":
+                share[self.layout.index(fault.name)] = fault.share
+        self._share = share
+        self._is_stuck = not np.isnan(self._stuck_at).all()
+        self._announced_damage = damage_of(self.layout, self._announced_faults, self._stuck_at)
 
     def mend(self, name: str, *, announced: bool | None = None) -> None:
         """An actuator works again as it should; a `LayoutError` where there is none of that
@@ -251,12 +270,12 @@ class ClosedLoop:
         while self._pending and self._pending[0].time_s <= time + 1e-9:
             event = self._pending.pop(0)
             self.fail(event.name, event.kind, event.share)
-        measurement = self._sensors.measure(time, self.state)
+        measurement = self._sensors.measure(time, self.state.tolist())
         if self.monitor is not None:
             self.verdict = self.monitor.step(measurement, self._command)
         if self._plant.feels_flow:  # what the sensors know of it: the water itself is taken to rest
             self._flow = np.concatenate([measurement.velocity, measurement.rates])
-        setpoint = self.task.setpoint(time)
+        setpoint = self._next_setpoints()[0]
         completion = self._current_completion()
         delivered = self._delivered()
         wrench = completion(self.controller.wrench(measurement, setpoint, delivered))
@@ -265,7 +284,7 @@ class ClosedLoop:
             damage=self.damage,
             flow=self._flow,
             previous=self._allocation_before,
-            reference=self._reference(time, completion),
+            reference=self._reference(completion),
             policy=self.policy,
             seed=self.seed,
         )
@@ -275,6 +294,7 @@ class ClosedLoop:
             command = self.monitor.probed(command)
         tick = self._simulate(measurement, setpoint, wrench, command, allocation.solve_ms)
         self._command = command
+        self._setpoints.popleft()
         self._ticks.append(tick)
         learned = None if self.learner is None else self.learner.step(tick.measured, tick.command)
         if learned is not None:
@@ -288,6 +308,7 @@ class ClosedLoop:
         self._announced_faults = {
             name: fault for name, fault in self._announced_faults.items() if fault.kind != "torn"
         }
+        self._note_faults()
         if self.monitor is not None:
             self.monitor.adopt(layout)
         self._completion.clear()
@@ -298,17 +319,24 @@ class ClosedLoop:
             self.step()
         return self.log
 
-    def _reference(self, time: float, completion: Completion) -> Array | None:
+    def _next_setpoints(self) -> deque[Setpoint]:
+        """The setpoints of this tick and of those that the allocator is given in advance, and
+        perhaps more."""
+        setpoints = self._setpoints
+        if len(setpoints) <= LOOKAHEAD_TICKS:
+            first = len(self._ticks) + len(setpoints)
+            ticks = np.arange(first, first + SETPOINTS_AT_ONCE)
+            # What comes after the end is not swum: a path that ends under way is swum to its end.
+            times = np.minimum(ticks * self.period_s, self.task.duration_s)
+            setpoints.extend(self.task.setpoints(times))
+        return setpoints
+
+    def _reference(self, completion: Completion) -> Array | None:
         """The wrenches (K, 6) that will be asked for at the next ticks, where the controller can
         tell."""
         if self._foresighted is None:
             return None
-        while len(self._setpoints) <= LOOKAHEAD_TICKS:
-            # What comes after the end is not swum: a path that ends under way is swum to its end.
-            after = min(time + len(self._setpoints) * self.period_s, self.task.duration_s)
-            self._setpoints.append(self.task.setpoint(after))
-        expected = self._foresighted.ahead(self._setpoints)
-        self._setpoints.popleft()
+        expected = self._foresighted.ahead(list(islice(self._setpoints, LOOKAHEAD_TICKS + 1)))
         return completion(expected)
 
     def _delivered(self) -> Array:
@@ -319,7 +347,8 @@ class ClosedLoop:
         believed = self._believed_motion
         believed.step(self._command, self.period_s)
         force = self._plant.force(believed.command, flow=self._flow) * believed.pushes[:, None]
-        force[list(self.layout.indices(self.damage.lost))] = 0.0
+        if lost := self.damage.lost:
+            force[list(self.layout.indices(lost))] = 0.0
         before = self._wrench_before
         self._wrench_before = self._plant.wrench_of(force, flow=self._flow)
         return 0.5 * (before + self._wrench_before)
@@ -334,11 +363,6 @@ class ClosedLoop:
             )
         return self._completion[lost]
 
-    def _alive(self) -> NDArray[np.bool_]:
-        """Which actuators (n,) are not lost."""
-        lost = self.lost
-        return np.array([name not in lost for name in self.layout.names])
-
     def _for_weak(self, command: Array) -> Array:
         """A command (n, 3) for torn thrusters, which are asked for more than they are to give."""
         if not self.damage.weak:
@@ -352,13 +376,10 @@ class ClosedLoop:
     def _for_drives(self, command: Array) -> Array:
         """What drives make of a command (n, 3): a lost actuator is not moved, a stuck one does not
         turn."""
-        result = command.copy()
-        result[~self._alive()] = np.nan
-        return (
-            result
-            if np.isnan(self._stuck_at).all()
-            else self.motion.turned_to(result, self._stuck_at)
-        )
+        result = command
+        if self.broken:
+            result = np.where(self._alive[:, None], command, np.nan)
+        return self.motion.turned_to(result, self._stuck_at) if self._is_stuck else result
 
     def _simulate(
         self,
@@ -379,29 +400,11 @@ class ClosedLoop:
         """
         time = self.time
         before = self.state
-        n = self.layout.n
         n_steps = max(1, math.ceil(self.period_s / self._forces.step_s - 1e-9))
         dt = self.period_s / n_steps
         sent = command if self.learner is None else command * self.learner.factor
-        for_drives = self._for_drives(sent)
-        share = np.ones(n)
-        for fault in self.broken.values():
-            if fault.kind == "torn":
-                share[self.layout.index(fault.name)] = fault.share
-        mean = np.zeros((n, 6))
-        power = np.zeros((2, n))
-        for k in range(n_steps):
-            water = self.vehicle.velocity_in_water(self.state)
-            output = self._forces.step(for_drives, dt, water, share)
-            wrenches = self._forces.wrenches(output.force, water)
-            self.state = self.vehicle.step(self.state, wrenches.sum(axis=0).tolist(), dt)
-            if k + 1 < n_steps:  # the sample at the end belongs to the next period
-                self._sensors.sample(time + (k + 1) * dt, self.state)
-            mean += wrenches
-            power += output.power
-        mean = mean / n_steps
-        power = power / n_steps
-        beliefs = (np.full(n, np.nan),) * 3 if self.verdict is None else self.verdict[1:]
+        mean = self._swim(self._for_drives(sent), dt, n_steps, time)
+        beliefs = (self._no_beliefs,) * 3 if self.verdict is None else self.verdict[1:]
         return Tick(
             time=time,
             position=before[:3].copy(),
@@ -413,15 +416,82 @@ class ClosedLoop:
             reference_surge=setpoint.surge,
             asked=wrench,
             allocated=self._plant.wrench(command, flow=self._flow),
-            delivered=mean.sum(axis=0),
+            delivered=mean.wrench,
             command=sent,
             fin_motion=self.motion.command,
-            force=mean[:, :3],
-            inertial_power=power[0],
-            driving_power=power[1],
-            alive=self._alive(),
+            force=mean.force,
+            inertial_power=mean.inertial_power,
+            driving_power=mean.driving_power,
+            alive=self._alive,
             fault_probability=beliefs[0],
             strength=beliefs[1],
             strength_std=beliefs[2],
             solve_ms=solve_ms,
         )
+
+    def _swim(self, command: Array, dt: float, n_steps: int, time: float) -> "MeanOutput":
+        """Moves actuators and body over K steps, lets the sensors sample on the way, and returns
+        what the actuators gave.
+
+        Args:
+            command: of the drives (n, 3); NaN rows are lost.
+            dt: length of a step [s].
+            n_steps: how many, K.
+            time: at the beginning [s].
+        """
+        forces = self._forces
+        vehicle = self.vehicle
+        moved = forces.move(command, dt, n_steps)
+        if not forces.feels_flow:
+            # Nothing depends on how the body moves through the water: all steps are one call.
+            output = forces.output(moved, dt, self._share, None)
+            wrench = forces.wrench(output.force, None)
+            states = vehicle.steps(self.state, wrench, dt)[1:]
+        else:
+            states = np.empty((n_steps, STATE_SIZE))
+            wrench = np.empty((n_steps, 6))
+            outputs = []
+            state = self.state
+            for k in range(n_steps):
+                water = vehicle.velocity_in_water(state)
+                in_step = forces.output(moved.at(k), dt, self._share, water)
+                wrench[k] = forces.wrench(in_step.force, water)[0]
+                state = vehicle.step(state, wrench[k], dt)
+                states[k] = state
+                outputs.append(in_step)
+            output = ActuatorOutput(*(np.concatenate(each) for each in zip(*outputs, strict=True)))
+        self.state = states[-1].copy()
+        for k, state_then in enumerate(states[:-1].tolist(), start=1):
+            # The sample at the end belongs to the next period.
+            self._sensors.sample(time + k * dt, state_then)
+        delivered = _mean(wrench)
+        return MeanOutput(
+            delivered,
+            forces.in_body(_mean(output.force), delivered),
+            _mean(output.inertial_power),
+            _mean(output.driving_power),
+        )
+
+
+class MeanOutput(NamedTuple):
+    """What n actuators gave in a period, on average."""
+
+    wrench: Array
+    """(6,) [N, N m]."""
+    force: Array
+    """Forces (n, 3) in the body frame [N], with a share of what the actuators do to each other."""
+    inertial_power: Array
+    """(n,) [W]."""
+    driving_power: Array
+    """(n,) [W]."""
+
+
+def _mean(values: Array) -> Array:
+    """The mean (...) of values (K, ...) over the steps of a period."""
+    return np.asarray(np.add.reduce(values) / len(values))
+
+
+def _constant(values: NDArray[Any]) -> NDArray[Any]:
+    """An array that all ticks of a swim share, which nobody may change."""
+    values.setflags(write=False)
+    return values

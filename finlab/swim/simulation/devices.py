@@ -13,15 +13,14 @@ from typing import NamedTuple
 import numpy as np
 
 from finlab.arrays import Array
-from finlab.axes import wrapped
 from finlab.errors import FinlabError
 from finlab.layout import Layout
-from finlab.layout.effectiveness import own_effectiveness
+from finlab.layout.effectiveness import body_force, own_effectiveness
 from finlab.physics import plant_of
 from finlab.swim.control import Measurement
 from finlab.swim.vehicle.actuator_motion import ActuatorMotion
-from finlab.swim.vehicle.attitude import rotation_of_quaternion, tilt_of
-from finlab.swim.vehicle.fin_motion import FinMotion, fin_power
+from finlab.swim.vehicle.attitude import tilt_of_quaternion
+from finlab.swim.vehicle.fin_motion import FinMotion, FinSteps, fin_power
 
 
 @dataclass(frozen=True)
@@ -92,50 +91,125 @@ NOISE_ALONE = SensorSettings().each(lambda sensor: replace(sensor.perfect(), noi
 """The usual sensors with noise, but with no bias, delay or losses."""
 
 
+NORMALS_AT_ONCE = 512
+"""Normal random numbers that are drawn from a generator at once: one at a time costs more."""
+
+
+class NormalNumbers:
+    """Standard normal numbers, in the order in which a generator gives them."""
+
+    def __init__(self, rng: np.random.Generator) -> None:
+        """Takes a generator, which nobody else draws from."""
+        self._rng = rng
+        self._drawn: list[float] = []
+        self._used = 0
+
+    def take(self, count: int) -> list[float]:
+        """Returns the next numbers, few of them."""
+        start = self._used
+        end = start + count
+        if end > len(self._drawn):
+            more = self._rng.standard_normal(NORMALS_AT_ONCE).tolist()
+            self._drawn = self._drawn[start:] + more
+            start = 0
+            end = count
+        self._used = end
+        return self._drawn[start:end]
+
+
 class SensorChannel:
     """One sensor at work: samples at its rate, held until the next one arrives."""
 
-    def __init__(self, sensor: Sensor, rng: np.random.Generator) -> None:
-        """Takes the sensor, and where its noise comes from."""
-        self._sensor = sensor
+    def __init__(
+        self,
+        sensor: Sensor,
+        read: Callable[[list[float]], list[float]],
+        rng: np.random.Generator,
+        normals: NormalNumbers,
+    ) -> None:
+        """Makes a sensor at the beginning of a run.
+
+        Args:
+            sensor: the sensor.
+            read: from a state (13) to the true values.
+            rng: of the run; the bias and what is lost come from a stream of their own, so that a
+                run has the same noise with and without these.
+            normals: the numbers of that generator, which all sensors share.
+        """
+        self._read = read
         self._period = 1.0 / sensor.rate_hz
-        # Another stream than the noise's, so that a run has the same noise with and without the
-        # rest.
-        self._rng = rng
+        self._delay_s = sensor.delay_s
+        self._dropout = sensor.dropout
+        self._normals = normals
         self._loss_rng = rng.spawn(1)[0]
-        self._noise = np.array(sensor.noise)
-        self.bias: Array = np.array(sensor.bias) * self._loss_rng.standard_normal(len(sensor.bias))
-        """What each value is off for the whole run."""
-        self._next_time = 0.0
-        # When a sample arrives, when it was taken, and its values.
-        self._in_transit: deque[tuple[float, float, Array]] = deque()
+        self._noise = sensor.noise
+        self._size = len(sensor.noise)
+        bias = np.array(sensor.bias) * self._loss_rng.standard_normal(len(sensor.bias))
+        self._bias: list[float] = bias.tolist()  # what each value is off for the whole run
+        self.next_time = 0.0
+        """When it samples next [s]."""
+        # When a sample arrives, when it was taken, of which state, and its noise.
+        self._in_transit: deque[tuple[float, float, list[float], list[float]]] = deque()
         self._first = True
-        self._newest = self.bias
+        self._newest: Array = bias
         self.taken = 0.0
         """When the newest sample that has arrived was taken [s]."""
 
-    def is_due(self, time: float) -> bool:
-        """Whether it samples now."""
-        return time >= self._next_time - 1e-9
-
-    def take(self, time: float, true: list[float]) -> None:
-        """Samples the true values at a time [s]."""
-        self._next_time = max(self._next_time + self._period, time)
-        sample = true + self.bias + self._noise * self._rng.standard_normal(len(true))
-        lost = self._sensor.dropout > 0.0 and self._loss_rng.random() < self._sensor.dropout
+    def take(self, time: float, state: list[float]) -> None:
+        """Samples a state (13) at a time [s]; the list is kept, and must not change."""
+        self.next_time = max(self.next_time + self._period, time)
+        noise = self._normals.take(self._size)
+        lost = self._dropout > 0.0 and self._loss_rng.random() < self._dropout
         # The robot has waited at rest for its first samples.
-        if self._first or not lost:
-            self._in_transit.append(
-                (time if self._first else time + self._sensor.delay_s, time, sample)
-            )
-        self._first = False
+        if self._first:
+            self._in_transit.append((time, time, state, noise))
+            self._first = False
+        elif not lost:
+            self._in_transit.append((time + self._delay_s, time, state, noise))
 
     def value(self, time: float) -> Array:
         """The newest sample that has arrived; the same array as before where there is no new
         one."""
-        while self._in_transit and self._in_transit[0][0] <= time + 1e-9:
-            _, self.taken, self._newest = self._in_transit.popleft()
+        in_transit = self._in_transit
+        arrived = None
+        while in_transit and in_transit[0][0] <= time + 1e-9:
+            arrived = in_transit.popleft()
+        if arrived is not None:
+            _, self.taken, state, normals = arrived
+            true = self._read(state)
+            values = zip(true, self._bias, self._noise, normals, strict=True)
+            self._newest = np.array([x + bias + std * normal for x, bias, std, normal in values])
         return self._newest
+
+
+def _marker(state: list[float]) -> list[float]:
+    """Position [m] and heading [rad] of a state (13)."""
+    x, y, z, qw, qx, qy, qz, *_ = state
+    return [x, y, z, math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))]
+
+
+def _pressure(state: list[float]) -> list[float]:
+    """Depth [m] of a state (13)."""
+    return [-state[2]]
+
+
+def _dvl(state: list[float]) -> list[float]:
+    """Velocity [m/s] of a state (13)."""
+    return state[7:10]
+
+
+def _imu(state: list[float]) -> list[float]:
+    """Roll, pitch [rad] and angular rates [rad/s] of a state (13)."""
+    return [*tilt_of_quaternion(*state[3:7]), *state[10:]]
+
+
+READINGS: dict[str, Callable[[list[float]], list[float]]] = {
+    "marker": _marker,
+    "pressure": _pressure,
+    "dvl": _dvl,
+    "imu": _imu,
+}
+"""What each of `SENSORS` reads of a state (13)."""
 
 
 class Sensors:
@@ -143,53 +217,67 @@ class Sensors:
 
     def __init__(self, settings: SensorSettings, rng: np.random.Generator) -> None:
         """Draws the biases of this run."""
-        self._channels = [SensorChannel(getattr(settings, name), rng) for name in SENSORS]
+        normals = NormalNumbers(rng)
+        self._channels = [
+            SensorChannel(getattr(settings, name), READINGS[name], rng, normals) for name in SENSORS
+        ]
 
-    def measure(self, time: float, state: Array) -> Measurement:
-        """The newest samples at `time` [s] for a state (13,); to be called in order of time."""
+    def measure(self, time: float, state: list[float]) -> Measurement:
+        """The newest samples at `time` [s] for a state (13); to be called in order of time."""
         self.sample(time, state)
-        pose, depth, velocity, turning = (channel.value(time) for channel in self._channels)
-        marker, pressure, dvl, imu = (time - channel.taken for channel in self._channels)
+        marker, pressure, dvl, imu = self._channels
+        pose = marker.value(time)
+        depth = pressure.value(time)
+        velocity = dvl.value(time)
+        turning = imu.value(time)
         roll, pitch = turning[:2].tolist()
-        ages = marker, pressure, dvl, imu
         return Measurement(
-            time,
-            pose[:3],
-            float(pose[3]),
-            velocity,
-            float(depth[0]),
-            turning[2:],
-            roll,
-            pitch,
-            ages,
+            time=time,
+            position=pose[:3],
+            yaw=float(pose[3]),
+            velocity=velocity,
+            depth=float(depth[0]),
+            rates=turning[2:],
+            roll=roll,
+            pitch=pitch,
+            ages=(time - marker.taken, time - pressure.taken, time - dvl.taken, time - imu.taken),
         )
 
-    def sample(self, time: float, state: Array) -> None:
-        """Let the sensors sample a state (13,) whose measurement is not needed yet."""
-        x, y, z, qw, qx, qy, qz, *motion = state.tolist()
-        marker, pressure, dvl, imu = self._channels
-        if marker.is_due(time):
-            yaw = math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))
-            marker.take(time, [x, y, z, yaw])
-        if pressure.is_due(time):
-            pressure.take(time, [-z])
-        if dvl.is_due(time):
-            dvl.take(time, motion[:3])
-        if imu.is_due(time):
-            imu.take(time, [*tilt_of(rotation_of_quaternion(qw, qx, qy, qz)), *motion[3:]])
+    def sample(self, time: float, state: list[float]) -> None:
+        """Let the sensors sample a state (13) whose measurement is not needed yet."""
+        for channel in self._channels:
+            if time >= channel.next_time - 1e-9:
+                channel.take(time, state)
 
 
 STEP_S = 0.02
 """Longest step that resolves the forces [s]."""
 
 
+class ActuatorSteps(NamedTuple):
+    """How n actuators moved in K steps, whatever the water does meanwhile."""
+
+    fins: FinSteps | None
+    """What the fins did; None of a robot without."""
+    others: Array
+    """Commands (K, n - n_fins, 3) that the others followed, means over each step."""
+
+    def at(self, k: int) -> "ActuatorSteps":
+        """One of the steps."""
+        step = slice(k, k + 1)
+        fins = None if self.fins is None else FinSteps(*(values[step] for values in self.fins))
+        return ActuatorSteps(fins, self.others[step])
+
+
 class ActuatorOutput(NamedTuple):
-    """What n actuators do in a step."""
+    """What n actuators give in K steps."""
 
     force: Array
-    """Forces (n, 3) in own frames [N]."""
-    power: Array
-    """Inertial and driving power (2, n) [W]; of what is no fin, none and that of its law."""
+    """Forces (K, n, 3) in own frames [N]."""
+    inertial_power: Array
+    """(K, n) [W]; none of what is no fin."""
+    driving_power: Array
+    """(K, n) [W]; of what is no fin that of its law."""
 
 
 class ActuatorForce:
@@ -201,54 +289,99 @@ class ActuatorForce:
         """Takes the true robot and how its fins move."""
         self.motion = ActuatorMotion(layout, fins)
         self._beat = fins
-        of_fins = self.motion.fin_indices
-        of_others = self.motion.other_indices
         self._plant = plant_of(layout)
-        self.effectiveness = own_effectiveness(layout)
-        """Wrench (n, 3, 6) of 1 N along each own axis, about the true centre of gravity."""
-        if len(of_fins):
+        self.feels_flow = self._plant.feels_flow
+        """Whether what the actuators give depends on how the robot moves through the water."""
+        self._frames = layout.frames
+        # The wrench (3 n, 6) of 1 N along each own axis of each actuator.
+        self._effectiveness = own_effectiveness(layout).reshape(-1, 6)
+        others = tuple(layout.actuators[i] for i in self.motion.other_indices)
+        self._n_others = len(others)
+        if len(self.motion.fin_indices):
             self._fins = plant_of(layout.fins_alone)
-        if len(of_others):
-            others = tuple(layout.actuators[i] for i in of_others)
-            self._others = plant_of(replace(layout, actuators=others))
+        if others:
+            self._others = plant_of(replace(layout, actuators=others, interaction=None))
 
-    def step(self, command: Array, dt: float, water: Array, share: Array) -> ActuatorOutput:
-        """Follows a command (n, 3) for `dt` [s].
+    def move(self, command: Array, dt: float, count: int) -> ActuatorSteps:
+        """Follows a command (n, 3) over steps.
 
         Args:
             command: NaN rows are lost and give nothing.
-            dt: length of the step [s].
-            water: how the robot moves through the water (6,) [m/s, rad/s], body frame.
+            dt: length of a step [s].
+            count: how many, K.
+        """
+        of_fins, of_others = self.motion.split(command)
+        fins = self._beat.steps(of_fins, dt, count) if len(of_fins) else None
+        if not len(of_others):
+            return ActuatorSteps(fins, np.zeros((count, 0, 3)))
+        values = self.motion.others.steps(of_others, dt, count)
+        return ActuatorSteps(fins, 0.5 * (values[:-1] + values[1:]))
+
+    def output(
+        self, steps: ActuatorSteps, dt: float, share: Array, water: Array | None
+    ) -> ActuatorOutput:
+        """Returns what the actuators give in steps that have just been taken.
+
+        Args:
+            steps: what `move` returned, or part of it in order.
+            dt: length of a step [s].
             share: of its force that each actuator gives (n,).
+            water: how the robot moves through the water (6,) [m/s, rad/s], body frame, where that
+                matters; in one step.
         """
         motion = self.motion
-        motion.step(command, dt)
-        fins = np.zeros((0, 3))
-        fin_watts = np.zeros((2, 0))
-        others = np.zeros((0, 3))
-        watts = np.zeros((2, 0))
-        if len(motion.fin_indices):
-            fins = self.of_fins(dt) * share[motion.fin_indices, None]
-            fin_watts = np.array(fin_power(*self._beat.speed_and_acceleration(), self._fins.blade))
-        if len(motion.other_indices):
-            mean = 0.5 * (motion.others.value_before + motion.others.value)
-            works = share[motion.other_indices] * motion.pushes[motion.other_indices]
-            others = self._others.force(mean, flow=water) * works[:, None]
-            spent = self._others.power(mean, flow=water) * motion.pushes[motion.other_indices]
-            watts = np.array([0.0 * spent, spent])
-        return ActuatorOutput(motion.joined(fins, others), motion.joined(fin_watts.T, watts.T).T)
+        if steps.fins is None:
+            return self._output_of_others(steps.others, share, water)
+        fin_share = share[motion.fin_indices]
+        of_fins = ActuatorOutput(
+            self.of_fins(steps.fins, dt) * fin_share[:, None],
+            *fin_power(steps.fins.speed, steps.fins.acceleration, self._fins.blade),
+        )
+        if not self._n_others:
+            return of_fins
+        of_others = self._output_of_others(steps.others, share[motion.other_indices], water)
+        # Actuators first, as the rows of `joined`.
+        return ActuatorOutput(
+            *(
+                motion.joined(fins.swapaxes(0, 1), others.swapaxes(0, 1)).swapaxes(0, 1)
+                for fins, others in zip(of_fins, of_others, strict=True)
+            )
+        )
 
-    def wrenches(self, force: Array, water: Array) -> Array:
-        """Returns the wrench (n, 6) [N, N m] of each actuator's force (n, 3) [N], with an equal
-        share of what they do to each other; `water` as in `step`."""
-        offset = self._plant.offset(force, flow=water) / len(force)
-        return np.asarray(np.einsum("nk,nkw->nw", force, self.effectiveness) + offset)
+    def _output_of_others(
+        self, command: Array, share: Array, water: Array | None
+    ) -> ActuatorOutput:
+        """What the actuators that are no fins give by commands (K, n - n_fins, 3); those that have
+        stopped give and take nothing."""
+        works = self.motion.others_work
+        force = self._others.force(command, flow=water) * (share * works)[:, None]
+        power = self._others.power(command, flow=water) * works
+        return ActuatorOutput(force, np.zeros_like(power), power)
 
-    def of_fins(self, dt: float) -> Array:
-        """Force (n, 3) of each fin in its own frame [N], the mean over the step `dt` [s] that has
-        just been taken."""
-        command = self._beat.mean_command
-        command[:, 2] = wrapped(command[:, 2])
+    def wrench(self, force: Array, water: Array | None) -> Array:
+        """Returns the wrenches (K, 6) [N, N m] of forces (K, n, 3) [N], with what the actuators do
+        to each other; `water` as of `output`."""
+        wrench: Array = force.reshape(len(force), -1) @ self._effectiveness
+        if self._plant.interaction is None:
+            return wrench
+        return np.asarray(wrench + self._plant.offset(force, flow=water))
+
+    def in_body(self, force: Array, delivered: Array) -> Array:
+        """Returns forces in the body frame (n, 3) [N], with an equal share of what the actuators do
+        to each other.
+
+        Args:
+            force: in own frames (n, 3) [N].
+            delivered: the wrench (6,) of all [N, N m].
+        """
+        by_actuator = body_force(force, self._frames)
+        if self._plant.interaction is None:
+            return np.asarray(by_actuator)
+        of_interaction = delivered[:3] - by_actuator.sum(axis=0)
+        return np.asarray(by_actuator + of_interaction / len(force))
+
+    def of_fins(self, steps: FinSteps, dt: float) -> Array:
+        """Forces (K, n_fins, 3) of the fins in their own frames [N], means over steps of `dt`
+        [s]."""
         # One that does not beat gives nothing, whatever its law.
-        beats = (command[:, 0] > 0.0) & (command[:, 1] > 0.0)
-        return self._fins.force(command) * beats[:, None]
+        return np.asarray(self._fins.force(steps.mean_command) * steps.beats[..., None])

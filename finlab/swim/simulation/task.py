@@ -79,37 +79,61 @@ class Trajectory:
         self.duration_s = float(time[-1])
         # Over less than the samples' spacing the acceleration would be a row of spikes.
         self._slope_s = float(np.clip(np.median(np.diff(time)), *SLOPE_S))
-        along = np.diff(position[:, :2], axis=0)
-        self._moves = np.flatnonzero(np.hypot(*along.T) > RESTING_SPEED * np.diff(time))
-        self._headings = np.arctan2(along[self._moves, 1], along[self._moves, 0])
+        change = np.diff(position, axis=0)
+        spacing = np.diff(time)
+        # Of the piece from each sample on; the last one stands still.
+        self._slopes = np.zeros_like(position)
+        self._slopes[:-1] = change / spacing[:, None]
+        # Pieces of the path that do not rest, and their headings.
+        self._moves = np.flatnonzero(np.hypot(*change[:, :2].T) > RESTING_SPEED * spacing)
+        self._headings = np.arctan2(change[self._moves, 1], change[self._moves, 0])
 
     def position(self, time: float | Array) -> Array:
         """Position (..., 3) [m] at times (...,) [s]; beyond the ends as at the ends."""
-        return np.stack([np.interp(time, self.time, axis) for axis in self.samples.T], axis=-1)
+        time_within = np.clip(time, 0.0, self.duration_s)
+        piece = np.searchsorted(self.time, time_within, side="right") - 1
+        into_piece = time_within - self.time[piece]
+        return np.asarray(self.samples[piece] + self._slopes[piece] * into_piece[..., None])
 
     def setpoint(self, time: float) -> Setpoint:
         """Position, velocity and acceleration at `time` [s]; after the end at rest."""
+        return self.setpoints(np.array([time]))[0]
+
+    def setpoints(self, times: Array) -> list[Setpoint]:
+        """Position, velocity and acceleration at each of K times (K,) [s]; after the end at
+        rest."""
         # A path may end under way: what would stop it there within a moment is no part of it.
         dt = self._slope_s
-        middle = min(time, self.duration_s - dt)
-        times = np.array([time, middle - dt, middle, middle + dt])
-        position, behind, between, ahead = self.position(times)
-        if time > self.duration_s:
-            return Setpoint(position, 0.0, onward=self._onward(time))
+        middle = np.minimum(times, self.duration_s - dt)
+        position, behind, between, ahead = self.position(
+            np.stack([times, middle - dt, middle, middle + dt])
+        )
+        is_over = times > self.duration_s
         # Central differences.
         velocity = (ahead - behind) / (2 * dt)
         acceleration = (ahead - 2 * between + behind) / dt**2
-        speed = math.sqrt(velocity @ velocity)
-        return Setpoint(position, speed, velocity, acceleration, self._onward(time))
+        velocity[is_over] = 0.0
+        acceleration[is_over] = 0.0
+        speed = np.sqrt((velocity * velocity).sum(axis=-1)).tolist()
+        onward = self._onward(times)
+        setpoints = []
+        for k in range(len(times)):
+            setpoints.append(
+                Setpoint(position[k], speed[k], velocity[k], acceleration[k], onward[k])
+            )
+        return setpoints
 
-    def _onward(self, time: float) -> float:
-        """Heading [rad] of the first piece from `time` [s] on that does not rest; else that of the
-        last."""
+    def _onward(self, times: Array) -> list[float]:
+        """Headings [rad] of the first pieces from times (K,) [s] on that do not rest; else that of
+        the last."""
         if not len(self._moves):
-            return math.nan
-        piece = np.searchsorted(self.time, time, side="right") - 1
+            return [math.nan] * len(times)
+        piece = np.searchsorted(self.time, times, side="right") - 1
         following = np.searchsorted(self._moves, piece)
-        return float(self._headings[min(following, len(self._headings) - 1)])
+        headings: list[float] = self._headings[
+            np.minimum(following, len(self._headings) - 1)
+        ].tolist()
+        return headings
 
     def start(self) -> tuple[Array, float]:
         """The first position, and the heading of the first horizontal metre or of what there is."""

@@ -70,9 +70,11 @@ def rotation_of_angles(angles: Array) -> tuple[Array, ...]:
     return (*x_axis, *y_axis, *z_axis)
 
 
-def tilt_of(rotation: tuple[float, ...]) -> tuple[float, float]:
-    """Roll and pitch of a rotation [rad]."""
-    _, _, r31, _, _, r32, _, _, r33 = rotation
+def tilt_of_quaternion(w: float, x: float, y: float, z: float) -> tuple[float, float]:
+    """Roll and pitch [rad] of a quaternion of unit length."""
+    r31 = 2 * (x * z - w * y)
+    r32 = 2 * (y * z + w * x)
+    r33 = 1 - 2 * (x * x + y * y)
     return math.atan2(r32, r33), math.asin(min(max(-r31, -1.0), 1.0))
 
 
@@ -86,16 +88,3 @@ def to_world(rotation: tuple[Any, ...], u: Any, v: Any, w: Any) -> tuple[Any, An
     """Returns a vector (u, v, w) of the body frame in the world."""
     r11, r21, r31, r12, r22, r32, r13, r23, r33 = rotation
     return (r11 * u + r12 * v + r13 * w, r21 * u + r22 * v + r23 * w, r31 * u + r32 * v + r33 * w)
-
-
-def in_world(velocity: Array, roll: float, pitch: float, yaw: float) -> Array:
-    """Returns a velocity in the world (3,) [m/s].
-
-    Args:
-        velocity: in the body frame, the first three numbers of an array [m/s].
-        roll: about x [rad].
-        pitch: about y [rad], positive nose down.
-        yaw: about z [rad].
-    """
-    rotation = rotation_of_quaternion(*quaternion_of(roll, pitch, yaw))
-    return np.array(to_world(rotation, *velocity[:3].tolist()))

@@ -9,11 +9,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.actuators.law import Blade
 from finlab.arrays import Array
-from finlab.axes import TURN, is_full_turn
+from finlab.axes import is_full_turn
+from finlab.core import library
+from finlab.core.shared_array import SharedArray
 from finlab.layout import Layout
 
 TURN_SHARE_MIN = 0.1
@@ -58,38 +59,48 @@ class LagStep(NamedTuple):
             rate_by_rate=(1.0 - pole * dt) * decay,
         )
 
-    def follow(self, value: Array, rate: Array, target: Array) -> tuple[Array, Array]:
-        """Returns values and rates after the step, all arguments of the poles' shape."""
-        error = value - target
-        value_after = target + self.error_by_error * error + self.error_by_rate * rate
-        rate_after = self.rate_by_error * error + self.rate_by_rate * rate
-        return value_after, rate_after
-
 
 class FinLag:
     """What the n fins of one layout do if they follow as they should: enough for whoever watches
-    ten times a second. `FinMotion` adds what happens within the beat."""
+    ten times a second. `FinMotion` adds what happens within the beat.
+
+    The core moves the fins (finlab/core/src/fin_motion.c): the filters of `LagStep`, with A f
+    bounded by the servo's speed before the filter and behind it.
+    """
 
     def __init__(self, layout: Layout) -> None:
         """Starts at rest: no amplitude, no frequency, zero directions at the middle of their
         arcs."""
+        n = layout.n_fins
         lower, upper = np.array([fin.limits.zero_direction for fin in layout.fins]).reshape(-1, 2).T
-        self._turns_fully = is_full_turn(upper - lower)
-        self._poles = np.ascontiguousarray(layout.servo_poles.reshape(-1, 3).T)
-        self._max_swing = layout.speed_limit / TURN  # largest A f [rad/s]
-        self.value = np.zeros((3, layout.n_fins))
-        """Half amplitude [rad], frequency [Hz] and zero direction [rad], counted on over the seam
-        (3, n)."""
-        self.value[2] = 0.5 * (lower + upper)
-        self.rate = np.zeros((3, layout.n_fins))
-        """The same per second (3, n)."""
+        self._poles = layout.servo_poles.reshape(-1, 3)
+        speed_limit = np.asarray(layout.speed_limit)
+        # A row of a fin, in the order of `fin_numbers` in the core's fin_motion.c.
+        self._fins = SharedArray(np.zeros((n, 15)))
+        self._fins.array[:, 12] = is_full_turn(upper - lower)
+        self._fins.array[:, 13] = speed_limit
+        self._fins.array[:, 14] = TURN_SHARE_MIN * speed_limit
+        # The same of `fin_state`: three values, their rates, a phase.
+        self._state = SharedArray(np.zeros((n, 7)))
+        self._state.array[:, 2] = 0.5 * (lower + upper)
+        self._command = SharedArray(np.zeros((n, 3)))
         self._dt = math.nan
-        self._lag: LagStep
+
+    @property
+    def value(self) -> Array:
+        """Half amplitude [rad], frequency [Hz] and zero direction [rad], counted on over the seam
+        (3, n); a view."""
+        return self._state.array[:, :3].T
+
+    @property
+    def rate(self) -> Array:
+        """The same per second (3, n); a view."""
+        return self._state.array[:, 3:6].T
 
     @property
     def command(self) -> Array:
         """What the fins do now, as a command (n, 3) [rad, Hz, rad]; a copy."""
-        return self.value.T.copy()
+        return self._state.array[:, :3].copy()
 
     def step(self, command: Array, dt: float) -> None:
         """Follows a command over a step.
@@ -98,95 +109,85 @@ class FinLag:
             command: (n, 3) [rad, Hz, rad]; a fin whose row is NaN stops at once and hangs still.
             dt: length of the step [s].
         """
-        self._follow(command, dt)
+        self._take(command, dt)
+        library().fl_follow_fins(
+            self._fins.address, self._command.address, len(command), self._state.address
+        )
 
-    def _follow(self, command: Array, dt: float) -> NDArray[np.bool_] | None:
-        """Takes the step; returns which fins (n,) hang still, or None where all follow."""
+    def _take(self, command: Array, dt: float) -> None:
+        """Copies a command to where the core reads it, and sees that the filters' step fits."""
+        self._command.array[:] = command
         if dt != self._dt:
             self._dt = dt
-            self._lag = LagStep.of(self._poles, dt)
-        before = self.value
-        target = command.T.copy()
-        lost = np.isnan(target[0])
-        some_lost = bool(lost.any())
-        if some_lost:
-            target[:, lost] = before[:, lost]
-        # A f is bounded by the servo's speed, before the filter and behind it.
-        np.minimum(target[0], self._max_swing / np.maximum(target[1], 1e-9), out=target[0])
-        turn = target[2] - before[2]
-        shorter_turn = turn - TURN * np.rint(turn / TURN)
-        target[2] = before[2] + np.where(self._turns_fully, shorter_turn, turn)
-        value, rate = self._lag.follow(before, self.rate, target)
-        np.minimum(value[0], self._max_swing / np.maximum(value[1], 1e-9), out=value[0])
-        if some_lost:
-            value[:2, lost] = 0.0
-            value[2, lost] = before[2, lost]
-            rate[:, lost] = 0.0
-        self.value = value
-        self.rate = rate
-        return lost if some_lost else None
+            lag = np.stack(LagStep.of(self._poles, dt), axis=-1)
+            self._fins.array[:, :12] = lag.reshape(-1, 12)
+
+
+class FinSteps(NamedTuple):
+    """What n fins did in K steps much shorter than a beat."""
+
+    mean_command: Array
+    """Their command (K, n, 3) [rad, Hz, rad] as a mean over each step, zero directions wrapped."""
+    beats: Array
+    """1 where a fin (K, n) beats by that, 0 where it does not."""
+    angle: Array
+    """Angles (K, n) at the end of each step [rad]: theta = A sin(phase) + zero direction (the
+    paper's Eq. 1)."""
+    phase: Array
+    """Phases of the flapping (K, n) at the end of each step [rad]."""
+    speed: Array
+    """Angular speeds (K, n) [rad/s]."""
+    acceleration: Array
+    """Angular accelerations (K, n) [rad/s^2]; those by changes of the command are means over a
+    step."""
 
 
 class FinMotion(FinLag):
-    """Angles of the fins of one layout over time, in steps much shorter than a beat; all arrays are
-    (n,)."""
-
-    def __init__(self, layout: Layout) -> None:
-        """Starts at rest, as `FinLag`."""
-        super().__init__(layout)
-        self._speed_limit = layout.speed_limit
-        self._min_turn_speed = TURN_SHARE_MIN * self._speed_limit
-        self._before = self.value
-        self._acceleration = np.zeros((3, layout.n_fins))
-        self.phase = np.zeros(layout.n_fins)
-        """Phase of the flapping [rad]."""
-
-    def step(self, command: Array, dt: float) -> None:
-        """Follows a command as `FinLag`, within the beat."""
-        before = self.value
-        rate_before = self.rate
-        lost = self._follow(command, dt)
-        value = self.value
-        rate = self.rate
-        # What flapping leaves of the servo's speed is there to turn the fin.
-        swing = value[0] * (TURN * value[1])
-        turn_speed = np.maximum(self._speed_limit - swing, self._min_turn_speed)
-        turn = np.minimum(np.maximum(value[2] - before[2], -turn_speed * dt), turn_speed * dt)
-        value[2] = before[2] + turn
-        rate[2] = np.minimum(np.maximum(rate[2], -turn_speed), turn_speed)
-        if lost is not None:
-            before = np.where(lost, value, before)
-        self.phase = np.mod(self.phase + (0.5 * TURN * dt) * (before[1] + value[1]), TURN)
-        self._acceleration = (rate - rate_before) / dt
-        self._before = before
+    """Angles of the fins of one layout over time, in steps much shorter than a beat."""
 
     @property
-    def mean_command(self) -> Array:
-        """`command` as a mean over the last step (n, 3)."""
-        command: Array = 0.5 * (self._before + self.value).T
-        return command
+    def phase(self) -> Array:
+        """Phases of the flapping (n,) [rad]; a view."""
+        return self._state.array[:, 6]
 
     @property
     def angle(self) -> Array:
-        """The fins' angles [rad]: theta = A sin(phase) + zero direction (the paper's Eq. 1)."""
-        return np.asarray(self.value[0] * np.sin(self.phase) + self.value[2])
+        """The fins' angles (n,) now [rad], as in `FinSteps`."""
+        amplitude, _, zero_direction = self.value
+        return np.asarray(amplitude * np.sin(self.phase) + zero_direction)
 
-    def speed_and_acceleration(self) -> tuple[Array, Array]:
-        """Returns the fins' angular speeds (n,) [rad/s] and accelerations (n,) [rad/s^2]; those by
-        changes of the command are means over the last step."""
-        # theta = A sin(phase) + phi, phase' = omega: differentiated twice
-        amplitude, frequency, _ = self.value
-        amplitude_rate, frequency_rate, phi_rate = self.rate
-        amplitude_acceleration, _, phi_acceleration = self._acceleration
-        omega = TURN * frequency
-        swing = amplitude * omega
-        sine = np.sin(self.phase)
-        cosine = np.cos(self.phase)
-        speed = phi_rate + amplitude_rate * sine + swing * cosine
-        by_sine = amplitude_acceleration - swing * omega
-        by_cosine = 2.0 * amplitude_rate * omega + (TURN * amplitude) * frequency_rate
-        acceleration = phi_acceleration + by_sine * sine + by_cosine * cosine
-        return speed, acceleration
+    def step(self, command: Array, dt: float) -> None:
+        """Follows a command as `FinLag`, within the beat."""
+        self.steps(command, dt, 1)
+
+    def steps(self, command: Array, dt: float, count: int) -> FinSteps:
+        """Follows a command over several steps.
+
+        Args:
+            command: as of `step`.
+            dt: length of a step [s].
+            count: how many, K.
+        """
+        self._take(command, dt)
+        n = len(command)
+        moves = np.empty((count, n, 8))
+        library().fl_move_fins(
+            self._fins.address,
+            self._command.address,
+            n,
+            dt,
+            count,
+            self._state.address,
+            moves.ctypes.data,
+        )
+        return FinSteps(
+            mean_command=moves[..., :3],
+            beats=moves[..., 3],
+            angle=moves[..., 4],
+            phase=moves[..., 5],
+            speed=moves[..., 6],
+            acceleration=moves[..., 7],
+        )
 
 
 class FinPower(NamedTuple):

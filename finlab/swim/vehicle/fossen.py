@@ -10,8 +10,8 @@ The Coriolis terms are written by momenta (Kirchhoff): the linear momentum p = M
 angular momentum h = M_ang omega give C(nu_r) nu_r = (omega x p, omega x h + v_r x p). Order of six:
 surge, sway, heave, roll, pitch, yaw; x forward, y left, z up.
 
-Numbers may be plain floats, which for one body are several times faster than arrays, or arrays that
-broadcast; vectors are sequences of them.
+Numbers may be plain floats, or arrays that broadcast; vectors are sequences of them. The core has
+`accelerations` of one body in C (finlab/core/src/vehicle.c), for `vehicle.py`.
 """
 
 from dataclasses import replace

@@ -1,8 +1,7 @@
-"""One step of an ordinary differential equation y' = f(y), by two explicit Runge-Kutta rules.
+"""One step of an ordinary differential equation y' = f(y), by the classical Runge-Kutta rule.
 
-A state is a sequence of components: floats of one robot, or arrays of many robots side by side. So
-the rules stand here once, for what swims in simulation (`vehicle.py`), for the fault monitor's
-model of it, and for the thousands of robots that a fit integrates (`many_bodies.py`).
+A state is a sequence of components, arrays of many robots side by side: the thousands that a fit
+integrates (`many_bodies.py`). One body alone is integrated by the core (`vehicle.py`).
 """
 
 from collections.abc import Callable, Sequence
@@ -36,17 +35,3 @@ def runge_kutta_step(
         a + h / 6.0 * (b + 2.0 * (c + d) + e)
         for a, b, c, d, e in zip(y, k1, k2, k3, k4, strict=True)
     ]
-
-
-def midpoint_step(
-    derivative: Callable[[Sequence[Component]], Sequence[Component]],
-    y: Sequence[Component],
-    h: float,
-) -> list[Component]:
-    """Returns the state after a step by the midpoint rule, of order 2, in half the time.
-
-    y <- y + h f(y + h/2 f(y)); arguments as of `runge_kutta_step`.
-    """
-    k1 = derivative(y)
-    k2 = derivative([a + 0.5 * h * b for a, b in zip(y, k1, strict=True)])
-    return [a + h * b for a, b in zip(y, k2, strict=True)]

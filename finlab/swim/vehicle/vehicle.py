@@ -4,22 +4,24 @@ State (13,): position in the world [m], quaternion (w, x, y, z), velocity over g
 angular rates [rad/s] in the body frame. The water moves without rotation, so nu' = nu_r' - omega x
 (current in body) + (its acceleration in body). Where it accelerates, it carries the body along by
 the pressure that it accelerates itself with: M nu_r' says so of a body as heavy as the water in its
-place; the buoyant force leans with it. All in plain floats: at this size they are several times
-faster than arrays. `many_bodies.py` has the same for many.
+place; the buoyant force leans with it. The core computes it (finlab/core/src/vehicle.c): a
+simulation takes fifty such steps for each second that it simulates. `many_bodies.py` has the same
+for many, by `fossen.py`.
 """
 
 import math
 from collections.abc import Sequence
-from functools import partial
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from finlab.arrays import Array
+from finlab.core import library
+from finlab.core.shared_array import SharedArray
 from finlab.errors import LayoutError
 from finlab.layout import Body
-from finlab.swim.vehicle.attitude import rotation_of_quaternion, to_body, to_world
-from finlab.swim.vehicle.fossen import accelerations, damping_jacobian, dynamics_of
-from finlab.swim.vehicle.integration import midpoint_step, runge_kutta_step
+from finlab.swim.vehicle.attitude import rotation_of_quaternion, to_body
+from finlab.swim.vehicle.fossen import dynamics_of
 
 STATE_SIZE = 13
 STABLE_STEP = 1.5
@@ -30,7 +32,7 @@ MAX_SUBSTEPS = 500
 
 
 class Vehicle:
-    """The dynamics of one vehicle; it holds no state."""
+    """The dynamics of one vehicle; it keeps nothing from one call to the next."""
 
     def __init__(self, body: Body, current: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
         """Makes the dynamics of a body in water.
@@ -42,11 +44,10 @@ class Vehicle:
         Raises:
             LayoutError: the body has no mass or no inertia, or the current is no velocity.
         """
-        self.current = tuple(float(value) for value in current)
-        """Velocity of the water (3,) in the world [m/s]."""
-        if len(self.current) != 3 or not all(map(math.isfinite, self.current)):
+        velocity = tuple(float(value) for value in current)
+        if len(velocity) != 3 or not all(map(math.isfinite, velocity)):
             raise LayoutError(
-                f"expected a velocity of three finite numbers, got {current!r:.60}", "current"
+                f"expected a velocity of three finite numbers, got {velocity!r:.60}", "current"
             )
         self.dynamics = dynamics_of(body)
         self.inertia = self.dynamics.inertia
@@ -56,19 +57,40 @@ class Vehicle:
         self.buoyancy = self.dynamics.buoyancy
         """Buoyant force [N]."""
         mass_spread = max(self.inertia[:3]) - min(self.inertia[:3])
-        self._munk = math.sqrt(mass_spread / min(self.inertia[3:]))
-        self._rate_at_rest = max(damping_jacobian(self.dynamics, (0.0,) * 6))
-        quadratic = max(
-            d / m for d, m in zip(self.dynamics.quadratic_damping, self.inertia, strict=True)
+        munk_rate = math.sqrt(mass_spread / min(self.inertia[3:]))
+        # In the order of `body_numbers` in the core's vehicle.c.
+        self._body = SharedArray(
+            [
+                *self.inertia,
+                *self.dynamics.linear_damping,
+                *self.dynamics.quadratic_damping,
+                self.weight,
+                self.buoyancy,
+                *self.dynamics.center_of_buoyancy,
+                munk_rate,
+                *velocity,
+            ]
         )
-        self._rate_by_speed = 2.0 * quadratic + self._munk + 1.0
+        # Where the core reads the arguments of one call and writes what it returns.
+        self._state = SharedArray(np.zeros(STATE_SIZE))
+        self._wrench = SharedArray(np.zeros(6))
+        self._rates = SharedArray(np.zeros(STATE_SIZE))
 
-    def n_steps(self, nu: Sequence[float], dt: float) -> int:
+    @property
+    def current(self) -> tuple[float, ...]:
+        """Velocity of the water (3,) in the world [m/s]; it may be set."""
+        return tuple(self._body.array[-3:].tolist())
+
+    @current.setter
+    def current(self, velocity: Sequence[float]) -> None:
+        self._body.array[-3:] = velocity
+
+    def n_steps(self, nu: ArrayLike, dt: float) -> int:
         """Into how many equal steps a period has to be cut so that integrating it stays stable.
 
         One for a robot as robots are; more where damping, Munk's moments or its own turning change
         the motion within the period, as of a light body that water holds fast, or of one that
-        tumbles.
+        tumbles. The core cuts each of its steps so.
 
         Args:
             nu: velocity and angular rates (6,) in the body frame [m/s, rad/s].
@@ -77,15 +99,10 @@ class Vehicle:
         Raises:
             LayoutError: even `MAX_SUBSTEPS` would not do.
         """
-        cx, cy, cz = self.current
-        current_speed = abs(cx) + abs(cy) + abs(cz)
-        speed_bound = max(map(abs, nu)) + current_speed
-        if dt * (self._rate_at_rest + self._rate_by_speed * speed_bound) <= STABLE_STEP:
-            return 1  # as nearly always: known from a bound, which takes less time
-        u, v, w, p, q, r = map(abs, nu)
-        speeds = (u + current_speed, v + current_speed, w + current_speed, p, q, r)
-        damping: float = max(damping_jacobian(self.dynamics, speeds))
-        fastest_rate = damping + self._munk * max(speeds[:3]) + max(speeds[3:])
+        self._state.array[7:] = nu
+        fastest_rate: float = library().fl_body_fastest_rate(
+            self._body.address, self._state.address
+        )
         max_rate = MAX_SUBSTEPS * STABLE_STEP / dt
         if not fastest_rate <= max_rate:  # nor where it is no number any more
             got = "beyond all bounds"
@@ -98,68 +115,67 @@ class Vehicle:
             )
         return max(1, math.ceil(fastest_rate * dt / STABLE_STEP))
 
-    def derivative(self, state: Sequence[float], wrench: Sequence[float]) -> list[float]:
+    def derivative(self, state: Sequence[float] | Array, wrench: Sequence[float] | Array) -> Array:
         """Returns the rate of change (13,) of a state.
 
         Args:
             state: see the head of this file (13,).
             wrench: tau (6,) in the body frame [N, N m].
         """
-        _, _, _, qw, qx, qy, qz, u, v, w, p, q, r = state
-        rotation = rotation_of_quaternion(qw, qx, qy, qz)
-        up = rotation[2::3]
-        cu, cv, cw = to_body(rotation, *self.current)
-        nu_r = (u - cu, v - cv, w - cw, p, q, r)
-        surge, sway, heave, roll, pitch, yaw = accelerations(self.dynamics, nu_r, up, wrench)
-        return [
-            *to_world(rotation, u, v, w),
-            # The quaternion's rate is half its product with (0, p, q, r).
-            0.5 * (-qx * p - qy * q - qz * r),
-            0.5 * (qw * p + qy * r - qz * q),
-            0.5 * (qw * q + qz * p - qx * r),
-            0.5 * (qw * r + qx * q - qy * p),
-            # nu' = nu_r' - omega x (current in the body frame)
-            surge - (q * cw - r * cv),
-            sway - (r * cu - p * cw),
-            heave - (p * cv - q * cu),
-            roll,
-            pitch,
-            yaw,
-        ]
+        self._state.array[:] = state
+        self._wrench.array[:] = wrench
+        library().fl_body_rates(
+            self._body.address, self._state.address, self._wrench.address, self._rates.address
+        )
+        return self._rates.array.copy()
 
     def velocity_in_water(self, state: Array) -> Array:
         """Returns nu_r (6,) of a state (13,): velocity relative to the water and angular rates,
         body frame [m/s, rad/s]."""
         velocity = state[7:].copy()
-        if any(self.current):
-            velocity[:3] -= to_body(rotation_of_quaternion(*state[3:7].tolist()), *self.current)
+        current = self.current
+        if any(current):
+            velocity[:3] -= to_body(rotation_of_quaternion(*state[3:7].tolist()), *current)
         return velocity
 
-    def step(self, state: Array, wrench: Sequence[float], dt: float) -> Array:
-        """Returns the state (13,) after a period, by Runge-Kutta of order 4.
+    def steps(self, state: ArrayLike, wrenches: ArrayLike, dt: float) -> Array:
+        """Returns the states (K + 1, 13) at the beginning and after each of K periods, by
+        Runge-Kutta of order 4.
 
         Args:
             state: at the beginning (13,).
-            wrench: tau (6,) [N, N m], which the body carries along.
-            dt: the period [s].
+            wrenches: tau (K, 6) in each period [N, N m], which the body carries along.
+            dt: a period [s].
 
         Raises:
             LayoutError: the body moves too fast to be simulated.
         """
-        y: list[float] = state.tolist()
-        n_steps = self.n_steps(y[7:], dt)
-        derivative = partial(self.derivative, wrench=wrench)
-        for _ in range(n_steps):
-            y = runge_kutta_step(derivative, y, dt / n_steps)
-            norm = math.hypot(*y[3:7])  # of any size, as those of a motion beyond all bounds
-            y[3:7] = [value / norm for value in y[3:7]]
-        return np.array(y)
+        tau = np.ascontiguousarray(wrenches, dtype=np.float64)
+        count = len(tau)
+        states = np.empty((count + 1, STATE_SIZE))
+        states[0] = state
+        taken = library().fl_body_steps(
+            self._body.address, tau.ctypes.data, count, dt, states.ctypes.data
+        )
+        if taken < count:
+            self.n_steps(states[taken, 7:], dt)  # says what is wrong
+        return states
 
-    def coarse_step(self, state: list[float], wrench: Sequence[float], dt: float) -> list[float]:
+    def step(self, state: ArrayLike, wrench: ArrayLike, dt: float) -> Array:
+        """Returns the state (13,) after one period; arguments and errors as of `steps`, which takes
+        many periods at once."""
+        after: Array = self.steps(state, np.reshape(wrench, (1, 6)), dt)[1]
+        return after
+
+    def coarse_step(
+        self, state: Sequence[float] | Array, wrench: Sequence[float] | Array, dt: float
+    ) -> Array:
         """As `step`, by the midpoint rule, in half the time; the quaternion keeps the length that
         it comes to."""
-        n_steps = self.n_steps(state[7:], dt)
-        derivative = partial(self.derivative, wrench=wrench)
-        for _ in range(n_steps):
-            state = midpoint_step(derivative, state, dt / n_steps)
-        return state
+        self._state.array[:] = state
+        self._wrench.array[:] = wrench
+        if not library().fl_body_coarse_step(
+            self._body.address, self._wrench.address, dt, self._state.address
+        ):
+            self.n_steps(self._state.array[7:].copy(), dt)  # says what is wrong
+        return self._state.array.copy()

@@ -223,7 +223,10 @@ def test_it_is_the_one_that_the_slowest_fin_is_in_time_for(pole: float) -> None:
     value = np.zeros(1)
     rate = np.zeros(1)
     for tick in range(200):
-        value, rate = lag.follow(value, rate, np.array([tick + asked]))
+        target = tick + asked
+        error = value - target
+        value = target + lag.error_by_error * error + lag.error_by_rate * rate
+        rate = lag.rate_by_error * error + lag.rate_by_rate * rate
     # Between the ends of the last period, in the middle of the steps that the command takes.
     assert 200.0 - 1.0 < value[0] < 200.0
 

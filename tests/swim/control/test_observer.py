@@ -107,3 +107,29 @@ def test_a_body_that_is_given_it_follows_a_path_of_changing_speed() -> None:
         for _ in range(5):
             state = vehicle.step(state, wrench.tolist(), 0.02)
     assert state[0] == pytest.approx(path.position(12.0)[0], rel=0.03)
+
+
+@pytest.mark.parametrize("name", ["A", "bluerov2_heavy"])
+def test_wrenches_along_a_path_are_those_of_its_model(name: str) -> None:
+    """M nu' + D(nu) nu by arrays, with numpy's differences of the yaw rate."""
+    robot = load_layout(name)
+    observer = MotionObserver(robot, PERIOD_S)
+    path = make_trajectory("lissajous")
+    setpoints = path.setpoints(np.arange(0.0, 20.0, PERIOD_S))
+    current = np.array([0.06, -0.03])
+    slow = 0.1
+    found = observer.wrenches_along(setpoints, current.tolist(), slow)
+    velocity = np.array([each.velocity for each in setpoints])
+    acceleration = np.array([each.acceleration for each in setpoints])
+    x, y = (velocity[:, :2] - current).T
+    ax, ay, az = acceleration.T
+    speed = np.hypot(x, y)
+    turning = (x * ay - y * ax) / np.maximum(speed, slow) ** 2
+    zero = np.zeros_like(speed)
+    nu = np.stack([speed, zero, velocity[:, 2], turning], axis=-1)
+    surge_rate = (x * ax + y * ay) / speed
+    nu_rate = np.stack([surge_rate, zero, az, np.gradient(turning, PERIOD_S)], axis=-1)
+    wanted = np.zeros((len(speed), 6))
+    wanted[:, [0, 1, 2, 5]] = observer.inertia * (nu_rate + observer.deceleration(nu))
+    assert np.abs(wanted[:, 5]).max() > 0.01
+    np.testing.assert_allclose(found, wanted, rtol=1e-9, atol=1e-11)

@@ -9,7 +9,7 @@ from finlab.arrays import Array
 from finlab.errors import FinlabError
 from finlab.swim.control import Measurement
 from finlab.swim.simulation import NO_NOISE, NOISE_ALONE, SensorSettings
-from finlab.swim.simulation.devices import Sensor, Sensors
+from finlab.swim.simulation.devices import NORMALS_AT_ONCE, NormalNumbers, Sensor, Sensors
 from finlab.swim.vehicle.attitude import euler
 
 STATE = np.zeros(13)
@@ -21,7 +21,7 @@ STATE[7] = 0.2
 def seen(settings: SensorSettings, steps: int, seed: int = 0) -> list[Measurement]:
     """What sensors say of a robot that stays as it is, every 0.01 s."""
     sensors = Sensors(settings, np.random.default_rng(seed))
-    return [sensors.measure(0.01 * k, STATE) for k in range(steps)]
+    return [sensors.measure(0.01 * k, STATE.tolist()) for k in range(steps)]
 
 
 def new(values: list[float] | Array) -> int:
@@ -41,7 +41,7 @@ def test_perfect_sensors_say_what_is_true_at_once() -> None:
     for _ in range(20):
         state = rng.standard_normal(13)
         state[3:7] /= np.linalg.norm(state[3:7])
-        found = Sensors(NO_NOISE, rng).measure(0.0, state)
+        found = Sensors(NO_NOISE, rng).measure(0.0, state.tolist())
         np.testing.assert_allclose(
             found.as_array(), [*state[:3], *euler(state[3:7]), *state[7:]], rtol=1e-12, atol=1e-12
         )
@@ -53,7 +53,7 @@ def test_what_is_late_is_of_a_while_ago() -> None:
     state = STATE.copy()
     for k in range(100):
         state[:3] = 0.02 * k
-        found = sensors.measure(0.02 * k, state)
+        found = sensors.measure(0.02 * k, state.tolist())
         assert found.position[0] == pytest.approx(0.02 * max(k - 5, 0)), (
             "at rest before the beginning"
         )
@@ -72,3 +72,14 @@ def test_what_no_sensor_has_is_refused() -> None:
     for wrong in ({"rate_hz": 0.0}, {"delay_s": -0.1}, {"dropout": 1.0}, {"noise": (np.nan,) * 3}):
         with pytest.raises(FinlabError, match="sensors: dvl: expected"):
             SensorSettings(dvl=replace(usual, **wrong))
+
+
+def test_noise_comes_in_the_order_of_its_generator() -> None:
+    numbers = NormalNumbers(np.random.default_rng(3))
+    taken = []
+    for count in (1, 5, 4, 3) * 200:
+        few = numbers.take(count)
+        assert len(few) == count
+        taken += few
+    assert len(taken) > 4 * NORMALS_AT_ONCE
+    assert taken == np.random.default_rng(3).standard_normal(len(taken)).tolist()

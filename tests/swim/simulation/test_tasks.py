@@ -30,6 +30,20 @@ def test_a_path_says_where_it_goes_on_while_it_rests() -> None:
     assert np.isnan(make_trajectory("station").setpoint(12.0).onward)
 
 
+@pytest.mark.parametrize("name", SHIPPED)
+def test_many_setpoints_are_those_one_by_one(name: str) -> None:
+    path = make_trajectory(name)
+    times = np.append(np.linspace(0.0, path.duration_s, 37), path.duration_s + 2.0)
+    together = path.setpoints(times)
+    for time, found in zip(times.tolist(), together, strict=True):
+        alone = path.setpoint(time)
+        for value, wanted in zip(found, alone, strict=True):
+            np.testing.assert_array_equal(value, wanted)
+        by_axis = [np.interp(time, path.time, axis) for axis in path.samples.T]
+        np.testing.assert_allclose(found.position, by_axis, rtol=1e-12, atol=1e-15)
+    assert not np.any(together[-1].velocity) and together[-1].surge == 0.0
+
+
 def test_coarse_samples_of_a_smooth_path_have_a_smooth_acceleration() -> None:
     """The square's legs, 41 samples each, are cubics over time."""
     path = make_trajectory("square")

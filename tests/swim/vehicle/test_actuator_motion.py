@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 from finlab.actuators.thrust_model import PowerLaw
 from finlab.layout import Azimuth, Layout, Rudder, Thruster, load_layout
-from finlab.swim.vehicle.actuator_motion import ActuatorMotion
+from finlab.swim.vehicle.actuator_motion import ActuatorMotion, FirstOrderLag
 from finlab.swim.vehicle.fin_motion import FinLag
 
 LAW = PowerLaw(1.0)
@@ -75,6 +75,21 @@ def test_each_follows_to_first_order_within_its_rate(mixed: Layout, dt: float) -
         )
         assert motion.command[place] == pytest.approx(exact.y[0, -1], abs=1e-4)
     assert motion.command[2, 0] == pytest.approx(min(2.0, 1.5 * n_steps * dt))
+
+
+def test_steps_at_once_are_as_many_single_ones() -> None:
+    others = (THRUSTER, AZIMUTH, RUDDER)
+    together = FirstOrderLag(others)
+    single = FirstOrderLag(others)
+    for command in (
+        [[-18.0, 0.0, 0.0], [3.0, 40.0, 0.0], [0.45, 0.0, 0.0]],
+        [[12.0, 0.0, 0.0], [-3.0, 5.0, 0.0], [math.nan] * 3],
+    ):
+        values = together.steps(np.array(command), 0.03, 8)
+        for k in range(8):
+            single.step(np.array(command), 0.03)
+            np.testing.assert_allclose(values[k + 1], single.value, rtol=1e-12, atol=1e-13)
+    assert together.value[2, 0] == values[0, 2, 0], "a rudder that stops stays where it is"
 
 
 def test_fins_among_others_move_as_fins_alone(mixed: Layout) -> None:

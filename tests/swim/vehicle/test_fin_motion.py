@@ -94,10 +94,12 @@ def test_accelerations_are_those_of_the_speed(pair: Layout) -> None:
     angles = []
     speeds = []
     found = []
-    for _ in range(3000):
-        motion.step(command, dt)
-        speed, acceleration = motion.speed_and_acceleration()
-        angles.append(motion.angle), speeds.append(speed), found.append(acceleration)
+    for _ in range(1000):
+        steps = motion.steps(command, dt, 3)
+        angles.extend(steps.angle)
+        speeds.extend(steps.speed)
+        found.extend(steps.acceleration)
+        np.testing.assert_allclose(steps.angle[-1], motion.angle, rtol=0, atol=1e-12)
     np.testing.assert_allclose(np.diff(angles, axis=0)[5:] / dt, speeds[6:], atol=0.02)
     np.testing.assert_allclose(np.diff(speeds, axis=0)[5:] / dt, found[6:], atol=0.1)
     assert np.abs(found).max() > 20.0
@@ -114,11 +116,12 @@ def test_mean_power_is_what_a_sinusoid_has(pair: Layout) -> None:
     torque = []
     driving = []
     for _ in range(10 * round(1 / (frequency * STEP_S))):
-        motion.step(command, STEP_S)
-        power = fin_power(*motion.speed_and_acceleration(), Blade(), 0.7)
-        inertial.append(power.inertial[0])
-        torque.append(fin_power(*motion.speed_and_acceleration(), Blade(), 0.0).driving[0])
-        driving.append(power.driving[0])
+        steps = motion.steps(command, STEP_S, 1)
+        power = fin_power(steps.speed, steps.acceleration, Blade(), 0.7)
+        inertial.append(power.inertial[0, 0])
+        without_heat = fin_power(steps.speed, steps.acceleration, Blade(), 0.0)
+        torque.append(without_heat.driving[0, 0])
+        driving.append(power.driving[0, 0])
     swing = 2 * math.pi * frequency
     assert np.mean(inertial) == pytest.approx(
         OWN_INERTIA * amplitude**2 * swing**3 / math.pi, rel=0.01
@@ -128,6 +131,22 @@ def test_mean_power_is_what_a_sinusoid_has(pair: Layout) -> None:
     squares = 0.5 * Blade().inertia ** 2 + 0.375 * (Blade().drag * amplitude) ** 2
     heat = 0.7 * amplitude**2 * swing**4 * squares
     assert np.mean(driving) == pytest.approx(Blade().power(amplitude, frequency) + heat, rel=0.01)
+
+
+def test_steps_at_once_are_as_many_single_ones(pair: Layout) -> None:
+    """Fins of which one stops on the way."""
+    together = flapping(pair, 0.3, 1.2, 0.4)
+    single = flapping(pair, 0.3, 1.2, 0.4)
+    for command in ([[0.5, 1.7, 2.9], [0.2, 0.6, -3.0]], [[0.5, 1.0, 1.0], [math.nan] * 3]):
+        steps = together.steps(np.array(command), STEP_S, 9)
+        for k in range(9):
+            alone = single.steps(np.array(command), STEP_S, 1)
+            for values, value in zip(steps, alone, strict=True):
+                np.testing.assert_array_equal(values[k], value[0])
+        np.testing.assert_array_equal(together.command, single.command)
+    assert steps.beats[:, 0].all() and not steps.beats[:, 1].any()
+    assert (together.command[1, :2] == 0.0).all() and (together.rate[:, 1] == 0.0).all()
+    assert (np.abs(steps.mean_command[..., 2]) <= math.pi).all()
 
 
 def test_one_step_per_period_follows_as_the_small_steps_do(layout_a: Layout) -> None:

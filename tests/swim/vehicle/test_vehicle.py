@@ -101,6 +101,36 @@ def test_runge_kutta_is_of_fourth_order(ucat: Body) -> None:
     )
 
 
+def test_many_steps_at_once_are_as_many_single_ones(ucat: Body) -> None:
+    vehicle = Vehicle(ucat, (0.1, 0.05, 0.0))
+    state = at_rest()
+    state[7:] = (0.4, -0.2, 0.1, 0.5, -0.4, 0.6)
+    wrenches = np.random.default_rng(2).uniform(-3.0, 3.0, (7, 6))
+    together = vehicle.steps(state, wrenches, 0.02)
+    np.testing.assert_array_equal(together[0], state)
+    for k, wrench in enumerate(wrenches):
+        state = vehicle.step(state, wrench, 0.02)
+        np.testing.assert_array_equal(together[k + 1], state)
+
+
+def test_steps_are_those_of_the_rule_with_its_rates(ucat: Body) -> None:
+    """Runge-Kutta's and the midpoint rule written here, on the rates of change."""
+    vehicle = Vehicle(ucat, (0.1, -0.05, 0.02))
+    y = at_rest()
+    y[3:7] = quaternion_of(0.3, -0.2, 1.1)
+    y[7:] = (0.4, -0.2, 0.1, 0.5, -0.4, 0.6)
+    tau = (4.0, 1.0, -2.0, 0.3, 0.2, 0.8)
+    h = 0.05
+    k1 = vehicle.derivative(y, tau)
+    k2 = vehicle.derivative(y + 0.5 * h * k1, tau)
+    k3 = vehicle.derivative(y + 0.5 * h * k2, tau)
+    k4 = vehicle.derivative(y + h * k3, tau)
+    after = y + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+    after[3:7] /= np.linalg.norm(after[3:7])
+    np.testing.assert_allclose(vehicle.step(y, tau, h), after, rtol=1e-13, atol=1e-15)
+    np.testing.assert_allclose(vehicle.coarse_step(y, tau, h), y + h * k2, rtol=1e-13, atol=1e-15)
+
+
 def test_water_that_holds_a_light_body_fast_does_not_shake_it(ucat: Body) -> None:
     """Damping many times faster than the step: the body comes to the speed at which drag meets the
     thrust."""
