@@ -8,6 +8,7 @@ standard deviation.
 
 import io
 import json
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache, partial
 from pathlib import Path
@@ -25,7 +26,8 @@ from finlab.files.guarded import decoded, read_file
 from finlab.layout import FinModelSpec, Layout
 from finlab.physics import Plant
 from finlab.research.executor import cores, map_parts
-from finlab.research.networks.trained import WrenchNormalization
+from finlab.research.networks.trained import WrenchNormalization, to_normalized
+from finlab.research.paper.network import raw_features
 from finlab.research.random_layouts import TRAINING_FINS, random_layout
 from finlab.research.training.loop import seeded_generator
 from finlab.whole_file import make_folder, remove_temporary_files, write_whole
@@ -44,7 +46,7 @@ VERSION = 1
 ROBOT = ("position", "mounting_angle", "lower", "upper", "mask")
 """Arrays of a part that each layout has once."""
 FIELDS = (*ROBOT, "command", "wrench")
-"""All arrays of a part, layouts first; see `SampleBatch`."""
+"""All arrays of a part, layouts first; see `SampleTable.of`."""
 
 
 @dataclass(frozen=True)
@@ -186,23 +188,60 @@ def _write_about(
 
 
 class SampleBatch(NamedTuple):
-    """B samples, each a robot padded to n fins, a command and its wrench, float32; padding is all
-    zeros."""
+    """B samples as the networks take them, float32: each a robot padded to n fins, a command and
+    its wrench."""
 
+    features: Tensor
+    """Node features x_i (B, n, 10), as `raw_features` scales them."""
     position: Tensor
     """(B, n, 3), body frame [m]."""
-    mounting_angle: Tensor
-    """(B, n) [rad]."""
-    lower: Tensor
-    """(B, n, 3) [rad, Hz, rad]."""
-    upper: Tensor
-    """(B, n, 3) [rad, Hz, rad]."""
     mask: Tensor
     """(B, n) bool, True where there is a fin."""
     command: Tensor
-    """(B, n, 3) [rad, Hz, rad], uniform within the limits."""
+    """(B, n, 3) in normalized coordinates: within the limits, which are -1 and 1."""
     wrench: Tensor
     """(B, 6) that the command causes [N, N m]."""
+
+
+class SampleTable(NamedTuple):
+    """C samples of each of R robots, in the units of `SampleBatch`. All that does not depend on
+    weights is worked out here, once, and a batch is gathered."""
+
+    features: Tensor
+    """(R, n, 10)."""
+    position: Tensor
+    """(R, n, 3)."""
+    mask: Tensor
+    """(R, n)."""
+    command: Tensor
+    """(R C, n, 3), robot after robot."""
+    wrench: Tensor
+    """(R C, 6)."""
+
+    @classmethod
+    def of(cls, arrays: Mapping[str, Tensor]) -> "SampleTable":
+        """Returns the table of samples as they are drawn.
+
+        Args:
+            arrays: `FIELDS` by name, R robots, their commands (R, C, n, 3) [rad, Hz, rad] and
+                wrenches (R, C, 6) [N, N m].
+        """
+        position, angle, lower, upper, mask, command, wrench = (arrays[name] for name in FIELDS)
+        features = raw_features(position, angle, lower, upper)
+        normalized = to_normalized(command, lower[:, None], upper[:, None])
+        return cls(features, position, mask, normalized.flatten(0, 1), wrench.flatten(0, 1))
+
+    def batch(self, chosen: Tensor) -> SampleBatch:
+        """Returns the samples with the numbers (B,), counted robot after robot."""
+        commands = len(self.command) // len(self.mask)
+        robot = chosen // commands
+        return SampleBatch(
+            features=self.features.index_select(0, robot),
+            position=self.position.index_select(0, robot),
+            mask=self.mask.index_select(0, robot),
+            command=self.command.index_select(0, chosen),
+            wrench=self.wrench.index_select(0, chosen),
+        )
 
 
 class SampleSet:
@@ -223,11 +262,14 @@ class SampleSet:
                 f"{folder}: an unfinished data set; run `finlab data generate` again"
             ) from error
         count = -(-self.layouts // DataSettings(commands=self.commands).together)
-        parts = [read_part(part_file(folder, k)) for k in range(count)]
-        joined = {name: np.concatenate([part[name] for part in parts]) for name in FIELDS}
-        if joined["wrench"].shape != (self.layouts, self.commands, 6):
+        parts = []
+        for number in range(count):
+            arrays = read_part(part_file(folder, number))
+            parts.append(SampleTable.of(_tensors(arrays)))
+        joined = [torch.cat(fields) for fields in zip(*parts, strict=True)]
+        self._table = SampleTable._make(field.to(device) for field in joined)
+        if self._table.wrench.shape != (self.layouts * self.commands, 6):
             raise DataError(f"{folder}: its parts are not those of its {DATA_FILE}")
-        self._parts = [torch.from_numpy(joined[name]).to(device) for name in FIELDS]
         self._device = device
         self._epoch = -1
         self._order = torch.empty(0)
@@ -250,26 +292,21 @@ class SampleSet:
             )
         if one_layout:
             draw = seeded_generator(seed, 1_000_000 + step, self._device)
-            command = torch.randint(self.commands, (size,), generator=draw, device=self._device)[
-                rows
-            ]
-            layout = self._order[place].expand(len(command))
+            command = torch.randint(self.commands, (size,), generator=draw, device=self._device)
+            chosen = self._order[place] * self.commands + command[rows]
         else:
             chosen = self._order[place * size : (place + 1) * size][rows]
-            layout = chosen // self.commands
-            command = chosen % self.commands
-        *robots, commands, wrench = self._parts
-        mixed = commands[layout, command], wrench[layout, command]
-        return SampleBatch._make([*(part[layout] for part in robots), *mixed])
+        return self._table.batch(chosen)
 
 
 @lru_cache(maxsize=1)
 def fresh_batch(settings: DataSettings) -> SampleBatch:
     """All samples of a data set, in memory alone."""
     robots = [samples_of(settings, k) for k in range(settings.layouts)]
-    times = [len(robot["wrench"]) for robot in robots]
     joined = {name: np.stack([robot[name] for robot in robots]) for name in FIELDS}
-    once = {name: np.repeat(joined[name], times, axis=0) for name in ROBOT}
-    flat = {name: np.concatenate(joined[name]) for name in FIELDS[len(ROBOT) :]}
-    tensors = {name: torch.from_numpy(part) for name, part in (once | flat).items()}
-    return SampleBatch(**tensors)
+    everything = torch.arange(settings.layouts * settings.commands)
+    return SampleTable.of(_tensors(joined)).batch(everything)
+
+
+def _tensors(arrays: Mapping[str, AnyArray]) -> dict[str, Tensor]:
+    return {name: torch.from_numpy(array) for name, array in arrays.items()}

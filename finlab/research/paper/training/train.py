@@ -114,7 +114,7 @@ def train_surrogate(options: TrainingOptions) -> TrainedWeights:
 
         def terms(step: int) -> dict[str, Tensor]:
             batch = source.batch(step)
-            with source.place.autocast():
+            with source.place.autocast(max(made.surrogate.hidden)):
                 return {"loss": modules.physics(wrench, batch, std).mean()}
 
         return terms
@@ -161,14 +161,16 @@ def train_allocator(options: TrainingOptions, surrogate: Path) -> TrainedWeights
         mean, std = source.tensors(*base.normalization)
         frozen = surrogate_of(base, device=source.place.device)
         ramp = replace(settings, steps=source.settings.steps)
+        network_width = max(network.width, network.feedforward)
+        surrogate_width = max(SurrogateConfig.of(base).hidden)
 
         def terms(step: int) -> dict[str, Tensor]:
             batch = source.batch(step)
-            with source.place.autocast():
-                target = (batch.wrench - mean) / std
-                hidden = network.encoded(weights, modules.features(batch), target, batch.mask)
+            target = (batch.wrench - mean) / std
+            with source.place.autocast(network_width):
+                hidden = network.encoded(weights, batch.features, target, batch.mask)
             mixture = network.mixture(weights, hidden.float())
-            with source.place.autocast():
+            with source.place.autocast(surrogate_width):
                 guide = modules.guidance(mixture, frozen, batch, std, source.noise(step)).mean()
             imitate = modules.imitation(mixture, batch).mean()
             entropy = modules.negative_entropy(mixture, batch.mask).mean()

@@ -11,6 +11,8 @@ import torch
 from finlab.errors import DataError
 from finlab.layout import Fin, Layout
 from finlab.physics import Plant
+from finlab.research.networks.trained import to_command
+from finlab.research.paper.network import raw_features
 from finlab.research.paper.training import samples as parts_of
 from finlab.research.paper.training.samples import (
     DataSettings,
@@ -80,6 +82,25 @@ def test_normalization_is_that_of_all_samples(folder: Path) -> None:
     found = SampleSet(folder, CPU).normalization
     np.testing.assert_allclose(found.mean, wrench.mean(0), atol=1e-9)
     np.testing.assert_allclose(found.std, wrench.std(0), rtol=1e-9)
+
+
+def test_a_batch_has_the_drawn_samples_as_networks_take_them(folder: Path) -> None:
+    (whole,) = (np.load(path) for path in folder.glob("*.npz"))
+    wrenches = whole["wrench"].reshape(-1, 6)
+    batch = SampleSet(folder, CPU).batch(3, 50, 1, False, ALL_COMMANDS)
+    for row, wrench in enumerate(batch.wrench.numpy()):
+        (number,) = np.flatnonzero((wrenches == wrench).all(axis=1))
+        robot, command = divmod(int(number), SETTINGS.commands)
+        n = int(whole["mask"][robot].sum())
+        lower = whole["lower"][robot, :n]
+        upper = whole["upper"][robot, :n]
+        assert np.array_equal(batch.mask[row], whole["mask"][robot])
+        assert np.array_equal(batch.position[row], whole["position"][robot])
+        angle = whole["mounting_angle"][robot, :n]
+        expected = raw_features(whole["position"][robot, :n], angle, lower, upper)
+        np.testing.assert_allclose(batch.features[row, :n], expected, atol=1e-6)
+        drawn = to_command(batch.command[row, :n].numpy(), lower, upper)
+        np.testing.assert_allclose(drawn, whole["command"][robot, command, :n], atol=1e-6)
 
 
 def test_an_epoch_has_every_sample_once_in_an_order_of_its_own(folder: Path) -> None:
