@@ -206,7 +206,7 @@ class Training:
             while self.done < settings.steps and (self.done == first == 0 or self.seconds < limit):
                 step = self.done
                 rate = learning_rate(settings, step, self.seconds / limit)
-                terms = self._step(terms_of, step, rate)
+                terms = self.step(terms_of, step, rate)
                 self.done = step + 1
                 self.seconds = time.monotonic() - started
                 bar.update()
@@ -221,7 +221,8 @@ class Training:
             write_whole(self.folder / CURVES_FILE, picture, DataError)
         self.place.wait()
 
-    def _step(self, terms_of: Terms, step: int, rate: float) -> dict[str, Tensor]:
+    def step(self, terms_of: Terms, step: int, rate: float) -> dict[str, Tensor]:
+        """Takes step number `step` with a learning rate, and returns its loss terms."""
         self.optimizer.param_groups[0]["lr"] = rate
         terms = terms_of(step)
         self._set_gradient(terms["loss"])
