@@ -116,22 +116,24 @@ def samples_of(settings: DataSettings, number: int) -> dict[str, AnyArray]:
     rng = np.random.default_rng([DATA_SEED, settings.seed, number])
     varied = rng.random() < settings.varied_limits
     layout = random_layout(rng, limits="varied" if varied else "nominal")
-    layout = Layout(
-        layout.name, tuple(replace(fin, model=settings.fin_model) for fin in layout.fins)
-    )
+    if settings.fin_model != FinModelSpec():
+        fins = tuple(replace(fin, model=settings.fin_model) for fin in layout.fins)
+        layout = Layout(layout.name, fins)
     plant = Plant(layout)
     command = plant.sample(rng, (settings.commands,))
-    more = N_FINS - layout.n
+    n = layout.n
 
-    def padded(values: AnyArray, axis: int = 0) -> AnyArray:
-        return np.pad(values, [(0, more if k == axis else 0) for k in range(values.ndim)]).astype(
-            np.float32
-        )
+    def padded(values: AnyArray) -> AnyArray:
+        whole = np.zeros((N_FINS, *values.shape[1:]), np.float32)
+        whole[:n] = values
+        return whole
 
+    padded_command = np.zeros((settings.commands, N_FINS, 3), np.float32)
+    padded_command[:, :n] = command
     return {
         **{name: padded(getattr(layout, name)) for name in ROBOT[:-1]},
-        "mask": np.arange(N_FINS) < layout.n,
-        "command": padded(command, 1),
+        "mask": np.arange(N_FINS) < n,
+        "command": padded_command,
         "wrench": plant.wrench(command).astype(np.float32),
     }
 
