@@ -263,15 +263,7 @@ class SampleSet:
             raise DataError(
                 f"{folder}: an unfinished data set; run `finlab data generate` again"
             ) from error
-        count = -(-self.layouts // DataSettings(commands=self.commands).together)
-        parts = []
-        for number in range(count):
-            arrays = read_part(part_file(folder, number))
-            parts.append(SampleTable.of(_tensors(arrays)))
-        joined = [torch.cat(fields) for fields in zip(*parts, strict=True)]
-        self._table = SampleTable._make(field.to(device) for field in joined)
-        if self._table.wrench.shape != (self.layouts * self.commands, 6):
-            raise DataError(f"{folder}: its parts are not those of its {DATA_FILE}")
+        self._table = _read_table(folder, self.layouts, self.commands, device)
         self._device = device
         self._epoch = -1
         self._order = torch.empty(0)
@@ -308,6 +300,29 @@ def fresh_batch(settings: DataSettings) -> SampleBatch:
     joined = {name: np.stack([robot[name] for robot in robots]) for name in FIELDS}
     everything = torch.arange(settings.layouts * settings.commands)
     return SampleTable.of(_tensors(joined)).batch(everything)
+
+
+def _read_table(folder: Path, layouts: int, commands: int, device: torch.device) -> SampleTable:
+    """The table of a folder's parts on a device. Raises DataError: a part is missing or damaged, or
+    together they hold other samples."""
+    count = -(-layouts // DataSettings(commands=commands).together)
+    parts = []
+    for number in range(count):
+        path = part_file(folder, number)
+        arrays = read_part(path)
+        try:
+            parts.append(SampleTable.of(_tensors(arrays)))
+        except (RuntimeError, TypeError) as error:  # arrays of other shapes or types
+            reason = str(error).splitlines()[0][:120]
+            raise DataError(
+                f"{path}: no part of a data set ({reason}); remove it and generate again"
+            ) from error
+    robots = sum(len(part.mask) for part in parts)
+    samples = sum(len(part.wrench) for part in parts)
+    if (robots, samples) != (layouts, layouts * commands):
+        raise DataError(f"{folder}: its parts are not those of its {DATA_FILE}")
+    joined = [torch.cat(fields).to(device) for fields in zip(*parts, strict=True)]
+    return SampleTable._make(joined)
 
 
 def _tensors(arrays: Mapping[str, AnyArray]) -> dict[str, Tensor]:

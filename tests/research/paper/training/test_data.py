@@ -146,3 +146,17 @@ def test_refuses_in_one_sentence_what_does_not_fit(folder: Path, tmp_path: Path)
     (tmp_path / "part-00000.npz").write_bytes(b"nothing")
     with pytest.raises(DataError, match="part-00000.npz: no part of a data set"):
         SampleSet(tmp_path, CPU)
+
+
+def test_parts_of_another_set_are_refused(folder: Path, tmp_path: Path) -> None:
+    about = json.loads((folder / "data.json").read_text())
+    (part,) = folder.glob("*.npz")
+    (tmp_path / part.name).write_bytes(part.read_bytes())
+    about["settings"]["layouts"] = SETTINGS.layouts + 1
+    (tmp_path / "data.json").write_text(json.dumps(about))
+    with pytest.raises(DataError, match="its parts are not those of its data.json"):
+        SampleSet(tmp_path, CPU)
+    arrays = dict(np.load(part))
+    np.savez(tmp_path / part.name, **(arrays | {"lower": arrays["lower"][:-1]}))
+    with pytest.raises(DataError, match="part-00000.npz: no part of a data set"):
+        SampleSet(tmp_path, CPU)
