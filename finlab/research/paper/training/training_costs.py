@@ -10,9 +10,9 @@ from finlab.research.paper.training import modules
 from finlab.research.paper.training.recipes import PaperLoop, recipe
 from finlab.research.paper.training.samples import DataSettings, SampleSet, generate
 from finlab.research.paper.training.train import BatchSource, allocator_terms, surrogate_terms
-from finlab.research.training.cost import StepCost, step_cost
 from finlab.research.training.device import Workplace
 from finlab.research.training.loop import Terms, Training, Weights, first_weights
+from finlab.research.training.step_cost import StepCost, step_cost
 
 DATA = DataSettings(layouts=200, commands=200)
 """What is learned from while the time is taken."""

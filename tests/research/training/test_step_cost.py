@@ -4,8 +4,8 @@ from pathlib import Path
 
 import torch
 
-from finlab.research.paper.training.cost import training_costs
-from finlab.research.training.cost import step_cost
+from finlab.research.paper.training.training_costs import training_costs
+from finlab.research.training.step_cost import step_cost
 
 
 def test_products_of_a_layer_are_one_forward_and_one_for_each_gradient() -> None:
