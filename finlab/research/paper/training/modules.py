@@ -12,6 +12,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from finlab.research.networks import layers
+from finlab.research.networks.padding import Padding
 from finlab.research.paper.network import Mixture
 from finlab.research.paper.surrogate import FORCE_UNIT, SurrogateConfig
 from finlab.research.paper.training.samples import SampleBatch
@@ -20,8 +21,6 @@ from finlab.research.training.loop import Weights, first_weights
 FIRST_WEIGHT = 2.0
 """Largest first weight of the surrogate's first layer: angles enter as plain numbers whose sines
 must be learned, and wide first weights start nearer to that."""
-ROWS = 64
-"""Rows of a block of fins."""
 
 
 def surrogate_weights(config: SurrogateConfig, seed: int, device: torch.device) -> Weights:
@@ -49,16 +48,14 @@ def surrogate_wrench(
         command: (B, n, 3) in normalized coordinates.
         batch: the robots.
     """
-    inputs = torch.cat([batch.features, command], -1).flatten(0, 1)
-    rows = rows_of_fins(batch.mask)
-    of_rows = inputs.index_select(0, rows)
+    padding = Padding.of(batch.mask)
+    inputs = padding.rows(torch.cat([batch.features, command], -1))
     first, *others = config.layers()
-    hidden = few_inputs(w, first, of_rows)
+    hidden = few_inputs(w, first, inputs)
     for name in others:
         hidden = layers.linear(w, name, functional.silu(hidden))
     of_fins = hidden.to(command.dtype) * FORCE_UNIT
-    force = torch.zeros_like(command).view(-1, 3).index_copy(0, rows, of_fins)
-    force = force.view(command.shape) * batch.mask[..., None]
+    force = padding.padded(of_fins) * batch.mask[..., None]
     torque = torch.linalg.cross(batch.position, force)
     wrench = torch.cat([force.sum(1), torque.sum(1)], -1)
     affine = layers.linear(w, "affine", descriptor(w, batch))
@@ -87,22 +84,6 @@ def few_inputs(w: Weights, name: str, x: Tensor) -> Tensor:
     weight = w[f"{name}.weight"].t().contiguous().t()
     outputs: Tensor = functional.linear(x, weight, w[f"{name}.bias"])
     return outputs
-
-
-def rows_of_fins(mask: Tensor) -> Tensor:
-    """The rows (M,) of a padded batch (B n, ...) that are worked on.
-
-    All fins come first. Padding fills up the last block of rows: with each new number of rows,
-    torch's bfloat16 products on a processor compile a new kernel.
-
-    Args:
-        mask: (B, n), True where there is a fin.
-    """
-    flat = mask.flatten()
-    fins = flat.nonzero().flatten()
-    missing = -len(fins) % ROWS
-    padding = (~flat).nonzero().flatten()[:missing]
-    return torch.cat([fins, padding])
 
 
 WrenchOf = Callable[[Tensor, SampleBatch], Tensor]

@@ -112,20 +112,6 @@ def test_wrenches_of_a_padded_batch_are_those_of_each_robot_alone(
         )
 
 
-def test_rows_are_all_fins_once_in_whole_blocks() -> None:
-    draw = torch.Generator().manual_seed(5)
-    for robots in (1, 7, 40, 256):
-        mask = torch.rand((robots, N_FINS), generator=draw) < 0.7
-        rows = modules.rows_of_fins(mask)
-        fins = int(mask.sum())
-        assert mask.flatten()[rows[:fins]].all() and not mask.flatten()[rows[fins:]].any()
-        assert (
-            len(rows.unique())
-            == len(rows)
-            == min(-(-fins // modules.ROWS) * modules.ROWS, mask.numel())
-        )
-
-
 @pytest.mark.parametrize("fill", [0.0, 7.0])
 def test_padding_has_no_influence_on_wrenches_and_their_gradients(
     robots: list[Layout], fill: float
