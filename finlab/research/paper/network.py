@@ -15,6 +15,7 @@ from finlab.arrays import Values, library_of
 from finlab.layout.graph_file import COMMAND_SCALES, POSITION_SCALE
 from finlab.research.networks import layers
 from finlab.research.networks.layers import Weights
+from finlab.research.networks.padding import Padding
 from finlab.research.networks.trained import Shapes, check_sizes, linear_shapes, norm_shapes
 
 RAW_SIZE = 10
@@ -109,19 +110,25 @@ class NetworkConfig:
     def encoded(self, w: Weights, x: Values, target: Values, mask: Values | None = None) -> Values:
         """What the encoding phase makes of them: features (B, n, width) of each fin."""
         xp = library_of(x)
-        hidden = layers.linear(w, "enter", x)
+        padding = None if mask is None else Padding.of(mask)
+        hidden = layers.linear(w, "enter", x if padding is None else padding.rows(x))
         for name in self._named("graph", self.graph_layers):
-            hidden = hidden + layers.elu(layers.graph_attention(w, name, hidden, mask=mask))
-        wrench = layers.linear(w, "wrench", target)[:, None]
-        wrench = xp.broadcast_to(wrench, (*hidden.shape[:-1], wrench.shape[-1]))
+            attended = layers.graph_attention(w, name, hidden, padding=padding)
+            hidden = hidden + layers.elu(attended)
+        wrench = layers.linear(w, "wrench", target)
+        if padding is None:
+            wrench = xp.broadcast_to(wrench[:, None], (*hidden.shape[:-1], wrench.shape[-1]))
+        else:
+            wrench = padding.rows_of_robots(wrench)
         hidden = layers.linear(w, "join", xp.concatenate([hidden, wrench], -1))
         for name in self._named("transformer.layers", self.transformer_layers):
             attention = f"{name}.self_attn"
             normed = layers.layer_norm(w, f"{name}.norm1", hidden)
-            hidden = hidden + layers.self_attention(w, attention, self.heads, normed, mask)
+            hidden = hidden + layers.self_attention(w, attention, self.heads, normed, padding)
             normed = layers.layer_norm(w, f"{name}.norm2", hidden)
             hidden = hidden + layers.feed_forward(w, f"{name}.linear1", f"{name}.linear2", normed)
-        return layers.layer_norm(w, "norm", hidden)
+        hidden = layers.layer_norm(w, "norm", hidden)
+        return hidden if padding is None else padding.padded(hidden)
 
     def mixture(self, w: Weights, hidden: Values) -> "Mixture":
         """The mixtures of fins with features (B, n, width)."""

@@ -1,14 +1,17 @@
 """Device and processes of a training: those of torchrun, and a pool for the parts of its data."""
 
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
 import torch
-from torch import Tensor, distributed, nn
+from torch import Tensor, distributed
 
 from finlab.errors import CommandError
+
+CPU_BFLOAT16_WIDTH = 128
+"""Width of a layer from which a processor that knows bfloat16 gains by it."""
 
 
 @dataclass(frozen=True)
@@ -24,13 +27,11 @@ class Workplace:
         rows = size // self.world
         return slice(self.rank * rows, (self.rank + 1) * rows)
 
-    def average(self, weights: Iterable[Tensor]) -> None:
-        """Average the gradients of weights over all processes; every process must ask."""
+    def average(self, gradient: Tensor) -> None:
+        """Average a gradient over all processes, in place; every process must ask."""
         if self.world > 1:
-            gradients = [weight.grad for weight in weights if weight.grad is not None]
-            together = nn.utils.parameters_to_vector(gradients)
-            distributed.all_reduce(together)
-            nn.utils.vector_to_parameters(together / self.world, gradients)
+            distributed.all_reduce(gradient)
+            gradient /= self.world
 
     def mean(self, value: Tensor) -> float:
         """The mean of a number over all processes; every process must ask."""
@@ -44,11 +45,19 @@ class Workplace:
         if self.world > 1:
             distributed.barrier()
 
-    def autocast(self) -> torch.autocast:
-        """Matrix products in bfloat16 where the device multiplies it faster than float32. The CPU
-        is asked, not timed: a resumed run would go on in another precision."""
+    def autocast(self, width: int) -> torch.autocast:
+        """Matrix products in bfloat16 where the device multiplies it faster than float32.
+
+        The processor is asked, not timed: a resumed run would go on in another precision.
+
+        Args:
+            width: of the widest layer. On a processor narrow products gain less than rounding
+                their factors costs.
+        """
         kind = self.device.type
-        fast = kind == "cuda" or (kind == "cpu" and torch.cpu._is_avx512_bf16_supported())
+        fast = kind == "cuda"
+        if kind == "cpu" and width >= CPU_BFLOAT16_WIDTH:
+            fast = torch.cpu._is_avx512_bf16_supported()
         return torch.autocast(kind, torch.bfloat16, enabled=fast)
 
 

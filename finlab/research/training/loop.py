@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
-from torch import Tensor, nn
+from torch import Tensor
 from tqdm import tqdm
 
 from finlab.display.figures import figure_bytes, panels
@@ -110,6 +110,16 @@ def _drawn(name: str, shape: tuple[int, ...], shapes: Shapes, generator: torch.G
     return (2.0 * torch.rand(shape, generator=generator) - 1.0) * bound
 
 
+def joined(weights: Weights) -> Tensor:
+    """Returns one vector (P,) with all weights in their order, which from now on are views of it:
+    what changes the vector changes them, in one operation instead of one for each."""
+    vector = torch.cat([weight.detach().reshape(-1) for weight in weights.values()])
+    sizes = [weight.numel() for weight in weights.values()]
+    for weight, part in zip(weights.values(), vector.split(sizes), strict=True):
+        weight.data = part.view_as(weight)
+    return vector
+
+
 class Training:
     """A run: its weights, their running average, its optimizer and its log."""
 
@@ -121,17 +131,17 @@ class Training:
         identity: dict[str, Any],
         place: Workplace,
     ) -> None:
-        """Takes weights by name, which are changed in place; a folder, made if need be, for log,
-        curves and state; and the settings that a resumed run must share, as plain values."""
+        """Takes weights by name, which are moved into one vector and changed in place; a folder,
+        made if need be, for log, curves and state; and the settings that a resumed run must share,
+        as plain values."""
         self.weights = weights
         self.settings = settings
         self.place = place
         self.folder = make_folder(folder)
         self.identity = identity
-        self.optimizer = torch.optim.Adam(weights.values(), lr=settings.learning_rate)
-        self.average = (
-            {name: w.detach().clone() for name, w in weights.items()} if settings.ema else {}
-        )
+        self.vector = joined(weights)
+        self.average = self.vector.clone() if settings.ema else None
+        self.optimizer = torch.optim.Adam([self.vector], lr=settings.learning_rate, fused=True)
         self.done, self.seconds = 0, 0.0
         """Steps, and the time that they took, with all that went before them."""
         self.rows = list[dict[str, float]]()
@@ -141,8 +151,12 @@ class Training:
     @property
     def shipped(self) -> ArraysByName:
         """The weights to ship, as arrays."""
+        vector = self.vector if self.average is None else self.average
+        sizes = [weight.numel() for weight in self.weights.values()]
+        parts = vector.cpu().split(sizes)
         return {
-            name: w.detach().cpu().numpy() for name, w in (self.average or self.weights).items()
+            name: part.view(weight.shape).numpy()
+            for (name, weight), part in zip(self.weights.items(), parts, strict=True)
         }
 
     def resume(self) -> None:
@@ -192,7 +206,7 @@ class Training:
             while self.done < settings.steps and (self.done == first == 0 or self.seconds < limit):
                 step = self.done
                 rate = learning_rate(settings, step, self.seconds / limit)
-                terms = self._step(terms_of, step, rate)
+                terms = self.step(terms_of, step, rate)
                 self.done = step + 1
                 self.seconds = time.monotonic() - started
                 bar.update()
@@ -207,20 +221,26 @@ class Training:
             write_whole(self.folder / CURVES_FILE, picture, DataError)
         self.place.wait()
 
-    def _step(self, terms_of: Terms, step: int, rate: float) -> dict[str, Tensor]:
+    def step(self, terms_of: Terms, step: int, rate: float) -> dict[str, Tensor]:
+        """Takes step number `step` with a learning rate, and returns its loss terms."""
         self.optimizer.param_groups[0]["lr"] = rate
-        self.optimizer.zero_grad(set_to_none=True)
         terms = terms_of(step)
-        terms["loss"].backward()
-        self.place.average(self.weights.values())
-        nn.utils.clip_grad_norm_(self.weights.values(), GRADIENT_MAX)
+        self._set_gradient(terms["loss"])
         self.optimizer.step()
-        # The average starts short and grows, so that early weights are soon forgotten.
-        decay = min(self.settings.ema, (1 + step) / (10 + step))
-        with torch.no_grad():
-            for name, value in self.average.items():
-                value.lerp_(self.weights[name], 1 - decay)
+        if self.average is not None:
+            # The average starts short and grows, so that early weights are soon forgotten.
+            decay = min(self.settings.ema, (1 + step) / (10 + step))
+            self.average.lerp_(self.vector, 1 - decay)
         return terms
+
+    def _set_gradient(self, loss: Tensor) -> None:
+        """Set the gradient of the vector of weights: averaged over all processes, clipped."""
+        weights = list(self.weights.values())
+        slopes = torch.autograd.grad(loss, weights, allow_unused=True, materialize_grads=True)
+        gradient = torch.cat([slope.reshape(-1) for slope in slopes])
+        self.place.average(gradient)
+        norm = torch.linalg.vector_norm(gradient)
+        self.vector.grad = gradient.mul_((GRADIENT_MAX / norm).clamp(max=1.0))
 
     def _log(self, terms: dict[str, Tensor], rate: float) -> float:
         """Add a row for the last step; its loss."""
@@ -248,16 +268,15 @@ class Training:
 
     def _take(self, state: dict[str, Any]) -> None:
         self.optimizer.load_state_dict(state["optimizer"])
-        with torch.no_grad():
-            for ours, read in ((self.weights, state["weights"]), (self.average, state["average"])):
-                for name, value in ours.items():
-                    value.copy_(read[name])
+        self.vector.copy_(state["vector"])
+        if self.average is not None:
+            self.average.copy_(state["average"])
         self.done = state["done"]
         self.seconds = state["seconds"]
         self.rows = state["rows"]
 
 
-_KEPT = ("identity", "weights", "average", "done", "seconds", "rows")
+_KEPT = ("identity", "vector", "average", "done", "seconds", "rows")
 """Parts of a run that its state holds, beside the optimizer's."""
 
 

@@ -87,6 +87,32 @@ def test_it_learns_and_leaves_curves_and_nothing_half(tmp_path: Path) -> None:
     assert (tmp_path / "curves.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_weights_in_one_vector_are_trained_as_torch_trains_them_apart(tmp_path: Path) -> None:
+    found = run(tmp_path)
+    weights = {name: torch.zeros(1, requires_grad=True) for name in ("slope", "shift")}
+    average = {name: torch.zeros(1) for name in weights}
+    optimizer = torch.optim.Adam(weights.values())
+    terms = terms_with(weights)
+    for step in range(SETTINGS.steps):
+        optimizer.param_groups[0]["lr"] = learning_rate(SETTINGS, step)
+        optimizer.zero_grad()
+        terms(step)["loss"].backward()
+        torch.nn.utils.clip_grad_norm_(weights.values(), loop.GRADIENT_MAX)
+        optimizer.step()
+        decay = min(SETTINGS.ema, (1 + step) / (10 + step))
+        for name, weight in weights.items():
+            average[name] = decay * average[name] + (1.0 - decay) * weight.detach()
+    for name, expected in average.items():
+        np.testing.assert_allclose(found[name], expected, rtol=1e-5)
+
+
+def test_weights_without_influence_stay_as_they_are(tmp_path: Path) -> None:
+    weights = {name: torch.ones(2, requires_grad=True) for name in ("used", "unused")}
+    training = Training(weights, SETTINGS, tmp_path, {}, Workplace(CPU))
+    training.run(lambda step: {"loss": weights["used"].square().sum()}, lambda state, made: None)
+    assert (weights["used"] < 1.0).all() and (weights["unused"] == 1.0).all()
+
+
 def test_other_settings_and_damaged_states_are_refused_in_one_sentence(tmp_path: Path) -> None:
     run(tmp_path)
     with pytest.raises(DataError, match=r"holds a run with other settings \(seed\)"):

@@ -12,8 +12,8 @@ from torch import Tensor
 from torch.nn import functional
 
 from finlab.research.networks import layers
-from finlab.research.networks.trained import to_command, to_normalized
-from finlab.research.paper.network import Mixture, raw_features
+from finlab.research.networks.padding import Padding
+from finlab.research.paper.network import Mixture
 from finlab.research.paper.surrogate import FORCE_UNIT, SurrogateConfig
 from finlab.research.paper.training.samples import SampleBatch
 from finlab.research.training.loop import Weights, first_weights
@@ -21,12 +21,6 @@ from finlab.research.training.loop import Weights, first_weights
 FIRST_WEIGHT = 2.0
 """Largest first weight of the surrogate's first layer: angles enter as plain numbers whose sines
 must be learned, and wide first weights start nearer to that."""
-
-
-def features(batch: SampleBatch) -> Tensor:
-    """Node features x_i (B, n, 10) of a batch's robots, scaled as `raw_features` says."""
-    x: Tensor = raw_features(batch.position, batch.mounting_angle, batch.lower, batch.upper)
-    return x
 
 
 def surrogate_weights(config: SurrogateConfig, seed: int, device: torch.device) -> Weights:
@@ -51,29 +45,49 @@ def surrogate_wrench(
     Args:
         config: sizes of the surrogate.
         w: its weights.
-        command: (B, n, 3) [rad, Hz, rad].
+        command: (B, n, 3) in normalized coordinates.
         batch: the robots.
     """
-    x = features(batch)
-    mask = batch.mask
-    inputs = torch.cat([x, to_normalized(command, batch.lower, batch.upper)], -1)
+    padding = Padding.of(batch.mask)
+    inputs = padding.rows(torch.cat([batch.features, command], -1))
     first, *others = config.layers()
-    hidden = layers.linear(w, first, inputs[mask])
+    hidden = few_inputs(w, first, inputs)
     for name in others:
         hidden = layers.linear(w, name, functional.silu(hidden))
-    of_fins = hidden.to(command.dtype) * FORCE_UNIT  # of all fins that are no padding
-    force = of_fins.new_zeros(command.shape).masked_scatter(mask[..., None], of_fins)
+    of_fins = hidden.to(command.dtype) * FORCE_UNIT
+    force = padding.padded(of_fins) * batch.mask[..., None]
     torque = torch.linalg.cross(batch.position, force)
-    wrench = torch.cat([force, torque], -1).sum(1)
-    described = torch.tanh(layers.linear(w, "descriptor.0", x))
-    descriptor = (described * mask[..., None]).sum(1) / mask.sum(1, keepdim=True)
-    scale, bias = layers.linear(w, "affine", descriptor).to(command.dtype).chunk(2, -1)
-    corrected: Tensor = wrench * (1.0 + scale) + bias
-    return corrected
+    wrench = torch.cat([force.sum(1), torque.sum(1)], -1)
+    affine = layers.linear(w, "affine", descriptor(w, batch))
+    scale, bias = affine.to(command.dtype).chunk(2, -1)
+    return torch.addcmul(wrench + bias, wrench, scale)
+
+
+def descriptor(w: Weights, batch: SampleBatch) -> Tensor:
+    """The descriptor (B, 64) of each layout: the mean over its fins of tanh z, z of a linear layer.
+
+    tanh z = 2 s(2 z) - 1 with the logistic function s, which torch computes six times as quickly.
+    """
+    doubled = {f"twice.{part}": 2.0 * w[f"descriptor.0.{part}"] for part in ("weight", "bias")}
+    logistic = few_inputs(doubled, "twice", batch.features).to(batch.features.dtype).sigmoid()
+    total = (logistic * batch.mask[..., None]).sum(1)
+    mean: Tensor = total / (0.5 * batch.mask.sum(1, keepdim=True)) - 1.0
+    return mean
+
+
+def few_inputs(w: Weights, name: str, x: Tensor) -> Tensor:
+    """The outputs of a linear layer whose inputs are few.
+
+    Its weights are laid out input by input: then their gradient is the product of the transposed
+    inputs, not of the transposed outputs, which takes a third of the time.
+    """
+    weight = w[f"{name}.weight"].t().contiguous().t()
+    outputs: Tensor = functional.linear(x, weight, w[f"{name}.bias"])
+    return outputs
 
 
 WrenchOf = Callable[[Tensor, SampleBatch], Tensor]
-"""Wrenches (B, 6) of commands (B, n, 3) of a batch's robots."""
+"""Wrenches (B, 6) of normalized commands (B, n, 3) of a batch's robots."""
 
 
 def physics(surrogate: WrenchOf, batch: SampleBatch, std: Tensor) -> Tensor:
@@ -83,8 +97,7 @@ def physics(surrogate: WrenchOf, batch: SampleBatch, std: Tensor) -> Tensor:
 
 def imitation(mixture: Mixture, batch: SampleBatch) -> Tensor:
     """L_imit = -log p(u* | G) (B,) of the recorded commands (Eq. 7), the sum over fins."""
-    recorded = to_normalized(batch.command, batch.lower, batch.upper)
-    likelihood: Tensor = mixture.log_prob(recorded[:, None])[:, 0]
+    likelihood: Tensor = mixture.log_prob(batch.command[:, None])[:, 0]
     return -(likelihood * batch.mask).sum(1)
 
 
@@ -99,9 +112,9 @@ def guidance(
 
     `noise` is uniform (B, n, 1) and standard normal (B, n, 1, 3), as `Mixture.sample` takes it.
     """
-    raw = to_command(mixture.sample(*noise)[:, 0], batch.lower, batch.upper)
+    raw = mixture.sample(*noise)[:, 0]
     # The gradient passes the clamp, or samples outside the limits would teach nothing.
-    command = raw + (raw.clamp(batch.lower, batch.upper) - raw).detach()
+    command = raw + (raw.clamp(-1.0, 1.0) - raw).detach()
     return physics(surrogate, batch._replace(command=command), std)
 
 

@@ -8,6 +8,7 @@ standard deviation.
 
 import io
 import json
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache, partial
 from pathlib import Path
@@ -25,7 +26,8 @@ from finlab.files.guarded import decoded, read_file
 from finlab.layout import FinModelSpec, Layout
 from finlab.physics import Plant
 from finlab.research.executor import cores, map_parts
-from finlab.research.networks.trained import WrenchNormalization
+from finlab.research.networks.trained import WrenchNormalization, to_normalized
+from finlab.research.paper.network import raw_features
 from finlab.research.random_layouts import TRAINING_FINS, random_layout
 from finlab.research.training.loop import seeded_generator
 from finlab.whole_file import make_folder, remove_temporary_files, write_whole
@@ -44,7 +46,7 @@ VERSION = 1
 ROBOT = ("position", "mounting_angle", "lower", "upper", "mask")
 """Arrays of a part that each layout has once."""
 FIELDS = (*ROBOT, "command", "wrench")
-"""All arrays of a part, layouts first; see `SampleBatch`."""
+"""All arrays of a part, layouts first; see `SampleTable.of`."""
 
 
 @dataclass(frozen=True)
@@ -114,22 +116,24 @@ def samples_of(settings: DataSettings, number: int) -> dict[str, AnyArray]:
     rng = np.random.default_rng([DATA_SEED, settings.seed, number])
     varied = rng.random() < settings.varied_limits
     layout = random_layout(rng, limits="varied" if varied else "nominal")
-    layout = Layout(
-        layout.name, tuple(replace(fin, model=settings.fin_model) for fin in layout.fins)
-    )
+    if settings.fin_model != FinModelSpec():
+        fins = tuple(replace(fin, model=settings.fin_model) for fin in layout.fins)
+        layout = Layout(layout.name, fins)
     plant = Plant(layout)
     command = plant.sample(rng, (settings.commands,))
-    more = N_FINS - layout.n
+    n = layout.n
 
-    def padded(values: AnyArray, axis: int = 0) -> AnyArray:
-        return np.pad(values, [(0, more if k == axis else 0) for k in range(values.ndim)]).astype(
-            np.float32
-        )
+    def padded(values: AnyArray) -> AnyArray:
+        whole = np.zeros((N_FINS, *values.shape[1:]), np.float32)
+        whole[:n] = values
+        return whole
 
+    padded_command = np.zeros((settings.commands, N_FINS, 3), np.float32)
+    padded_command[:, :n] = command
     return {
         **{name: padded(getattr(layout, name)) for name in ROBOT[:-1]},
-        "mask": np.arange(N_FINS) < layout.n,
-        "command": padded(command, 1),
+        "mask": np.arange(N_FINS) < n,
+        "command": padded_command,
         "wrench": plant.wrench(command).astype(np.float32),
     }
 
@@ -186,23 +190,60 @@ def _write_about(
 
 
 class SampleBatch(NamedTuple):
-    """B samples, each a robot padded to n fins, a command and its wrench, float32; padding is all
-    zeros."""
+    """B samples as the networks take them, float32: each a robot padded to n fins, a command and
+    its wrench."""
 
+    features: Tensor
+    """Node features x_i (B, n, 10), as `raw_features` scales them."""
     position: Tensor
     """(B, n, 3), body frame [m]."""
-    mounting_angle: Tensor
-    """(B, n) [rad]."""
-    lower: Tensor
-    """(B, n, 3) [rad, Hz, rad]."""
-    upper: Tensor
-    """(B, n, 3) [rad, Hz, rad]."""
     mask: Tensor
     """(B, n) bool, True where there is a fin."""
     command: Tensor
-    """(B, n, 3) [rad, Hz, rad], uniform within the limits."""
+    """(B, n, 3) in normalized coordinates: within the limits, which are -1 and 1."""
     wrench: Tensor
     """(B, 6) that the command causes [N, N m]."""
+
+
+class SampleTable(NamedTuple):
+    """C samples of each of R robots, in the units of `SampleBatch`. All that does not depend on
+    weights is worked out here, once, and a batch is gathered."""
+
+    features: Tensor
+    """(R, n, 10)."""
+    position: Tensor
+    """(R, n, 3)."""
+    mask: Tensor
+    """(R, n)."""
+    command: Tensor
+    """(R C, n, 3), robot after robot."""
+    wrench: Tensor
+    """(R C, 6)."""
+
+    @classmethod
+    def of(cls, arrays: Mapping[str, Tensor]) -> "SampleTable":
+        """Returns the table of samples as they are drawn.
+
+        Args:
+            arrays: `FIELDS` by name, R robots, their commands (R, C, n, 3) [rad, Hz, rad] and
+                wrenches (R, C, 6) [N, N m].
+        """
+        position, angle, lower, upper, mask, command, wrench = (arrays[name] for name in FIELDS)
+        features = raw_features(position, angle, lower, upper)
+        normalized = to_normalized(command, lower[:, None], upper[:, None])
+        return cls(features, position, mask, normalized.flatten(0, 1), wrench.flatten(0, 1))
+
+    def batch(self, chosen: Tensor) -> SampleBatch:
+        """Returns the samples with the numbers (B,), counted robot after robot."""
+        commands = len(self.command) // len(self.mask)
+        robot = chosen // commands
+        return SampleBatch(
+            features=self.features.index_select(0, robot),
+            position=self.position.index_select(0, robot),
+            mask=self.mask.index_select(0, robot),
+            command=self.command.index_select(0, chosen),
+            wrench=self.wrench.index_select(0, chosen),
+        )
 
 
 class SampleSet:
@@ -222,12 +263,7 @@ class SampleSet:
             raise DataError(
                 f"{folder}: an unfinished data set; run `finlab data generate` again"
             ) from error
-        count = -(-self.layouts // DataSettings(commands=self.commands).together)
-        parts = [read_part(part_file(folder, k)) for k in range(count)]
-        joined = {name: np.concatenate([part[name] for part in parts]) for name in FIELDS}
-        if joined["wrench"].shape != (self.layouts, self.commands, 6):
-            raise DataError(f"{folder}: its parts are not those of its {DATA_FILE}")
-        self._parts = [torch.from_numpy(joined[name]).to(device) for name in FIELDS]
+        self._table = _read_table(folder, self.layouts, self.commands, device)
         self._device = device
         self._epoch = -1
         self._order = torch.empty(0)
@@ -250,26 +286,44 @@ class SampleSet:
             )
         if one_layout:
             draw = seeded_generator(seed, 1_000_000 + step, self._device)
-            command = torch.randint(self.commands, (size,), generator=draw, device=self._device)[
-                rows
-            ]
-            layout = self._order[place].expand(len(command))
+            command = torch.randint(self.commands, (size,), generator=draw, device=self._device)
+            chosen = self._order[place] * self.commands + command[rows]
         else:
             chosen = self._order[place * size : (place + 1) * size][rows]
-            layout = chosen // self.commands
-            command = chosen % self.commands
-        *robots, commands, wrench = self._parts
-        mixed = commands[layout, command], wrench[layout, command]
-        return SampleBatch._make([*(part[layout] for part in robots), *mixed])
+        return self._table.batch(chosen)
 
 
 @lru_cache(maxsize=1)
 def fresh_batch(settings: DataSettings) -> SampleBatch:
     """All samples of a data set, in memory alone."""
     robots = [samples_of(settings, k) for k in range(settings.layouts)]
-    times = [len(robot["wrench"]) for robot in robots]
     joined = {name: np.stack([robot[name] for robot in robots]) for name in FIELDS}
-    once = {name: np.repeat(joined[name], times, axis=0) for name in ROBOT}
-    flat = {name: np.concatenate(joined[name]) for name in FIELDS[len(ROBOT) :]}
-    tensors = {name: torch.from_numpy(part) for name, part in (once | flat).items()}
-    return SampleBatch(**tensors)
+    everything = torch.arange(settings.layouts * settings.commands)
+    return SampleTable.of(_tensors(joined)).batch(everything)
+
+
+def _read_table(folder: Path, layouts: int, commands: int, device: torch.device) -> SampleTable:
+    """The table of a folder's parts on a device. Raises DataError: a part is missing or damaged, or
+    together they hold other samples."""
+    count = -(-layouts // DataSettings(commands=commands).together)
+    parts = []
+    for number in range(count):
+        path = part_file(folder, number)
+        arrays = read_part(path)
+        try:
+            parts.append(SampleTable.of(_tensors(arrays)))
+        except (RuntimeError, TypeError) as error:  # arrays of other shapes or types
+            reason = str(error).splitlines()[0][:120]
+            raise DataError(
+                f"{path}: no part of a data set ({reason}); remove it and generate again"
+            ) from error
+    robots = sum(len(part.mask) for part in parts)
+    samples = sum(len(part.wrench) for part in parts)
+    if (robots, samples) != (layouts, layouts * commands):
+        raise DataError(f"{folder}: its parts are not those of its {DATA_FILE}")
+    joined = [torch.cat(fields).to(device) for fields in zip(*parts, strict=True)]
+    return SampleTable._make(joined)
+
+
+def _tensors(arrays: Mapping[str, AnyArray]) -> dict[str, Tensor]:
+    return {name: torch.from_numpy(array) for name, array in arrays.items()}

@@ -20,7 +20,7 @@ from finlab.research.networks.checkpoint import (
 from finlab.research.networks.trained import ArraysByName, TrainedWeights, sizes_for_file
 from finlab.research.paper.surrogate import SurrogateConfig
 from finlab.research.paper.training import modules
-from finlab.research.paper.training.recipes import PaperLoop, recipe, write_card
+from finlab.research.paper.training.recipes import PaperLoop, PaperRecipe, recipe, write_card
 from finlab.research.paper.training.samples import (
     N_FINS,
     DataSettings,
@@ -108,17 +108,6 @@ def train_surrogate(options: TrainingOptions) -> TrainedWeights:
     CommandError: there is no such device."""
     made = recipe(options.preset)
 
-    def terms_of(weights: Weights, source: BatchSource) -> Terms:
-        (std,) = source.tensors(source.samples.normalization.std)
-        wrench = partial(modules.surrogate_wrench, made.surrogate, weights)
-
-        def terms(step: int) -> dict[str, Tensor]:
-            batch = source.batch(step)
-            with source.place.autocast():
-                return {"loss": modules.physics(wrench, batch, std).mean()}
-
-        return terms
-
     def checkpoint(samples: SampleSet, state: ArraysByName) -> TrainedWeights:
         trained = TrainedWeights(
             name="",
@@ -135,7 +124,27 @@ def train_surrogate(options: TrainingOptions) -> TrainedWeights:
         return replace(trained, metrics={"surrogate": {"wrench_error_norm": error}})
 
     begin = partial(modules.surrogate_weights, made.surrogate)
+    terms_of = partial(surrogate_terms, made.surrogate)
     return _train("surrogate", options, made.surrogate_training, begin, terms_of, checkpoint)
+
+
+def surrogate_terms(config: SurrogateConfig, weights: Weights, source: BatchSource) -> Terms:
+    """Returns the loss of a step of the surrogate's training (Eq. 5).
+
+    Args:
+        config: sizes of the surrogate.
+        weights: its weights.
+        source: of the batches.
+    """
+    (std,) = source.tensors(source.samples.normalization.std)
+    wrench = partial(modules.surrogate_wrench, config, weights)
+
+    def terms(step: int) -> dict[str, Tensor]:
+        batch = source.batch(step)
+        with source.place.autocast(max(config.hidden)):
+            return {"loss": modules.physics(wrench, batch, std).mean()}
+
+    return terms
 
 
 def train_allocator(options: TrainingOptions, surrogate: Path) -> TrainedWeights:
@@ -158,30 +167,47 @@ def train_allocator(options: TrainingOptions, surrogate: Path) -> TrainedWeights
             raise DataError(
                 f"{options.data}: its wrenches are of another fin model than the surrogate's"
             )
-        mean, std = source.tensors(*base.normalization)
-        frozen = surrogate_of(base, device=source.place.device)
-        ramp = replace(settings, steps=source.settings.steps)
-
-        def terms(step: int) -> dict[str, Tensor]:
-            batch = source.batch(step)
-            with source.place.autocast():
-                target = (batch.wrench - mean) / std
-                hidden = network.encoded(weights, modules.features(batch), target, batch.mask)
-            mixture = network.mixture(weights, hidden.float())
-            with source.place.autocast():
-                guide = modules.guidance(mixture, frozen, batch, std, source.noise(step)).mean()
-            imitate = modules.imitation(mixture, batch).mean()
-            entropy = modules.negative_entropy(mixture, batch.mask).mean()
-            loss = imitate + ramp.beta(step) * guide + ramp.entropy * entropy  # Eq. 7
-            return {"loss": loss, "imitation": imitate, "guidance": guide, "entropy": entropy}
-
-        return terms
+        return allocator_terms(made, base, weights, source)
 
     def checkpoint(samples: SampleSet, state: ArraysByName) -> TrainedWeights:
         return replace(base, network_sizes=sizes_for_file(network), network=state)
 
     begin = partial(first_weights, network.shapes())
     return _train("allocator", options, settings, begin, terms_of, checkpoint, base.sha256)
+
+
+def allocator_terms(
+    made: PaperRecipe, base: TrainedWeights, weights: Weights, source: BatchSource
+) -> Terms:
+    """Returns the loss of a step of the network's training and its terms (Eq. 7).
+
+    Args:
+        made: the recipe.
+        base: checkpoint of the surrogate that guides.
+        weights: of the network.
+        source: of the batches.
+    """
+    mean, std = source.tensors(*base.normalization)
+    frozen = surrogate_of(base, device=source.place.device)
+    ramp = replace(made.allocator_training, steps=source.settings.steps)
+    network = made.network
+    network_width = max(network.width, network.feedforward)
+    surrogate_width = max(SurrogateConfig.of(base).hidden)
+
+    def terms(step: int) -> dict[str, Tensor]:
+        batch = source.batch(step)
+        target = (batch.wrench - mean) / std
+        with source.place.autocast(network_width):
+            hidden = network.encoded(weights, batch.features, target, batch.mask)
+        mixture = network.mixture(weights, hidden.float())
+        with source.place.autocast(surrogate_width):
+            guide = modules.guidance(mixture, frozen, batch, std, source.noise(step)).mean()
+        imitate = modules.imitation(mixture, batch).mean()
+        entropy = modules.negative_entropy(mixture, batch.mask).mean()
+        loss = imitate + ramp.beta(step) * guide + ramp.entropy * entropy  # Eq. 7
+        return {"loss": loss, "imitation": imitate, "guidance": guide, "entropy": entropy}
+
+    return terms
 
 
 def _train(

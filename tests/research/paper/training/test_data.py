@@ -11,6 +11,8 @@ import torch
 from finlab.errors import DataError
 from finlab.layout import Fin, Layout
 from finlab.physics import Plant
+from finlab.research.networks.trained import to_command
+from finlab.research.paper.network import raw_features
 from finlab.research.paper.training import samples as parts_of
 from finlab.research.paper.training.samples import (
     DataSettings,
@@ -82,6 +84,25 @@ def test_normalization_is_that_of_all_samples(folder: Path) -> None:
     np.testing.assert_allclose(found.std, wrench.std(0), rtol=1e-9)
 
 
+def test_a_batch_has_the_drawn_samples_as_networks_take_them(folder: Path) -> None:
+    (whole,) = (np.load(path) for path in folder.glob("*.npz"))
+    wrenches = whole["wrench"].reshape(-1, 6)
+    batch = SampleSet(folder, CPU).batch(3, 50, 1, False, ALL_COMMANDS)
+    for row, wrench in enumerate(batch.wrench.numpy()):
+        (number,) = np.flatnonzero((wrenches == wrench).all(axis=1))
+        robot, command = divmod(int(number), SETTINGS.commands)
+        n = int(whole["mask"][robot].sum())
+        lower = whole["lower"][robot, :n]
+        upper = whole["upper"][robot, :n]
+        assert np.array_equal(batch.mask[row], whole["mask"][robot])
+        assert np.array_equal(batch.position[row], whole["position"][robot])
+        angle = whole["mounting_angle"][robot, :n]
+        expected = raw_features(whole["position"][robot, :n], angle, lower, upper)
+        np.testing.assert_allclose(batch.features[row, :n], expected, atol=1e-6)
+        drawn = to_command(batch.command[row, :n].numpy(), lower, upper)
+        np.testing.assert_allclose(drawn, whole["command"][robot, command, :n], atol=1e-6)
+
+
 def test_an_epoch_has_every_sample_once_in_an_order_of_its_own(folder: Path) -> None:
     samples = SampleSet(folder, CPU)
     size = 100
@@ -123,5 +144,19 @@ def test_refuses_in_one_sentence_what_does_not_fit(folder: Path, tmp_path: Path)
         SampleSet(tmp_path, CPU)
     (tmp_path / "data.json").write_text(json.dumps(about))
     (tmp_path / "part-00000.npz").write_bytes(b"nothing")
+    with pytest.raises(DataError, match="part-00000.npz: no part of a data set"):
+        SampleSet(tmp_path, CPU)
+
+
+def test_parts_of_another_set_are_refused(folder: Path, tmp_path: Path) -> None:
+    about = json.loads((folder / "data.json").read_text())
+    (part,) = folder.glob("*.npz")
+    (tmp_path / part.name).write_bytes(part.read_bytes())
+    about["settings"]["layouts"] = SETTINGS.layouts + 1
+    (tmp_path / "data.json").write_text(json.dumps(about))
+    with pytest.raises(DataError, match="its parts are not those of its data.json"):
+        SampleSet(tmp_path, CPU)
+    arrays = dict(np.load(part))
+    np.savez(tmp_path / part.name, **(arrays | {"lower": arrays["lower"][:-1]}))
     with pytest.raises(DataError, match="part-00000.npz: no part of a data set"):
         SampleSet(tmp_path, CPU)

@@ -8,12 +8,19 @@ import pytest
 import torch
 
 from finlab.layout import Layout
-from finlab.research.networks.trained import TrainedWeights, WrenchNormalization
+from finlab.research.networks.trained import TrainedWeights, WrenchNormalization, to_command
 from finlab.research.paper.network import Mixture, NetworkConfig, raw_features
 from finlab.research.paper.surrogate import LayoutSurrogate, SurrogateConfig
 from finlab.research.paper.training import modules
 from finlab.research.paper.training.recipes import RECIPES
-from finlab.research.paper.training.samples import N_FINS, DataSettings, SampleBatch, fresh_batch
+from finlab.research.paper.training.samples import (
+    FIELDS,
+    N_FINS,
+    DataSettings,
+    SampleBatch,
+    SampleTable,
+    fresh_batch,
+)
 from finlab.research.random_layouts import random_layout
 from finlab.research.training.loop import first_weights
 from tests.torch_weights import arrays_of
@@ -38,20 +45,25 @@ def robots() -> list[Layout]:
 def padded(robots: list[Layout], fill: float) -> SampleBatch:
     """A batch of robots with random commands; `fill` stands where there is no fin."""
     rng = np.random.default_rng(4)
-    parts: dict[str, list[np.ndarray]] = {name: [] for name in SampleBatch._fields}
+    parts: dict[str, list[np.ndarray]] = {name: [] for name in FIELDS}
     for layout in robots:
         command = rng.uniform(layout.lower, layout.upper)
         own = {name: getattr(layout, name) for name in GEOMETRY_FIELDS} | {"command": command}
         for name, values in own.items():
-            whole = np.full((N_FINS, *values.shape[1:]), fill)
+            whole = np.full((N_FINS, *values.shape[1:]), fill, np.float32)
             whole[: layout.n] = values
             parts[name].append(whole)
         parts["mask"].append(np.arange(N_FINS) < layout.n)
-        parts["wrench"].append(rng.normal(size=6))
-    arrays = [np.stack(part) for part in parts.values()]
-    return SampleBatch(
-        *(torch.from_numpy(a if a.dtype == bool else a.astype(np.float32)) for a in arrays)
-    )
+        parts["wrench"].append(rng.normal(size=6).astype(np.float32))
+    arrays = {name: torch.from_numpy(np.stack(part)) for name, part in parts.items()}
+    one_each = {name: arrays[name][:, None] for name in ("command", "wrench")}
+    return SampleTable.of(arrays | one_each).batch(torch.arange(len(robots)))
+
+
+def commands_of(batch: SampleBatch, row: int, layout: Layout) -> np.ndarray:
+    """The commands (n, 3) [rad, Hz, rad] of a robot of a batch."""
+    normalized = batch.command[row, : layout.n].numpy()
+    return np.asarray(to_command(normalized, layout.lower, layout.upper))
 
 
 def weights_of(sizes: NetworkConfig | SurrogateConfig) -> dict[str, torch.Tensor]:
@@ -70,7 +82,7 @@ def test_mixtures_of_a_padded_batch_are_those_of_each_robot_alone(
 ) -> None:
     weights = weights_of(NETWORK_SIZES)
     batch = padded(robots, fill)
-    together = NETWORK_SIZES(weights, modules.features(batch), batch.wrench, batch.mask)
+    together = NETWORK_SIZES(weights, batch.features, batch.wrench, batch.mask)
     for row, layout in enumerate(robots):
         x = raw_features(*(getattr(layout, name) for name in GEOMETRY_FIELDS)).astype(np.float32)[
             None
@@ -94,16 +106,35 @@ def test_wrenches_of_a_padded_batch_are_those_of_each_robot_alone(
     )
     together = modules.surrogate_wrench(SURROGATE_SIZES, tensors, batch.command, batch).detach()
     for row, layout in enumerate(robots):
-        command = batch.command[row, : layout.n].numpy()
+        command = commands_of(batch, row, layout)
         np.testing.assert_allclose(
             together[row], LayoutSurrogate(layout, weights).wrench(command[None])[0], atol=1e-5
         )
 
 
+@pytest.mark.parametrize("fill", [0.0, 7.0])
+def test_padding_has_no_influence_on_wrenches_and_their_gradients(
+    robots: list[Layout], fill: float
+) -> None:
+    weights = weights_of(SURROGATE_SIZES)
+
+    def answer(batch: SampleBatch) -> list[torch.Tensor]:
+        command = batch.command.clone().requires_grad_()
+        wrench = modules.surrogate_wrench(SURROGATE_SIZES, weights, command, batch)
+        slopes = torch.autograd.grad(wrench.square().sum(), [*weights.values(), command])
+        assert (slopes[-1][~batch.mask] == 0.0).all()
+        return [wrench, *slopes[:-1], slopes[-1][batch.mask]]
+
+    for found, expected in zip(
+        answer(padded(robots, fill)), answer(padded(robots, 3.0)), strict=True
+    ):
+        torch.testing.assert_close(found, expected, rtol=0.0, atol=0.0)
+
+
 def test_no_gradient_comes_from_fins_that_do_not_exist(robots: list[Layout]) -> None:
     batch = padded(robots, 7.0)
     weights = weights_of(NETWORK_SIZES)
-    x = modules.features(batch).requires_grad_()
+    x = batch.features.requires_grad_()
     mixture = NETWORK_SIZES(weights, x, batch.wrench, batch.mask)
     sum(
         (part * batch.mask[..., None, None].squeeze(-1 if part.dim() == 3 else ())).sum()
@@ -139,9 +170,7 @@ def test_imitation_is_the_negative_log_likelihood_of_the_fins_that_exist(
     for row in range(len(found)):
         expected = 0.0
         for i in range(int(batch.mask[row].sum())):
-            low = batch.lower[row, i].numpy()
-            high = batch.upper[row, i].numpy()
-            x = (2.0 * batch.command[row, i].numpy() - low - high) / (high - low)
+            x = batch.command[row, i].numpy()
             # All components are alike, so their weights cancel.
             expected -= float(
                 np.sum(-0.5 * (x / math.exp(-0.5)) ** 2 + 0.5 - 0.5 * math.log(2 * math.pi))
@@ -164,13 +193,13 @@ def test_guidance_is_the_squared_error_of_a_sample_inside_the_limits(batch: Samp
     normal = torch.randn((*noise.shape, 3), generator=draw)
     found = modules.guidance(mixture, surrogate, batch, std, (noise, normal))
     (command,) = seen
-    inside = (command >= batch.lower - 1e-6) & (command <= batch.upper + 1e-6)
-    assert inside.all() and (command == batch.upper)[batch.mask].any()
+    inside = command.abs() <= 1.0
+    assert inside.all() and (command == 1.0)[batch.mask].any()
     wrench = (command * batch.mask[..., None]).sum(1).repeat(1, 2)
     torch.testing.assert_close(found, (((wrench - batch.wrench) / std) ** 2).sum(1))
     found.sum().backward()
     assert mixture.mean.grad is not None
-    clamped = (command == batch.upper) & batch.mask[..., None]
+    clamped = (command == 1.0) & batch.mask[..., None]
     assert (
         mixture.mean.grad.sum(2)[clamped] != 0.0
     ).all()  # a sample outside its limits teaches, too
