@@ -13,6 +13,8 @@ viser-project/viser:
   `atomic_end` and `flush`.
 - `_windows`: messages to one page are sent as they are told, not gathered for 16 ms; it is woken
   six times less. `infra/_async_message_buffer.py`, `_window_loop`.
+- `_pack_quickly`: messages of a step packed without asking for the type of each part;
+  `infra/_messages.py`, `as_serializable_dict`.
 - `keep_private`: no message to the other pages about an input of one page; `_gui_api.py`,
   `sync_other_clients`.
 - `assign`: several properties of a node in one message; `_scene_handles.py`, `_queue_update`.
