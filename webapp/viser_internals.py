@@ -15,6 +15,10 @@ viser-project/viser:
   six times less. `infra/_async_message_buffer.py`, `_window_loop`.
 - `_pack_quickly`: messages of a step packed without asking for the type of each part;
   `infra/_messages.py`, `as_serializable_dict`.
+- `_pack_quickly`: messages of a step packed without a look at the type of each of their parts;
+  `infra/_messages.py`, `as_serializable_dict`.
+- `_pack_quickly`: messages of a step packed without a look at the type of each of their parts;
+  `infra/_messages.py`, `as_serializable_dict`.
 - `keep_private`: no message to the other pages about an input of one page; `_gui_api.py`,
   `sync_other_clients`.
 - `assign`: several properties of a node in one message; `_scene_handles.py`, `_queue_update`.
@@ -36,7 +40,7 @@ import logging
 import secrets
 import threading
 from collections.abc import AsyncGenerator, Callable, Iterator, Sequence
-from functools import cache
+from functools import cache, partialmethod
 from http import HTTPStatus
 from importlib.resources import files
 from itertools import islice
@@ -52,6 +56,7 @@ from numpy.typing import NDArray
 from viser import _assignable_props_api, _messages
 from viser._assignable_props_api import AssignablePropsBase
 from viser.infra._async_message_buffer import AsyncMessageBuffer
+from viser.infra._messages import wire_field_names
 from websockets.http11 import Request, Response
 
 from webapp.guard import SECURE, Guard
@@ -73,6 +78,7 @@ def start_server(guard: Guard = LOCAL, port: int = 0) -> viser.ViserServer:
     _keep_property_types()
     buffers: Any = AsyncMessageBuffer
     buffers._window_loop = _window_loop
+    _pack_quickly()
     with _STARTING, _guarded(guard), contextlib.redirect_stdout(io.StringIO()):
         server = viser.ViserServer(host=guard.host, port=port, label="finlab", verbose=False)
     _stay_awake(server.get_event_loop())
@@ -235,6 +241,37 @@ def _take(buffer: AsyncMessageBuffer) -> list[Any]:
         return [buffer.pop_message_locked(number) for number in first]
 
 
+PLAIN = (str, float, bool, int)
+"""Types of values that are packed as they are."""
+
+
+@cache
+def _pack_quickly() -> None:
+    """Let updates, of which a step of a slider consists, be packed in a few operations where all
+    that they hold is plain; viser compares the type of each part with ten others."""
+    for kind in (_messages.GuiUpdateMessage, _messages.SceneNodeUpdateMessage):
+        updates: Any = kind
+        updates.as_serializable_dict = partialmethod(_packed, kind.as_serializable_dict)
+
+
+def _packed(
+    message: Any, pack: Callable[..., dict[str, Any]], buffers: list[memoryview] | None = None
+) -> dict[str, Any]:
+    """An update as a dictionary, with its arrays in `buffers`; `pack` is viser's own function."""
+    values: dict[str, Any] = {}
+    for name, value in message.updates.items():
+        if type(value) in PLAIN:
+            values[name] = value
+        elif buffers is not None and type(value) is np.ndarray and value.flags.c_contiguous:
+            values[name] = {"__binary_index": len(buffers), "dtype": value.dtype.str}
+            buffers.append(value.data)
+        else:
+            return pack(message, buffers)
+    kind: Any = type(message)
+    packed = {name: getattr(message, name) for name in wire_field_names(kind)}
+    return {**packed, "updates": values, "type": kind.__name__}
+
+
 def keep_private(handle: Any) -> None:
     """Let viser tell no other page of what a user changes: each page has inputs of its own, and the
     message would be dropped just before it is sent."""
@@ -257,6 +294,12 @@ def assign(handle: Any, values: dict[str, Any]) -> None:
     for name, value in values.items():
         if name not in own:
             setattr(handle, name, value)
+
+
+def write_content(handle: Any, content: str) -> None:
+    """Let markup of the page be another one."""
+    handle._impl.props.content = content
+    handle._queue_update("content", content)
 
 
 UNKNOWN = object()

@@ -46,6 +46,7 @@ class Arrows:
             head_length=HEAD_LENGTH * thickness,
             visible=False,
         )
+        self._is_visible = False
         self._colors: NDArray[np.uint8] | None = None
         self._is_drawn = b""
         """Which of the arrows are drawn, as bytes of a mask (n,)."""
@@ -61,7 +62,9 @@ class Arrows:
         """
         is_drawn = (vectors * vectors).sum(axis=1) > (SHORTEST * size) ** 2
         n_drawn = int(is_drawn.sum())
-        self.node.visible = n_drawn > 0
+        is_visible = n_drawn > 0
+        if is_visible != self._is_visible:
+            self.node.visible = self._is_visible = is_visible
         if not n_drawn:
             return
         points = np.empty((len(starts), 2, 3))

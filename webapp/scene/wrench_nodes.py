@@ -161,6 +161,7 @@ class UnitMesh:
         self._turn = turn
         self._direction = np.zeros(3)
         self._scale = (0.0, 0.0, 0.0)
+        self._is_visible = True
 
     def show(self, vector: Array, length: float, scale: tuple[float, float, float]) -> None:
         """Turn the mesh to a vector and scale it; one of no length is hidden.
@@ -170,10 +171,11 @@ class UnitMesh:
             length: of that vector.
             scale: of the mesh along its own axes.
         """
-        if scale[0] <= SHORTEST:
-            self.node.visible = False
+        is_visible = scale[0] > SHORTEST
+        if is_visible != self._is_visible:
+            self.node.visible = self._is_visible = is_visible
+        if not is_visible:
             return
-        self.node.visible = True
         if scale != self._scale:
             self._scale = scale
             set_properties(self.node, scale=scale)

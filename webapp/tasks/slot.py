@@ -1,5 +1,6 @@
-"""Questions that take time: asked on the event loop, answered on threads; the newest one counts. One
-that takes less than to hand it to a thread is answered on the loop.
+"""Questions that take time: asked on the event loop, answered on threads; the newest one counts.
+
+What takes less time than to hand it to a thread is answered on the loop.
 
 A `Slot` keeps what one page has asked of one kind, and what came of it. Nothing is locked: a
 question is frozen, an answer is never changed, and all that a slot holds belongs to the event loop.
