@@ -268,8 +268,10 @@ def _packed(
         else:
             return pack(message, buffers)
     kind: Any = type(message)
-    packed = {name: getattr(message, name) for name in wire_field_names(kind)}
-    return {**packed, "updates": values, "type": kind.__name__}
+    packed: dict[str, Any] = {"type": kind.__name__}
+    for name in wire_field_names(kind):
+        packed[name] = values if name == "updates" else getattr(message, name)
+    return packed
 
 
 def keep_private(handle: Any) -> None:

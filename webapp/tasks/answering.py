@@ -60,13 +60,6 @@ class Variant(NamedTuple):
     """The answer with that command."""
 
 
-def is_same_but_target(a: State, b: State) -> bool:
-    """Whether two states ask the same robot in the same way for wrenches."""
-    is_same_robot = a.layout is b.layout and a.damage is b.damage and a.speed == b.speed
-    is_same_method = a.method == b.method and a.policy == b.policy and a.network == b.network
-    return is_same_robot and is_same_method and a.temperature == b.temperature
-
-
 class Answering:
     """The newest answer, its modes, and the part of it that is on the robot."""
 
@@ -78,7 +71,7 @@ class Answering:
         bell = context.bell
         solver = context.solver
         self.slot: Slot[State, Reply] = Slot(
-            pool, bell, solver.reply, live=True, title="No answer", alike=is_same_but_target
+            pool, bell, solver.reply, live=True, title="No answer", alike=State.is_same_but_target
         )
         self.search: Slot[ModeSearch, Modes] = Slot(
             pool, bell, search_modes, rest_s=SEARCH_REST_S, title="No candidates"
