@@ -29,8 +29,15 @@ def set_properties(handle: Any, **values: Any) -> None:
         if key == "content":
             value = str(escape(value))
         old = getattr(handle, key)
-        arrays = isinstance(old, np.ndarray) or isinstance(value, np.ndarray)
-        if not (np.array_equal(old, value) if arrays else old == value):
+        is_old_array = isinstance(old, np.ndarray)
+        is_new_array = isinstance(value, np.ndarray)
+        if is_old_array and is_new_array:  # quicker than numpy's own comparison
+            is_same = old.shape == value.shape and bool((old == value).all())
+        elif is_old_array or is_new_array:
+            is_same = np.array_equal(old, value)
+        else:
+            is_same = old == value
+        if not is_same:
             changed[key] = value
     if changed:
         assign(handle, changed)

@@ -47,9 +47,6 @@ class Arrows:
             visible=False,
         )
         self._is_visible = False
-        self._colors: NDArray[np.uint8] | None = None
-        self._is_drawn = b""
-        """Which of the arrows are drawn, as bytes of a mask (n,)."""
 
     def show(self, starts: Array, vectors: Array, colors: NDArray[np.uint8], size: float) -> None:
         """Show arrows; those of no length are left out.
@@ -57,7 +54,7 @@ class Arrows:
         Args:
             starts: where they begin (n, 3) [m].
             vectors: from there to their tips (n, 3) [m].
-            colors: of each (n, 3), in linear light; the same array while they stay as they are.
+            colors: of each (n, 3), in linear light.
             size: factor of the thickness of their shafts.
         """
         is_drawn = (vectors * vectors).sum(axis=1) > (SHORTEST * size) ** 2
@@ -65,21 +62,18 @@ class Arrows:
         is_visible = n_drawn > 0
         if is_visible != self._is_visible:
             self.node.visible = self._is_visible = is_visible
-        if not n_drawn:
+        if not is_visible:
             return
         points = np.empty((len(starts), 2, 3))
         points[:, 0] = starts
         points[:, 1] = starts + vectors
+        points /= size
         if n_drawn < len(points):
             points = points[is_drawn]
-        points /= size
-        properties = {"scale": size, "points": points.round(DIGITS).astype(np.float32)}
-        mask = is_drawn.tobytes()
-        if colors is not self._colors or mask != self._is_drawn:
-            self._colors = colors
-            self._is_drawn = mask
-            properties["colors"] = colors[is_drawn]
-        set_properties(self.node, **properties)
+            colors = colors[is_drawn]
+        set_properties(
+            self.node, scale=size, colors=colors, points=points.round(DIGITS).astype(np.float32)
+        )
 
 
 class ForceNodes:

@@ -37,8 +37,6 @@ HEIGHT = 0.16
 """How far above the hull the arrows begin [m]; inside it they could not be seen."""
 FORCE_COLORS = linear([DELIVERED, MISSING])
 """Of the arrows of the delivered and of the missing force (2, 3), in linear light."""
-ORIGIN = np.zeros(3)
-"""Where the arrows begin [m]."""
 LARGEST = 0.42
 """How far the drawn set may reach from the centre of gravity [m]."""
 
@@ -140,8 +138,11 @@ class WrenchNodes:
                 set_properties(node, scale=size)
         asked_force = size * scale * target[:3]
         delivered = size * scale * got[:3]
-        starts = np.array([ORIGIN, delivered])
-        vectors = np.array([delivered, size * scale * missing[:3]])
+        starts = np.zeros((2, 3))  # the missing force begins where the delivered one ends
+        starts[1] = delivered
+        vectors = np.empty((2, 3))
+        vectors[0] = delivered
+        vectors[1] = size * scale * missing[:3]
         self._forces.show(starts, vectors, FORCE_COLORS, size)
         length = math.hypot(*asked_force.tolist())
         self._asked_force.show(asked_force, length, (round(length, DIGITS), size, size))
