@@ -20,6 +20,8 @@ from webapp.viser_internals import disable_sharing, stored
 
 FRAME_S = 1 / 25
 """Time between two poses of robots that swim [s]."""
+LOOK_S = 0.25
+"""Time between two looks whether a robot has begun to swim [s]."""
 STORAGE_KEY = "finlab-sessions"
 PATIENCE_S = (0.5, 1.0, 1.5, 2.0, 4.0, 8.0, 16.0, 30.0, 30.0)
 """How long a page may take to say which sessions it knows [s], try by try."""
@@ -177,7 +179,8 @@ class App:
     async def _animate(self) -> None:
         before = time.monotonic()
         while True:
-            await asyncio.sleep(FRAME_S)
+            swims = any(view.jobs.swimming.active for view in self.views.values())
+            await asyncio.sleep(FRAME_S if swims else LOOK_S)
             now = time.monotonic()
             for view in list(self.views.values()):
                 # A long pause (a busy machine) must not become a leap of the robots.

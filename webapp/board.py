@@ -12,6 +12,8 @@ from typing import Any
 
 from markupsafe import Markup, escape
 
+from webapp.viser_internals import write_content
+
 Facts = dict[str, Any]
 """Whoever shows a part names the facts that it is made of, each with its type."""
 
@@ -79,7 +81,10 @@ class Group:
                     before = handle.value if key == "value" else rule.last
                     is_nan_as_before = made != made and before != before
                     if before is UNKNOWN or (before != made and not is_nan_as_before):
-                        setattr(handle, key, str(made) if key == "content" else made)
+                        if key == "content":
+                            write_content(handle, str(made))
+                        else:
+                            setattr(handle, key, made)
                     rule.last = made
                 rule.is_due = False
         except Exception as error:

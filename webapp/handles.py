@@ -13,7 +13,7 @@ from markupsafe import escape
 from finlab.errors import FinlabError
 from webapp.markup.words import html, marker
 from webapp.tasks.slot import Bell
-from webapp.viser_internals import run_file, run_script, uuid_of
+from webapp.viser_internals import assign, keep_private, run_file, run_script, uuid_of
 
 
 def add_html(gui: viser.GuiApi, content: str) -> viser.GuiHtmlHandle:
@@ -23,14 +23,24 @@ def add_html(gui: viser.GuiApi, content: str) -> viser.GuiHtmlHandle:
 
 def set_properties(handle: Any, **values: Any) -> None:
     """Set those properties of a handle that differ, so that an unchanged page gets no message;
-    content not marked as markup is text."""
+    content not marked as markup is text. An array must not be changed afterwards."""
+    changed: dict[str, Any] = {}
     for key, value in values.items():
         if key == "content":
             value = str(escape(value))
         old = getattr(handle, key)
-        arrays = isinstance(old, np.ndarray) or isinstance(value, np.ndarray)
-        if not (np.array_equal(old, value) if arrays else old == value):
-            setattr(handle, key, value)
+        is_old_array = isinstance(old, np.ndarray)
+        is_new_array = isinstance(value, np.ndarray)
+        if is_old_array and is_new_array:  # quicker than numpy's own comparison
+            is_same = old.shape == value.shape and bool((old == value).all())
+        elif is_old_array or is_new_array:
+            is_same = np.array_equal(old, value)
+        else:
+            is_same = old == value
+        if not is_same:
+            changed[key] = value
+    if changed:
+        assign(handle, changed)
 
 
 def on_user_change(handle: Any, act: Callable[[Any], None]) -> None:
@@ -38,6 +48,7 @@ def on_user_change(handle: Any, act: Callable[[Any], None]) -> None:
     kind than the input's own is not from our page: it goes back to what it held last."""
     honest = handle.value
     buttons = isinstance(handle, viser.GuiButtonGroupHandle)
+    keep_private(handle)
 
     async def changed(event: Any) -> None:
         nonlocal honest

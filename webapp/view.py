@@ -91,8 +91,7 @@ class View:
             try:
                 self._look()
                 if self._is_due and not self._is_held():
-                    if self._held_for is not NO_SLOTS:
-                        self._end_hold()
+                    self._end_hold()
                     await self._write()
             except Exception as error:  # the page must go on, whatever we have got wrong
                 self.intents.fault(error)
@@ -121,7 +120,7 @@ class View:
         if is_revised and self.busy:
             self._hold(PATIENCE_S, jobs.first)
         else:
-            self._held_for = NO_SLOTS
+            self._end_hold()
 
     def _attend(self, waiting: Attended) -> bool:
         """Let something that has rung go on; whether there is something new to show."""

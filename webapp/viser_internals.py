@@ -7,8 +7,21 @@ viser-project/viser:
   class `WebsockServer`.
 - `_name_page`: title, icon and first page as arguments of `ViserServer`; `_viser.py`.
 - `stored`: an awaitable `get_item` of `client.local_storage`; `_viser.py`.
-- `_keep_property_types`: types of properties looked up once for each class;
-  `_assignable_props_api.py`, `AssignablePropsBase._prop_hints`.
+- `_keep_property_types`: types of properties looked up once for each class, and those of arrays
+  made once; `_assignable_props_api.py`, `_prop_hints` and `_cast_value_recursive`.
+- `_stay_awake`: no wake-up of a loop by its own thread; `infra/_async_message_buffer.py`, `push`,
+  `atomic_end` and `flush`.
+- `_windows`: messages to one page are sent as they are told, not gathered for 16 ms; it is woken
+  six times less. `infra/_async_message_buffer.py`, `_window_loop`.
+- `_pack_quickly`: messages of a step packed without asking for the type of each part;
+  `infra/_messages.py`, `as_serializable_dict`.
+- `_pack_quickly`: messages of a step packed without a look at the type of each of their parts;
+  `infra/_messages.py`, `as_serializable_dict`.
+- `_pack_quickly`: messages of a step packed without a look at the type of each of their parts;
+  `infra/_messages.py`, `as_serializable_dict`.
+- `keep_private`: no message to the other pages about an input of one page; `_gui_api.py`,
+  `sync_other_clients`.
+- `assign`: several properties of a node in one message; `_scene_handles.py`, `_queue_update`.
 - `uuid_of`: a public name of a widget's element in the page; `_gui_handles.py`.
 - `run_script`, `run_file`: a public way to run a script, as `add_plotly` does; `_gui_api.py`.
 - `hold_uploads`: sizes and parts of files checked as they come; `_gui_api.py`,
@@ -26,18 +39,24 @@ import io
 import logging
 import secrets
 import threading
-from collections.abc import Callable, Iterator, Sequence
-from functools import cache
+from collections.abc import AsyncGenerator, Callable, Iterator, Sequence
+from functools import cache, partialmethod
 from http import HTTPStatus
 from importlib.resources import files
+from itertools import islice
 from operator import attrgetter
+from types import SimpleNamespace
 from typing import Any, get_type_hints
 from unittest.mock import patch
 
+import numpy as np
 import viser
 import websockets.asyncio.server as websockets_server
-from viser import _messages
+from numpy.typing import NDArray
+from viser import _assignable_props_api, _messages
 from viser._assignable_props_api import AssignablePropsBase
+from viser.infra._async_message_buffer import AsyncMessageBuffer
+from viser.infra._messages import wire_field_names
 from websockets.http11 import Request, Response
 
 from webapp.guard import SECURE, Guard
@@ -57,8 +76,13 @@ def start_server(guard: Guard = LOCAL, port: int = 0) -> viser.ViserServer:
     """A server behind a guard, without a banner of viser's own; `verbose=False` alone would leave
     it."""
     _keep_property_types()
+    buffers: Any = AsyncMessageBuffer
+    buffers._window_loop = _window_loop
+    _pack_quickly()
     with _STARTING, _guarded(guard), contextlib.redirect_stdout(io.StringIO()):
-        return viser.ViserServer(host=guard.host, port=port, label="finlab", verbose=False)
+        server = viser.ViserServer(host=guard.host, port=port, label="finlab", verbose=False)
+    _stay_awake(server.get_event_loop())
+    return server
 
 
 @contextlib.contextmanager
@@ -155,6 +179,140 @@ def _keep_property_types() -> None:
             props.finlab_hints = get_type_hints(props)
     handles: Any = AssignablePropsBase
     handles._prop_hints = property(attrgetter("_impl.props.finlab_hints"))
+    # To each value that is set, viser compares the type of the property with four types of arrays,
+    # and makes these anew: a third of the time of a slider's step.
+    types: Any = _assignable_props_api
+    types.npt = SimpleNamespace(NDArray=_ArrayTypes())
+
+
+class _ArrayTypes(dict[Any, Any]):
+    """In place of `numpy.typing.NDArray`: the type of arrays of each kind is made once."""
+
+    def __missing__(self, kind: Any) -> Any:
+        self[kind] = NDArray[kind]
+        return self[kind]
+
+
+def _stay_awake(loop: asyncio.AbstractEventLoop) -> None:
+    """Let a loop be called from its own thread without being woken up: it is awake. Viser wakes it,
+    through a socket, for each message, each group of messages, and each flush."""
+    from_thread = loop.call_soon_threadsafe
+
+    def call_soon(callback: Callable[..., object], *arguments: Any, **options: Any) -> Any:
+        is_own = asyncio._get_running_loop() is loop
+        call = loop.call_soon if is_own else from_thread
+        return call(callback, *arguments, **options)
+
+    loop.call_soon_threadsafe = call_soon  # type: ignore[assignment, method-assign]
+
+
+_gathered = AsyncMessageBuffer._window_loop
+"""The windows of messages that viser makes."""
+
+
+def _window_loop(
+    buffer: AsyncMessageBuffer, client_id: int, last_known: int, end_of_known: Any
+) -> AsyncGenerator[Sequence[Any], None]:
+    """Windows of messages; arguments as in viser, which makes those that go to all pages, and are
+    kept for pages to come."""
+    if buffer.persistent_messages:
+        return _gathered(buffer, client_id, last_known, end_of_known)
+    return _windows(buffer)
+
+
+async def _windows(buffer: AsyncMessageBuffer) -> AsyncGenerator[Sequence[Any], None]:
+    """Windows of the messages to one page, each with all that was told until the loop came to
+    it."""
+    while not buffer.done:
+        buffer.message_event.clear()
+        window = _take(buffer)
+        if window:
+            yield window
+        else:
+            await buffer.message_event.wait()
+
+
+def _take(buffer: AsyncMessageBuffer) -> list[Any]:
+    """The first messages of a buffer, as many as a window has; none while a group is told."""
+    with buffer.buffer_lock:
+        if buffer.atomic_counter:
+            return []
+        first = list(islice(buffer.message_from_id, buffer.max_window_size))
+        return [buffer.pop_message_locked(number) for number in first]
+
+
+PLAIN = (str, float, bool, int)
+"""Types of values that are packed as they are."""
+
+
+@cache
+def _pack_quickly() -> None:
+    """Let updates, of which a step of a slider consists, be packed in a few operations where all
+    that they hold is plain; viser compares the type of each part with ten others."""
+    for kind in (_messages.GuiUpdateMessage, _messages.SceneNodeUpdateMessage):
+        updates: Any = kind
+        updates.as_serializable_dict = partialmethod(_packed, kind.as_serializable_dict)
+
+
+def _packed(
+    message: Any, pack: Callable[..., dict[str, Any]], buffers: list[memoryview] | None = None
+) -> dict[str, Any]:
+    """An update as a dictionary, with its arrays in `buffers`; `pack` is viser's own function."""
+    values: dict[str, Any] = {}
+    for name, value in message.updates.items():
+        if type(value) in PLAIN:
+            values[name] = value
+        elif buffers is not None and type(value) is np.ndarray and value.flags.c_contiguous:
+            values[name] = {"__binary_index": len(buffers), "dtype": value.dtype.str}
+            buffers.append(value.data)
+        else:
+            return pack(message, buffers)
+    kind: Any = type(message)
+    packed: dict[str, Any] = {"type": kind.__name__}
+    for name in wire_field_names(kind):
+        packed[name] = values if name == "updates" else getattr(message, name)
+    return packed
+
+
+def keep_private(handle: Any) -> None:
+    """Let viser tell no other page of what a user changes: each page has inputs of its own, and the
+    message would be dropped just before it is sent."""
+    handle._impl.sync_cb = None
+
+
+def assign(handle: Any, values: dict[str, Any]) -> None:
+    """Set properties of a handle to values that they do not have yet; those of a node's own shape
+    and colour are one message, where viser makes one of each."""
+    own: dict[str, Any] = {}
+    if isinstance(handle, viser.SceneNodeHandle):
+        props = handle._impl.props
+        for name, value in values.items():
+            if _is_of_same_type(vars(props).get(name, UNKNOWN), value):
+                setattr(props, name, value)
+                own[name] = value
+        if own:
+            update = _messages.SceneNodeUpdateMessage(handle.name, own)
+            handle._impl.api._queue_scene_message(update)
+    for name, value in values.items():
+        if name not in own:
+            setattr(handle, name, value)
+
+
+def write_content(handle: Any, content: str) -> None:
+    """Let markup of the page be another one."""
+    handle._impl.props.content = content
+    handle._queue_update("content", content)
+
+
+UNKNOWN = object()
+"""In place of a property that a handle has elsewhere."""
+
+
+def _is_of_same_type(old: Any, new: Any) -> bool:
+    """Whether viser would take a new value of a property as it is."""
+    if isinstance(new, np.ndarray):
+        return isinstance(old, np.ndarray) and old.dtype == new.dtype
+    return not isinstance(old, np.ndarray) and old is not UNKNOWN
 
 
 def uuid_of(handle: Any) -> str:

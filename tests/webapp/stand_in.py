@@ -158,6 +158,10 @@ class Direct(Pool):
             future.set_exception(error)
         return future
 
+    def do_now(self, work: Callable[[], Any]) -> "Future[Any]":
+        """As all is done."""
+        return self.submit(work)
+
     def stop(self) -> None:
         """There is nothing to end."""
 

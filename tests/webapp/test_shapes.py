@@ -137,11 +137,19 @@ def test_directions_become_rotations(turn: Any) -> None:
         assert np.linalg.det(rotation) == pytest.approx(1.0)
 
 
-class Recorded:
-    """A scene whose nodes keep what they are told."""
+class Node(SimpleNamespace):
+    """A node that keeps what it is told."""
 
     def __getattr__(self, name: str) -> Any:
-        return lambda *_, **options: SimpleNamespace(**options)
+        """Nothing was told."""
+        return None
+
+
+class Recorded:
+    """A scene of such nodes."""
+
+    def __getattr__(self, name: str) -> Any:
+        return lambda *_, **options: Node(**options)
 
 
 def test_forces_start_at_blades_and_fans_reach_as_far_as_they_beat() -> None:

@@ -7,11 +7,10 @@ escaping, in few calls.
 """
 
 import math
-from functools import cache
+from collections.abc import Sequence
+from functools import cache, lru_cache
 
-import numpy as np
 from markupsafe import Markup
-from numpy.typing import ArrayLike, NDArray
 
 from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
@@ -44,12 +43,18 @@ BARS_HEADER = Markup(
     "<b class='right missing'>missing</b>"
 )
 """Heads of the bars; the first one says what the ends of a bar stand for."""
+NO_CELLS = "<td>–</td>" * 5
+"""Beside the name of an actuator that there is no command for."""
+LOST_CELLS = "<td colspan='5'>lost</td>"
+"""Beside the name of an actuator that is lost."""
 MIDDLE = "<i style='left:50%;top:0;width:1px;height:14px;background:rgba(128,128,128,.55)'></i>"
 """Where nothing is asked, in the track of bars."""
 LEAST_FORCE_SCALE = 2.0
 """Least force at the end of a bar [N]."""
 LEAST_TORQUE_SCALE = 0.5
 """Least torque at the end of a bar [N m]."""
+PLACES = 7
+"""Places behind the point to which wrenches are rounded before they are drawn [N, N m]."""
 LEAST_MISSING_BAR = 0.02
 """Share of a bar's scale up to which a missing component is not drawn."""
 
@@ -65,35 +70,43 @@ def bars_of(
         layout: the present robot, which says which axes count.
         busy: whether the answer is one to an earlier question.
     """
-    if shown_allocation is None:
-        return wrench_bars(np.where(layout.commanded, target, np.nan), None)
-    demanded = shown_allocation.target if busy else np.where(layout.commanded, target, np.nan)
-    return wrench_bars(demanded, shown_allocation.wrench)
+    if shown_allocation is not None and busy:
+        demanded = shown_allocation.target.tolist()
+    else:
+        counts = layout.commanded.tolist()
+        demanded = [target[axis] if counts[axis] else math.nan for axis in range(6)]
+    delivered = None if shown_allocation is None else shown_allocation.wrench.tolist()
+    return wrench_bars(demanded, delivered)
 
 
-def wrench_bars(demanded: ArrayLike, delivered: ArrayLike | None) -> str:
+def wrench_bars(demanded: Sequence[float], delivered: Sequence[float] | None) -> str:
     """The bars of all six axes.
 
     Args:
         demanded: wrench (6,) [N, N m], NaN where an axis is free.
         delivered: wrench (6,) [N, N m]; None while there is no answer.
     """
-    demanded = np.asarray(demanded, dtype=float)
-    delivered = None if delivered is None else np.asarray(delivered, dtype=float)
-    target = np.nan_to_num(demanded)
-    values = np.array([target, target if delivered is None else delivered])
+    demands = [None if math.isnan(value) else round(value, PLACES) for value in demanded]
+    deliveries: list[float | None] = [None] * 6
+    if delivered is not None:
+        deliveries = [round(value, PLACES) for value in delivered]
     # One scale for the forces and one for the torques, so that bars compare; it moves in coarse
     # steps only.
-    force_scale = max(nice_limit(np.abs(values[:, :3]).max()), LEAST_FORCE_SCALE)
-    torque_scale = max(nice_limit(np.abs(values[:, 3:]).max()), LEAST_TORQUE_SCALE)
+    sizes = [max(abs(demands[axis] or 0.0), abs(deliveries[axis] or 0.0)) for axis in range(6)]
+    force_scale = max(nice_limit(max(sizes[:3])), LEAST_FORCE_SCALE)
+    torque_scale = max(nice_limit(max(sizes[3:])), LEAST_TORQUE_SCALE)
     rows = []
     for axis in range(6):
-        axis_demand = None if np.isnan(demanded[axis]) else float(demanded[axis])
-        axis_delivery = None if delivered is None else float(delivered[axis])
         scale = force_scale if axis < 3 else torque_scale
-        rows.append(_bar_row(axis, axis_demand, axis_delivery, scale))
-    header = BARS_HEADER.format(f"±{force_scale:g} N, ±{torque_scale:g} N m")
-    return html("<div class='fl'><div class='bars'>{}{}</div></div>", header, Markup("".join(rows)))
+        rows.append(_bar_row(axis, demands[axis], deliveries[axis], scale))
+    header = _bars_header(force_scale, torque_scale)
+    return Markup(f"<div class='fl'><div class='bars'>{header}{''.join(rows)}</div></div>")
+
+
+@lru_cache(maxsize=32)
+def _bars_header(force_scale: float, torque_scale: float) -> str:
+    """What stands above the bars, whose ends stand for a force [N] and a torque [N m]."""
+    return BARS_HEADER.format(f"±{force_scale:g} N, ±{torque_scale:g} N m")
 
 
 def nice_limit(value: float) -> float:
@@ -108,9 +121,11 @@ def nice_limit(value: float) -> float:
     return decade * 10.0
 
 
+@lru_cache(maxsize=256)
 def _bar_row(axis: int, demanded: float | None, delivered: float | None, scale: float) -> str:
     """Name, bars and figures of one axis [N or N m], of which nothing is demanded where it is free;
-    a bar as long as half the track stands for `scale`."""
+    a bar as long as half the track stands for `scale`. Rows are kept: a step of a slider changes
+    one or two."""
     missing = None if demanded is None or delivered is None else demanded - delivered
     bars = []  # start and end [N or N m], px from the track's upper edge, colour
     if demanded is not None:
@@ -176,45 +191,66 @@ def fin_table(
         full_thrust: largest force (n,) of each actuator [N].
         selected: name of the selected actuator, whose row is marked.
     """
-    limits = None if allocation is None else saturated(allocation)
     is_damaged = damage != NO_DAMAGE
     rows = []
+    cells = [NO_CELLS] * layout.n
+    is_lost = [False] * layout.n
+    if allocation is not None:
+        cells = _cells(layout, allocation, full_thrust)
+        is_lost = [row == LOST_CELLS for row in cells]
     for i, actuator in enumerate(layout.actuators):
-        is_lost = allocation is not None and not np.isfinite(allocation.command[i, 0])
-        style = " ".join(["dead"] * is_lost + ["chosen"] * (actuator.name == selected))
-        faults = ""
-        if is_damaged and not is_lost:
-            faults = damage_words(damage, actuator.name, actuator.KIND.sticks_at_angle)
-        remark = html("<div class='missing damage'>{}</div>", faults) if faults else ""
-        if allocation is None or limits is None:
-            cells: str = Markup("<td>–</td>") * 5
-        elif is_lost:
-            cells = Markup("<td colspan='5'>lost</td>")
-        else:
-            force = float(np.linalg.norm(allocation.forces[i]))
-            load = min(force / max(full_thrust[i], 1e-9), 1.0)
-            bar = f"width:{100 * load:.0f}%;background:{css(fin_color(i))}"
-            meter = Markup(f"<span class='meter'><i style='{bar}'></i></span>")
-            if isinstance(actuator, Fin):
-                cells = _fin_cells(allocation.command[i], limits[i], force, meter)
-            else:
-                cells = _plain_cells(actuator, allocation.command[i], limits[i], force, meter)
-        row = "<tr class='{}'><td>{}<span class='name' title='{}'>{}</span>{}</td>{}</tr>"
         name = actuator.name
-        rows.append(html(row, style, swatch(i, is_lost), name, name, remark, cells))
+        faults = ""
+        if is_damaged and not is_lost[i]:
+            faults = damage_words(damage, name, actuator.KIND.sticks_at_angle)
+        rows.append(f"{_row_head(i, name, is_lost[i], name == selected, faults)}{cells[i]}</tr>")
     template = FIN_HEADER if layout.fins else PLAIN_HEADER
     header = html(template, "fin" if layout.is_of_fins else "")
-    return html("<div class='fl'><table class='fins'>{}{}</table></div>", header, rows)
+    return Markup(f"<div class='fl'><table class='fins'>{header}{''.join(rows)}</table></div>")
 
 
-def _fin_cells(command: Array, limits: NDArray[np.bool_], force: float, meter: Markup) -> str:
+@lru_cache(maxsize=256)
+def _row_head(index: int, name: str, is_lost: bool, is_selected: bool, faults: str) -> str:
+    """How the row of an actuator begins: its number and name, and what is wrong with it."""
+    style = " ".join(["dead"] * is_lost + ["chosen"] * is_selected)
+    remark = html("<div class='missing damage'>{}</div>", faults) if faults else ""
+    row = "<tr class='{}'><td>{}<span class='name' title='{}'>{}</span>{}</td>"
+    return html(row, style, swatch(index, is_lost), name, name, remark)
+
+
+def _cells(layout: Layout, allocation: Allocation, full_thrust: Array) -> list[str]:
+    """The cells beside the name of each actuator: its command, its force and its load."""
+    limits = saturated(allocation)
+    commands = allocation.command.tolist()
+    forces = allocation.forces.tolist()
+    most = full_thrust.tolist()
+    cells = []
+    for i, actuator in enumerate(layout.actuators):
+        command = commands[i]
+        if not math.isfinite(command[0]):
+            cells.append(LOST_CELLS)
+            continue
+        force = math.hypot(*forces[i])
+        load = min(force / max(most[i], 1e-9), 1.0)
+        bar = f"width:{100 * load:.0f}%;background:{css(fin_color(i))}"
+        meter = f"<span class='meter'><i style='{bar}'></i></span>"
+        if isinstance(actuator, Fin):
+            cells.append(_fin_cells(command, limits[i], force, meter))
+        else:
+            cells.append(_plain_cells(actuator, command, limits[i], force, meter))
+    return cells
+
+
+def _fin_cells(
+    command: Sequence[float], limits: tuple[bool, bool], force: float, meter: str
+) -> str:
     """Half amplitude, frequency and zero direction of a fin, its force [N] and its load; those of
-    the first two that are at a limit (2,) are marked."""
-    amplitude, frequency, direction = command.tolist()
+    the first two that are at a limit are marked."""
+    amplitude, frequency, direction = command
     amplitude_style = "full" if limits[0] else ""
     frequency_style = "full" if limits[1] else ""
     angle = f"{round(math.degrees(direction)):+d}".replace("-", "−")
-    return Markup(
+    return (
         f"<td class='{amplitude_style}'>{math.degrees(amplitude):.1f}</td>"
         f"<td class='{frequency_style}'>{frequency:.2f}</td>"
         f"<td>{angle}</td><td>{force:.2f}</td><td>{meter}</td>"
@@ -222,7 +258,11 @@ def _fin_cells(command: Array, limits: NDArray[np.bool_], force: float, meter: M
 
 
 def _plain_cells(
-    actuator: Actuator, command: Array, limits: NDArray[np.bool_], force: float, meter: Markup
+    actuator: Actuator,
+    command: Sequence[float],
+    limits: tuple[bool, bool],
+    force: float,
+    meter: str,
 ) -> str:
     """Type of an actuator that is no fin, its angle where it has one, its force [N] and its load;
     the force is marked where a number of its command is at a limit."""
@@ -235,7 +275,7 @@ def _plain_cells(
     return html(
         "<td colspan='3' class='words'>{}</td><td class='{}'>{}</td><td>{}</td>",
         remark,
-        "full" if limits.any() else "",
+        "full" if any(limits) else "",
         f"{round(along, 2) + 0.0:.2f}".replace("-", "−"),
-        meter,
+        Markup(meter),
     )

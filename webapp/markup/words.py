@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 from markupsafe import Markup
-from numpy.typing import NDArray
 
 import finlab.display
 from finlab.actuators.kinds import free_angles
@@ -240,22 +239,30 @@ def trim_sentence(layout: Layout, reach: Array) -> str | None:
     )
 
 
-def saturated(allocation: Allocation) -> NDArray[np.bool_]:
-    """Which of the first two numbers of commands (n, 2) are at their limits, but for free
-    angles."""
-    layout = allocation.layout
-    command = allocation.command[:, :2]
-    turns = _turning(layout)[:, :2]
-    with np.errstate(invalid="ignore"):
-        high = (command >= AT_LIMIT * layout.upper[:, :2]) & (layout.upper[:, :2] > 0.0)
-        low = (command <= AT_LIMIT * layout.lower[:, :2]) & (layout.lower[:, :2] < 0.0)
-    return np.asarray((high | low) & ~turns)
+def saturated(allocation: Allocation) -> list[tuple[bool, bool]]:
+    """Which of the first two numbers of each command are at their limits, but for free angles."""
+    at_limits = []
+    limits = _limits(allocation.layout)
+    for command, (first, second) in zip(allocation.command.tolist(), limits, strict=True):
+        is_first = command[0] >= first[1] or command[0] <= first[0]
+        is_second = command[1] >= second[1] or command[1] <= second[0]
+        at_limits.append((is_first, is_second))
+    return at_limits
+
+
+Interval = tuple[float, float]
 
 
 @lru_cache(maxsize=8)
-def _turning(layout: Layout) -> NDArray[np.bool_]:
-    """Which numbers of the commands (n, 3) are free angles, without limits."""
-    return free_angles(layout.actuators)
+def _limits(layout: Layout) -> list[tuple[Interval, Interval]]:
+    """Values at and beyond which the first two numbers of each command count as saturated; infinite
+    where one has no limit: at 0, and of free angles."""
+    turns = free_angles(layout.actuators)[:, :2]
+    is_above = (layout.upper[:, :2] > 0.0) & ~turns
+    is_below = (layout.lower[:, :2] < 0.0) & ~turns
+    high = np.where(is_above, AT_LIMIT * layout.upper[:, :2], np.inf).tolist()
+    low = np.where(is_below, AT_LIMIT * layout.lower[:, :2], -np.inf).tolist()
+    return [((low[i][0], high[i][0]), (low[i][1], high[i][1])) for i in range(layout.n)]
 
 
 def parts_word(layout: Layout) -> str:

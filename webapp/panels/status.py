@@ -8,6 +8,7 @@ from markupsafe import Markup
 
 from finlab.allocation.allocation import Allocation
 from finlab.axes import AXES, UNITS
+from finlab.layout import Layout
 from finlab.physics.objective import REACHED
 from webapp.handles import set_properties
 from webapp.markup.verdict import COLORS, WORKING, verdict_of, verdict_sentence
@@ -184,9 +185,7 @@ def corner(
         refined: the step of the refinement of that mode; empty at its end.
         badge: where that mode comes from.
     """
-    count = state.layout.n
-    fins = f"{count - len(state.lost)} of {count} {parts_word(state.layout)}"
-    markup = [html("<span class='aside'>{}</span>", fins)]
+    markup = [_working_words(state.layout, state.lost)]
     if error is not None:
         markup.append(html("<span class='missing'>{}</span>", error))
     elif busy or allocation is None:  # an old verdict would be taken for that of the new question
@@ -195,13 +194,18 @@ def corner(
             html("<span class='pill' style='background:{}'>{}</span>", css(DEAD), WORKING)
         )
     else:
-        markup += _figures(allocation, least, in_reach, refined, badge)
+        markup.append(_figures(allocation, least, in_reach, refined, badge))
     return _cards(legend, markup)
 
 
-def _figures(
-    allocation: Allocation, least: bool, in_reach: bool, refined: str, badge: str
-) -> list[str]:
+@lru_cache(maxsize=32)
+def _working_words(layout: Layout, lost: tuple[str, ...]) -> str:
+    """How many of the actuators work."""
+    words = f"{layout.n - len(lost)} of {layout.n} {parts_word(layout)}"
+    return html("<span class='aside'>{}</span>", words)
+
+
+def _figures(allocation: Allocation, least: bool, in_reach: bool, refined: str, badge: str) -> str:
     """Error, power, effort, method and verdict of an answer; arguments as for `corner`."""
     color = DEAD if refined else COLORS[verdict_of(allocation, in_reach)]
     sentence = refined or verdict_sentence(allocation, in_reach)
@@ -210,7 +214,11 @@ def _figures(
     rest = ", ".join([f"{axis} {value:+.2g} {unit}" for axis, value, unit in missing]).replace(
         "-", "−"
     )
-    costs = []
+    method = allocation.method
+    figures = [
+        f"<span title='missing, as a share of what the robot can push: {rest}'><span class='dim'>"
+        f"error</span> <b class='err'>{error_digits(allocation.err_norm)}</b></span>"
+    ]
     kinds = (
         ("power", "watts", allocation.power, " W"),
         ("effort", "effort", allocation.effort, ""),
@@ -218,25 +226,19 @@ def _figures(
     for word, kind, value, unit in kinds:
         if value is None:  # effort is of fins
             continue
-        is_least = least and LEAST.get(kind) == allocation.method
-        label = f"least {word}" if is_least else word
-        cost = "<span><span class='dim'>{}</span> <b class='{}'>{}</b>{}</span>"
-        costs.append(html(cost, label, word, three_digits(value), unit))
-    method = allocation.method
+        label = f"least {word}" if least and LEAST.get(kind) == method else word
+        figures.append(
+            f"<span><span class='dim'>{label}</span> <b class='{word}'>{three_digits(value)}</b>"
+            f"{unit}</span>"
+        )
     ms = allocation.solve_ms
     time = f"{ms:.2g}" if ms < FEW_MS else f"{ms:.0f}"
     who = html("<span class='dim'>{}</span> {} ms", method, time) if least else badge or "network"
-    return [
-        html(
-            "<span title='missing, as a share of what the robot can push: {}'>"
-            "<span class='dim'>error</span> <b class='err'>{}</b></span>",
-            rest,
-            error_digits(allocation.err_norm),
-        ),
-        *costs,
-        html("<span class='aside'>{}</span>", who),
-        html("<span class='{}' style='background:{}'>{}</span>", pill, css(color), sentence),
-    ]
+    figures.append(html("<span class='aside'>{}</span>", who))
+    figures.append(
+        html("<span class='{}' style='background:{}'>{}</span>", pill, css(color), sentence)
+    )
+    return Markup("".join(figures))
 
 
 def swim_corner(swimmer: Swimmer, moment: Moment, pace: str, newtons: float) -> str:

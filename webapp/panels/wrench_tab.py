@@ -76,6 +76,7 @@ def add_target(page: Page) -> None:
     page.presses.on("axis", lambda key, _modifier: session.toggle_axis(placed(key, 6)))
     sliders: list[Any] = [_add_slider(page, k) for k in range(6)]
     ends = [1.0] * 6
+    limits = [0.0] * 6
 
     def reach(able: Layout, lost: tuple[str, ...], flow: Flow | None) -> None:
         ends[:] = [slider_end(size) for size in axis_reach(able, lost, flow).tolist()]
@@ -84,10 +85,12 @@ def add_target(page: Page) -> None:
         target: tuple[float, ...], able: Layout, lost: tuple[str, ...], flow: Flow | None
     ) -> None:
         """Show the target; first the ends: a value beyond them would not be shown."""
-        for value, slider, end in zip(target, sliders, ends, strict=True):
-            limit = max(end, abs(value))
-            slider.max = limit
-            slider.min = -limit
+        for axis, slider in enumerate(sliders):
+            value = target[axis]
+            limit = max(ends[axis], abs(value))
+            if limit != limits[axis]:
+                limits[axis] = slider.max = limit
+                slider.min = -limit
             rounded = round(value, 4) + 0.0
             if slider.value != rounded:
                 slider.value = rounded
@@ -100,7 +103,7 @@ def add_target(page: Page) -> None:
     def mark(ranges: Ranges | None, able: Layout, target: Any) -> Markup:
         """Show what is within reach on the sliders: the marks of all are one message."""
         del target  # it may have moved the ends
-        markup: Markup = style(ranges, able, *[slider.max for slider in sliders])
+        markup: Markup = style(ranges, able, *limits)
         return markup
 
     def hint(ranges: Ranges | None, able: Layout, lost: tuple[str, ...], flow: Flow | None) -> None:

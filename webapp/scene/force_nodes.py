@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.swim.hull.mesh_file import Mesh
+from webapp.handles import set_properties
 from webapp.scene.actuator_shapes import CHORD, ROOT, SHORTEST, SPAN
 from webapp.theme import Rgb, fin_color
 
@@ -45,6 +46,7 @@ class Arrows:
             head_length=HEAD_LENGTH * thickness,
             visible=False,
         )
+        self._is_visible = False
 
     def show(self, starts: Array, vectors: Array, colors: NDArray[np.uint8], size: float) -> None:
         """Show arrows; those of no length are left out.
@@ -55,14 +57,23 @@ class Arrows:
             colors: of each (n, 3), in linear light.
             size: factor of the thickness of their shafts.
         """
-        is_drawn = np.linalg.norm(vectors, axis=1) > SHORTEST * size
-        self.node.visible = bool(is_drawn.any())
-        if not is_drawn.any():
+        is_drawn = (vectors * vectors).sum(axis=1) > (SHORTEST * size) ** 2
+        n_drawn = int(is_drawn.sum())
+        is_visible = n_drawn > 0
+        if is_visible != self._is_visible:
+            self.node.visible = self._is_visible = is_visible
+        if not is_visible:
             return
-        points = np.stack([starts, starts + vectors], axis=1)[is_drawn] / size
-        self.node.scale = size
-        self.node.colors = colors[is_drawn]
-        self.node.points = points.round(DIGITS).astype(np.float32)
+        points = np.empty((len(starts), 2, 3))
+        points[:, 0] = starts
+        points[:, 1] = starts + vectors
+        points /= size
+        if n_drawn < len(points):
+            points = points[is_drawn]
+            colors = colors[is_drawn]
+        set_properties(
+            self.node, scale=size, colors=colors, points=points.round(DIGITS).astype(np.float32)
+        )
 
 
 class ForceNodes:
@@ -91,6 +102,8 @@ class ForceNodes:
         """Of each actuator (n, 3), in linear light."""
         self._middles = self._turns = self._starts = np.zeros((0, 3))
         self._sizes = (1.0, 1.0)
+        self._swept = np.zeros((2, 0))
+        """Half angles and angles [rad] of the fans that are shown (2, n)."""
 
     def place(self, layout: Layout, sizes: tuple[float, float]) -> None:
         """Where actuators stand; `sizes` are of them and of arrows."""
@@ -99,11 +112,17 @@ class ForceNodes:
         shafts = layout.frames[:, 0] * layout.is_fin[:, None]
         self._starts = layout.position + size * (ROOT + SPAN / 2) * shafts
         self._turns = np.array([quaternion(frame.T) for frame in layout.frames])
+        self._swept = np.zeros((2, 0))  # the fans are elsewhere
 
     def command(self, forces: Array, amplitudes: Array, angles: Array) -> None:
         """Show forces (n, 3) as arrows [m], and fans of half angles (n,) about angles (n,)
         [rad]."""
         self._arrows.show(self._starts, forces, self._colors, self._sizes[1])
+        swept = np.array([amplitudes, angles]).round(DIGITS)
+        if np.array_equal(swept, self._swept):
+            return
+        self._swept = swept
+        amplitudes, angles = swept
         beats = amplitudes > 0.0
         fans = self._fans
         fans.visible = bool(beats.any())
@@ -115,12 +134,14 @@ class ForceNodes:
         scales = np.full((*across.shape, 3), size)
         scales[..., 2] *= np.tan(half) / math.tan(WEDGE)
         turns = turned_about_x(self._turns[beats, None], across)
-        fans.batched_colors = np.repeat(self._colors[beats], WEDGES, axis=0)
-        fans.batched_positions = _rows(
-            np.broadcast_to(self._starts[beats, None], (*across.shape, 3))
+        positions = np.broadcast_to(self._starts[beats, None], (*across.shape, 3))
+        set_properties(
+            fans,
+            batched_colors=np.repeat(self._colors[beats], WEDGES, axis=0),
+            batched_positions=_rows(positions),
+            batched_scales=_rows(scales),
+            batched_wxyzs=_rows(turns),
         )
-        fans.batched_scales = _rows(scales)
-        fans.batched_wxyzs = _rows(turns)
 
 
 def _rows(values: Array) -> NDArray[np.float32]:

@@ -1,10 +1,10 @@
 """The whole 3D view of one browser."""
 
-import json
 import math
 from functools import partial
 from typing import Any
 
+import msgspec
 import numpy as np
 import viser
 
@@ -250,7 +250,7 @@ class RobotScene:
         speed, still = (
             (SPEED, display.frozen) if moment is None else (swim.speed, paused or moment.done)
         )
-        moves = json.dumps([self._moves, speed, still])[1:-1]
+        moves = msgspec.json.encode([self._moves, speed, still]).decode()[1:-1]
         if moves != self._flaps:
             self._flaps = moves
             run_script(self._client.gui, f"finlabFrames.flap({moves});")

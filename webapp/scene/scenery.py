@@ -76,7 +76,8 @@ class Scenery:
             self._swam = swim_scale(swimmer, self._swam)
             return self._swam
         self._swam = INITIAL_SCALE
-        if (target, shown_allocation) != self._fitted:
+        fitted = self._fitted
+        if fitted is None or fitted[0] != target or fitted[1] is not shown_allocation:
             try:
                 self._scale = fitting_scale(target, shown_allocation, self._scale)
                 self._fitted = (target, shown_allocation)

@@ -1,5 +1,6 @@
 """Nodes of the target wrench, and the needle by which the selected actuator is turned."""
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -53,14 +54,14 @@ def fitting_scale(
     target: Sequence[float], shown_allocation: Allocation | None, now: Scale
 ) -> Scale:
     """The scale for a target (6,) and what is shown of it; `now` as far as that is good enough."""
-    demanded = np.array(target)
-    forces = [demanded[:3]]
-    torques = [demanded[3:]]
+    forces = [list(target[:3])]
+    torques = [list(target[3:])]
     if shown_allocation is not None:
-        forces += [shown_allocation.wrench[:3], *shown_allocation.forces]
-        torques += [missing_part(shown_allocation)[3:], shown_allocation.wrench[3:]]
-    force = float(np.sqrt((np.array(forces) ** 2).sum(axis=1).max()))
-    torque = float(np.sqrt((np.array(torques) ** 2).sum(axis=1).max()))
+        wrench = shown_allocation.wrench.tolist()
+        forces += [wrench[:3], *shown_allocation.forces.tolist()]
+        torques += [missing_part(shown_allocation)[3:].tolist(), wrench[3:]]
+    force = max([math.hypot(*vector) for vector in forces])
+    torque = max([math.hypot(*vector) for vector in torques])
     newtons = fitting(NEWTONS, force, now.newtons, LENGTH, ARROWS)
     return Scale(newtons, fitting(TORQUES, torque, now.torque, LENGTH, RINGS))
 
@@ -114,6 +115,8 @@ class WrenchNodes:
             part("missing_torque", MISSING, unit_ring(0.05)),
         )
         self._torques = [UnitMesh(ring, about_z) for ring in rings]
+        self._placed: tuple[float, float] | None = None
+        """Top of the hull [m] and size that the nodes stand for."""
 
     def refresh(
         self,
@@ -128,19 +131,24 @@ class WrenchNodes:
         """Show a target (6,) [N, N m], what is delivered of it (zero while unknown), and what is
         missing enough to be drawn; `top` is the hull's [m], `scale` of arrows [m/N], `turn` of
         rings [m/(N m)]."""
-        self._root.position = np.array([0.0, 0.0, top + HEIGHT * size])
-        for node in self._nodes:
-            node.scale = size
+        if (top, size) != self._placed:
+            self._placed = top, size
+            self._root.position = np.array([0.0, 0.0, top + HEIGHT * size])
+            for node in self._nodes:
+                set_properties(node, scale=size)
         asked_force = size * scale * target[:3]
         delivered = size * scale * got[:3]
-        starts = np.stack([np.zeros(3), delivered])
-        vectors = np.stack([delivered, size * scale * missing[:3]])
+        starts = np.zeros((2, 3))  # the missing force begins where the delivered one ends
+        starts[1] = delivered
+        vectors = np.empty((2, 3))
+        vectors[0] = delivered
+        vectors[1] = size * scale * missing[:3]
         self._forces.show(starts, vectors, FORCE_COLORS, size)
-        length = float(np.linalg.norm(asked_force))
+        length = math.hypot(*asked_force.tolist())
         self._asked_force.show(asked_force, length, (round(length, DIGITS), size, size))
         for ring, wrench in zip(self._torques, (target, got, missing), strict=True):
             torque = wrench[3:]
-            length = float(np.linalg.norm(torque))
+            length = math.hypot(*torque.tolist())
             radius = round(size * turn * length, DIGITS)
             ring.show(torque, length, (radius, radius, radius))
 
@@ -153,6 +161,8 @@ class UnitMesh:
         self.node = node
         self._turn = turn
         self._direction = np.zeros(3)
+        self._scale = (0.0, 0.0, 0.0)
+        self._is_visible = True
 
     def show(self, vector: Array, length: float, scale: tuple[float, float, float]) -> None:
         """Turn the mesh to a vector and scale it; one of no length is hidden.
@@ -162,10 +172,14 @@ class UnitMesh:
             length: of that vector.
             scale: of the mesh along its own axes.
         """
-        self.node.visible = is_seen = scale[0] > SHORTEST
-        if not is_seen:
+        is_visible = scale[0] > SHORTEST
+        if is_visible != self._is_visible:
+            self.node.visible = self._is_visible = is_visible
+        if not is_visible:
             return
-        self.node.scale = scale
+        if scale != self._scale:
+            self._scale = scale
+            set_properties(self.node, scale=scale)
         direction = vector / length
         if abs(direction - self._direction).max() > 1e-4:
             self._direction = direction

@@ -84,6 +84,14 @@ class State:
             other, layout=self.layout, damage=self.damage, links=self.links, method=method
         )
 
+    def is_same_but_target(self, other: "State") -> bool:
+        """Whether another state asks the same robot in the same way, for this wrench or another."""
+        is_same_robot = self.layout is other.layout and self.damage is other.damage
+        is_same_method = self.method == other.method and self.policy == other.policy
+        is_same_network = self.network == other.network and self.temperature == other.temperature
+        is_as_fast = self.speed == other.speed
+        return is_same_robot and is_same_method and is_same_network and is_as_fast
+
     def with_target(self, axis: int, value: Any) -> "State":
         """One component of the target changed."""
         target = list(self.target)

@@ -70,7 +70,9 @@ class Answering:
         pool = context.pools.answers
         bell = context.bell
         solver = context.solver
-        self.slot: Slot[State, Reply] = Slot(pool, bell, solver.reply, live=True, title="No answer")
+        self.slot: Slot[State, Reply] = Slot(
+            pool, bell, solver.reply, live=True, title="No answer", alike=State.is_same_but_target
+        )
         self.search: Slot[ModeSearch, Modes] = Slot(
             pool, bell, search_modes, rest_s=SEARCH_REST_S, title="No candidates"
         )

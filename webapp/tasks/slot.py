@@ -1,14 +1,19 @@
 """Questions that take time: asked on the event loop, answered on threads; the newest one counts.
 
+What takes less time than to hand it to a thread is answered on the loop.
+
 A `Slot` keeps what one page has asked of one kind, and what came of it. Nothing is locked: a
 question is frozen, an answer is never changed, and all that a slot holds belongs to the event loop.
 """
 
 import asyncio
+import math
 import threading
+import time
 import traceback
 from collections.abc import Callable, Hashable
 from concurrent.futures import Future
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from functools import partial
 from queue import SimpleQueue
@@ -18,6 +23,8 @@ from finlab.errors import FinlabError
 
 Question = TypeVar("Question")
 Answer = TypeVar("Answer")
+QUICK_S = 0.003
+"""Processor time up to which the loop of all pages may answer a question itself [s]."""
 Job = tuple["Future[Any]", Callable[[], Any]]
 """What a thread has to do: the future of its result, and the function that makes that."""
 
@@ -28,6 +35,8 @@ class Pool:
     def __init__(self, size: int = 1) -> None:
         """Start so many threads; they do not keep the process from ending."""
         self._jobs: SimpleQueue[Job | None] = SimpleQueue()
+        self._turn = threading.Lock() if size == 1 else None
+        """Held while a job of a single thread is done."""
         self._threads = [threading.Thread(target=self._run, daemon=True) for _ in range(size)]
         for thread in self._threads:
             thread.start()
@@ -36,6 +45,21 @@ class Pool:
         """Have a job done; one that is cancelled before it has begun is left out."""
         future: Future[Answer] = Future()
         self._jobs.put((future, work))
+        return future
+
+    def do_now(self, work: Callable[[], Answer]) -> "Future[Answer] | None":
+        """Do a job on the calling thread, in place of the pool's single one; None where that is at
+        work, has something to do, or is not alone."""
+        turn = self._turn
+        if turn is None or not self._jobs.empty() or not turn.acquire(blocking=False):
+            return None
+        future: Future[Answer] = Future()
+        try:
+            future.set_result(work())
+        except BaseException as error:  # whoever asked is told
+            future.set_exception(error)
+        finally:
+            turn.release()
         return future
 
     def stop(self) -> None:
@@ -50,10 +74,11 @@ class Pool:
             future, work = job
             if not future.set_running_or_notify_cancel():
                 continue
-            try:
-                future.set_result(work())
-            except BaseException as error:  # whoever asked is told, and the others go on
-                future.set_exception(error)
+            with self._turn or nullcontext():
+                try:
+                    future.set_result(work())
+                except BaseException as error:  # whoever asked is told, and the others go on
+                    future.set_exception(error)
 
 
 @dataclass(frozen=True)
@@ -139,6 +164,8 @@ class Work(Generic[Question]):
         """Set when nobody waits for the answer any more, or for no more of it."""
         self.progress: Any = None
         self.future: Future[Any] | None = None
+        self.took_s = math.inf
+        """Processor time that the answer took [s]; infinite until it is there."""
         self._tell = tell
 
     def report(self, progress: Any) -> None:
@@ -161,6 +188,7 @@ class Slot(Generic[Question, Answer]):
         watched: bool = False,
         stage: str | None = None,
         title: str = "",
+        alike: Callable[[Question, Question], bool] | None = None,
     ) -> None:
         """An empty slot.
 
@@ -177,6 +205,8 @@ class Slot(Generic[Question, Answer]):
             stage: progress of work that has reported nothing yet.
             title: heading of the note that tells of an error; empty where the page says it
                 elsewhere.
+            alike: whether two questions take about as long. Where the last one was answered within
+                `QUICK_S`, one like it is answered on the loop: to hand it to a thread takes longer.
         """
         self._pool = pool
         self._bell = bell
@@ -186,6 +216,9 @@ class Slot(Generic[Question, Answer]):
         self._watched = watched
         self._stage = stage
         self.title = title
+        self._alike = alike
+        self._took_s = math.inf
+        """Processor time that the last answer took [s]."""
         self._work: Work[Question] | None = None
         self._rest: Timer | None = None
         """Begins to work on the question when it has not changed for some time."""
@@ -236,6 +269,7 @@ class Slot(Generic[Question, Answer]):
         self.answered = work.question
         error_before = self.error
         self.answer = self.error = None
+        self._took_s = work.took_s
         try:
             self.answer = future.result()
         except FinlabError as error:
@@ -269,11 +303,31 @@ class Slot(Generic[Question, Answer]):
         self._rest = None
         ring = partial(self._bell.ring_from_thread, self)
         work = Work(self.question, ring)
-        watch = (work,) if self._watched else ()
-        work.future = self._pool.submit(partial(self._solve, work.question, *watch))
-        work.future.add_done_callback(ring)
+        answer = partial(self._answer, work)
+        is_quick = (
+            self._took_s <= QUICK_S
+            and self._alike is not None
+            and self.answered is not None
+            and self._alike(self.answered, self.question)
+        )
+        if is_quick:
+            work.future = self._pool.do_now(answer)
         self._work = work
+        if work.future is not None and work.future.exception() is None:
+            self.attend()
+            return
+        if work.future is None:
+            work.future = self._pool.submit(answer)
+        work.future.add_done_callback(ring)
         self.progress = self._stage
+
+    def _answer(self, work: Work[Question]) -> Answer:
+        """The answer to a question, on any thread."""
+        watch = (work,) if self._watched else ()
+        start = time.thread_time()
+        answer = self._solve(work.question, *watch)
+        work.took_s = time.thread_time() - start
+        return answer
 
     def _cancel(self) -> None:
         """Gives up the work that is under way."""
