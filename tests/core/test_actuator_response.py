@@ -288,7 +288,7 @@ def test_a_set_goes_as_far_along_prices_as_its_farthest_force(name: str) -> None
             for price in prices_of(robot, i, rng, 8):
                 found = np.zeros(2)
                 functions().fl_support_of_set(
-                    at(robot.block), i, ctypes.byref(limits), at(price), at(found)
+                    at(robot.block), i, ctypes.byref(limits), at(price), at(found), None
                 )
                 best = (force @ price).max()
                 scale = np.abs(price).max() * max(np.abs(force).max(), 1e-9)

@@ -42,7 +42,8 @@ static quadratic_cost quadratic_of(const real *block, const fl_actuator *a, real
 /* Force over price at a share of the largest force, over the secant of that [1]. Where the cost is
    ~ T^1.5, as of all laws nearly, it is the root of the share; the table of a line whose cost is
    another one says it. */
-static real secant_at(const real *block, int i, real price, real share, const quadratic_cost *cost) {
+static real secant_at(const real *block, int i, real price, real share,
+                      const quadratic_cost *cost) {
   const fl_actuator *a = ACTUATOR(block, i);
   const int has_cells = table_for(block, a, price)[1] > 1;
   if (a->rows != 1 || !has_cells) return SQRT(share);
@@ -109,8 +110,8 @@ static real price_of_largest_force(const real *block, const fl_actuator *a, real
   return price_max * a->power_scale / a->force_scale;
 }
 
-/* What the rim of the attainable set with an outer normal n asks of each actuator: those that n has a
-   price for give the farthest force along n. The others, at whose forces n is 0, give what is left. */
+/* What the rim of the attainable set with an outer normal n asks of each actuator: those that n has
+   a price for give the farthest force along n. The others, whose price is 0, give what is left. */
 typedef struct {
   int is_other[FL_MOST];
   int others; /* how many there are */
@@ -197,8 +198,7 @@ void fl_first_lambda_at_rim(const real *block, fl_work *work, const real *target
   /* The last share of a force may have a price without end. */
   for (int k = 0; k < SEARCH_STEPS; k++) {
     const real shorter = t / SEARCH_FACTOR;
-    const real lost =
-        lost_along(block, work, target_reduced, normal, nu, shorter, -to_target);
+    const real lost = lost_along(block, work, target_reduced, normal, nu, shorter, -to_target);
     if (lost > least) break;
     t = shorter;
   }
@@ -206,9 +206,9 @@ void fl_first_lambda_at_rim(const real *block, fl_work *work, const real *target
 }
 
 /* Multipliers to begin with at a target that lies so far `inside` of the rim along its normal n, of
-   those of a target at the rim, which become them: t n + nu with a smaller t. What forces lose along
-   n by nu grows about as 1 / t^2, by those that are no longer the largest it grows faster: t is
-   looked for at which they lose about as much as the target does. */
+   those of a target at the rim, which become them: t n + nu with a smaller t. What forces lose
+   along n by nu grows about as 1 / t^2, by those that are no longer the largest it grows faster: t
+   is looked for at which they lose about as much as the target does. */
 void fl_first_lambda_inside(const real *block, fl_work *work, const real *target_reduced,
                             const real *normal, real inside, real *lambda) {
   const real squared = dot(normal, normal, 6);
