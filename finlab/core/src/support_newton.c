@@ -43,16 +43,16 @@ typedef struct {
   wide normal[6];      /* m */
   wide last_normal[6]; /* m_k */
   wide sigma;
-  wide rho;                      /* of a force whose half range is 1 N */
-  wide ray_size;                 /* t */
-  wide gradient[6];              /* of the rounded function; of a ray less t e */
-  wide middle[FL_MOST];          /* of a line's forces [N] */
-  wide half[FL_MOST];            /* half range of a line, radius of a plane [N] */
-  wide force[FL_MOST][2];        /* y [N] */
-  wide force_center[FL_MOST][2]; /* z [N] */
-  wide price[FL_MOST][2];        /* s */
-  wide change[FL_MOST][2];       /* of the prices in a step */
-  wide slope[FL_MOST][3];        /* dy/ds: xx, xy, yy */
+  wide rho;                /* of a force whose half range is 1 N */
+  wide ray_size;           /* t */
+  wide gradient[6];        /* of the rounded function; of a ray less t e */
+  wide middle[FL_MOST];    /* of a line's forces [N] */
+  wide half[FL_MOST];      /* half range of a line, radius of a plane [N] */
+  wide (*force)[2];        /* y (n, 2) [N] */
+  wide (*force_center)[2]; /* z (n, 2) [N] */
+  wide price[FL_MOST][2];  /* s */
+  wide change[FL_MOST][2]; /* of the prices in a step */
+  wide slope[FL_MOST][3];  /* dy/ds: xx, xy, yy */
 } support_problem;
 
 static int is_line(const support_problem *p, int i) { return ACTUATOR(p->block, i)->rows == 1; }
@@ -329,6 +329,13 @@ static int come_to_optimum(support_problem *p, wide close) {
   return 0;
 }
 
+/* Keeps forces and their centres where a mixture has room for two more points; whether it has. */
+static int has_room(support_problem *p, fl_mixture *m) {
+  p->force = m->force[FL_POINTS - 2];
+  p->force_center = m->force[FL_POINTS - 1];
+  return m->count <= FL_POINTS - 2;
+}
+
 /* Makes the mixture one point, that of the forces. */
 static void make_mixture(const support_problem *p, fl_mixture *m) {
   m->count = 1;
@@ -340,7 +347,8 @@ static void make_mixture(const support_problem *p, fl_mixture *m) {
 }
 
 /* Makes a mixture the point nearest to a target (6,) in weighted axes, from a normal (6,) on that
-   parts it from the set. Returns whether the steps came to one, to so much `close`. */
+   parts it from the set. Returns whether the steps came to one, to so much `close`; where they did
+   not, the mixture stays as it was. */
 int fl_nearest_by_normal(const real *block, const fl_work *work, const wide *target_weighted,
                          const wide *normal, wide close, fl_mixture *m) {
   support_problem p;
@@ -355,7 +363,7 @@ int fl_nearest_by_normal(const real *block, const fl_work *work, const wide *tar
   /* The best length of the normal. */
   const wide gap = dot_wide(p.center, p.normal, 6) - support_at_normal(&p);
   const wide squared = dot_wide(p.normal, p.normal, 6);
-  if (!(gap > 0)) return 0;
+  if (!(gap > 0) || !has_room(&p, m)) return 0;
   for (int k = 0; k < 6; k++) p.normal[k] *= gap / squared;
   find_prices(&p);
   if (!come_to_optimum(&p, close)) return 0;
@@ -377,7 +385,7 @@ int fl_end_of_ray_by_normal(const real *block, const fl_work *work, const wide *
   memcpy(p.normal, normal, sizeof p.normal);
   if (!(dot_wide(ray, p.normal, 6) > 0)) memcpy(p.normal, ray, sizeof p.normal);
   const wide across = dot_wide(ray, p.normal, 6);
-  if (!(across > 0)) return 0;
+  if (!(across > 0) || !has_room(&p, m)) return 0;
   for (int k = 0; k < 6; k++) p.normal[k] /= across;
   find_prices(&p);
   if (!come_to_optimum(&p, close)) return 0;
