@@ -114,7 +114,7 @@ check: setup
 	$(BIN)/mypy
 
 CORE_FILES = $(wildcard finlab/core/*.h finlab/core/src/*.[ch] finlab/core/tests/test_*.c finlab/core/tests/golden.h \
-    finlab/deploy/c_files/*.c)
+    finlab/deploy/c_files/*.c finlab/deploy/c_stubs/*.c)
 
 figures: setup
 	$(THREADS) $(BIN)/python tools/figures.py $(PAGE)

@@ -20,6 +20,7 @@ from finlab.allocation.policy import Policy, PolicyName
 from finlab.allocation.question import check_flow
 from finlab.arrays import Array
 from finlab.axes import AXES
+from finlab.core.fields import actuators_of
 from finlab.deploy.thin_block import tables_of, thinned
 from finlab.errors import AllocationError
 from finlab.layout import Layout
@@ -55,6 +56,11 @@ QUESTIONS: tuple[tuple[PolicyName, float], ...] = (
 tick, with the command for half that wrench before it."""
 TEMPLATES = Path(__file__).with_name("c_files")
 """Files that go into an export as they are, but for the README's fields."""
+STUBS = Path(__file__).with_name("c_stubs")
+"""Files that stand in place of those of foils, in exports of robots without them: a tenth of the
+code."""
+FILES_OF_FOILS = ("foil_drag.c", "foil_lattice.c")
+"""Files of the core that only robots with foils in a flow need."""
 
 
 def c_sources(
@@ -88,6 +94,11 @@ def c_sources(
     sources = {
         path.name: path.read_text("utf-8") for path in files if path.name not in FILES_LEFT_OUT
     }
+    has_foils = bool((actuators_of(block)["flow_speed"] > 0.0).any())
+    if not has_foils:
+        for file in FILES_OF_FOILS:
+            del sources[file]
+        sources |= {path.name: path.read_text("utf-8") for path in STUBS.glob("*.c")}
     name = _identifier(layout.name)
     sources["fl_names.h"] = _prefixed_names(sources["finlab.h"] + sources["internal.h"], name)
     sources["finlab.h"] = _with_size(sources["finlab.h"], layout.n)

@@ -1,0 +1,32 @@
+/* In place of foil_drag.c and foil_lattice.c, for a robot none of whose actuators is a foil in a
+   flow: nothing calls these functions, which the other files name. */
+#include "internal.h"
+
+void fl_improve_commands(const real *block, fl_work *work, const real *target_reduced,
+                         real *best_cost) {
+  (void)block;
+  (void)work;
+  (void)target_reduced;
+  (void)best_cost;
+}
+
+void fl_improve_from_starts(const real *block, fl_work *work, const real *target_reduced,
+                            real *best_cost) {
+  fl_improve_commands(block, work, target_reduced, best_cost);
+}
+
+int fl_take_sure_forces(const real *block, fl_work *work) {
+  (void)block;
+  (void)work;
+  return 0;
+}
+
+void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, real found,
+                          real most, fl_answer *out) {
+  (void)block;
+  (void)work;
+  (void)wrench;
+  (void)found;
+  (void)most;
+  (void)out;
+}
