@@ -8,7 +8,7 @@ from pathlib import Path
 
 from finlab.errors import FinlabError
 
-VERSION = 11
+VERSION = 12
 """What `fl_version()` of the C files returns; both rise together where a signature or a struct
 changes."""
 SIGNATURES = {
@@ -23,7 +23,7 @@ SIGNATURES = {
     "fl_answer_many": "ippppipppppppp",
     "fl_commands": "vpppipp",
     "fl_forces_of_commands": "vppip",
-    "fl_conjugates": "ippppip",
+    "fl_conjugates": "ippppipp",
     "fl_reach": "vpppppirppp",
     "fl_jets": "vppipppp",
     "fl_outer_iterations": "ipppppppp",

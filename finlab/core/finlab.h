@@ -68,7 +68,7 @@ typedef double fl_wide; /* where differences of large numbers matter, in single 
 #define FL_FOILS (FL_FOIL_STEPS * FL_STEPS_AT_KINK * 2 * (FL_STARTS + FL_RAY_SHARES))
 #define FL_BOUND (2 * (FL_FORCES + FL_FOILS))
 
-#define FL_VERSION 11  /* of all structs and functions here */
+#define FL_VERSION 12  /* of all structs and functions here */
 #define FL_MAGIC 41721 /* first number of a block */
 
 /* The structs that cross the border of the library. */
@@ -238,10 +238,17 @@ void fl_forces_of_commands(const fl_real *block, const fl_real *command, int cou
 
    @param question    what limits the sets of forces; its wrench is not read
    @param multipliers (count, 6) lambda [W/N, W/(N m)]
-   @param conjugates  becomes those of each actuator (count, n)
+   @param margins     (n), for each actuator 0, or how far the conjugate of its law may be above that
+                      of its table: price of the largest force [W/N], N and M, by how much the law
+                      may give less than the table's least force [N], the largest difference at
+                      prices between price_max (j / N)^4 and the next (N) [W], and beyond them the
+                      difference over the price, at price_max / (1 - j / M) (M + 1) [N]
+   @param conjugates  becomes those of each actuator (count, n), of one with a margin an upper bound
+                      of that of its law over all that its limits allow, rates left out
    @return            FL_OK or FL_BAD_NUMBER */
 int fl_conjugates(const fl_real *block, fl_work *work, const fl_question *question,
-                  const fl_real *multipliers, int count, fl_actuator_conjugate *conjugates);
+                  const fl_real *multipliers, int count, const fl_real *const *margins,
+                  fl_actuator_conjugate *conjugates);
 
 /* Says how far rays go in the wrenches that robots of planes give.
 

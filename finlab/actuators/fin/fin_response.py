@@ -70,6 +70,8 @@ class FinTable:
         directions: arc, gauge and deflection of its force.
         beat: amplitudes [rad] and frequencies [Hz] (POINTS + 1, 2) that give the forces `largest (j
             / POINTS)^2`.
+        best: commands (CELLS + 1, 3) with the largest profit at the prices of the table [rad, Hz,
+            rad].
         box: the law within the limits.
         form: how a force becomes a command.
     """
@@ -77,14 +79,19 @@ class FinTable:
     table: RadialTable
     directions: Directions
     beat: Array
+    best: Array
     box: LawBox
     form: Form
 
     @cached_property
-    def is_largest_at_corner(self) -> bool:
-        """Whether the force is largest at the largest amplitude and frequency."""
-        corner = self.box.command(self.box.upper[None, :2])
-        return float(self.box.force(corner)[0]) >= self.box.largest() * (1.0 - NEARLY)
+    def conjugate_margin(self) -> Array | None:
+        """By how much the conjugate of the law may be above that of the table, as the core takes
+        it; None of a fin that was measured, whose forces have other directions too."""
+        if self.box.law.measured:
+            return None
+        from finlab.actuators.fin.conjugate_margin import conjugate_margin
+
+        return conjugate_margin(self.box, self.table, self.best)
 
     @property
     def largest(self) -> float:
@@ -115,32 +122,16 @@ class FinGroup(Group):
             self.responses.append(
                 Plane(matrix[1:], table.table, arc.sector_center, arc.sector_half_angle, arc.gauge)
             )
-        self._largest = np.array([table.table.largest for table in tables])
 
     @property
     def forms(self) -> list[Form]:
         return [table.form for table in self._tables]
 
-    def radial_conjugate_bound(
-        self, price: Array, price_reverse: Array, force_limits: Array | None
-    ) -> Array:
-        """See `Group`: from the commands of the table on both sides of each price, by the law; NaN
-        for fins that were measured. Where a price is below 0, or the force is not largest at the
-        largest command, also from a grid of commands."""
-        result = np.full(price.shape, np.nan)
-        for i, table in enumerate(self._tables):
-            if table.box.law.measured:
-                continue
-            v = price[:, i]
-            force = np.interp(v, table.table.price, table.table.force)
-            share = force / self._largest[i]
-            cell = np.minimum((np.sqrt(share) * POINTS).astype(np.intp), POINTS - 1)
-            starts = np.stack([table.beat[np.clip(cell + k, 0, POINTS)] for k in (-1, 0, 1, 2)])
-            profit = table.box.optimum(v, starts).profit
-            if not table.is_largest_at_corner or (v < 0.0).any():
-                profit = np.maximum(profit, table.box.optimum(v).profit)
-            result[:, i] = profit
-        return result
+    @property
+    def conjugate_margins(self) -> list[Array | None]:
+        """See `Group`: of fins by a formula; made once for a model and limits, at the first
+        question."""
+        return [table.conjugate_margin for table in self._tables]
 
     def conjugate_bound(self, price: Array) -> Array:
         """See `Group`: an upper bound, of fins that were measured alone."""
@@ -194,7 +185,7 @@ def _tabulated(
     frequency = np.interp(size, force, command[:, 1])
     beat = np.stack([amplitude, frequency], axis=-1)
     directions = _directions(law, box)
-    return FinTable(table, directions, beat, box, _form(law, box, beat, directions))
+    return FinTable(table, directions, beat, command, box, _form(law, box, beat, directions))
 
 
 def _form(law: FinLaw, box: LawBox, beat: Array, directions: Directions) -> Form:

@@ -29,7 +29,7 @@ def power_bound(
     Returns:
         Power (N,) [W] that no answer undercuts which gives these wrenches under the conditions.
     """
-    by_tables = compiled.core.conjugates(multipliers, conditions)
+    by_tables = compiled.core.conjugates(multipliers, compiled.conjugate_margins, conditions)
     conjugate = by_tables.conjugate.copy()
     for index, (indices, group) in enumerate(compiled.groups):
         along_price = compiled.conjugates_by_laws(index, by_tables)

@@ -169,9 +169,32 @@ real fl_dual_value(const real *block, fl_work *work, const real *wrench, const r
   return state->dual_value;
 }
 
-/* The conjugate of one actuator's cost at its prices s (Eq. 4), over all that it may give now. */
+/* The error of a table in `margins` of fl_conjugates: by how much the conjugate of the law may be
+   above that of the table at a price v [W/N]. */
+static real margin_at(const real *margin, real v) {
+  const real price_max = margin[0];
+  const int cells = (int)margin[1];
+  const int cells_beyond = (int)margin[2];
+  const real force_error = margin[3];
+  const real *within = margin + 4;
+  const real *beyond = within + cells;
+  if (!(v > 0)) return within[0] - v * force_error;
+  if (v < price_max) {
+    const int cell = (int)((real)cells * SQRT(SQRT(v / price_max)));
+    if (cell < cells) return within[cell];
+    return within[cells - 1];
+  }
+  const real position = (real)cells_beyond * (1 - price_max / v);
+  int cell = (int)position;
+  if (cell >= cells_beyond) cell = cells_beyond - 1;
+  const real t = position - (real)cell;
+  return v * (beyond[cell] + t * (beyond[cell + 1] - beyond[cell]));
+}
+
+/* The conjugate of one actuator's cost at its prices s (Eq. 4), over all that it may give now; with
+   a margin an upper bound of that of its law, over all that its limits ever allow. */
 static fl_actuator_conjugate conjugate_at(const real *block, int i, const fl_set *set,
-                                          const real *s) {
+                                          const real *s, const real *margin) {
   wide unused[2];
   const real along_force = fl_support_of_set(block, i, set, s, unused, 0);
   fl_actuator_conjugate result = {0};
@@ -189,12 +212,20 @@ static fl_actuator_conjugate conjugate_at(const real *block, int i, const fl_set
     result.price_reverse = fl_support_of_set(block, i, &back, s, unused, 0);
     result.force_min = -set->force_max_reverse;
   }
-  result.conjugate = fl_response(block, i, set, s).conjugate;
+  if (!margin) {
+    result.conjugate = fl_response(block, i, set, s).conjugate;
+    return result;
+  }
+  const fl_actuator *a = ACTUATOR(block, i);
+  const line_response y = fl_unlimited_response(block, a, along_force);
+  const real v = along_force * a->force_scale / a->power_scale; /* price of the table */
+  result.conjugate = y.conjugate + a->power_scale * margin_at(margin, v);
   return result;
 }
 
 int fl_conjugates(const real *block, fl_work *work, const fl_question *question,
-                  const real *multipliers, int count, fl_actuator_conjugate *conjugates) {
+                  const real *multipliers, int count, const real *const *margins,
+                  fl_actuator_conjugate *conjugates) {
   fl_question q = *question;
   q.calm = 0; /* turning is no power */
   if (!fl_prepare_question(block, work, &q)) return FL_BAD_NUMBER;
@@ -204,7 +235,7 @@ int fl_conjugates(const real *block, fl_work *work, const fl_question *question,
     for (int i = 0; i < COUNT(block); i++) {
       real s[2];
       actuator_price(work, i, lambda, s);
-      conjugates[k * COUNT(block) + i] = conjugate_at(block, i, work->set + i, s);
+      conjugates[k * COUNT(block) + i] = conjugate_at(block, i, work->set + i, s, margins[i]);
     }
   }
   return FL_OK;
