@@ -24,6 +24,7 @@ SIGNATURES = {
     "fl_commands": "vpppipp",
     "fl_forces_of_commands": "vppip",
     "fl_conjugates": "ippppipp",
+    "fl_power_bounds": "ipppppipp",
     "fl_reach": "vpppppirppp",
     "fl_jets": "vppipppp",
     "fl_outer_iterations": "ipppppppp",

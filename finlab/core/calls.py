@@ -191,6 +191,8 @@ class ConjugateMargins:
                 self._addresses[i] = margin.ctypes.data
         self.address = self._addresses.ctypes.data
         """Of the addresses (n,)."""
+        self.are_complete = bool(self._addresses.all())
+        """Whether each actuator has one."""
 
 
 def policy_record(
@@ -595,6 +597,45 @@ class Core:
             force_min=records["force_min"][:1],
             force_max=records["force_max"][:1],
         )
+
+    def power_bounds(
+        self,
+        multipliers: Array,
+        wrench: Array,
+        margins: ConjugateMargins,
+        conditions: Conditions = NOMINAL,
+    ) -> Array:
+        """Proves lower bounds of the power by weak duality (Eq. 3), at given multipliers and at 0.
+
+        Args:
+            multipliers: lambda (N, 6) of the wrench [W/N, W/(N m)]; any prove a bound.
+            wrench: (N, 6) [N, N m] that is given, 0 along axes that do not count.
+            margins: of all actuators.
+            conditions: what holds of the robot.
+
+        Returns:
+            Power (N,) [W].
+
+        Raises:
+            CommandError: the core cannot work with these numbers.
+        """
+        multipliers = np.ascontiguousarray(multipliers)
+        wrench = np.ascontiguousarray(wrench)
+        bound = np.empty(len(wrench))
+        with self._lock:
+            self._question.write_conditions(conditions)
+            code = self._core.fl_power_bounds(
+                self._block_address,
+                self._work_address,
+                self._question.address,
+                multipliers.ctypes.data,
+                wrench.ctypes.data,
+                len(wrench),
+                margins.address,
+                bound.ctypes.data,
+            )
+        raise_refusal(code)
+        return bound
 
 
 def error_text(code: int) -> str:

@@ -195,7 +195,11 @@ def judged_power(plant: Plant, command: Array) -> Array:
     Returns:
         (N,) [W].
     """
-    return np.asarray(np.nansum(plant.power(command), axis=-1))
+    power = plant.power(command)
+    total = power.sum(axis=-1)
+    if np.isnan(total).any():  # `nansum` takes ten times as long
+        total = np.nansum(power, axis=-1)
+    return np.asarray(total)
 
 
 def judged_effort(layout: Layout, command: Array) -> Array:

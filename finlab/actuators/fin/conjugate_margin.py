@@ -9,27 +9,35 @@ the profit of all commands u if and only if P(u) is nowhere below the table's po
 "Bounds by formulas" of docs/theory/method.md.
 """
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from numpy.typing import NDArray
 
+from finlab.actuators.fin.fin_response import LawBox, Optimum
 from finlab.actuators.response import CELLS, RadialTable
 from finlab.arrays import NOTHING, ROUNDING, ROUNDS, Array
-
-if TYPE_CHECKING:
-    from finlab.actuators.fin.fin_response import LawBox
 
 STEPS = 32
 """Prices in each interval of the table at which the law is asked. The chords between them are above
 the conjugate by up to 1e-6 of the power, mostly by 1e-8."""
 CELLS_BEYOND = 64
 """Intervals beyond the price of the table's largest force: of `price_max / v`, from 1 to 0."""
-COMMANDS_ASKED = (129, 129)
+GRID_ASKED = (33, 65)
 """Amplitudes and frequencies of the grid on which no command may take less power than the table
 says of its force."""
+EDGE_ASKED = 513
+"""Commands along each edge of the limits of which the same is asked, where forces that saturate are
+mostly given best: such a force has a narrow ridge, which a grid misses."""
+SMALLEST_ASKED = 1e-4
+"""Smallest of these amplitudes and frequencies beside the least, over the largest."""
+EVERY_ASKED = 32
+"""Of how many of the table's prices one is asked of all these commands."""
+LEAST_SHARE = 1e-3
+"""Share of the largest conjugate whose rounding is the least that counts."""
+LEAST_GAIN = 1e-11
+"""Share of a power by which another command is better."""
 
 
-def conjugate_margin(box: "LawBox", table: RadialTable, commands: Array) -> Array:
+def conjugate_margin(box: LawBox, table: RadialTable, commands: Array) -> Array:
     """Returns by how much the conjugate of a law may be above that of its table, as the core takes
     it.
 
@@ -52,20 +60,24 @@ def conjugate_margin(box: "LawBox", table: RadialTable, commands: Array) -> Arra
 class _SampledLaw:
     """A fin's law at the prices of its table, between them and beyond, beside the table."""
 
-    def __init__(self, box: "LawBox", table: RadialTable, commands: Array) -> None:
+    def __init__(self, box: LawBox, table: RadialTable, commands: Array) -> None:
         """Takes the arguments of `conjugate_margin`."""
         self._box = box
         self._table = table
         share = np.linspace(0.0, 1.0, STEPS * CELLS + 1)
         self._price = table.price_max * share**4
         """Prices v_k (STEPS * CELLS + 1,) [W/N]."""
-        self._conjugate, self._loss = self._largest_profits(commands[:, :2])
+        self._asked = self._commands_asked()
+        """Commands (G, 3) of a grid within the limits, and along each of their edges."""
+        beat = self._better_beats(commands[:, :2])
+        self._conjugate, self._loss = self._largest_profits(beat)
+        """Conjugates c*(v_k) [W] of the law, and what they may lack in each interval [W]."""
         self._inverse_price = np.linspace(1.0, 0.0, CELLS_BEYOND + 1)
         """price_max / v (M + 1,) at prices beyond the table."""
-        finite = table.price_max / self._inverse_price[:-1]
-        self._profit_over_price = np.append(box.optimum(finite).profit / finite, box.largest())
+        self._profit_over_price = self._largest_beyond()
         """c*(v) / v (M + 1,) [N] there, which is convex in 1 / v."""
-        self.least_force_error = self._raise_to_grid()
+        least = min(float(box.force(asked).min()) for asked in self._asked)
+        self.least_force_error = max(float(table.force[0]) - least, 0.0)
         """By how much the law may give less than the table's least force [N]."""
 
     def margins(self) -> tuple[Array, Array]:
@@ -77,7 +89,8 @@ class _SampledLaw:
         force, conjugate = self._table.force_and_conjugate(self._price)
         difference = self._conjugate - conjugate
         sag = 0.25 * np.diff(self._price) * np.diff(force)
-        rounding = ROUNDING * np.abs(self._conjugate[1:])
+        size = np.abs(self._conjugate)
+        rounding = ROUNDING * (size[1:] + LEAST_SHARE * size.max())
         each = np.maximum(difference[:-1], difference[1:]) + sag + rounding
         within = each.reshape(CELLS, STEPS).max(axis=1) + self._loss
 
@@ -137,29 +150,108 @@ class _SampledLaw:
             loss[curved] = 0.0
         return profit, loss
 
-    def _raise_to_grid(self) -> float:
-        """Raises the largest profits to those of a grid of commands, where these are larger;
-        returns by how much the least force of the grid is below that of the table [N]."""
+    def _commands_asked(self) -> list[Array]:
+        """See `_asked`."""
         box = self._box
-        commands = box.grid(COMMANDS_ASKED)
-        force = box.force(commands)
-        power = box.power(commands)
-        price = np.interp(force, self._table.force, self._table.price)
-        profit = price * force - power
-        for _ in range(ROUNDS):
-            excess = profit - np.interp(price, self._price, self._conjugate)
-            worst = int(excess.argmax())
-            if excess[worst] <= ROUNDING * power[worst]:
-                break
-            start = commands[worst, :2][None, None]
-            better = box.optimum(price[worst : worst + 1], start).command
-            self._raise(float(box.force(better)[0]), float(box.power(better)[0]))
-        else:
-            self._loss = self._loss + max(float(excess.max()), 0.0)
-        return max(float(self._table.force[0] - force.min()), 0.0)
+        low = box.lower[:2]
+        high = box.upper[:2]
+        amplitude, frequency = (_spread(low[k], high[k], GRID_ASKED[k]) for k in range(2))
+        along_amplitude, along_frequency = (_spread(low[k], high[k], EDGE_ASKED) for k in range(2))
+        asked = []
+        for amplitudes, frequencies in (
+            (amplitude, frequency),
+            (low[:1], along_frequency),
+            (high[:1], along_frequency),
+            (along_amplitude, low[1:]),
+            (along_amplitude, high[1:]),
+        ):
+            beat = np.stack(np.meshgrid(amplitudes, frequencies, indexing="ij"), axis=-1)
+            asked.append(box.command(beat.reshape(-1, 2)))
+        return asked
 
-    def _raise(self, force: float, power: float) -> None:
-        """Raises the largest profits to those of a command with a force [N] and a power [W]."""
-        self._conjugate = np.maximum(self._conjugate, self._price * force - power)
-        over_price = force - self._inverse_price * power / self._table.price_max
-        self._profit_over_price = np.maximum(self._profit_over_price, over_price)
+    def _best_of_asked(self, price: Array) -> Optimum:
+        """The best commands at prices (K,) [W/N] that are near the grid or an edge."""
+        box = self._box
+        starts = []
+        for commands in self._asked:
+            profit = box.profit(price[:, None], commands)
+            starts.append(commands[profit.argmax(axis=1), :2])
+        # Each is followed uphill: on a ridge the highest one is not always where the best lies.
+        count = len(starts)
+        found = box.optimum(np.tile(price, count), np.concatenate(starts)[None])
+        profit = found.profit.reshape(count, -1)
+        best = profit.argmax(axis=0)
+        row = np.arange(len(price))
+        command = found.command.reshape(count, -1, 3)[best, row]
+        return Optimum(command, profit[best, row])
+
+    def _better_beats(self, beat: Array) -> Array:
+        """The best amplitudes and frequencies (CELLS + 1, 2) at the table's prices, of which
+        others may be known."""
+        box = self._box
+        price = self._table.price
+        best = Optimum(box.command(beat), box.profit(price, box.command(beat)))
+        some = np.arange(0, CELLS + 1, EVERY_ASKED)
+        of_asked = self._best_of_asked(price[some])
+        lacking = self._is_better(of_asked.profit, best.profit[some], of_asked.command)
+        if lacking.any():
+            # At all prices between the last one and the next, from the better command.
+            near = np.arange(-EVERY_ASKED + 1, EVERY_ASKED)
+            rows = some[lacking][:, None] + near
+            starts = of_asked.command[lacking, None, :2].repeat(len(near), axis=1)
+            is_within = (rows >= 0) & (rows <= CELLS)
+            best = self._improved(best, rows[is_within], starts[is_within])
+        for _ in range(ROUNDS):
+            # A command that is best at one price may be better at others than theirs.
+            force = box.force(best.command)
+            power = box.power(best.command)
+            profit = price[:, None] * force - power
+            other = profit.argmax(axis=1)
+            most = profit[np.arange(CELLS + 1), other]
+            rows = np.flatnonzero(self._is_better(most, best.profit, best.command[other]))
+            if not len(rows):
+                break
+            best = self._improved(best, rows, best.command[other[rows], :2])
+        return best.command[:, :2]
+
+    def _is_better(self, profit: Array, known: Array, command: Array) -> NDArray[np.bool_]:
+        """Whether profits (K,) [W] of commands (K, 3) are larger than those that are known."""
+        least_gain = LEAST_GAIN * (self._box.power(command) + np.abs(known))
+        return np.asarray(profit > known + least_gain)
+
+    def _improved(self, best: Optimum, rows: NDArray[np.intp], starts: Array) -> Optimum:
+        """The best commands at the table's prices, some `rows` (R,) of which, each any number of
+        times, are looked for from `starts` (R, 2)."""
+        found = self._box.optimum(self._table.price[rows], starts[None])
+        command = best.command.copy()
+        profit = best.profit.copy()
+        for row in np.argsort(found.profit):  # of each row the best one last
+            if found.profit[row] > profit[rows[row]]:
+                command[rows[row]] = found.command[row]
+                profit[rows[row]] = found.profit[row]
+        return Optimum(command, profit)
+
+    def _largest_beyond(self) -> Array:
+        """The largest profits over the price (M + 1,) [N] at the prices beyond the table."""
+        box = self._box
+        price = self._table.price_max / self._inverse_price[:-1]
+        best = self._best_of_asked(price)
+        force = box.force(best.command)
+        power = box.power(best.command)
+        # A command that is best at one of these prices may be better at others than theirs.
+        of_all = force - power / price[:, None]
+        start = best.command[of_all.argmax(axis=1), :2]
+        profit = box.optimum(price, start[None]).profit
+        largest = max(box.largest(), float(force.max()))
+        return np.append(profit / price, largest)
+
+
+def _spread(low: float, high: float, count: int) -> Array:
+    """Numbers (up to `count`,) from `low` to `high`: half of them evenly, half dense near 0."""
+    if low == high:
+        return np.array([low])
+    half = count // 2
+    smallest = max(low, SMALLEST_ASKED * high)
+    return np.unique(
+        np.concatenate([np.linspace(low, high, half), np.geomspace(smallest, high, half), [low]])
+    )

@@ -55,12 +55,17 @@ def bound_by_laws(
     Args:
         compiled: the robot.
         wrench: (N, 6) [N, N m] that is given.
-        multipliers: lambda (N, 6) [W/N, W/(N m)].
+        multipliers: lambda (N, 6) [W/N, W/(N m)], of which some may not be finite.
         conditions: what holds of the robot.
 
     Returns:
         Power (N,) [W], as of `power_bound`.
     """
+    if compiled.is_certified:
+        margins = compiled.conjugate_margins
+        return compiled.core.power_bounds(multipliers, wrench, margins, conditions)
+    is_finite = np.isfinite(multipliers).all(axis=-1, keepdims=True)
+    multipliers = np.where(is_finite, multipliers, 0.0)
     # The last row is the multiplier 0, which proves for any wrench what all take at rest.
     multipliers_and_zero = np.concatenate([multipliers, np.zeros((1, 6))])
     wrenches = np.concatenate([wrench, np.zeros((1, 6))])

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.actuators.kinds import groups_of
-from finlab.actuators.response import Form, Line, Response, power_of, with_square
+from finlab.actuators.response import Form, Line, Plane, Response, power_of, with_square
 from finlab.allocation.dual.block import BlockContents, block_of
 from finlab.allocation.method import USUAL_PERIOD_S
 from finlab.allocation.policy import Policy
@@ -286,6 +286,15 @@ class Compiled:
             for i, margin in zip(indices, group.conjugate_margins, strict=True):
                 margins[i] = margin
         return ConjugateMargins(margins)
+
+    @cached_property
+    def is_certified(self) -> bool:
+        """Whether the core alone proves bounds by the laws: all actuators have margins, and none
+        has a gauge, whose table of directions has none."""
+        has_gauge = any(
+            isinstance(each, Plane) and each.gauge is not None for each in self.responses
+        )
+        return not has_gauge and self.conjugate_margins.are_complete
 
     def forces_along(self, force: Array) -> Array:
         """Returns forces (..., n, 3) [N] in own axes as those (..., n, 2) [N] along each actuator's

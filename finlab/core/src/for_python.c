@@ -254,6 +254,49 @@ void fl_forces_of_commands(const real *block, const real *command, int count, re
   }
 }
 
+/* g(lambda) of Eq. 3 at multipliers (6,) for a wrench, with margins, less what its sums may be off
+   by. */
+static real certified_dual_value(const real *block, fl_work *work, const real *multipliers,
+                                 const real *wrench, const real *const *margins) {
+  const fl_span *span = &work->span;
+  real paid = 0;
+  real size = 0; /* of all that is summed [W] */
+  for (int k = 0; k < 6; k++) {
+    const real part = multipliers[k] * (wrench[k] - span->wrench_offset[k]);
+    paid += part;
+    size += FABS(part);
+  }
+  real lambda[6];
+  fl_reduce_lambda(work, multipliers, lambda);
+  real conjugates = 0;
+  for (int i = 0; i < COUNT(block); i++) {
+    if (span->is_lost[i]) continue;
+    real s[2];
+    actuator_price(work, i, lambda, s);
+    const real conjugate = conjugate_at(block, i, work->set + i, s, margins[i]).conjugate;
+    conjugates += conjugate;
+    size += FABS(conjugate);
+  }
+  return paid - conjugates - ROUNDING * size;
+}
+
+int fl_power_bounds(const real *block, fl_work *work, const fl_question *question,
+                    const real *multipliers, const real *wrench, int count,
+                    const real *const *margins, real *bound) {
+  fl_question q = *question;
+  q.calm = 0; /* turning is no power */
+  if (!fl_prepare_question(block, work, &q)) return FL_BAD_NUMBER;
+  static const real zero[6] = {0};
+  const real at_rest = certified_dual_value(block, work, zero, zero, margins);
+  for (int k = 0; k < count; k++) {
+    const real value =
+        certified_dual_value(block, work, multipliers + 6 * k, wrench + 6 * k, margins);
+    bound[k] = larger(at_rest, 0);
+    if (value > bound[k] && value < LARGEST_NUMBER) bound[k] = value; /* not of NaN */
+  }
+  return FL_OK;
+}
+
 void fl_commands(const real *block, fl_work *work, const real *force, int count,
                  const real *previous, real *command) {
   const int n = COUNT(block);
