@@ -163,7 +163,7 @@ class Answer(PlainData, Generic[Number]):
     """Properties that are computed when they are first read."""
     ARRAYS: ClassVar[tuple[str, ...]] = ("target", "command", "scale", "flow", "wrench_expected")
     """Fields with arrays."""
-    NOT_COPIED: ClassVar[tuple[str, ...]] = ("_plant",)
+    NOT_COPIED: ClassVar[tuple[str, ...]] = ("_plant", "expected_error")
     """What is kept, and quickly made again."""
 
     layout: Layout
@@ -267,7 +267,7 @@ class Answer(PlainData, Generic[Number]):
         scaled = self.unallocated / self.scale
         return self._number(np.sqrt((scaled * scaled).sum(axis=-1)))
 
-    @property
+    @cached_property
     def expected_error(self) -> Number:
         """Size of `expected_miss`, each axis over its `scale`: by how much the true wrench may be
         off."""
@@ -304,7 +304,7 @@ class Answer(PlainData, Generic[Number]):
         """Figures (N,) of rows; of one answer the plain number."""
         if self.command.ndim == 3:
             return read_only(values)  # type: ignore[return-value]
-        return float(np.ravel(values)[0])  # type: ignore[return-value]
+        return values.item()  # type: ignore[return-value]
 
     @cached_property
     def _plant(self) -> Plant:

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from finlab.actuators.fin.fin_laws import make_law
 from finlab.actuators.kinds import free_angles, laws_of, wrapping_angles
-from finlab.actuators.law import ActuatorLaw, Blade
+from finlab.actuators.law import ActuatorLaw, Blade, FinLaw
 from finlab.arrays import Array
 from finlab.axes import feasible, is_full_turn
 from finlab.errors import CommandError
@@ -301,6 +301,8 @@ class Plant:
         # The same as below, without an index and a copy: every tick pays for it.
         if not self.feels_flow and len(self._laws) == 1:
             return np.asarray(self._laws[0][1].power(command))
+        if self._has_blades:
+            return np.asarray(self.blade.power(command[..., 0], command[..., 1]))
         inflow = self.inflow(flow)
         power = np.empty(_broadcast(command, inflow)[:-1])
         for indices, law in self._laws:
@@ -327,6 +329,12 @@ class Plant:
         if self.interaction is not None:
             return True
         return any(actuator.is_uncertain for actuator in self.layout.actuators)
+
+    @cached_property
+    def _has_blades(self) -> bool:
+        """Whether all actuators are fins, of any laws, that take the power of their blades."""
+        laws = [law for _, law in self._laws]
+        return all(isinstance(law, FinLaw) and not law.measured for law in laws)
 
     @cached_property
     def blade(self) -> Blade:
