@@ -54,13 +54,9 @@ class Plant:
         """Fins (n,) whose zero direction wraps."""
         self.effectiveness: Array = own_effectiveness(layout)
         """Wrench (n, 3, 6) of 1 N along the own axes of each actuator [1, m], body frame."""
-        laws = laws_of(layout.actuators)
+        laws = [(_as_slice(indices), law) for indices, law in laws_of(layout.actuators)]
         self._laws: list[tuple[Any, ActuatorLaw]] = laws
         """Indices of actuators with one law, and the law."""
-        if len(laws) == 1:
-            # A slice in place of indices: numpy copies no array for it.
-            only_law = laws[0][1]
-            self._laws = [(slice(None), only_law)]
         model = layout.interaction
         self.interaction: PointInteraction | None = None
         """Hydrodynamic interaction of the actuators; None where the layout names none."""
@@ -417,6 +413,15 @@ class Plant:
                 "actuator has NaN in all three entries, any other has none"
             )
         return values, is_lost
+
+
+def _as_slice(indices: NDArray[np.intp]) -> NDArray[np.intp] | slice:
+    """Rising indices (m,) that have no gap as a slice, for which numpy copies no array; others as
+    they are."""
+    first = int(indices[0])
+    count = len(indices)
+    has_gap = int(indices[-1]) - first != count - 1
+    return indices if has_gap else slice(first, first + count)
 
 
 def _broadcast(command: Array, inflow: Array | None) -> tuple[int, ...]:

@@ -19,6 +19,7 @@ PYTHON_FILES = [
     ROOT / "finlab/arrays.py",
     ROOT / "finlab/allocation/levenberg_marquardt.py",
     *sorted((ROOT / "finlab/allocation/dual").glob("*.py")),
+    ROOT / "finlab/actuators/fin/conjugate_margin.py",
     ROOT / "finlab/actuators/fin/fin_response.py",
     ROOT / "finlab/actuators/kinds.py",
     ROOT / "finlab/actuators/response.py",
