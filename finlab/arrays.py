@@ -29,6 +29,8 @@ FINE = 1e-5
 """Relative error that a table may have between its points."""
 CLOSE = 1e-4
 """Relative gain that is not worth another search."""
+EXACT = 1e-8
+"""Normalized error up to which commands need no further step."""
 ROUNDS = 12
 """Most iterations of a search that mostly settles after a few."""
 

@@ -8,7 +8,8 @@ import pytest
 
 from finlab.actuators.fin.conjugate_margin import CELLS_BEYOND
 from finlab.actuators.fin.fin_model import FinModelSpec, Limits
-from finlab.actuators.fin.fin_response import FinTable, LawBox, fin_table
+from finlab.actuators.fin.fin_response import FinTable, fin_table
+from finlab.actuators.fin.law_box import LawBox
 from finlab.actuators.response import CELLS
 from finlab.allocation import Allocator
 from finlab.arrays import Array

@@ -21,6 +21,7 @@ PYTHON_FILES = [
     *sorted((ROOT / "finlab/allocation/dual").glob("*.py")),
     ROOT / "finlab/actuators/fin/conjugate_margin.py",
     ROOT / "finlab/actuators/fin/fin_response.py",
+    ROOT / "finlab/actuators/fin/law_box.py",
     ROOT / "finlab/actuators/kinds.py",
     ROOT / "finlab/actuators/response.py",
     ROOT / "finlab/actuators/rudder.py",

@@ -12,7 +12,7 @@ the profit of all commands u if and only if P(u) is nowhere below the table's po
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.actuators.fin.fin_response import LawBox, Optimum
+from finlab.actuators.fin.law_box import LawBox, Optimum
 from finlab.actuators.response import CELLS, RadialTable
 from finlab.arrays import NOTHING, ROUNDING, ROUNDS, Array
 

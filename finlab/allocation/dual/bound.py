@@ -61,9 +61,6 @@ def bound_by_laws(
     Returns:
         Power (N,) [W], as of `power_bound`.
     """
-    if compiled.is_certified:
-        margins = compiled.conjugate_margins
-        return compiled.core.power_bounds(multipliers, wrench, margins, conditions)
     is_finite = np.isfinite(multipliers).all(axis=-1, keepdims=True)
     multipliers = np.where(is_finite, multipliers, 0.0)
     # The last row is the multiplier 0, which proves for any wrench what all take at rest.

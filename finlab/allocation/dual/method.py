@@ -14,19 +14,18 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.dual.bound import TABLE_ERROR, bound_by_laws, bound_by_measured_tables
 from finlab.allocation.dual.compiled import Compiled
-from finlab.allocation.levenberg_marquardt import EXACT, CommandProblem, exact_commands, norms
 from finlab.allocation.method import Method, Settings, number
 from finlab.allocation.policy import CLOSEST, Policy
 from finlab.allocation.question import MethodQuestion
 from finlab.allocation.solution import Solution, Solved
-from finlab.arrays import NEARLY, NOTHING, ROUNDING, Array
+from finlab.arrays import EXACT, NEARLY, NOTHING, ROUNDING, Array
 from finlab.axes import axes_in
 from finlab.core.calls import NOMINAL, AnswerRow, Conditions
 from finlab.layout.effectiveness import wrench_of_forces
 
 if TYPE_CHECKING:
+    from finlab.allocation.levenberg_marquardt import CommandProblem
     from finlab.core.coupled_core import CoupledCore
 
 LAW_SAMPLES = 64
@@ -159,8 +158,10 @@ class Dual(Method):
         """Those of the last question outside of ticks."""
 
     @cached_property
-    def problem(self) -> CommandProblem:
+    def problem(self) -> "CommandProblem":
         """Steps on the commands, by the laws themselves."""
+        from finlab.allocation.levenberg_marquardt import CommandProblem
+
         return CommandProblem.of(self.plant, self.scale)
 
     @cached_property
@@ -262,6 +263,8 @@ class Dual(Method):
             answer = row.copied()
         else:
             answer = self.compiled.forces(targets, policy, None, conditions)
+        from finlab.allocation.levenberg_marquardt import exact_commands
+
         problem = self.problem_under(conditions)
         command = exact_commands(problem, answer)
         # A search of bytes takes a third of the time of numpy's `all`, and every tick pays for it.
@@ -403,7 +406,7 @@ class Dual(Method):
         works = np.ones(self.layout.n, bool) if conditions.lost is None else ~conditions.lost
         return works, np.where(works[:, None], command, self.plant.lower)
 
-    def problem_under(self, conditions: Conditions) -> CommandProblem:
+    def problem_under(self, conditions: Conditions) -> "CommandProblem":
         """Returns the problem of steps on commands under some conditions: within the rates, with
         the actuators that work, in the axes that count."""
         problem = self.problem
@@ -501,15 +504,42 @@ class Dual(Method):
         wrench = wrench_of_forces(force, self.plant.effectiveness)
         if conditions.free is not None:  # its multiplier is 0
             wrench = np.where(conditions.free, 0.0, wrench)
-        bound = bound_by_laws(self.compiled, wrench, multipliers, conditions)
-        if self.compiled.is_certified and not gap_power_bound.any():
-            return bound * (1.0 - ROUNDING)
+        compiled = self.compiled
+        if compiled.is_certified:
+            margins = compiled.conjugate_margins
+            bound = compiled.core.power_bounds(multipliers, wrench, margins, conditions)
+            if not gap_power_bound.any():
+                return np.asarray(bound * (1.0 - ROUNDING))
+        else:
+            from finlab.allocation.dual.bound import bound_by_laws
+
+            bound = bound_by_laws(compiled, wrench, multipliers, conditions)
+        return self._bound_below_power(
+            bound, wrench_served, multipliers, gap_power_bound, conditions, command, wrench
+        )
+
+    def _bound_below_power(
+        self,
+        bound: Array,
+        wrench_served: Array,
+        multipliers: Array,
+        gap_power_bound: Array,
+        conditions: Conditions,
+        command: Array,
+        wrench: Array,
+    ) -> Array:
+        """Raises bounds (N,) [W] by what gaps and measured tables prove, and cuts them at the
+        power; the other arguments are those of `bound`, and the wrenches (N, 6) [N, N m] that
+        count."""
+        from finlab.allocation.dual.bound import TABLE_ERROR, bound_by_measured_tables
 
         works, command = self._without_nan(command, conditions)
         power = self.plant.power(command)[:, works].sum(axis=-1)
         if not self._reads_tables:
-            is_served = norms((wrench - wrench_served) / self.scale) <= NEARLY
-            with_gaps = np.maximum(bound, self._bound_of_gaps(gap_power_bound, power))
+            missed = (wrench - wrench_served) / self.scale
+            is_served = np.linalg.norm(missed, axis=-1) <= NEARLY
+            by_gaps = (1.0 - TABLE_ERROR) * gap_power_bound - self._least_table_error
+            with_gaps = np.maximum(bound, np.minimum(by_gaps, power))
             bound = np.where(is_served, with_gaps, bound)
         elif works.all():
             # The multipliers are those of the smooth shapes that stand for measured tables.
@@ -530,15 +560,10 @@ class Dual(Method):
         bound = np.where(bound > largest_by_tables, 0.0, np.clip(bound, 0.0, power))
         return np.asarray(bound * (1.0 - ROUNDING))
 
-    def _bound_of_gaps(self, gap_power_bound: Array, power: Array) -> Array:
-        """Lower bounds (N,) [W] of what the core proved of gaps by its tables, which are off by a
-        share of full power, and at the least forces by more; never above the power (N,)."""
-        by_laws = (1.0 - TABLE_ERROR) * gap_power_bound - self._least_table_error
-        return np.minimum(by_laws, power)
-
     @cached_property
     def _least_table_error(self) -> float:
-        """By how much [W] tables may be off at the least forces."""
+        """By how much [W] the core's tables, which are off by a share of full power, may be off at
+        the least forces by more."""
         return NEARLY * self.compiled.largest_power
 
     @cached_property

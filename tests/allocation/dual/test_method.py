@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from finlab.allocation import Allocator
-from finlab.allocation.dual import method as dual_method
+from finlab.allocation.dual import bound as dual_bound
 from finlab.allocation.dual.bound import TABLE_ERROR, bound_by_laws, power_bound
 from finlab.allocation.dual.compiled import Compiled
 from finlab.allocation.dual.method import MAX_BASES
@@ -50,7 +50,7 @@ def with_bound_by_laws(
     """Has the laws prove some shares of the power."""
     command = method.plant.sample(np.random.default_rng(1), (len(shares),))
     power = method.plant.power(command).sum(axis=-1)
-    monkeypatch.setattr(dual_method, "bound_by_laws", lambda *_: power * shares)
+    monkeypatch.setattr(dual_bound, "bound_by_laws", lambda *_: power * shares)
     return lambda **said: bounds_of(method, command, **said)
 
 
@@ -76,7 +76,7 @@ def test_bounds_of_measured_tables_are_raised_where_they_are_low(
         power = np.asarray(heavy.plant.power(command).sum(axis=-1))
         return power * [0.8, 0.6, 0.95]
 
-    monkeypatch.setattr(dual_method, "bound_by_measured_tables", raised)
+    monkeypatch.setattr(dual_bound, "bound_by_measured_tables", raised)
     np.testing.assert_allclose(bounds(), [0.8, 1.0 - 0.5 * TABLE_ERROR, 0.7, 0.95], rtol=1e-9)
     assert asked == [3]
 
