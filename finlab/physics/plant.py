@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from finlab.actuators.fin.fin_laws import make_law
 from finlab.actuators.kinds import free_angles, laws_of, wrapping_angles
-from finlab.actuators.law import ActuatorLaw, Blade, FinLaw
+from finlab.actuators.law import ActuatorLaw, Blade, FinLaw, PlanarLaw, planar_force
 from finlab.arrays import Array
 from finlab.axes import feasible, is_full_turn
 from finlab.errors import CommandError
@@ -226,6 +226,8 @@ class Plant:
         # The same as below, without an index and a copy: every tick pays for it.
         if not self.feels_flow and len(self._laws) == 1:
             return np.asarray(self._laws[0][1].force(command))
+        if self._force_offset is not None:
+            return self._planar_forces(command, self._force_offset)
         inflow = self.inflow(flow)
         force = np.empty(_broadcast(command, inflow))
         for indices, law in self._laws:
@@ -325,6 +327,27 @@ class Plant:
         if self.interaction is not None:
             return True
         return any(actuator.is_uncertain for actuator in self.layout.actuators)
+
+    @cached_property
+    def _force_offset(self) -> Array | None:
+        """Angles (n,) [rad] from the fins' zero directions to their forces, of a robot of fins by
+        formulas alone; None of any other."""
+        offset = np.zeros(self.n)
+        for indices, law in self._laws:
+            if not isinstance(law, PlanarLaw):
+                return None
+            offset[indices] = law.offset
+        return offset
+
+    def _planar_forces(self, command: Array, offset: Array) -> Array:
+        """Forces (..., n, 3) [N] of commands (..., n, 3) of fins by formulas; the same as law by
+        law, with one evaluation of all directions."""
+        thrust = np.empty(command.shape[:-1])
+        for indices, law in self._laws:
+            assert isinstance(law, PlanarLaw)
+            own = command[..., indices, :]
+            thrust[..., indices] = law.thrust(own[..., 0], own[..., 1], own[..., 2])
+        return planar_force(thrust, command[..., 2] + offset)
 
     @cached_property
     def _has_blades(self) -> bool:

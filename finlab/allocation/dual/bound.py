@@ -35,9 +35,12 @@ def power_bound(
         along_price = compiled.conjugates_by_laws(index, by_tables)
         in_all_directions = group.conjugate_bound(multipliers)
         for by_laws in (along_price, in_all_directions):
-            if by_laws is not None:
-                is_said = ~np.isnan(by_laws)
-                conjugate[:, indices] = np.where(is_said, by_laws, conjugate[:, indices])
+            if by_laws is None:
+                continue
+            is_left = np.isnan(by_laws)
+            if is_left.any():
+                by_laws = np.where(is_left, conjugate[:, indices], by_laws)
+            conjugate[:, indices] = by_laws
     wrench_offset = compiled.wrench_offset
     if conditions.lost is not None:
         conjugate[:, conditions.lost] = 0.0

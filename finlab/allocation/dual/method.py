@@ -23,6 +23,7 @@ from finlab.arrays import EXACT, NEARLY, NOTHING, ROUNDING, Array
 from finlab.axes import axes_in
 from finlab.core.calls import NOMINAL, AnswerRow, Conditions
 from finlab.layout.effectiveness import wrench_of_forces
+from finlab.physics.objective import judged_power
 
 if TYPE_CHECKING:
     from finlab.allocation.levenberg_marquardt import CommandProblem
@@ -533,15 +534,14 @@ class Dual(Method):
         count."""
         from finlab.allocation.dual.bound import TABLE_ERROR, bound_by_measured_tables
 
-        works, command = self._without_nan(command, conditions)
-        power = self.plant.power(command)[:, works].sum(axis=-1)
-        if not self._reads_tables:
+        power = judged_power(self.plant, command)
+        if not self._reads_tables and gap_power_bound.any():
             missed = (wrench - wrench_served) / self.scale
             is_served = np.linalg.norm(missed, axis=-1) <= NEARLY
             by_gaps = (1.0 - TABLE_ERROR) * gap_power_bound - self._least_table_error
             with_gaps = np.maximum(bound, np.minimum(by_gaps, power))
             bound = np.where(is_served, with_gaps, bound)
-        elif works.all():
+        if self._reads_tables and conditions.lost is None:
             # The multipliers are those of the smooth shapes that stand for measured tables.
             low = np.flatnonzero(bound < (1.0 - TABLE_ERROR) * power)
             by_measurements = bound_by_measured_tables(
@@ -557,7 +557,8 @@ class Dual(Method):
 
         # Above the power it is off by what tables are off; by more than that it proves nothing.
         largest_by_tables = (1.0 + TABLE_ERROR) * power + self._least_table_error
-        bound = np.where(bound > largest_by_tables, 0.0, np.clip(bound, 0.0, power))
+        within = np.minimum(np.maximum(bound, 0.0), power)
+        bound = np.where(bound > largest_by_tables, 0.0, within)
         return np.asarray(bound * (1.0 - ROUNDING))
 
     @cached_property
