@@ -16,7 +16,7 @@ from finlab.allocation.policy import Policy
 from finlab.allocation.question import MethodQuestion
 from finlab.allocation.report import allocation_blocks, answer_notes, doubts, next_measurement
 from finlab.allocation.solution import CANDIDATE_ARRAYS, Candidates, PlainData, Solved
-from finlab.arrays import Array
+from finlab.arrays import Array, has_nan
 from finlab.display import html, text
 from finlab.layout.damage import Damage
 from finlab.layout.effectiveness import body_force
@@ -223,7 +223,8 @@ class Answer(PlainData, Generic[Number]):
     def unallocated(self) -> Array:
         """Target minus delivered wrench (6,) or (N, 6); 0 along axes that do not count."""
         missing = self.target - self.wrench
-        missing[np.isnan(missing)] = 0.0
+        if has_nan(missing):
+            missing[np.isnan(missing)] = 0.0
         return read_only(missing)
 
     @cached_property

@@ -6,6 +6,7 @@ the velocity of the body relative to the water [m/s, rad/s], body frame; None is
 An actuator's own frame has its own axes as rows (`Layout.frames`).
 """
 
+import math
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import astuple
@@ -426,7 +427,9 @@ class Plant:
                 f"expected commands (..., {self.n}, 3) for layout {self.layout.name}, got "
                 f"{values.shape}"
             )
-        if np.isfinite(values).all():
+        numbers = values.ravel()
+        is_finite = math.isfinite(numbers @ numbers)  # in half the time of the next line
+        if is_finite or np.isfinite(values).all():
             return values, None
         is_lost: NDArray[np.bool_] = np.asarray(np.isnan(values).all(axis=-1))
         values = np.where(is_lost[..., None], 0.0, values)

@@ -509,7 +509,7 @@ class Dual(Method):
         if compiled.is_certified:
             margins = compiled.conjugate_margins
             bound = compiled.core.power_bounds(multipliers, wrench, margins, conditions)
-            if not gap_power_bound.any():
+            if np.count_nonzero(gap_power_bound) == 0:
                 return np.asarray(bound * (1.0 - ROUNDING))
         else:
             from finlab.allocation.dual.bound import bound_by_laws
@@ -535,7 +535,7 @@ class Dual(Method):
         from finlab.allocation.dual.bound import TABLE_ERROR, bound_by_measured_tables
 
         power = judged_power(self.plant, command)
-        if not self._reads_tables and gap_power_bound.any():
+        if not self._reads_tables and np.count_nonzero(gap_power_bound):
             missed = (wrench - wrench_served) / self.scale
             is_served = np.linalg.norm(missed, axis=-1) <= NEARLY
             by_gaps = (1.0 - TABLE_ERROR) * gap_power_bound - self._least_table_error
