@@ -82,7 +82,7 @@ class FinishedSolution:
         """Command (1, n, 3)."""
 
     @property
-    def bound(self) -> Callable[[Array], Array] | None:
+    def bound(self) -> Callable[[Array, Array], Array] | None:
         """Proves the lower bound of the power, see `Dual.bound`; None where it proves none."""
         if self._method.has_no_bound:
             return None
