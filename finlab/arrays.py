@@ -4,6 +4,7 @@ All rooms use it. The tolerances have the same names and values in the C core
 (`finlab/core/src/internal.h`); a test holds both against docs/theory/numbers.md.
 """
 
+import math
 import sys
 from contextlib import suppress
 from typing import Any
@@ -29,6 +30,8 @@ FINE = 1e-5
 """Relative error that a table may have between its points."""
 CLOSE = 1e-4
 """Relative gain that is not worth another search."""
+EXACT = 1e-8
+"""Normalized error up to which commands need no further step."""
 ROUNDS = 12
 """Most iterations of a search that mostly settles after a few."""
 
@@ -42,6 +45,13 @@ def library_of(value: Any) -> Any:
         return np
     module = type(value).__module__.partition(".")[0]
     return sys.modules[module] if module in ("torch", "casadi") else np
+
+
+def has_nan(array: Array) -> bool:
+    """Returns whether a contiguous array holds NaN; a product tells it in half the time of `isnan`
+    and `any`."""
+    numbers = array.ravel()
+    return math.isnan(numbers @ numbers)
 
 
 def solve_or_nan(matrix: Array, right: Array) -> AnyArray:

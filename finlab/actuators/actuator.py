@@ -426,9 +426,10 @@ class Actuator(Checked, ABC):
 
     def command(self, row: Array) -> Command | None:
         """Returns a row (3,) as the kind's own type; None of a lost one, whose row is NaN."""
-        if np.isnan(row[0]):
+        numbers = row.tolist()
+        if math.isnan(numbers[0]):
             return None
-        return self.KIND.command(*row[: len(self.KIND.numbers)].tolist())
+        return self.KIND.command(*numbers[: len(self.KIND.numbers)])
 
     def commands(self, rows: Array) -> Command:
         """Returns N rows (N, 3) as the kind's own type, with an array (N,) in place of each

@@ -109,9 +109,9 @@ class AzimuthGroup(Group):
         return [form_of("pod", limits, turning_costs=True) for limits in self._limits]
 
     def radial_conjugate_bound(
-        self, price: Array, price_reverse: Array, force_limits: Array | None
+        self, price: Array, price_reverse: Array, force_limits: Array
     ) -> Array:
-        least, most = (self._limits if force_limits is None else force_limits).T
+        least, most = force_limits.T
         ahead = self._power.conjugate(price, np.maximum(least, 0.0), np.maximum(most, 0.0))
         astern = self._power.conjugate(
             -price_reverse, np.minimum(least, 0.0), np.minimum(most, 0.0)

@@ -217,6 +217,25 @@ class FinLaw(ActuatorLaw):
         return gradient
 
 
+def planar_force(thrust: Array, direction: Array) -> Array:
+    """Returns forces across the shafts of fins.
+
+    Args:
+        thrust: size of the force (...) [N].
+        direction: of the force, from the zero axis towards shaft x zero (...) [rad].
+
+    Returns:
+        Forces (..., 3) [N], own frames.
+    """
+    # Half the time of `stack`: the plant evaluates this for many answers of an allocator.
+    force = np.zeros((*thrust.shape, 3), thrust.dtype)
+    np.cos(direction, out=force[..., 1])
+    np.sin(direction, out=force[..., 2])
+    planar = force[..., 1:]
+    planar *= thrust[..., None]
+    return force
+
+
 class PlanarLaw(FinLaw):
     """A fin whose mean force lies in the plane across its shaft: a size T(A, f, phi), and the
     direction phi + `offset`.
@@ -264,13 +283,7 @@ class PlanarLaw(FinLaw):
         thrust = self.thrust(amplitude, frequency, zero_direction)
         direction = zero_direction + self.offset
         if isinstance(command, np.ndarray):
-            # Half the time of `stack`: the plant evaluates this for every answer of an allocator.
-            force = np.zeros((*thrust.shape, 3), thrust.dtype)
-            np.cos(direction, out=force[..., 1])
-            np.sin(direction, out=force[..., 2])
-            planar = force[..., 1:]
-            planar *= thrust[..., None]
-            return force
+            return planar_force(thrust, direction)
         xp = library_of(command)
         # Nothing acts along the shaft.
         parts = [xp.zeros_like(thrust), thrust * xp.cos(direction), thrust * xp.sin(direction)]

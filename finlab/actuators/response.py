@@ -106,39 +106,40 @@ class RadialTable:
         return np.asarray(price * force - self.conjugate(price))
 
     def conjugate(self, price: Array) -> Array:
-        """Returns the convex conjugate c*(v) (...) [W] at prices v (...) [W/N] from 0 to
-        `price_max`, the integral of the force (Eq. 4)."""
-        interval = np.searchsorted(_GRID, price / self.price_max, side="right") - 1
-        cell = np.clip(interval, 0, CELLS - 1)
-        width = self.price_max * np.diff(_GRID)
-        share = price / self.price_max - _GRID[cell]
-        t = share / np.diff(_GRID)[cell]
-        first = self.force[cell]
-        rise = self.force[cell + 1] - first
-        m0 = self._slopes[0, cell]
-        m1 = self._slopes[1, cell]
+        """Returns the convex conjugate c*(v) (...) [W] at prices v (...) [W/N], at least 0, the
+        integral of the force (Eq. 4)."""
+        _, conjugate = self.force_and_conjugate(price)
+        return conjugate
 
-        # The integral from 0 to t of the cubic Hermite polynomial, over t.
-        quadratic = m0 / 2.0
-        cubic = (3.0 * rise - 2.0 * m0 - m1) / 3.0
-        quartic = (m0 + m1 - 2.0 * rise) / 4.0
-        mean = first + t * (quadratic + t * (cubic + t * quartic))
-        return np.asarray(self._conjugates[cell] + width[cell] * t * mean)
+    def force_and_conjugate(self, price: Array) -> tuple[Array, Array]:
+        """Evaluates the table as the core does, at the knots of `numbers`.
 
-    @cached_property
-    def _slopes(self) -> Array:
-        """Derivatives (2, CELLS) [N] of the force at both ends of each interval, by the price over
-        the interval's width."""
-        width = self.price_max * np.diff(_GRID)
-        return np.stack([self.slope[:-1] * width, self.slope[1:] * width])
+        Args:
+            price: prices v (...) [W/N], at least 0.
 
-    @cached_property
-    def _conjugates(self) -> Array:
-        """Conjugates (CELLS + 1,) [W] at the ends of the intervals."""
-        m0, m1 = self._slopes
-        mean = 0.5 * (self.force[:-1] + self.force[1:]) + (m0 - m1) / 12.0
-        gains = self.price_max * np.diff(_GRID) * mean
-        return np.concatenate([[0.0], np.cumsum(gains)]) - self.power_at_least
+        Returns:
+            Forces T(v) (...) [N], and convex conjugates c*(v) (...) [W], the integral of the force
+            (Eq. 4).
+        """
+        force, slope, conjugate = self.numbers[3:].reshape(-1, 3).T
+        knots = self.price_max * np.linspace(0.0, 1.0, len(force)) ** 4
+        within = np.minimum(price, self.price_max)
+        interval = np.searchsorted(knots, within, side="right") - 1
+        cell = np.clip(interval, 0, len(knots) - 2)
+        width = np.diff(knots)[cell]
+        t = (within - knots[cell]) / width
+        first = force[cell]
+        rise = force[cell + 1] - first
+        m0 = slope[cell] * width
+        m1 = slope[cell + 1] * width
+
+        # A cubic Hermite polynomial, and its integral from 0 to t.
+        b = 3.0 * rise - 2.0 * m0 - m1
+        c = m0 + m1 - 2.0 * rise
+        force_at_price = first + t * (m0 + t * (b + t * c))
+        integral = t * (first + t * (m0 / 2.0 + t * (b / 3.0 + t * c / 4.0)))
+        beyond = (price - within) * self.largest
+        return force_at_price, conjugate[cell] + width * integral + beyond
 
     @cached_property
     def numbers(self) -> Array:
@@ -379,23 +380,33 @@ class Group(ABC):
         """Returns the wrench offset (N, 6) [N, N m] at forces (N, m, 2) [N] of the responses."""
         return np.zeros((len(force), 6))
 
+    @property
+    def conjugate_margins(self) -> list[Array | None]:
+        """By how much the conjugate of each actuator's law may be above that of its table, as
+        `fl_conjugates` of finlab/core/finlab.h takes it; None where `radial_conjugate_bound` or
+        `conjugate_bound` says it, or the law is the table.
+
+        `power_bound` of `finlab/allocation/dual/bound.py` asks, by `Compiled.conjugate_margins`.
+        Fins by a formula answer, whose conjugates would take long for each bound.
+        """
+        return [None] * len(self.responses)
+
     def radial_conjugate_bound(
-        self, price: Array, price_reverse: Array, force_limits: Array | None
+        self, price: Array, price_reverse: Array, force_limits: Array
     ) -> Array | None:
         """Returns the conjugate of each actuator's power along its force, by the law itself
         (Eq. 4).
 
         `power_bound` of `finlab/allocation/dual/bound.py` asks, by `Compiled.conjugates_by_laws`.
-        Thrusters, azimuths, tilts and fins by a formula answer: what they give has the directions
-        of their responses, and their laws tell the power at each size. Fins with measured tables
-        and rudders do not: theirs has other directions too, see `conjugate_bound`.
+        Thrusters, azimuths and tilts answer: what they give has the directions of their responses,
+        and their laws tell the power at each size. Fins by a formula have `conjugate_margins`.
+        Fins with measured tables and rudders give other directions too, see `conjugate_bound`.
 
         Args:
             price: prices (N, m) [W/N] of that force, of lines signed.
             price_reverse: the same of a force in reverse, of planes that push either way.
-            force_limits: least and largest force (m, 2) [N], of planes below 0 in reverse; None
-                for all that the limits allow. What a law may give beyond them makes the bound
-                weaker, not wrong.
+            force_limits: least and largest force (m, 2) [N], of planes below 0 in reverse. What a
+                law may give beyond them makes the bound weaker, not wrong.
 
         Returns:
             (N, m) [W]; NaN, or None, where the conjugate of the tables holds.

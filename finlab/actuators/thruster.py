@@ -90,10 +90,8 @@ class ThrusterGroup(Group):
         return forms
 
     def radial_conjugate_bound(
-        self, price: Array, price_reverse: Array, force_limits: Array | None
+        self, price: Array, price_reverse: Array, force_limits: Array
     ) -> Array:
-        if force_limits is None:
-            return self._power.conjugate(self._sign * price, *self._limits.T)
         low, high = np.sort(self._sign[:, None] * force_limits, axis=1).T
         return self._power.conjugate(self._sign * price, low, high)
 

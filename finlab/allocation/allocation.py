@@ -16,9 +16,10 @@ from finlab.allocation.policy import Policy
 from finlab.allocation.question import MethodQuestion
 from finlab.allocation.report import allocation_blocks, answer_notes, doubts, next_measurement
 from finlab.allocation.solution import CANDIDATE_ARRAYS, Candidates, PlainData, Solved
-from finlab.arrays import Array
+from finlab.arrays import Array, has_nan
 from finlab.display import html, text
 from finlab.layout.damage import Damage
+from finlab.layout.effectiveness import body_force
 from finlab.layout.layout import Layout
 from finlab.physics.objective import REACHED, judged_effort, judged_power
 from finlab.physics.plant import Plant, plant_of
@@ -56,6 +57,8 @@ class LazyFigures(NamedTuple):
     """Desired wrenches as they came, (6,) or (N, 6) [N, N m]."""
     solution: Solved
     """What the method answered."""
+    is_of_command: bool = True
+    """Whether the command is the one of `solution`; not so where it was put in place of it."""
 
     @property
     def plant(self) -> Plant:
@@ -109,10 +112,18 @@ class LazyFigures(NamedTuple):
         """Returns the candidates before refinement; None where the method has none."""
         return self._candidates_of_all(self.solution.samples)
 
-    def bound(self) -> Array | None:
-        """Returns the lower bound (N,) of the power [W]; None where the method proves none."""
+    def bound(self, force: Array | None = None) -> Array | None:
+        """Returns the lower bound (N,) of the power [W]; None where the method proves none.
+
+        Args:
+            force: forces (N, n, 3) [N] of the solution's commands, own frames; None where they are
+                not known yet.
+        """
         bound = self.solution.bound
-        return None if bound is None else bound(self.solution.command)
+        if bound is None:
+            return None
+        command = self.solution.command
+        return bound(command, self.plant.forces(command) if force is None else force)
 
     def calm_power(self) -> Array | None:
         """Returns the part (N,) of the power [W] that goes into less turning; None where the method
@@ -152,6 +163,8 @@ class Answer(PlainData, Generic[Number]):
     """Properties that are computed when they are first read."""
     ARRAYS: ClassVar[tuple[str, ...]] = ("target", "command", "scale", "flow", "wrench_expected")
     """Fields with arrays."""
+    NOT_COPIED: ClassVar[tuple[str, ...]] = ("_plant", "expected_error")
+    """What is kept, and quickly made again."""
 
     layout: Layout
     """The whole layout, lost actuators included, with the limits that damage has left."""
@@ -209,17 +222,20 @@ class Answer(PlainData, Generic[Number]):
     @cached_property
     def unallocated(self) -> Array:
         """Target minus delivered wrench (6,) or (N, 6); 0 along axes that do not count."""
-        return read_only(np.nan_to_num(self.target - self.wrench))
+        missing = self.target - self.wrench
+        if has_nan(missing):
+            missing[np.isnan(missing)] = 0.0
+        return read_only(missing)
 
     @cached_property
     def forces(self) -> Array:
         """Force (n, 3) or (N, n, 3) of each actuator [N], body frame, by its own law; 0 if lost."""
-        return self._judged(Plant.body_forces)
+        return self._of_forces(lambda plant, force: body_force(force, plant.layout.frames))
 
     @cached_property
     def wrench(self) -> Array:
         """Delivered wrench (6,) or (N, 6) [N, N m] by the actuators' own laws and tables."""
-        return self._judged(Plant.wrench)
+        return self._of_forces(Plant.wrench_of)
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
@@ -249,12 +265,15 @@ class Answer(PlainData, Generic[Number]):
     @cached_property
     def err_norm(self) -> Number:
         """Size of what is missing from a target, each axis over its `scale`."""
-        return self._number(np.linalg.norm(self.unallocated / self.scale, axis=-1))
+        scaled = self.unallocated / self.scale
+        return self._number(np.sqrt((scaled * scaled).sum(axis=-1)))
 
-    @property
+    @cached_property
     def expected_error(self) -> Number:
         """Size of `expected_miss`, each axis over its `scale`: by how much the true wrench may be
         off."""
+        if not self._plant.is_uncertain:
+            return self._number(np.zeros(self.target.shape[:-1]))
         counted = np.where(np.isnan(self.target), 0.0, self.expected_miss / self.scale)
         return self._number(np.linalg.norm(counted, axis=-1))
 
@@ -275,14 +294,18 @@ class Answer(PlainData, Generic[Number]):
     def bound(self) -> Number | None:
         """Power [W] that no answer for the same wrench can undercut; None for methods that prove
         none."""
-        bound = None if self.answered is None else self.answered.bound()
+        bound = None if self.answered is None else self._proved_bound(self.answered)
         return None if bound is None else self._number(bound)
+
+    def _proved_bound(self, answered: LazyFigures) -> Array | None:
+        """The bounds (N,) [W] that the method proves; None where it proves none."""
+        return answered.bound()
 
     def _number(self, values: Array) -> Number:
         """Figures (N,) of rows; of one answer the plain number."""
         if self.command.ndim == 3:
             return read_only(values)  # type: ignore[return-value]
-        return float(np.ravel(values)[0])  # type: ignore[return-value]
+        return values.item()  # type: ignore[return-value]
 
     @cached_property
     def _plant(self) -> Plant:
@@ -299,6 +322,10 @@ class Answer(PlainData, Generic[Number]):
         parts = [figure(plant, self.command[rows]) for rows in chunks(len(self.command))]
         return read_only(np.concatenate(parts))
 
+    def _of_forces(self, figure: Callable[[Plant, Array], Array]) -> Array:
+        """Figures of the forces of the commands; `figure` takes (N, n, 3) [N], own frames."""
+        return self._judged(lambda plant, rows: figure(plant, plant.forces(rows)))
+
     def _equal_names(self) -> list[str]:
         """Fields, and what is computed of them: two answers are equal if they say the same."""
         return [*super()._equal_names(), *self.LAZY]
@@ -307,7 +334,8 @@ class Answer(PlainData, Generic[Number]):
         for name in (*self.LAZY, "_general_notes"):
             getattr(self, name)
         state = {**self.__dict__, "answered": None}
-        state.pop("_plant", None)  # quickly made again
+        for name in self.NOT_COPIED:
+            state.pop(name, None)
         return state
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -324,6 +352,7 @@ class BatchAllocation(Answer[Array]):
     """Answers to N targets on one layout: plain data, as an `Allocation` is."""
 
     ARRAYS: ClassVar[tuple[str, ...]] = (*Answer.ARRAYS, "solve_ms")
+    NOT_COPIED: ClassVar[tuple[str, ...]] = (*Answer.NOT_COPIED, "commands")
 
     solve_ms: Array = field(compare=False)
     """Time per target (N,) [ms]: the whole time divided by N."""
@@ -340,11 +369,6 @@ class BatchAllocation(Answer[Array]):
             is_lost = actuator.name in lost
             commands[actuator.name] = None if is_lost else actuator.commands(rows)
         return commands
-
-    def __getstate__(self) -> dict[str, Any]:
-        state = super().__getstate__()
-        state.pop("commands", None)  # quickly made again
-        return state
 
     @property
     def reachable(self) -> NDArray[np.bool_]:
@@ -373,6 +397,7 @@ class Allocation(Answer[float]):
 
     LAZY: ClassVar[tuple[str, ...]] = (*Answer.LAZY, "calm_power", "candidates", "samples")
     ARRAYS: ClassVar[tuple[str, ...]] = (*Answer.ARRAYS, "previous", "multipliers")
+    NOT_COPIED: ClassVar[tuple[str, ...]] = (*Answer.NOT_COPIED, "_own_forces")
 
     solve_ms: float = field(compare=False)
     """Time spent solving [ms], judging not included."""
@@ -386,11 +411,7 @@ class Allocation(Answer[float]):
 
     @classmethod
     def to_read(
-        cls,
-        command: Array,
-        previous: Array | None,
-        solve_ms: float,
-        answered: LazyFigures,
+        cls, command: Array, previous: Array | None, solve_ms: float, answered: LazyFigures
     ) -> Self:
         """Makes an answer whose other fields are set when the first of them is read: a control loop
         reads the command alone.
@@ -450,6 +471,17 @@ class Allocation(Answer[float]):
         """Raw candidates before refinement, best first; None for methods that draw none."""
         return None if self.answered is None else _read_only_candidates(self.answered.samples())
 
+    @cached_property
+    def _own_forces(self) -> Array:
+        """Forces (1, n, 3) [N], own frames, of which several figures are made."""
+        return self._plant.forces(self.command[None])
+
+    def _of_forces(self, figure: Callable[[Plant, Array], Array]) -> Array:
+        return read_only(np.asarray(figure(self._plant, self._own_forces)[0]))
+
+    def _proved_bound(self, answered: LazyFigures) -> Array | None:
+        return answered.bound(self._own_forces if answered.is_of_command else None)
+
     def _doubts(self) -> tuple[str, ...]:
         """Sentences about its forces, and about whether another one takes less power."""
         return doubts(self)
@@ -495,8 +527,11 @@ class Allocation(Answer[float]):
     def with_command(self, command: Array) -> Self:
         """Returns the same question with another command (n, 3) in place of the answer, judged by
         the plant."""
-        other = replace(self, command=command, wrench_expected=None)
-        if self.answered is None:
+        answered = self.answered
+        if answered is not None:
+            answered = answered._replace(is_of_command=False)
+        other = replace(self, command=command, wrench_expected=None, answered=answered)
+        if answered is None:
             # A copy has computed these already, and has nothing to compute them from again.
             of_question = ("bound", "calm_power", "candidates", "samples", "_general_notes")
             other.__dict__.update({name: getattr(self, name) for name in of_question})

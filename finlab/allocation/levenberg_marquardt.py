@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.arrays import CLOSE, NEARLY, NOTHING, ROUNDS, AnyArray, Array, solve_or_nan
+from finlab.arrays import CLOSE, EXACT, NEARLY, NOTHING, ROUNDS, AnyArray, Array, solve_or_nan
 from finlab.axes import feasible
 from finlab.core.calls import CoreAnswer
 from finlab.physics.plant import Plant
@@ -20,8 +20,6 @@ from finlab.physics.plant import Plant
 if TYPE_CHECKING:
     from finlab.allocation.rates import CommandBox
 
-EXACT = 1e-8
-"""Normalized error up to which commands need no further step."""
 RIDGE = (1e-9, 1e-14)
 """Regularization of the 6 x 6 systems: absolute, and relative to their trace. Without the latter
 those of strong fins on long levers are singular to rounding."""

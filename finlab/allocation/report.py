@@ -21,7 +21,7 @@ from finlab.actuators.fin.fin_model import DOUBT, FinModelSpec, Limits
 from finlab.actuators.kinds import KINDS
 from finlab.actuators.law import FinLaw
 from finlab.arrays import NEARLY, Array
-from finlab.axes import AXES, MOTIONS, UNITS, axes_in
+from finlab.axes import AXES, MOTIONS, UNITS
 from finlab.display import Block, Table, listed, three_digits
 from finlab.layout.layout import Layout
 from finlab.physics.plant import Plant
@@ -116,8 +116,10 @@ def missing_words(result: Allocation) -> str:
 def allocation_blocks(result: Allocation) -> list[Block]:
     """Returns the answer as two tables, of actuators and of wrenches, and sentences."""
     actuator_rows: list[tuple[str, ...]] = []
-    for actuator, force in zip(result.layout.actuators, result.forces, strict=True):
-        command = result.commands[actuator.name]
+    commands = result.commands
+    # Python's numbers: numpy's take ten times as long to be written.
+    for actuator, force in zip(result.layout.actuators, result.forces.tolist(), strict=True):
+        command = commands[actuator.name]
         words = "lost"
         size = ""
         if command is not None:
@@ -128,7 +130,7 @@ def allocation_blocks(result: Allocation) -> list[Block]:
     if result.expected_error:
         wrenches["uncertain"] = result.expected_miss
     wrench_rows = [
-        (name, *(_component_words(component) for component in wrench))
+        (name, *[_component_words(component) for component in wrench.tolist()])
         for name, wrench in wrenches.items()
     ]
     is_text = (True, True, True, False)
@@ -139,9 +141,10 @@ def allocation_blocks(result: Allocation) -> list[Block]:
 
 def _component_words(component: float) -> str:
     """A component of a wrench [N, N m]; NaN is that of a free axis."""
-    if math.isnan(component):
+    words = f"{component:.3f}"
+    if words == "nan":
         return "free"
-    return f"{round(component, 3) + 0.0:.3f}"  # + 0.0 turns a rounded -0.0 into 0.0
+    return "0.000" if words == "-0.000" else words
 
 
 def doubts(result: Allocation) -> tuple[str, ...]:
@@ -315,8 +318,13 @@ def answer_notes(
         drives or that do not count.
     """
     notes = fin_notes(layout, flow) + own
-    is_asked = (np.abs(target) > NEARLY * method.scale).reshape(-1, 6).any(axis=0)
-    asked = axes_in(np.asarray(is_asked))
+    idle = _idle_axes(method.undriven, layout.axes)
+    if not idle:
+        return method.notes + notes
+    is_asked = np.abs(target[..., idle]) > NEARLY * method.scale[idle]
+    if not is_asked.any():
+        return method.notes + notes
+    asked = [AXES[idle[k]] for k in np.flatnonzero(is_asked.reshape(-1, len(idle)).any(axis=0))]
     undriven = [axis for axis in asked if axis in method.undriven]
     if undriven:
         axes = " or ".join(undriven)
@@ -330,6 +338,12 @@ def answer_notes(
             "count",
         )
     return method.notes + notes
+
+
+@lru_cache(maxsize=64)
+def _idle_axes(undriven: tuple[str, ...], commanded: tuple[str, ...]) -> list[int]:
+    """Indices of the axes of a wrench that nothing drives, or that do not count."""
+    return [k for k, axis in enumerate(AXES) if axis in undriven or axis not in commanded]
 
 
 def fin_notes(layout: Layout, flow: Array | None = None) -> tuple[str, ...]:

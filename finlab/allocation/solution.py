@@ -128,9 +128,10 @@ class Solved(Protocol):
         """Chosen commands (N, n, 3)."""
 
     @property
-    def bound(self) -> Callable[[Array], Array] | None:
+    def bound(self) -> Callable[[Array, Array], Array] | None:
         """Gives the power (N,) [W] that no answer can undercut which gives the wrenches of the
-        chosen commands (N, n, 3); None for methods that prove none."""
+        chosen commands (N, n, 3), of which the plant's forces (N, n, 3) [N] are told too, in own
+        frames, 0 if lost; None for methods that prove none."""
 
     @property
     def calm_power(self) -> Callable[[Array], Array] | None:
@@ -163,7 +164,7 @@ class Solution(NamedTuple):
     """A `Solved` whose parts are known, or functions."""
 
     command: Array
-    bound: Callable[[Array], Array] | None = None
+    bound: Callable[[Array, Array], Array] | None = None
     calm_power: Callable[[Array], Array] | None = None
     wrench: Array | None = None
     candidates: Callable[[], Candidates] | None = None
@@ -221,7 +222,7 @@ def joined(parts: Iterable[tuple[Rows, Solved]], count: int, works: NDArray[np.b
     command = np.full((count, len(works), 3), np.nan)
     working = np.flatnonzero(works)
     parts_have_all = True
-    bounds: list[tuple[Rows, Callable[[Array], Array]]] = []
+    bounds: list[tuple[Rows, Callable[[Array, Array], Array]]] = []
     wrench: Array | None = None
     notes_of_parts: list[Callable[[], tuple[str, ...]]] = []
     for rows, part in parts:
@@ -235,13 +236,15 @@ def joined(parts: Iterable[tuple[Rows, Solved]], count: int, works: NDArray[np.b
             wrench = np.empty((count, 6)) if wrench is None else wrench
             wrench[rows] = part.wrench
 
-    def bound(command: Array) -> Array:
+    def bound(command: Array, force: Array) -> Array:
         result = np.empty(count)
         for rows, bound_of_part in bounds:
             command_of_part = command[rows]
+            force_of_part = force[rows]
             if not parts_have_all:
                 command_of_part = command_of_part[:, working]
-            result[rows] = bound_of_part(command_of_part)
+                force_of_part = force_of_part[:, working]
+            result[rows] = bound_of_part(command_of_part, force_of_part)
         return result
 
     def notes() -> tuple[str, ...]:

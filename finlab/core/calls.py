@@ -176,6 +176,25 @@ NOMINAL = Conditions()
 """Outside of ticks, nothing lost, no axis free."""
 
 
+class ConjugateMargins:
+    """By how much the conjugates of the laws of n actuators may be above those of their tables, as
+    `fl_conjugates` takes it."""
+
+    def __init__(self, margins: Sequence[Array | None]) -> None:
+        """Takes the numbers of each actuator, as finlab/core/finlab.h has them; None where the
+        table's conjugate is to stay."""
+        self._margins = [None if each is None else np.ascontiguousarray(each) for each in margins]
+        """At which the addresses point, so that they live as long."""
+        self._addresses = np.zeros(len(margins), np.uintp)
+        for i, margin in enumerate(self._margins):
+            if margin is not None:
+                self._addresses[i] = margin.ctypes.data
+        self.address = self._addresses.ctypes.data
+        """Of the addresses (n,)."""
+        self.are_complete = bool(self._addresses.all())
+        """Whether each actuator has one."""
+
+
 def policy_record(
     kind: str, axis_weights: Sequence[float], groups: Sequence[NDArray[np.bool_]]
 ) -> Record:
@@ -540,11 +559,15 @@ class Core:
         )
         return force
 
-    def conjugates(self, multipliers: Array, conditions: Conditions = NOMINAL) -> Conjugates:
+    def conjugates(
+        self, multipliers: Array, margins: ConjugateMargins, conditions: Conditions = NOMINAL
+    ) -> Conjugates:
         """Evaluates the conjugates of all costs (Eq. 4), by the core's tables.
 
         Args:
             multipliers: lambda (N, 6) of the wrench [W/N, W/(N m)].
+            margins: what is added for some actuators, so that theirs are upper bounds of those of
+                their laws, over all that their limits allow.
             conditions: what holds of the robot, which limits the sets of forces.
 
         Returns:
@@ -563,6 +586,7 @@ class Core:
                 self._question.address,
                 multipliers.ctypes.data,
                 len(multipliers),
+                margins.address,
                 records.ctypes.data,
             )
         raise_refusal(code)
@@ -573,6 +597,45 @@ class Core:
             force_min=records["force_min"][:1],
             force_max=records["force_max"][:1],
         )
+
+    def power_bounds(
+        self,
+        multipliers: Array,
+        wrench: Array,
+        margins: ConjugateMargins,
+        conditions: Conditions = NOMINAL,
+    ) -> Array:
+        """Proves lower bounds of the power by weak duality (Eq. 3), at given multipliers and at 0.
+
+        Args:
+            multipliers: lambda (N, 6) of the wrench [W/N, W/(N m)]; any prove a bound.
+            wrench: (N, 6) [N, N m] that is given, 0 along axes that do not count.
+            margins: of all actuators.
+            conditions: what holds of the robot.
+
+        Returns:
+            Power (N,) [W].
+
+        Raises:
+            CommandError: the core cannot work with these numbers.
+        """
+        multipliers = np.ascontiguousarray(multipliers)
+        wrench = np.ascontiguousarray(wrench)
+        bound = np.empty(len(wrench))
+        with self._lock:
+            self._question.write_conditions(conditions)
+            code = self._core.fl_power_bounds(
+                self._block_address,
+                self._work_address,
+                self._question.address,
+                multipliers.ctypes.data,
+                wrench.ctypes.data,
+                len(wrench),
+                margins.address,
+                bound.ctypes.data,
+            )
+        raise_refusal(code)
+        return bound
 
 
 def error_text(code: int) -> str:

@@ -238,10 +238,29 @@ void fl_forces_of_commands(const fl_real *block, const fl_real *command, int cou
 
    @param question    what limits the sets of forces; its wrench is not read
    @param multipliers (count, 6) lambda [W/N, W/(N m)]
-   @param conjugates  becomes those of each actuator (count, n)
+   @param margins     (n), for each actuator 0, or how far the conjugate of its law may be above
+                      that of its table: price_max of the largest force [W/N], N and M; by how much
+                      the law may give less than the table's least force [N]; the largest difference
+                      at prices between price_max (j / N)^4 and the next (N) [W]; and beyond them
+                      the difference over the price, at price_max / (1 - j / M) (M + 1) [N]
+   @param conjugates  becomes those of each actuator (count, n), of one with a margin an upper bound
+                      of that of its law over all that its limits allow, rates left out
    @return            FL_OK or FL_BAD_NUMBER */
 int fl_conjugates(const fl_real *block, fl_work *work, const fl_question *question,
-                  const fl_real *multipliers, int count, fl_actuator_conjugate *conjugates);
+                  const fl_real *multipliers, int count, const fl_real *const *margins,
+                  fl_actuator_conjugate *conjugates);
+
+/* Proves lower bounds of the power that wrenches need, Eq. 3, where all actuators have margins.
+
+   @param question    what limits the directions of forces; its wrench is not read
+   @param multipliers (count, 6) lambda [W/N, W/(N m)]; any prove a bound
+   @param wrench      (count, 6) that is given [N, N m], 0 along axes that do not count
+   @param margins     (n), as in fl_conjugates, none of them 0
+   @param bound       becomes the larger one of the bounds at these multipliers and at 0 (count) [W]
+   @return            FL_OK or FL_BAD_NUMBER */
+int fl_power_bounds(const fl_real *block, fl_work *work, const fl_question *question,
+                    const fl_real *multipliers, const fl_real *wrench, int count,
+                    const fl_real *const *margins, fl_real *bound);
 
 /* Says how far rays go in the wrenches that robots of planes give.
 

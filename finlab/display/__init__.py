@@ -138,15 +138,12 @@ def aligned(head: Sequence[str], rows: Sequence[Sequence[str]], words: Sequence[
         words: whether each column is aligned to the left.
     """
     widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
-
-    def line(cells: Sequence[str]) -> str:
-        columns = zip(cells, widths, words, strict=True)
-        return "  ".join(
-            cell.ljust(width) if is_words else cell.rjust(width)
-            for cell, width, is_words in columns
-        ).rstrip()
-
-    return "\n".join(map(line, [head, *rows]))
+    columns = []
+    for width, is_words in zip(widths, words, strict=True):
+        side = "<" if is_words else ">"
+        columns.append(f"{{:{side}{width}}}")
+    line = "  ".join(columns)
+    return "\n".join([line.format(*cells).rstrip() for cells in (head, *rows)])
 
 
 def html(blocks: Iterable[Block], picture: Callable[[], Figure]) -> str:

@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.arrays import AnyArray, Array, Values
+from finlab.arrays import AnyArray, Array, Values, has_nan
 from finlab.layout.layout import Layout
 from finlab.physics.plant import Plant, plant_of
 
@@ -88,10 +88,16 @@ class EffortMeter:
         """Diagonal (n, 3) of Q."""
         self._hessian_product = PRODUCT / (self._scale[:, 0] * self._scale[:, 1])
         """Entries (n,) of Q for amplitude and frequency of one fin."""
+        size = self._hessian_diagonal.size
+        unit_commands = np.eye(size).reshape(size, *upper.shape)
+        self._hessian = self.gradient(unit_commands).reshape(size, size)
+        """Q (3 n, 3 n)."""
 
     def __call__(self, command: NDArray[np.floating]) -> AnyArray:
         """Returns the efforts (R,) of commands (R, n, 3)."""
-        effort, _ = self.with_gradient(command)
+        numbers = command.reshape(len(command), -1)
+        # J = u^T Q u / 2
+        effort: AnyArray = 0.5 * (numbers @ self._hessian * numbers).sum(axis=-1)
         return effort
 
     def gradient(self, command: NDArray[np.floating]) -> AnyArray:
@@ -195,7 +201,11 @@ def judged_power(plant: Plant, command: Array) -> Array:
     Returns:
         (N,) [W].
     """
-    return np.asarray(np.nansum(plant.power(command), axis=-1))
+    power = plant.power(command)
+    total = power.sum(axis=-1)
+    if has_nan(total):  # `nansum` takes ten times as long
+        total = np.nansum(power, axis=-1)
+    return np.asarray(total)
 
 
 def judged_effort(layout: Layout, command: Array) -> Array:
@@ -205,9 +215,11 @@ def judged_effort(layout: Layout, command: Array) -> Array:
         layout: the robot.
         command: commands (N, n, 3) [rad, Hz, rad]; a row of NaN is a lost fin and adds nothing.
     """
-    is_lost = np.isnan(command).any(axis=-1, keepdims=True)
-    working = np.where(is_lost, 0.0, command) if is_lost.any() else command
-    return np.asarray(_effort_meter(layout)(working))
+    effort = _effort_meter(layout)(command)
+    if has_nan(effort):
+        is_lost = np.isnan(command).any(axis=-1, keepdims=True)
+        effort = _effort_meter(layout)(np.where(is_lost, 0.0, command))
+    return np.asarray(effort)
 
 
 def costs(layout: Layout, command: Array) -> tuple[Array, Array]:

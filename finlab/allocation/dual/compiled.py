@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.actuators.kinds import groups_of
-from finlab.actuators.response import Form, Group, Line, Plane, Response, power_of, with_square
+from finlab.actuators.response import Form, Line, Plane, Response, power_of, with_square
 from finlab.allocation.dual.block import BlockContents, block_of
 from finlab.allocation.method import USUAL_PERIOD_S
 from finlab.allocation.policy import Policy
@@ -22,6 +22,7 @@ from finlab.core.calls import (
     NOMINAL,
     AnswerRow,
     Conditions,
+    ConjugateMargins,
     Conjugates,
     Core,
     CoreAnswer,
@@ -76,14 +77,6 @@ class Compiled:
         self._counts = plant.counts.astype(np.float64)
         self.groups = groups_of(layout.actuators, plant.effectiveness)
         """Actuators by kind: indices, and the group of their responses."""
-        self._single_of_group: dict[int, Group] = {}
-        """Of each group all of whose responses are by the same tables, by its index: the first of
-        its actuators as a group of its own, which answers for all."""
-        for index, (indices, group) in enumerate(self.groups):
-            if _shares_tables(group):
-                first = slice(indices[0], indices[0] + 1)
-                single = groups_of(layout.actuators[first], plant.effectiveness[first])
-                self._single_of_group[index] = single[0][1]
         self._compile()
 
     @classmethod
@@ -230,13 +223,9 @@ class Compiled:
             return self
         other = copy(self)
         other.groups = []
-        other._single_of_group = {}
-        for index, (indices, group) in enumerate(self.groups):
+        for indices, group in self.groups:
             inflow_of_group = None if inflow is None else inflow[indices]
-            moved = group.at(inflow_of_group)
-            other.groups.append((indices, moved))
-            if moved is group and index in self._single_of_group:
-                other._single_of_group[index] = self._single_of_group[index]
+            other.groups.append((indices, group.at(inflow_of_group)))
         other._compile()
         return other
 
@@ -288,6 +277,25 @@ class Compiled:
                 directions[i] = response.rows
         return directions[..., :3]
 
+    @cached_property
+    def conjugate_margins(self) -> ConjugateMargins:
+        """How far the laws of the actuators may be above their tables, see
+        `Group.conjugate_margins`; made at the first bound."""
+        margins: list[Array | None] = [None] * self.count
+        for indices, group in self.groups:
+            for i, margin in zip(indices, group.conjugate_margins, strict=True):
+                margins[i] = margin
+        return ConjugateMargins(margins)
+
+    @cached_property
+    def is_certified(self) -> bool:
+        """Whether the core alone proves bounds by the laws: all actuators have margins, and none
+        has a gauge, whose table of directions has none."""
+        has_gauge = any(
+            isinstance(each, Plane) and each.gauge is not None for each in self.responses
+        )
+        return not has_gauge and self.conjugate_margins.are_complete
+
     def forces_along(self, force: Array) -> Array:
         """Returns forces (..., n, 3) [N] in own axes as those (..., n, 2) [N] along each actuator's
         directions."""
@@ -307,13 +315,6 @@ class Compiled:
         indices, group = self.groups[index]
         price = by_tables.price_ahead[:, indices]
         price_reverse = by_tables.price_reverse[:, indices]
-        single = self._single_of_group.get(index)
-        if single is not None:
-            # Identical tables: one actuator, within all that its limits allow, answers for all.
-            bound = single.radial_conjugate_bound(
-                price.reshape(-1, 1), price_reverse.reshape(-1, 1), None
-            )
-            return None if bound is None else bound.reshape(price.shape)
         force_limits = np.stack(
             [by_tables.force_min[0, indices], by_tables.force_max[0, indices]], axis=-1
         )
@@ -352,16 +353,3 @@ def _axes_of(form: Form) -> Array:
 def core_policy(policy: Policy) -> Record:
     """Returns a policy as the core reads it; equal ones have one record."""
     return policy_record(policy.kind, policy.axis_weights, policy.groups)
-
-
-def _shares_tables(group: Group) -> bool:
-    """Whether all of two or more actuators push in planes by the very same tables."""
-    if len(group.responses) < 2:
-        return False
-    planes = [response for response in group.responses if isinstance(response, Plane)]
-    if len(planes) < len(group.responses):
-        return False
-    first = planes[0]
-    return all(
-        plane.table is first.table and plane.reverse is first.reverse for plane in planes[1:]
-    )

@@ -14,19 +14,19 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.dual.bound import TABLE_ERROR, bound_by_laws, bound_by_measured_tables
 from finlab.allocation.dual.compiled import Compiled
-from finlab.allocation.levenberg_marquardt import EXACT, CommandProblem, exact_commands, norms
 from finlab.allocation.method import Method, Settings, number
 from finlab.allocation.policy import CLOSEST, Policy
 from finlab.allocation.question import MethodQuestion
 from finlab.allocation.solution import Solution, Solved
-from finlab.arrays import NEARLY, NOTHING, ROUNDING, Array
+from finlab.arrays import EXACT, NEARLY, NOTHING, ROUNDING, Array
 from finlab.axes import axes_in
 from finlab.core.calls import NOMINAL, AnswerRow, Conditions
 from finlab.layout.effectiveness import wrench_of_forces
+from finlab.physics.objective import judged_power
 
 if TYPE_CHECKING:
+    from finlab.allocation.levenberg_marquardt import CommandProblem
     from finlab.core.coupled_core import CoupledCore
 
 LAW_SAMPLES = 64
@@ -82,7 +82,7 @@ class FinishedSolution:
         """Command (1, n, 3)."""
 
     @property
-    def bound(self) -> Callable[[Array], Array] | None:
+    def bound(self) -> Callable[[Array, Array], Array] | None:
         """Proves the lower bound of the power, see `Dual.bound`; None where it proves none."""
         if self._method.has_no_bound:
             return None
@@ -159,8 +159,10 @@ class Dual(Method):
         """Those of the last question outside of ticks."""
 
     @cached_property
-    def problem(self) -> CommandProblem:
+    def problem(self) -> "CommandProblem":
         """Steps on the commands, by the laws themselves."""
+        from finlab.allocation.levenberg_marquardt import CommandProblem
+
         return CommandProblem.of(self.plant, self.scale)
 
     @cached_property
@@ -194,7 +196,7 @@ class Dual(Method):
             Commands (N, n, 3), NaN for lost actuators, and the lower bound of their power.
         """
         if len(question.targets) == 0:
-            return Solution(np.empty((0, self.layout.n, 3)), lambda _: np.empty(0))
+            return Solution(np.empty((0, self.layout.n, 3)), lambda *_: np.empty(0))
         previous = question.previous
         reference = question.reference
         calm = self.settings.calm
@@ -262,6 +264,8 @@ class Dual(Method):
             answer = row.copied()
         else:
             answer = self.compiled.forces(targets, policy, None, conditions)
+        from finlab.allocation.levenberg_marquardt import exact_commands
+
         problem = self.problem_under(conditions)
         command = exact_commands(problem, answer)
         # A search of bytes takes a third of the time of numpy's `all`, and every tick pays for it.
@@ -350,7 +354,7 @@ class Dual(Method):
         if conditions.lost is not None:
             command[:, conditions.lost] = np.nan
         command.setflags(write=False)
-        bound: Callable[[Array], Array] = partial(
+        bound: Callable[[Array, Array], Array] = partial(
             self.bound, wrench_served, multipliers, gap_power_bound, conditions
         )
         return Solution(
@@ -403,7 +407,7 @@ class Dual(Method):
         works = np.ones(self.layout.n, bool) if conditions.lost is None else ~conditions.lost
         return works, np.where(works[:, None], command, self.plant.lower)
 
-    def problem_under(self, conditions: Conditions) -> CommandProblem:
+    def problem_under(self, conditions: Conditions) -> "CommandProblem":
         """Returns the problem of steps on commands under some conditions: within the rates, with
         the actuators that work, in the axes that count."""
         problem = self.problem
@@ -480,6 +484,7 @@ class Dual(Method):
         gap_power_bound: Array,
         conditions: Conditions,
         command: Array,
+        force: Array,
     ) -> Array:
         """Proves a lower bound of the power by weak duality (Eq. 3).
 
@@ -491,26 +496,52 @@ class Dual(Method):
             conditions: under which they were found.
             command: (N, n, 3), whose wrenches count: they are the served ones to rounding, or as
                 near as the laws come.
+            force: their forces (N, n, 3) [N] by the plant, own frames, 0 of lost actuators.
 
         Returns:
             Power (N,) [W] that no answer undercuts which gives these wrenches under the conditions;
             never above theirs.
         """
-        works, command = self._without_nan(command, conditions)
-        force = np.where(works[:, None], self.plant.force(command), 0.0)
         wrench = wrench_of_forces(force, self.plant.effectiveness)
         if conditions.free is not None:  # its multiplier is 0
             wrench = np.where(conditions.free, 0.0, wrench)
-        is_finite = np.isfinite(multipliers).all(axis=-1, keepdims=True)
-        multipliers = np.where(is_finite, multipliers, 0.0)
-        power = self.plant.power(command)[:, works].sum(axis=-1)
+        compiled = self.compiled
+        if compiled.is_certified:
+            margins = compiled.conjugate_margins
+            bound = compiled.core.power_bounds(multipliers, wrench, margins, conditions)
+            if np.count_nonzero(gap_power_bound) == 0:
+                return np.asarray(bound * (1.0 - ROUNDING))
+        else:
+            from finlab.allocation.dual.bound import bound_by_laws
 
-        bound = bound_by_laws(self.compiled, wrench, multipliers, conditions)
-        if not self._reads_tables:
-            is_served = norms((wrench - wrench_served) / self.scale) <= NEARLY
-            with_gaps = np.maximum(bound, self._bound_of_gaps(gap_power_bound, power))
+            bound = bound_by_laws(compiled, wrench, multipliers, conditions)
+        return self._bound_below_power(
+            bound, wrench_served, multipliers, gap_power_bound, conditions, command, wrench
+        )
+
+    def _bound_below_power(
+        self,
+        bound: Array,
+        wrench_served: Array,
+        multipliers: Array,
+        gap_power_bound: Array,
+        conditions: Conditions,
+        command: Array,
+        wrench: Array,
+    ) -> Array:
+        """Raises bounds (N,) [W] by what gaps and measured tables prove, and cuts them at the
+        power; the other arguments are those of `bound`, and the wrenches (N, 6) [N, N m] that
+        count."""
+        from finlab.allocation.dual.bound import TABLE_ERROR, bound_by_measured_tables
+
+        power = judged_power(self.plant, command)
+        if not self._reads_tables and np.count_nonzero(gap_power_bound):
+            missed = (wrench - wrench_served) / self.scale
+            is_served = np.linalg.norm(missed, axis=-1) <= NEARLY
+            by_gaps = (1.0 - TABLE_ERROR) * gap_power_bound - self._least_table_error
+            with_gaps = np.maximum(bound, np.minimum(by_gaps, power))
             bound = np.where(is_served, with_gaps, bound)
-        elif works.all():
+        if self._reads_tables and conditions.lost is None:
             # The multipliers are those of the smooth shapes that stand for measured tables.
             low = np.flatnonzero(bound < (1.0 - TABLE_ERROR) * power)
             by_measurements = bound_by_measured_tables(
@@ -526,18 +557,14 @@ class Dual(Method):
 
         # Above the power it is off by what tables are off; by more than that it proves nothing.
         largest_by_tables = (1.0 + TABLE_ERROR) * power + self._least_table_error
-        bound = np.where(bound > largest_by_tables, 0.0, np.clip(bound, 0.0, power))
+        within = np.minimum(np.maximum(bound, 0.0), power)
+        bound = np.where(bound > largest_by_tables, 0.0, within)
         return np.asarray(bound * (1.0 - ROUNDING))
-
-    def _bound_of_gaps(self, gap_power_bound: Array, power: Array) -> Array:
-        """Lower bounds (N,) [W] of what the core proved of gaps by its tables, which are off by a
-        share of full power, and at the least forces by more; never above the power (N,)."""
-        by_laws = (1.0 - TABLE_ERROR) * gap_power_bound - self._least_table_error
-        return np.minimum(by_laws, power)
 
     @cached_property
     def _least_table_error(self) -> float:
-        """By how much [W] tables may be off at the least forces."""
+        """By how much [W] the core's tables, which are off by a share of full power, may be off at
+        the least forces by more."""
         return NEARLY * self.compiled.largest_power
 
     @cached_property

@@ -169,9 +169,32 @@ real fl_dual_value(const real *block, fl_work *work, const real *wrench, const r
   return state->dual_value;
 }
 
-/* The conjugate of one actuator's cost at its prices s (Eq. 4), over all that it may give now. */
+/* The error of a table in `margins` of fl_conjugates: by how much the conjugate of the law may be
+   above that of the table at a price v [W/N]. */
+static real margin_at(const real *margin, real v) {
+  const real price_max = margin[0];
+  const int cells = (int)margin[1];
+  const int cells_beyond = (int)margin[2];
+  const real force_error = margin[3];
+  const real *within = margin + 4;
+  const real *beyond = within + cells;
+  if (!(v > 0)) return within[0] - v * force_error;
+  if (v < price_max) {
+    const int cell = (int)((real)cells * SQRT(SQRT(v / price_max)));
+    if (cell < cells) return within[cell];
+    return within[cells - 1];
+  }
+  const real position = (real)cells_beyond * (1 - price_max / v);
+  int cell = (int)position;
+  if (cell >= cells_beyond) cell = cells_beyond - 1;
+  const real t = position - (real)cell;
+  return v * (beyond[cell] + t * (beyond[cell + 1] - beyond[cell]));
+}
+
+/* The conjugate of one actuator's cost at its prices s (Eq. 4), over all that it may give now; with
+   a margin an upper bound of that of its law, over all that its limits ever allow. */
 static fl_actuator_conjugate conjugate_at(const real *block, int i, const fl_set *set,
-                                          const real *s) {
+                                          const real *s, const real *margin) {
   wide unused[2];
   const real along_force = fl_support_of_set(block, i, set, s, unused, 0);
   fl_actuator_conjugate result = {0};
@@ -189,12 +212,20 @@ static fl_actuator_conjugate conjugate_at(const real *block, int i, const fl_set
     result.price_reverse = fl_support_of_set(block, i, &back, s, unused, 0);
     result.force_min = -set->force_max_reverse;
   }
-  result.conjugate = fl_response(block, i, set, s).conjugate;
+  if (!margin) {
+    result.conjugate = fl_response(block, i, set, s).conjugate;
+    return result;
+  }
+  const fl_actuator *a = ACTUATOR(block, i);
+  const line_response y = fl_unlimited_response(block, a, along_force);
+  const real v = along_force * a->force_scale / a->power_scale; /* price of the table */
+  result.conjugate = y.conjugate + a->power_scale * margin_at(margin, v);
   return result;
 }
 
 int fl_conjugates(const real *block, fl_work *work, const fl_question *question,
-                  const real *multipliers, int count, fl_actuator_conjugate *conjugates) {
+                  const real *multipliers, int count, const real *const *margins,
+                  fl_actuator_conjugate *conjugates) {
   fl_question q = *question;
   q.calm = 0; /* turning is no power */
   if (!fl_prepare_question(block, work, &q)) return FL_BAD_NUMBER;
@@ -204,7 +235,7 @@ int fl_conjugates(const real *block, fl_work *work, const fl_question *question,
     for (int i = 0; i < COUNT(block); i++) {
       real s[2];
       actuator_price(work, i, lambda, s);
-      conjugates[k * COUNT(block) + i] = conjugate_at(block, i, work->set + i, s);
+      conjugates[k * COUNT(block) + i] = conjugate_at(block, i, work->set + i, s, margins[i]);
     }
   }
   return FL_OK;
@@ -221,6 +252,49 @@ void fl_forces_of_commands(const real *block, const real *command, int count, re
       memset(own_force, 0, 3 * sizeof *own_force);
     }
   }
+}
+
+/* g(lambda) of Eq. 3 at multipliers (6,) for a wrench, with margins, less what its sums may be off
+   by. */
+static real certified_dual_value(const real *block, fl_work *work, const real *multipliers,
+                                 const real *wrench, const real *const *margins) {
+  const fl_span *span = &work->span;
+  real paid = 0;
+  real size = 0; /* of all that is summed [W] */
+  for (int k = 0; k < 6; k++) {
+    const real part = multipliers[k] * (wrench[k] - span->wrench_offset[k]);
+    paid += part;
+    size += FABS(part);
+  }
+  real lambda[6];
+  fl_reduce_lambda(work, multipliers, lambda);
+  real conjugates = 0;
+  for (int i = 0; i < COUNT(block); i++) {
+    if (span->is_lost[i]) continue;
+    real s[2];
+    actuator_price(work, i, lambda, s);
+    const real conjugate = conjugate_at(block, i, work->set + i, s, margins[i]).conjugate;
+    conjugates += conjugate;
+    size += FABS(conjugate);
+  }
+  return paid - conjugates - ROUNDING * size;
+}
+
+int fl_power_bounds(const real *block, fl_work *work, const fl_question *question,
+                    const real *multipliers, const real *wrench, int count,
+                    const real *const *margins, real *bound) {
+  fl_question q = *question;
+  q.calm = 0; /* turning is no power */
+  if (!fl_prepare_question(block, work, &q)) return FL_BAD_NUMBER;
+  static const real zero[6] = {0};
+  const real at_rest = certified_dual_value(block, work, zero, zero, margins);
+  for (int k = 0; k < count; k++) {
+    const real value =
+        certified_dual_value(block, work, multipliers + 6 * k, wrench + 6 * k, margins);
+    bound[k] = larger(at_rest, 0);
+    if (value > bound[k] && value < LARGEST_NUMBER) bound[k] = value; /* not of NaN */
+  }
+  return FL_OK;
 }
 
 void fl_commands(const real *block, fl_work *work, const real *force, int count,

@@ -151,6 +151,17 @@ void fl_fix_force(const real *block, int i, fl_set *set, const real *force) {
   fl_prepare_set(block, i, set);
 }
 
+/* The response of a plane ahead to a price along it, within all that its table gives: where the
+   price is against the force, the least one. */
+line_response fl_unlimited_response(const real *block, const fl_actuator *a, real price) {
+  line_response y = at_price(block, a, 0, larger(price, 0));
+  if (price < 0) {
+    y.slope = 0;
+    y.conjugate += price * y.force;
+  }
+  return y;
+}
+
 /* The response where a limit of a set holds it: no slope, and c*(v) = v y - c(y). */
 static line_response at_limit(real v, real force, real cost) {
   line_response limited;

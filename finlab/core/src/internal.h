@@ -136,6 +136,7 @@ real fl_gauge_lean(const real *gauge, real angle);
 
 /* force_set.c: what one actuator may give */
 void fl_empty_set(const real *block, int i, fl_set *set);
+line_response fl_unlimited_response(const real *block, const fl_actuator *a, real price);
 line_response fl_limited_response(const real *block, const fl_actuator *a, const fl_set *set,
                                   int line, real price);
 void fl_limit_set(const real *block, int i, fl_set *set, real low, real high, real middle,

@@ -9,9 +9,8 @@ import pytest
 
 import finlab
 from finlab.allocation.dual.method import Dual
-from finlab.allocation.levenberg_marquardt import EXACT
 from finlab.allocation.policy import POLICY_NAMES
-from finlab.arrays import Array
+from finlab.arrays import EXACT, Array
 from finlab.assets import shipped_layouts
 from finlab.layout import Layout
 from tests.random_robots import KINDS, load, random_robot

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from finlab.allocation import Allocator
-from finlab.allocation.dual import method as dual_method
+from finlab.allocation.dual import bound as dual_bound
 from finlab.allocation.dual.bound import TABLE_ERROR, bound_by_laws, power_bound
-from finlab.allocation.dual.compiled import Compiled, _shares_tables
+from finlab.allocation.dual.compiled import Compiled
 from finlab.allocation.dual.method import MAX_BASES
 from finlab.allocation.levenberg_marquardt import _starts_around, cheapest_exact
 from finlab.allocation.question import MethodQuestion
@@ -39,7 +39,8 @@ def bounds_of(method: Any, command: Array, **said: Any) -> Array:
     wrench = method.plant.wrench(command)
     served = said.get("served", wrench)
     gaps = said.get("gaps", np.zeros(len(command)))
-    bound = method.bound(served, np.zeros((len(command), 6)), gaps, NOMINAL, command)
+    force = method.plant.force(command)
+    bound = method.bound(served, np.zeros((len(command), 6)), gaps, NOMINAL, command, force)
     return np.asarray(bound / method.plant.power(command).sum(axis=-1))
 
 
@@ -49,7 +50,7 @@ def with_bound_by_laws(
     """Has the laws prove some shares of the power."""
     command = method.plant.sample(np.random.default_rng(1), (len(shares),))
     power = method.plant.power(command).sum(axis=-1)
-    monkeypatch.setattr(dual_method, "bound_by_laws", lambda *_: power * shares)
+    monkeypatch.setattr(dual_bound, "bound_by_laws", lambda *_: power * shares)
     return lambda **said: bounds_of(method, command, **said)
 
 
@@ -75,7 +76,7 @@ def test_bounds_of_measured_tables_are_raised_where_they_are_low(
         power = np.asarray(heavy.plant.power(command).sum(axis=-1))
         return power * [0.8, 0.6, 0.95]
 
-    monkeypatch.setattr(dual_method, "bound_by_measured_tables", raised)
+    monkeypatch.setattr(dual_bound, "bound_by_measured_tables", raised)
     np.testing.assert_allclose(bounds(), [0.8, 1.0 - 0.5 * TABLE_ERROR, 0.7, 0.95], rtol=1e-9)
     assert asked == [3]
 
@@ -206,11 +207,11 @@ def test_what_is_driven_is_kept_for_the_last_states_of_losses(heavy: Any) -> Non
     assert len(heavy._bases) == MAX_BASES
 
 
-def test_fins_share_tables_where_all_of_two_or_more_are_of_one_model_and_limits() -> None:
+def test_fins_of_one_model_and_limits_share_a_margin_which_is_made_once() -> None:
     alike = load_layout("A").fins
     other = replace(alike[1], limits=Limits((0.05, 0.4), (0.1, 2.1)))
-    for fins, shares in ((alike, True), (alike[:2], True), (alike[:1], False)):
-        ((_, group),) = dual_of(Layout("fins", fins)).compiled.groups
-        assert _shares_tables(group) == shares
-    for _, group in dual_of(Layout("fins", (alike[0], other, alike[2]))).compiled.groups:
-        assert not _shares_tables(group)
+    ((_, group),) = dual_of(Layout("fins", (alike[0], other, alike[2]))).compiled.groups
+    first, second, third = group.conjugate_margins
+    assert first is not None and first is third and first is not second
+    ((_, again),) = dual_of(Layout("again", alike[:1])).compiled.groups
+    assert again.conjugate_margins[0] is first
