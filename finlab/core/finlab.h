@@ -339,9 +339,9 @@ void fl_follow_fins(const fl_real *fins, const fl_real *command, int count, fl_r
    @param fins, command, states  as for fl_follow_fins
    @param step   length of a step [s]
    @param steps  how many
-   @param moves  (steps, count, 8) become mean amplitude, frequency and zero direction of a step,
-                 whether that beats, and angle, phase, speed and acceleration at its end
-                 [rad, Hz, rad/s, rad/s^2] */
+   @param moves  (steps, count, 10) become mean amplitude, frequency and zero direction of a step,
+                 whether that beats, and angle, phase, speed, acceleration, inertial and driving
+                 power at its end [rad, Hz, rad/s, rad/s^2, W] */
 void fl_move_fins(const fl_real *fins, const fl_real *command, int count, fl_real step, int steps,
                   fl_real *states, fl_real *moves);
 

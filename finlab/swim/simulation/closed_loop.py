@@ -415,7 +415,7 @@ class ClosedLoop:
             reference=setpoint.position,
             reference_surge=setpoint.surge,
             asked=wrench,
-            allocated=self._plant.wrench(command, flow=self._flow),
+            allocated=self._allocated(command),
             delivered=mean.wrench,
             command=sent,
             fin_motion=self.motion.command,
@@ -428,6 +428,15 @@ class ClosedLoop:
             strength_std=beliefs[2],
             solve_ms=solve_ms,
         )
+
+    def _allocated(self, command: Array) -> Array:
+        """The wrench (6,) that a command (n, 3) gives once the actuators have followed it [N, N
+        m]."""
+        if self.damage.lost:
+            return self._plant.wrench(command, flow=self._flow)
+        # Nothing is NaN, and nothing has to be checked.
+        force = self._plant.force(command, flow=self._flow)
+        return self._plant.wrench_of(force, flow=self._flow)
 
     def _swim(self, command: Array, dt: float, n_steps: int, time: float) -> "MeanOutput":
         """Moves actuators and body over K steps, lets the sensors sample on the way, and returns

@@ -20,7 +20,7 @@ from finlab.physics import plant_of
 from finlab.swim.control import Measurement
 from finlab.swim.vehicle.actuator_motion import ActuatorMotion
 from finlab.swim.vehicle.attitude import tilt_of_quaternion
-from finlab.swim.vehicle.fin_motion import FinMotion, FinSteps, fin_power
+from finlab.swim.vehicle.fin_motion import FinMotion, FinSteps
 
 
 @dataclass(frozen=True)
@@ -335,7 +335,8 @@ class ActuatorForce:
         fin_share = share[motion.fin_indices]
         of_fins = ActuatorOutput(
             self.of_fins(steps.fins, dt) * fin_share[:, None],
-            *fin_power(steps.fins.speed, steps.fins.acceleration, self._fins.blade),
+            steps.fins.inertial_power,
+            steps.fins.driving_power,
         )
         if not self._n_others:
             return of_fins

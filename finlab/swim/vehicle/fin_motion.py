@@ -10,12 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from finlab.actuators.law import Blade
 from finlab.arrays import Array
 from finlab.axes import is_full_turn
 from finlab.core import library
 from finlab.core.shared_array import SharedArray
 from finlab.layout import Layout
+from finlab.physics import plant_of
 
 TURN_SHARE_MIN = 0.1
 """Share of its speed that a servo turns its fin with, however fast that flaps."""
@@ -76,7 +76,7 @@ class FinLag:
         self._poles = layout.servo_poles.reshape(-1, 3)
         speed_limit = np.asarray(layout.speed_limit)
         # A row of a fin, in the order of `fin_numbers` in the core's fin_motion.c.
-        self._fins = SharedArray(np.zeros((n, 15)))
+        self._fins = SharedArray(np.zeros((n, 19)))
         self._fins.array[:, 12] = is_full_turn(upper - lower)
         self._fins.array[:, 13] = speed_limit
         self._fins.array[:, 14] = TURN_SHARE_MIN * speed_limit
@@ -140,10 +140,32 @@ class FinSteps(NamedTuple):
     acceleration: Array
     """Angular accelerations (K, n) [rad/s^2]; those by changes of the command are means over a
     step."""
+    inertial_power: Array
+    """|I alpha omega| (K, n) [W], the paper's: what turns the fin's own inertia, braking counted
+    like driving."""
+    driving_power: Array
+    """max(tau omega, 0) (K, n) [W], inertia, carried water and drag together, nothing won back by
+    braking, and the heat in the motor's windings, copper_loss tau^2: what a battery gives, but for
+    the electronics. The torque is that of a rigid plate in still water."""
 
 
 class FinMotion(FinLag):
     """Angles of the fins of one layout over time, in steps much shorter than a beat."""
+
+    def __init__(self, layout: Layout, copper_loss: float = COPPER_LOSS) -> None:
+        """Starts at rest, as `FinLag`.
+
+        Args:
+            layout: the robot.
+            copper_loss: heat in a motor's windings [W/(N m)^2].
+        """
+        super().__init__(layout)
+        if layout.n_fins:
+            blade = plant_of(layout.fins_alone).blade
+            self._fins.array[:, 15] = blade.inertia
+            self._fins.array[:, 16] = blade.drag
+            self._fins.array[:, 17] = blade.own_inertia
+            self._fins.array[:, 18] = copper_loss
 
     @property
     def phase(self) -> Array:
@@ -170,7 +192,7 @@ class FinMotion(FinLag):
         """
         self._take(command, dt)
         n = len(command)
-        moves = np.empty((count, n, 8))
+        moves = np.empty((count, n, 10))
         library().fl_move_fins(
             self._fins.address,
             self._command.address,
@@ -187,33 +209,6 @@ class FinMotion(FinLag):
             phase=moves[..., 5],
             speed=moves[..., 6],
             acceleration=moves[..., 7],
+            inertial_power=moves[..., 8],
+            driving_power=moves[..., 9],
         )
-
-
-class FinPower(NamedTuple):
-    """Power of each fin (..., n) [W], by two measures."""
-
-    inertial: Array
-    """|I alpha omega|, the paper's: what turns the fin's own inertia, braking counted like
-    driving."""
-    driving: Array
-    """max(tau omega, 0), inertia, carried water and drag together, nothing won back by braking, and
-    the heat in the motor's windings, copper_loss tau^2: what a battery gives, but for the
-    electronics."""
-
-
-def fin_power(
-    speed: Array, acceleration: Array, blade: Blade, copper_loss: float = COPPER_LOSS
-) -> FinPower:
-    """Returns the power of fins; the torque is that of a rigid plate in still water.
-
-    Args:
-        speed: angular speeds omega (..., n) [rad/s].
-        acceleration: angular accelerations alpha (..., n) [rad/s^2].
-        blade: inertia and drag of the fins, each (n,).
-        copper_loss: heat in a motor's windings [W/(N m)^2].
-    """
-    torque = blade.inertia * acceleration + blade.drag * speed * np.abs(speed)
-    mechanical = np.maximum(torque * speed, 0.0)
-    inertial = np.abs(blade.own_inertia * acceleration * speed)
-    return FinPower(inertial, mechanical + copper_loss * torque * torque)
