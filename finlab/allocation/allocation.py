@@ -386,11 +386,7 @@ class Allocation(Answer[float]):
 
     @classmethod
     def to_read(
-        cls,
-        command: Array,
-        previous: Array | None,
-        solve_ms: float,
-        answered: LazyFigures,
+        cls, command: Array, previous: Array | None, solve_ms: float, answered: LazyFigures
     ) -> Self:
         """Makes an answer whose other fields are set when the first of them is read: a control loop
         reads the command alone.
