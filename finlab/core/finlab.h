@@ -307,6 +307,14 @@ void fl_body_rates(const fl_real *body, const fl_real *state, const fl_real *tau
                  [1/s] */
 fl_real fl_body_fastest_rate(const fl_real *body, const fl_real *state);
 
+/* Says into how many equal parts a step is cut so that integrating it stays stable.
+
+   @param body   as for fl_body_rates
+   @param state  (13,) at the beginning
+   @param step   its length [s]
+   @return       how many, or 0 where the motion is too fast */
+int fl_body_parts(const fl_real *body, const fl_real *state, fl_real step);
+
 /* Moves a body over steps by Runge-Kutta of order 4, each cut into as many parts as stay stable.
 
    @param body    as for fl_body_rates

@@ -27,6 +27,23 @@ take 730 W/(N m)^2 at its own shaft (7 rpm per mN m) behind a gear of 50 : 1 at 
 fin turns twice a second."""
 
 
+# Columns of a fin's numbers, in the order of `fin_numbers` in the core's fin_motion.c.
+LAGS = slice(0, 12)
+TURNS_FULLY = 12
+SPEED_LIMIT = 13
+TURN_SPEED_MIN = 14
+INERTIA = 15
+DRAG = 16
+OWN_INERTIA = 17
+COPPER = 18
+N_FIN_NUMBERS = 19
+# Columns of what a fin does, in the order of `fin_state` there.
+VALUE = slice(0, 3)
+RATE = slice(3, 6)
+PHASE = 6
+N_STATE_NUMBERS = 7
+
+
 class LagStep(NamedTuple):
     """The exact step of critically damped filters, x'' = -2 p x' - p^2 e, towards constant targets.
 
@@ -75,14 +92,12 @@ class FinLag:
         lower, upper = np.array([fin.limits.zero_direction for fin in layout.fins]).reshape(-1, 2).T
         self._poles = layout.servo_poles.reshape(-1, 3)
         speed_limit = np.asarray(layout.speed_limit)
-        # A row of a fin, in the order of `fin_numbers` in the core's fin_motion.c.
-        self._fins = SharedArray(np.zeros((n, 19)))
-        self._fins.array[:, 12] = is_full_turn(upper - lower)
-        self._fins.array[:, 13] = speed_limit
-        self._fins.array[:, 14] = TURN_SHARE_MIN * speed_limit
-        # The same of `fin_state`: three values, their rates, a phase.
-        self._state = SharedArray(np.zeros((n, 7)))
-        self._state.array[:, 2] = 0.5 * (lower + upper)
+        self._fins = SharedArray(np.zeros((n, N_FIN_NUMBERS)))
+        self._fins.array[:, TURNS_FULLY] = is_full_turn(upper - lower)
+        self._fins.array[:, SPEED_LIMIT] = speed_limit
+        self._fins.array[:, TURN_SPEED_MIN] = TURN_SHARE_MIN * speed_limit
+        self._state = SharedArray(np.zeros((n, N_STATE_NUMBERS)))
+        self.value[2] = 0.5 * (lower + upper)
         self._command = SharedArray(np.zeros((n, 3)))
         self._dt = math.nan
 
@@ -90,17 +105,17 @@ class FinLag:
     def value(self) -> Array:
         """Half amplitude [rad], frequency [Hz] and zero direction [rad], counted on over the seam
         (3, n); a view."""
-        return self._state.array[:, :3].T
+        return self._state.array[:, VALUE].T
 
     @property
     def rate(self) -> Array:
         """The same per second (3, n); a view."""
-        return self._state.array[:, 3:6].T
+        return self._state.array[:, RATE].T
 
     @property
     def command(self) -> Array:
         """What the fins do now, as a command (n, 3) [rad, Hz, rad]; a copy."""
-        return self._state.array[:, :3].copy()
+        return self._state.array[:, VALUE].copy()
 
     def step(self, command: Array, dt: float) -> None:
         """Follows a command over a step.
@@ -120,7 +135,7 @@ class FinLag:
         if dt != self._dt:
             self._dt = dt
             lag = np.stack(LagStep.of(self._poles, dt), axis=-1)
-            self._fins.array[:, :12] = lag.reshape(-1, 12)
+            self._fins.array[:, LAGS] = lag.reshape(len(lag), -1)
 
 
 class FinSteps(NamedTuple):
@@ -162,15 +177,15 @@ class FinMotion(FinLag):
         super().__init__(layout)
         if layout.n_fins:
             blade = plant_of(layout.fins_alone).blade
-            self._fins.array[:, 15] = blade.inertia
-            self._fins.array[:, 16] = blade.drag
-            self._fins.array[:, 17] = blade.own_inertia
-            self._fins.array[:, 18] = copper_loss
+            self._fins.array[:, INERTIA] = blade.inertia
+            self._fins.array[:, DRAG] = blade.drag
+            self._fins.array[:, OWN_INERTIA] = blade.own_inertia
+            self._fins.array[:, COPPER] = copper_loss
 
     @property
     def phase(self) -> Array:
         """Phases of the flapping (n,) [rad]; a view."""
-        return self._state.array[:, 6]
+        return self._state.array[:, PHASE]
 
     @property
     def angle(self) -> Array:
