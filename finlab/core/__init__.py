@@ -30,6 +30,7 @@ SIGNATURES = {
     "fl_outer_iterations": "ipppppppp",
     "fl_body_rates": "vpppp",
     "fl_body_fastest_rate": "rpp",
+    "fl_body_parts": "ippr",
     "fl_body_steps": "ippirp",
     "fl_body_coarse_step": "ipprp",
     "fl_follow_fins": "vppip",

@@ -326,6 +326,14 @@ void fl_body_rates(const fl_real *body, const fl_real *state, const fl_real *tau
                  [1/s] */
 fl_real fl_body_fastest_rate(const fl_real *body, const fl_real *state);
 
+/* Says into how many equal parts a step is cut so that integrating it stays stable.
+
+   @param body   as for fl_body_rates
+   @param state  (13,) at the beginning
+   @param step   its length [s]
+   @return       how many, or 0 where the motion is too fast */
+int fl_body_parts(const fl_real *body, const fl_real *state, fl_real step);
+
 /* Moves a body over steps by Runge-Kutta of order 4, each cut into as many parts as stay stable.
 
    @param body    as for fl_body_rates
@@ -358,9 +366,9 @@ void fl_follow_fins(const fl_real *fins, const fl_real *command, int count, fl_r
    @param fins, command, states  as for fl_follow_fins
    @param step   length of a step [s]
    @param steps  how many
-   @param moves  (steps, count, 8) become mean amplitude, frequency and zero direction of a step,
-                 whether that beats, and angle, phase, speed and acceleration at its end
-                 [rad, Hz, rad/s, rad/s^2] */
+   @param moves  (steps, count, 10) become mean amplitude, frequency and zero direction of a step,
+                 whether that beats, and angle, phase, speed, acceleration, inertial and driving
+                 power at its end [rad, Hz, rad/s, rad/s^2, W] */
 void fl_move_fins(const fl_real *fins, const fl_real *command, int count, fl_real step, int steps,
                   fl_real *states, fl_real *moves);
 

@@ -22,6 +22,10 @@ typedef struct {
   real turns_fully;    /* 1 where the zero direction may be any angle, else 0 */
   real speed_limit;    /* of its servo [rad/s] */
   real turn_speed_min; /* that flapping leaves to turn the fin, however fast it is [rad/s] */
+  real inertia;        /* J of the blade and the water that it carries [kg m^2] */
+  real drag;           /* K of the blade [N m s^2] */
+  real own_inertia;    /* I of the blade alone [kg m^2] */
+  real copper_loss;    /* heat in the motor's windings [W/(N m)^2] */
 } fin_numbers;
 
 /* What one fin does. */
@@ -33,12 +37,14 @@ typedef struct {
 
 /* What one fin did in a step. */
 typedef struct {
-  real mean_value[3]; /* mean of fin_state.value over the step, the zero direction wrapped */
-  real beats;         /* 1 where that mean beats, else 0 */
-  real angle;         /* at its end [rad] */
-  real phase;         /* at its end [rad] */
-  real speed;         /* at its end [rad/s] */
-  real acceleration;  /* [rad/s^2] */
+  real mean_value[3];  /* mean of fin_state.value over the step, the zero direction wrapped */
+  real beats;          /* 1 where that mean beats, else 0 */
+  real angle;          /* at its end [rad] */
+  real phase;          /* at its end [rad] */
+  real speed;          /* at its end [rad/s] */
+  real acceleration;   /* [rad/s^2] */
+  real inertial_power; /* at its end [W] */
+  real driving_power;  /* at its end [W] */
 } fin_step;
 
 /* The amplitude that the servo's speed leaves at a frequency, 2 pi A f at most that speed. */
@@ -104,6 +110,16 @@ static void differentiate(const fin_state *before, const fin_state *state, real 
   made->acceleration = phi_acceleration + by_sine * sine + by_cosine * cosine;
 }
 
+/* The power of a rigid plate that turns in still water, by two measures. */
+static void measure_power(const fin_numbers *fin, fin_step *made) {
+  const real omega = made->speed;
+  const real alpha = made->acceleration;
+  /* tau = J alpha + K omega |omega| */
+  const real torque = fin->inertia * alpha + fin->drag * omega * FABS(omega);
+  made->inertial_power = FABS(fin->own_inertia * alpha * omega);
+  made->driving_power = larger(torque * omega, 0) + fin->copper_loss * torque * torque;
+}
+
 /* One fin over one step. */
 static void move(const fin_numbers *fin, const real *command, real step, fin_state *state,
                  fin_step *made) {
@@ -129,6 +145,7 @@ static void move(const fin_numbers *fin, const real *command, real step, fin_sta
   made->mean_value[2] = fl_wrap_angle(made->mean_value[2]);
   made->beats = made->mean_value[0] > 0 && made->mean_value[1] > 0;
   differentiate(&before, state, step, made);
+  measure_power(fin, made);
 }
 
 void fl_move_fins(const real *fins, const real *command, int count, real step, int steps,

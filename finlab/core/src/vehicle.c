@@ -143,9 +143,7 @@ real fl_body_fastest_rate(const real *body, const real *state) {
   return damping + b->munk_rate * speed + turning;
 }
 
-/* Into how many equal parts a step has to be cut so that integrating it stays stable; 0 where too
-   many would not do. */
-static int parts_of(const real *body, const real *state, real step) {
+int fl_body_parts(const real *body, const real *state, real step) {
   const real rate = fl_body_fastest_rate(body, state);
   const real parts = rate * step / STABLE_STEP;
   if (!(parts <= PARTS_MOST)) return 0;
@@ -202,7 +200,7 @@ int fl_body_steps(const real *body, const real *wrench, int count, real step, re
   for (int i = 0; i < count; i++) {
     const real *before = states + (size_t)i * STATE_SIZE;
     real *after = states + (size_t)(i + 1) * STATE_SIZE;
-    const int parts = parts_of(body, before, step);
+    const int parts = fl_body_parts(body, before, step);
     if (parts == 0) return i;
     memcpy(after, before, STATE_SIZE * sizeof(real));
     for (int part = 0; part < parts; part++) {
@@ -214,7 +212,7 @@ int fl_body_steps(const real *body, const real *wrench, int count, real step, re
 }
 
 int fl_body_coarse_step(const real *body, const real *wrench, real step, real *state) {
-  const int parts = parts_of(body, state, step);
+  const int parts = fl_body_parts(body, state, step);
   for (int part = 0; part < parts; part++) {
     midpoint_step(body, wrench, step / (real)parts, state);
   }

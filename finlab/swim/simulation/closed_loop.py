@@ -30,7 +30,13 @@ from finlab.swim.control import (
     TrackingController,
 )
 from finlab.swim.control.contract import NO_WRENCH
-from finlab.swim.simulation.devices import ActuatorForce, ActuatorOutput, Sensors, SensorSettings
+from finlab.swim.simulation.devices import (
+    ActuatorForce,
+    ActuatorOutput,
+    ActuatorSteps,
+    Sensors,
+    SensorSettings,
+)
 from finlab.swim.simulation.log import RunLog, Tick, log_of_ticks
 from finlab.swim.simulation.task import Trajectory
 from finlab.swim.simulation.truth import Fault, checked_truth, damage_of
@@ -415,7 +421,7 @@ class ClosedLoop:
             reference=setpoint.position,
             reference_surge=setpoint.surge,
             asked=wrench,
-            allocated=self._plant.wrench(command, flow=self._flow),
+            allocated=self._allocated(command),
             delivered=mean.wrench,
             command=sent,
             fin_motion=self.motion.command,
@@ -429,6 +435,15 @@ class ClosedLoop:
             solve_ms=solve_ms,
         )
 
+    def _allocated(self, command: Array) -> Array:
+        """The wrench (6,) that a command (n, 3) gives once the actuators have followed it [N, N
+        m]."""
+        if self.damage.lost:
+            return self._plant.wrench(command, flow=self._flow)
+        # Nothing is NaN, and nothing has to be checked.
+        force = self._plant.force(command, flow=self._flow)
+        return self._plant.wrench_of(force, flow=self._flow)
+
     def _swim(self, command: Array, dt: float, n_steps: int, time: float) -> "MeanOutput":
         """Moves actuators and body over K steps, lets the sensors sample on the way, and returns
         what the actuators gave.
@@ -439,38 +454,54 @@ class ClosedLoop:
             n_steps: how many, K.
             time: at the beginning [s].
         """
-        forces = self._forces
-        vehicle = self.vehicle
-        moved = forces.move(command, dt, n_steps)
-        if not forces.feels_flow:
-            # Nothing depends on how the body moves through the water: all steps are one call.
-            output = forces.output(moved, dt, self._share, None)
-            wrench = forces.wrench(output.force, None)
-            states = vehicle.steps(self.state, wrench, dt)[1:]
-        else:
-            states = np.empty((n_steps, STATE_SIZE))
-            wrench = np.empty((n_steps, 6))
-            outputs = []
-            state = self.state
-            for k in range(n_steps):
-                water = vehicle.velocity_in_water(state)
-                in_step = forces.output(moved.at(k), dt, self._share, water)
-                wrench[k] = forces.wrench(in_step.force, water)[0]
-                state = vehicle.step(state, wrench[k], dt)
-                states[k] = state
-                outputs.append(in_step)
-            output = ActuatorOutput(*(np.concatenate(each) for each in zip(*outputs, strict=True)))
+        moved = self._forces.move(command, dt, n_steps)
+        output, wrench, states = self._integrated(moved, dt)
         self.state = states[-1].copy()
-        for k, state_then in enumerate(states[:-1].tolist(), start=1):
+        for k, state in enumerate(states[:-1].tolist(), start=1):
             # The sample at the end belongs to the next period.
-            self._sensors.sample(time + k * dt, state_then)
+            self._sensors.sample(time + k * dt, state)
         delivered = _mean(wrench)
         return MeanOutput(
             delivered,
-            forces.in_body(_mean(output.force), delivered),
+            self._forces.in_body(_mean(output.force), delivered),
             _mean(output.inertial_power),
             _mean(output.driving_power),
         )
+
+    def _integrated(self, moved: ActuatorSteps, dt: float) -> tuple[ActuatorOutput, Array, Array]:
+        """Returns what the actuators give in K steps, its wrenches (K, 6) [N, N m], and the states
+        (K, 13) of the body after each; what does not depend on how that moves through the water is
+        one call for all steps.
+
+        Args:
+            moved: how the actuators move.
+            dt: length of a step [s].
+        """
+        forces = self._forces
+        vehicle = self.vehicle
+        if not forces.feels_flow:
+            output = forces.output(moved, dt, self._share, None)
+            wrench = forces.wrench(output.force, None)
+            return output, wrench, vehicle.steps(self.state, wrench, dt)[1:]
+        n_steps = len(moved.others)
+        wrench = np.empty((n_steps, 6))
+        states = np.empty((n_steps, STATE_SIZE))
+        in_steps: list[ActuatorOutput] = []
+        if not forces.laws_feel_flow:
+            output = forces.output(moved, dt, self._share, None)
+            in_steps = [output.at(k) for k in range(n_steps)]
+        state = self.state
+        for k in range(n_steps):
+            water = vehicle.velocity_in_water(state)
+            if forces.laws_feel_flow:
+                in_steps.append(forces.output(moved.at(k), dt, self._share, water))
+            wrench[k] = forces.wrench(in_steps[k].force, water)[0]
+            state = vehicle.step(state, wrench[k], dt)
+            states[k] = state
+        if forces.laws_feel_flow:
+            together = zip(*in_steps, strict=True)
+            output = ActuatorOutput(*(np.concatenate(values) for values in together))
+        return output, wrench, states
 
 
 class MeanOutput(NamedTuple):

@@ -20,7 +20,7 @@ from finlab.physics import plant_of
 from finlab.swim.control import Measurement
 from finlab.swim.vehicle.actuator_motion import ActuatorMotion
 from finlab.swim.vehicle.attitude import tilt_of_quaternion
-from finlab.swim.vehicle.fin_motion import FinMotion, FinSteps, fin_power
+from finlab.swim.vehicle.fin_motion import FinMotion, FinSteps
 
 
 @dataclass(frozen=True)
@@ -279,6 +279,10 @@ class ActuatorOutput(NamedTuple):
     driving_power: Array
     """(K, n) [W]; of what is no fin that of its law."""
 
+    def at(self, k: int) -> "ActuatorOutput":
+        """One of the steps."""
+        return ActuatorOutput(*(values[k : k + 1] for values in self))
+
 
 class ActuatorForce:
     """The actuators of one layout, the true one."""
@@ -291,7 +295,8 @@ class ActuatorForce:
         self._beat = fins
         self._plant = plant_of(layout)
         self.feels_flow = self._plant.feels_flow
-        """Whether what the actuators give depends on how the robot moves through the water."""
+        """Whether what the actuators give depends on how the robot moves through the water, by
+        their laws or by what they do to each other."""
         self._frames = layout.frames
         # The wrench (3 n, 6) of 1 N along each own axis of each actuator.
         self._effectiveness = own_effectiveness(layout).reshape(-1, 6)
@@ -299,8 +304,11 @@ class ActuatorForce:
         self._n_others = len(others)
         if len(self.motion.fin_indices):
             self._fins = plant_of(layout.fins_alone)
+        self.laws_feel_flow = False
+        """Whether their laws alone do."""
         if others:
             self._others = plant_of(replace(layout, actuators=others, interaction=None))
+            self.laws_feel_flow = self._others.feels_flow
 
     def move(self, command: Array, dt: float, count: int) -> ActuatorSteps:
         """Follows a command (n, 3) over steps.
@@ -335,7 +343,8 @@ class ActuatorForce:
         fin_share = share[motion.fin_indices]
         of_fins = ActuatorOutput(
             self.of_fins(steps.fins, dt) * fin_share[:, None],
-            *fin_power(steps.fins.speed, steps.fins.acceleration, self._fins.blade),
+            steps.fins.inertial_power,
+            steps.fins.driving_power,
         )
         if not self._n_others:
             return of_fins

@@ -10,12 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from finlab.actuators.law import Blade
 from finlab.arrays import Array
 from finlab.axes import is_full_turn
 from finlab.core import library
 from finlab.core.shared_array import SharedArray
 from finlab.layout import Layout
+from finlab.physics import plant_of
 
 TURN_SHARE_MIN = 0.1
 """Share of its speed that a servo turns its fin with, however fast that flaps."""
@@ -25,6 +25,23 @@ COPPER_LOSS = 0.5
 simulation. Our choice, as nothing is published of U-CAT's drives: a motor of 60 W whose windings
 take 730 W/(N m)^2 at its own shaft (7 rpm per mN m) behind a gear of 50 : 1 at 80 %, with which its
 fin turns twice a second."""
+
+
+# Columns of a fin's numbers, in the order of `fin_numbers` in the core's fin_motion.c.
+LAGS = slice(0, 12)
+TURNS_FULLY = 12
+SPEED_LIMIT = 13
+TURN_SPEED_MIN = 14
+INERTIA = 15
+DRAG = 16
+OWN_INERTIA = 17
+COPPER = 18
+N_FIN_NUMBERS = 19
+# Columns of what a fin does, in the order of `fin_state` there.
+VALUE = slice(0, 3)
+RATE = slice(3, 6)
+PHASE = 6
+N_STATE_NUMBERS = 7
 
 
 class LagStep(NamedTuple):
@@ -75,14 +92,12 @@ class FinLag:
         lower, upper = np.array([fin.limits.zero_direction for fin in layout.fins]).reshape(-1, 2).T
         self._poles = layout.servo_poles.reshape(-1, 3)
         speed_limit = np.asarray(layout.speed_limit)
-        # A row of a fin, in the order of `fin_numbers` in the core's fin_motion.c.
-        self._fins = SharedArray(np.zeros((n, 15)))
-        self._fins.array[:, 12] = is_full_turn(upper - lower)
-        self._fins.array[:, 13] = speed_limit
-        self._fins.array[:, 14] = TURN_SHARE_MIN * speed_limit
-        # The same of `fin_state`: three values, their rates, a phase.
-        self._state = SharedArray(np.zeros((n, 7)))
-        self._state.array[:, 2] = 0.5 * (lower + upper)
+        self._fins = SharedArray(np.zeros((n, N_FIN_NUMBERS)))
+        self._fins.array[:, TURNS_FULLY] = is_full_turn(upper - lower)
+        self._fins.array[:, SPEED_LIMIT] = speed_limit
+        self._fins.array[:, TURN_SPEED_MIN] = TURN_SHARE_MIN * speed_limit
+        self._state = SharedArray(np.zeros((n, N_STATE_NUMBERS)))
+        self.value[2] = 0.5 * (lower + upper)
         self._command = SharedArray(np.zeros((n, 3)))
         self._dt = math.nan
 
@@ -90,17 +105,17 @@ class FinLag:
     def value(self) -> Array:
         """Half amplitude [rad], frequency [Hz] and zero direction [rad], counted on over the seam
         (3, n); a view."""
-        return self._state.array[:, :3].T
+        return self._state.array[:, VALUE].T
 
     @property
     def rate(self) -> Array:
         """The same per second (3, n); a view."""
-        return self._state.array[:, 3:6].T
+        return self._state.array[:, RATE].T
 
     @property
     def command(self) -> Array:
         """What the fins do now, as a command (n, 3) [rad, Hz, rad]; a copy."""
-        return self._state.array[:, :3].copy()
+        return self._state.array[:, VALUE].copy()
 
     def step(self, command: Array, dt: float) -> None:
         """Follows a command over a step.
@@ -120,7 +135,7 @@ class FinLag:
         if dt != self._dt:
             self._dt = dt
             lag = np.stack(LagStep.of(self._poles, dt), axis=-1)
-            self._fins.array[:, :12] = lag.reshape(-1, 12)
+            self._fins.array[:, LAGS] = lag.reshape(len(lag), -1)
 
 
 class FinSteps(NamedTuple):
@@ -140,15 +155,37 @@ class FinSteps(NamedTuple):
     acceleration: Array
     """Angular accelerations (K, n) [rad/s^2]; those by changes of the command are means over a
     step."""
+    inertial_power: Array
+    """|I alpha omega| (K, n) [W], the paper's: what turns the fin's own inertia, braking counted
+    like driving."""
+    driving_power: Array
+    """max(tau omega, 0) (K, n) [W], inertia, carried water and drag together, nothing won back by
+    braking, and the heat in the motor's windings, copper_loss tau^2: what a battery gives, but for
+    the electronics. The torque is that of a rigid plate in still water."""
 
 
 class FinMotion(FinLag):
     """Angles of the fins of one layout over time, in steps much shorter than a beat."""
 
+    def __init__(self, layout: Layout, copper_loss: float = COPPER_LOSS) -> None:
+        """Starts at rest, as `FinLag`.
+
+        Args:
+            layout: the robot.
+            copper_loss: heat in a motor's windings [W/(N m)^2].
+        """
+        super().__init__(layout)
+        if layout.n_fins:
+            blade = plant_of(layout.fins_alone).blade
+            self._fins.array[:, INERTIA] = blade.inertia
+            self._fins.array[:, DRAG] = blade.drag
+            self._fins.array[:, OWN_INERTIA] = blade.own_inertia
+            self._fins.array[:, COPPER] = copper_loss
+
     @property
     def phase(self) -> Array:
         """Phases of the flapping (n,) [rad]; a view."""
-        return self._state.array[:, 6]
+        return self._state.array[:, PHASE]
 
     @property
     def angle(self) -> Array:
@@ -170,7 +207,7 @@ class FinMotion(FinLag):
         """
         self._take(command, dt)
         n = len(command)
-        moves = np.empty((count, n, 8))
+        moves = np.empty((count, n, 10))
         library().fl_move_fins(
             self._fins.address,
             self._command.address,
@@ -187,33 +224,6 @@ class FinMotion(FinLag):
             phase=moves[..., 5],
             speed=moves[..., 6],
             acceleration=moves[..., 7],
+            inertial_power=moves[..., 8],
+            driving_power=moves[..., 9],
         )
-
-
-class FinPower(NamedTuple):
-    """Power of each fin (..., n) [W], by two measures."""
-
-    inertial: Array
-    """|I alpha omega|, the paper's: what turns the fin's own inertia, braking counted like
-    driving."""
-    driving: Array
-    """max(tau omega, 0), inertia, carried water and drag together, nothing won back by braking, and
-    the heat in the motor's windings, copper_loss tau^2: what a battery gives, but for the
-    electronics."""
-
-
-def fin_power(
-    speed: Array, acceleration: Array, blade: Blade, copper_loss: float = COPPER_LOSS
-) -> FinPower:
-    """Returns the power of fins; the torque is that of a rigid plate in still water.
-
-    Args:
-        speed: angular speeds omega (..., n) [rad/s].
-        acceleration: angular accelerations alpha (..., n) [rad/s^2].
-        blade: inertia and drag of the fins, each (n,).
-        copper_loss: heat in a motor's windings [W/(N m)^2].
-    """
-    torque = blade.inertia * acceleration + blade.drag * speed * np.abs(speed)
-    mechanical = np.maximum(torque * speed, 0.0)
-    inertial = np.abs(blade.own_inertia * acceleration * speed)
-    return FinPower(inertial, mechanical + copper_loss * torque * torque)

@@ -26,9 +26,10 @@ from finlab.swim.vehicle.fossen import dynamics_of
 STATE_SIZE = 13
 STABLE_STEP = 1.5
 """Length of a step times the fastest rate of change in it, well within what Runge-Kutta (2.8) and
-the midpoint rule (2) bear."""
+the midpoint rule (2) bear; the core's vehicle.c has it, too."""
 MAX_SUBSTEPS = 500
-"""Into how many steps at most a period is cut for a body that water stops almost at once."""
+"""Into how many steps at most a period is cut for a body that water stops almost at once; likewise
+in the core."""
 
 
 class Vehicle:
@@ -100,20 +101,19 @@ class Vehicle:
             LayoutError: even `MAX_SUBSTEPS` would not do.
         """
         self._state.array[7:] = nu
-        fastest_rate: float = library().fl_body_fastest_rate(
-            self._body.address, self._state.address
+        arguments = self._body.address, self._state.address
+        parts: int = library().fl_body_parts(*arguments, dt)
+        if parts:
+            return parts
+        fastest_rate = library().fl_body_fastest_rate(*arguments)
+        got = "beyond all bounds"
+        if math.isfinite(fastest_rate):
+            got = f"{fastest_rate:.2g} times a second"
+        raise LayoutError(
+            f"its motion changes {got}, at most {MAX_SUBSTEPS * STABLE_STEP / dt:g} can be "
+            "simulated; check mass, inertia, added mass, damping and buoyancy",
+            "body",
         )
-        max_rate = MAX_SUBSTEPS * STABLE_STEP / dt
-        if not fastest_rate <= max_rate:  # nor where it is no number any more
-            got = "beyond all bounds"
-            if math.isfinite(fastest_rate):
-                got = f"{fastest_rate:.2g} times a second"
-            raise LayoutError(
-                f"its motion changes {got}, at most {max_rate:g} can be simulated; check mass, "
-                "inertia, added mass, damping and buoyancy",
-                "body",
-            )
-        return max(1, math.ceil(fastest_rate * dt / STABLE_STEP))
 
     def derivative(self, state: Sequence[float] | Array, wrench: Sequence[float] | Array) -> Array:
         """Returns the rate of change (13,) of a state.

@@ -1,5 +1,6 @@
 """The closed loop as a whole, with the quickest method."""
 
+from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -49,6 +50,21 @@ def test_same_seed_same_swim(layout_a: Layout, analytic: AllocatorCache) -> None
     first, again, other = ([swim.step() for _ in range(30)][-1].position for swim in swims)
     np.testing.assert_array_equal(first, again)
     assert (first != other).any()
+
+
+def test_a_copy_of_a_swim_goes_on_as_the_swim_does(
+    layout_a: Layout, analytic: AllocatorCache
+) -> None:
+    swim = sim.ClosedLoop(layout_a, analytic.on(layout_a), sim.make_trajectory("circle", 20.0))
+    for _ in range(5):
+        swim.step()
+    twin = deepcopy(swim)
+    ticks = [swim.step() for _ in range(5)]
+    for tick in ticks:
+        also = twin.step()
+        np.testing.assert_array_equal(tick.position, also.position)
+        np.testing.assert_array_equal(tick.command, also.command)
+        np.testing.assert_array_equal(tick.measured, also.measured)
 
 
 def test_a_straight_path_holds_speed_and_depth(layout_a: Layout, analytic: AllocatorCache) -> None:

@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from finlab.actuators.law import OWN_INERTIA, Blade
 from finlab.assets import shipped_layouts
 from finlab.layout import Layout, Servo, load_layout
-from finlab.swim.vehicle.fin_motion import FinLag, FinMotion, fin_power
+from finlab.swim.vehicle.fin_motion import COPPER_LOSS, FinLag, FinMotion
 
 STEP_S = 0.01
 """A step of the simulation [s]."""
@@ -27,9 +27,15 @@ def driven(layout: Layout, servo: Servo) -> Layout:
     return replace(layout, actuators=tuple(replace(fin, servo=servo) for fin in layout.fins))
 
 
-def flapping(layout: Layout, amplitude: float, frequency: float, direction: float) -> FinMotion:
+def flapping(
+    layout: Layout,
+    amplitude: float,
+    frequency: float,
+    direction: float,
+    copper_loss: float = COPPER_LOSS,
+) -> FinMotion:
     """Fins that have followed a command for long."""
-    motion = FinMotion(layout)
+    motion = FinMotion(layout, copper_loss)
     motion.value[0] = amplitude
     motion.value[1] = frequency
     motion.value[2] = direction
@@ -110,18 +116,13 @@ def test_mean_power_is_what_a_sinusoid_has(pair: Layout) -> None:
     too."""
     amplitude = 0.4
     frequency = 1.25
-    motion = flapping(pair, amplitude, frequency, 0.0)
-    command = motion.command.copy()
-    inertial = []
-    torque = []
-    driving = []
-    for _ in range(10 * round(1 / (frequency * STEP_S))):
-        steps = motion.steps(command, STEP_S, 1)
-        power = fin_power(steps.speed, steps.acceleration, Blade(), 0.7)
-        inertial.append(power.inertial[0, 0])
-        without_heat = fin_power(steps.speed, steps.acceleration, Blade(), 0.0)
-        torque.append(without_heat.driving[0, 0])
-        driving.append(power.driving[0, 0])
+    command = np.tile([amplitude, frequency, 0.0], (2, 1))
+    n_steps = 10 * round(1 / (frequency * STEP_S))
+    steps = flapping(pair, amplitude, frequency, 0.0, 0.7).steps(command, STEP_S, n_steps)
+    cold = flapping(pair, amplitude, frequency, 0.0, 0.0).steps(command, STEP_S, n_steps)
+    inertial = steps.inertial_power[:, 0]
+    torque = cold.driving_power[:, 0]
+    driving = steps.driving_power[:, 0]
     swing = 2 * math.pi * frequency
     assert np.mean(inertial) == pytest.approx(
         OWN_INERTIA * amplitude**2 * swing**3 / math.pi, rel=0.01
