@@ -8,7 +8,7 @@ from pathlib import Path
 
 from finlab.errors import FinlabError
 
-VERSION = 11
+VERSION = 12
 """What `fl_version()` of the C files returns; both rise together where a signature or a struct
 changes."""
 SIGNATURES = {
@@ -26,6 +26,8 @@ SIGNATURES = {
     "fl_conjugates": "ippppip",
     "fl_reach": "vpppppirppp",
     "fl_jets": "vppipppp",
+    "fl_message_rows": "vppipppp",
+    "fl_message_wrench": "vpipppp",
     "fl_outer_iterations": "ipppppppp",
     "fl_body_rates": "vpppp",
     "fl_body_fastest_rate": "rpp",
@@ -37,6 +39,8 @@ SIGNATURES = {
     "fl_path_wrenches": "vpppiprrp",
     "fl_kalman_predict": "vppip",
     "fl_kalman_correct": "vppiiipp",
+    "fl_answer_coupled_into_row": "ipppprp",
+    "fl_answer_coupled_many": "ipppppippppppp",
 }
 """What each function returns and takes: i int, r real, p pointer, s text, v nothing."""
 _TYPES = {
