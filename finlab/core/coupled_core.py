@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 
 from finlab.arrays import Array
 from finlab.core import library
-from finlab.core.answer_rows import AnswerRow, AnswerRows
 from finlab.core.calls import (
     NOMINAL,
     AnswerRecord,
+    AnswerRow,
+    AnswerRows,
     Conditions,
     CoreAnswer,
     QuestionRecord,

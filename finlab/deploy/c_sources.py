@@ -46,14 +46,6 @@ FILES_LEFT_OUT = (
 )
 """Files of the core that an export does not need: `interaction`, attainable sets, what Python
 alone calls, and what swims in a simulation."""
-    "messages.c",
-    "outer_iterations.c",
-    "outer_starts.c",
-    "ray_reach.c",
-    "for_python.c",
-)
-"""Files of the core that an export does not need: `interaction`, attainable sets, and what Python
-alone calls."""
 QUESTIONS: tuple[tuple[PolicyName, float], ...] = (
     ("closest", 0.9),
     ("closest", 3.0),

@@ -302,7 +302,7 @@ class Dual(Method):
 
     def _solve_coupled(
         self, conditions: Conditions, targets: Array, policy: Policy, multipliers: Array | None
-    ) -> Solution:
+    ) -> Solved:
         """Solves as `solve_under`, for a robot whose actuators act on each other."""
         from finlab.allocation.dual.outer_iterations import finished_answer
 
@@ -312,8 +312,8 @@ class Dual(Method):
                 targets[0], record, multipliers, conditions, self._most_core_error
             )
             if row.is_finished:
-                return self._solution_of_row(row, targets, conditions)
-            answer = CoreAnswer.of_row(row)
+                return FinishedSolution(self, conditions, targets, row)
+            answer = row.copied()
         else:
             answer = self.coupled.answer_many(targets, record, None, conditions)
         problem = self.problem_under(conditions)

@@ -36,8 +36,8 @@
 #define MU_KEPT_EARLY R(0.3)  /* the same where more than half of the slope is left at its end */
 #define SHARE_LEAST R(0.02)   /* of a refused step, the least share that is tried next */
 #define SHARE_LEAST_DRAG R(1e-3) /* the same where foils drag, whose kinks are many */
-#define SHARE_MOST R(0.7)        /* the largest one */
-#define WRENCH_MIN R(1e-3) /* what a scaled wrench counts at least, in rounding of its range */
+#define SHARE_MOST R(0.7)     /* the largest one */
+#define WRENCH_MIN R(1e-3)    /* what a scaled wrench counts at least, in rounding of its range */
 
 /* Scaled wrench in the basis. */
 void fl_reduce_wrench(const fl_work *work, const real *wrench, real *target_reduced) {

@@ -42,8 +42,7 @@ static quadratic_cost quadratic_of(const real *block, const fl_actuator *a, real
 /* Force over price at a share of the largest force, over the secant of that [1]. Where the cost is
    ~ T^1.5, as of all laws nearly, it is the root of the share; the table of a line whose cost is
    another one says it. */
-static real secant_at(const real *block, int i, real price, real share,
-                      const quadratic_cost *cost) {
+static real secant_at(const real *block, int i, real price, real share, const quadratic_cost *cost) {
   const fl_actuator *a = ACTUATOR(block, i);
   const int has_cells = table_for(block, a, price)[1] > 1;
   if (a->rows != 1 || !has_cells) return SQRT(share);
@@ -198,7 +197,8 @@ void fl_first_lambda_at_rim(const real *block, fl_work *work, const real *target
   /* The last share of a force may have a price without end. */
   for (int k = 0; k < SEARCH_STEPS; k++) {
     const real shorter = t / SEARCH_FACTOR;
-    const real lost = lost_along(block, work, target_reduced, normal, nu, shorter, -to_target);
+    const real lost =
+        lost_along(block, work, target_reduced, normal, nu, shorter, -to_target);
     if (lost > least) break;
     t = shorter;
   }

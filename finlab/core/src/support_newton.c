@@ -20,37 +20,37 @@
    is no answer. That knows sets of all kinds; here are lines, and planes that are full circles. */
 #include "internal.h"
 
-#define ROUNDS 12       /* of new centres, at most */
-#define ROUND_STEPS 20  /* of Newton's method in a round, at most */
-#define LINE_STEPS 8    /* of a search along a step, at most */
-#define RHO_FIRST 10    /* rho times the mean worth of a force, over half of its squared range */
-#define RHO_GROWTH 10   /* from round to round */
-#define RHO_MOST 1e4    /* above that the rounding of rho s would be that of forces */
-#define SIGMA_FIRST 0.1 /* sigma over the mean of the Hessian at the first rho */
-#define LOOSE 1e-3      /* residual that ends the first round, over the size of c or e */
-#define SHORT 1e-6      /* step over the normal that is not searched: slopes there are rounding */
-#define LEFT 0.5        /* share of the slope at the end of a step from which it is searched */
-#define CLOSER 0.01     /* residual that ends the last round, over the distance that is asked for */
+#define ROUNDS 12        /* of new centres, at most */
+#define ROUND_STEPS 20   /* of Newton's method in a round, at most */
+#define LINE_STEPS 8     /* of a search along a step, at most */
+#define RHO_FIRST 10     /* rho times the mean worth of a force, over half of its squared range */
+#define RHO_GROWTH 10    /* from round to round */
+#define RHO_MOST 1e4     /* above that the rounding of rho s would be that of forces */
+#define SIGMA_FIRST 0.1  /* sigma over the mean of the Hessian at the first rho */
+#define LOOSE 1e-3       /* residual that ends the first round, over the size of c or e */
+#define SHORT 1e-6       /* step over the normal that is not searched: slopes there are rounding */
+#define LEFT 0.5         /* share of the slope at the end of a step from which it is searched */
+#define CLOSER 0.01      /* residual that ends the last round, over the distance that is asked for */
 
 typedef struct {
   const real *block;
   const fl_work *work;
-  const wide *center;  /* c (6,), in weighted axes */
-  const wide *ray;     /* e (6,); 0 for none */
-  wide size;           /* of c or e */
-  wide normal[6];      /* m */
+  const wide *center; /* c (6,), in weighted axes */
+  const wide *ray;    /* e (6,); 0 for none */
+  wide size;          /* of c or e */
+  wide normal[6];     /* m */
   wide last_normal[6]; /* m_k */
   wide sigma;
-  wide rho;                      /* of a force whose half range is 1 N */
-  wide ray_size;                 /* t */
-  wide gradient[6];              /* of the rounded function; of a ray less t e */
-  wide middle[FL_MOST];          /* of a line's forces [N] */
-  wide half[FL_MOST];            /* half range of a line, radius of a plane [N] */
-  wide force[FL_MOST][2];        /* y [N] */
+  wide rho;                 /* of a force whose half range is 1 N */
+  wide ray_size;            /* t */
+  wide gradient[6];         /* of the rounded function; of a ray less t e */
+  wide middle[FL_MOST];     /* of a line's forces [N] */
+  wide half[FL_MOST];       /* half range of a line, radius of a plane [N] */
+  wide force[FL_MOST][2];   /* y [N] */
   wide force_center[FL_MOST][2]; /* z [N] */
-  wide price[FL_MOST][2];        /* s */
-  wide change[FL_MOST][2];       /* of the prices in a step */
-  wide slope[FL_MOST][3];        /* dy/ds: xx, xy, yy */
+  wide price[FL_MOST][2];   /* s */
+  wide change[FL_MOST][2];  /* of the prices in a step */
+  wide slope[FL_MOST][3];   /* dy/ds: xx, xy, yy */
 } support_problem;
 
 static int is_line(const support_problem *p, int i) { return ACTUATOR(p->block, i)->rows == 1; }
