@@ -27,6 +27,8 @@ SIGNATURES = {
     "fl_power_bounds": "ipppppipp",
     "fl_reach": "vpppppirppp",
     "fl_jets": "vppipppp",
+    "fl_message_rows": "vppipppp",
+    "fl_message_wrench": "vpipppp",
     "fl_outer_iterations": "ipppppppp",
     "fl_body_rates": "vpppp",
     "fl_body_fastest_rate": "rpp",
@@ -39,6 +41,8 @@ SIGNATURES = {
     "fl_path_wrenches": "vpppiprrp",
     "fl_kalman_predict": "vppip",
     "fl_kalman_correct": "vppiiipp",
+    "fl_answer_coupled_into_row": "ipppprp",
+    "fl_answer_coupled_many": "ipppppippppppp",
 }
 """What each function returns and takes: i int, r real, p pointer, s text, v nothing."""
 _TYPES = {

@@ -52,6 +52,26 @@ class AnswerMemory:
         """(ROWS, 1, 6) [W/N, W/(N m)]."""
 
 
+class AnswerRows:
+    """Rows for one answer after the other: memory is allocated anew when it is full."""
+
+    def __init__(self, n: int) -> None:
+        """Allocates rows for a robot of n actuators."""
+        self._n = n
+        self._memory = AnswerMemory(n)
+        self._used = 0
+        """Rows of the memory that hold answers."""
+
+    def next(self) -> tuple[AnswerMemory, int]:
+        """Returns a memory, and the index of a row of it that is free."""
+        row = self._used
+        if row == ROWS:
+            self._memory = AnswerMemory(self._n)
+            row = 0
+        self._used = row + 1
+        return self._memory, row
+
+
 class AnswerRow:
     """One answer of the core, in a row of memory. What each number is, `CoreAnswer` says."""
 

@@ -19,13 +19,15 @@ from finlab.core import library
 from finlab.core.calls import (
     NOMINAL,
     AnswerRecord,
+    AnswerRow,
+    AnswerRows,
     Conditions,
     CoreAnswer,
     QuestionRecord,
     prepared_work,
     raise_refusal,
 )
-from finlab.core.fields import Record, struct
+from finlab.core.fields import Record, constant, struct
 
 _OFFSET_CALLBACK = ctypes.CFUNCTYPE(
     None,
@@ -57,6 +59,9 @@ class WrenchOffset(NamedTuple):
     effect: Callable[[Array, Array | None], tuple[Array, Array]]
     """For forces (n, 3) [N], body frame, and `inflow`: the offset (6,) [N, N m], and its
     derivatives (n, 3, 6) by the forces."""
+    starts: Array | None = None
+    """Where iterations begin anew (K, n, 2): real and imaginary parts of factors, by which the
+    forces by the laws alone are multiplied as complex numbers. None for nowhere."""
 
 
 class OuterResult(NamedTuple):
@@ -103,16 +108,20 @@ class CoupledCore:
         self._answer = AnswerRecord(n)
         self._wrench_offset = wrench_offset
         self._raised: BaseException | None = None
-        """Raised by the callback, for `_run_iterations` to raise again."""
+        """Raised by the callback, to be raised again when C returns."""
         callback: Any = library().fl_jets
         if wrench_offset.core_constants is None:
             callback = _OFFSET_CALLBACK(self._effect)
         frames = np.ascontiguousarray(wrench_offset.frames)
+        starts = np.zeros((0, n, 2))
+        if wrench_offset.starts is not None:
+            starts = np.ascontiguousarray(wrench_offset.starts)
         self._pointed_at = (
             wrench_offset.core_constants,
             wrench_offset.inflow,
             block,
             frames,
+            starts,
             callback,
         )
         """What the struct points at, which has to live as long."""
@@ -123,11 +132,18 @@ class CoupledCore:
         robot["block_uncoupled"] = _address_of(block)
         robot["frames"] = _address_of(frames)
         robot["axis_counts"] = wrench_offset.counts
+        robot["starts"] = _address_of(starts)
+        robot["start_count"] = len(starts)
         self._robot: Record = robot
         self._limits: Record = np.zeros(1, struct("fl_outer_limits"))
         """When the iterations end."""
         self._result: Record = np.zeros(1, struct("fl_outer_result"))
         """What they end with."""
+        self._robot_address = robot.ctypes.data
+        self._block_address = self._block_linear.ctypes.data
+        self._work_address = ctypes.addressof(self._work)
+        self._unfinished = constant("FL_UNFINISHED")
+        self._rows = AnswerRows(n)
         self._force = np.zeros((n, 2))
         """Forces [N] at which the iterations begin, and then those at which they end."""
 
@@ -170,7 +186,18 @@ class CoupledCore:
             self._limits["most_iterations"] = most_iterations
             self._question.write_wrench(wrench)
             self._question.write(policy, multipliers, conditions)
-            raise_refusal(self._run_iterations())
+            code = self._core.fl_outer_iterations(
+                self._robot_address,
+                self._block_address,
+                self._work_address,
+                self._question.address,
+                self._limits.ctypes.data,
+                self._force.ctypes.data,
+                self._answer.address,
+                self._result.ctypes.data,
+            )
+            self._raise_from_callback()
+            raise_refusal(code)
             return OuterResult(
                 answer=self._answer.read() if most_iterations > 0 else None,
                 force=self._force.copy(),
@@ -180,29 +207,124 @@ class CoupledCore:
                 steps=float(self._result["steps"][0]),
             )
 
-    def _run_iterations(self) -> int:
-        """Runs the iterations for the question that is written; returns an error code."""
-        code: int = self._core.fl_outer_iterations(
-            self._robot.ctypes.data,
-            self._block_linear.ctypes.data,
-            ctypes.addressof(self._work),
-            self._question.address,
-            self._limits.ctypes.data,
-            self._force.ctypes.data,
-            self._answer.address,
-            self._result.ctypes.data,
+    def answer_row(
+        self,
+        wrench: Array,
+        policy: Record | None,
+        multipliers: Array | None,
+        conditions: Conditions,
+        most_error: float,
+    ) -> AnswerRow:
+        """Answers one wrench, as `answer_many` does; what it found is read when it is asked for.
+
+        Args:
+            wrench: desired (6,) [N, N m].
+            policy: as in `answer_many`, as are the next two.
+            multipliers: lambda (6,) at which the first answer begins.
+            conditions: what holds of the robot.
+            most_error: error up to which commands are exact, by the grids of the laws [1].
+
+        Returns:
+            The answer, finished where the wrench is within reach and the commands are exact.
+
+        Raises:
+            CommandError: the core cannot work with these numbers.
+        """
+        with self._lock:
+            memory, row = self._rows.next()
+            self._question.write_wrench(wrench)
+            self._question.write(policy, multipliers, conditions)
+            code = self._core.fl_answer_coupled_into_row(
+                self._robot_address,
+                self._block_address,
+                self._work_address,
+                self._question.address,
+                most_error,
+                memory.addresses[row],
+            )
+            self._raise_from_callback()
+        is_exact = code == 0
+        if not is_exact and code != self._unfinished:
+            raise_refusal(code)
+        return AnswerRow(memory, row, is_exact, is_exact)
+
+    def answer_many(
+        self,
+        wrenches: Array,
+        policy: Record | None,
+        multipliers: Array | None = None,
+        conditions: Conditions = NOMINAL,
+    ) -> CoreAnswer:
+        """Answers wrenches by outer iterations from all starts, in a tick from the command before.
+
+        Args:
+            wrenches: desired (N, 6) [N, N m].
+            policy: of `policy_record`, what to give out of reach; None for nothing else than the
+                wrenches.
+            multipliers: lambda (6,) [W/N, W/(N m)] at which each first answer begins; None for its
+                own.
+            conditions: what holds of the robot.
+
+        Returns:
+            N answers, of the dual's last answers by which the commands were found, with these
+            commands. Nothing is proved of gaps.
+
+        Raises:
+            CommandError: the core cannot work with these numbers.
+        """
+        wrenches = np.ascontiguousarray(wrenches)
+        count = len(wrenches)
+        force = np.empty((count, self._n, 2))
+        multipliers_found = np.empty((count, 6))
+        wrench_served = np.empty((count, 6))
+        command = np.empty((count, self._n, 3))
+        is_attainable = np.empty(count, np.bool_)
+        error = np.empty(count)
+        is_truncated = np.empty(count, np.bool_)
+        with self._lock:
+            self._question.write(policy, multipliers, conditions)
+            code = self._core.fl_answer_coupled_many(
+                self._robot_address,
+                self._block_address,
+                self._work_address,
+                self._question.address,
+                wrenches.ctypes.data,
+                count,
+                force.ctypes.data,
+                multipliers_found.ctypes.data,
+                wrench_served.ctypes.data,
+                command.ctypes.data,
+                is_attainable.ctypes.data,
+                error.ctypes.data,
+                is_truncated.ctypes.data,
+            )
+            self._raise_from_callback()
+        raise_refusal(code)
+        return CoreAnswer(
+            force=force,
+            multipliers=multipliers_found,
+            wrench_served=wrench_served,
+            gap_power_bound=np.zeros(count),
+            is_attainable=is_attainable,
+            command=command,
+            error=error,
+            is_truncated=bool(is_truncated.any()),
         )
+
+    def _raise_from_callback(self) -> None:
+        """Raises what the callback has raised during the last call."""
         if self._raised is not None:
             raised = self._raised
             self._raised = None
             raise raised
-        return code
 
     def _effect(
         self, _: int, force: int, count: int, inflow: int, change: int, wrench: int, slope: int
     ) -> None:
         """Writes the offset and its derivatives for C; the arguments are those of the callback."""
         n = self._n
+        if self._raised is not None:
+            return  # the answer is lost already: C only has to come to its end
         try:
             offset, derivatives = self._wrench_offset.effect(
                 _numbers_at(force, (n, 3)), self._wrench_offset.inflow

@@ -304,6 +304,33 @@ int fl_outer_iterations(const fl_coupled_robot *robot, fl_real *block, fl_work *
                         const fl_question *question, const fl_outer_limits *limits, fl_real *force,
                         fl_answer *answer, fl_outer_result *result);
 
+/* Finds commands of a robot whose actuators act on each other, by outer iterations from several
+   starts; in a tick from the commands before alone.
+
+   @param robot     what its actuators do to each other, and where iterations begin anew
+   @param block     a copy of robot->block_uncoupled, which becomes the linear model
+   @param work      work area, prepared for that block
+   @param question  as for fl_answer_one
+   @param answer    becomes the last answer of the dual by which the best commands were found, with
+                    these commands
+   @param result    becomes what their iterations end with
+   @return          as fl_answer_one */
+int fl_answer_coupled(const fl_coupled_robot *robot, fl_real *block, fl_work *work,
+                      const fl_question *question, fl_answer *answer, fl_outer_result *result);
+
+/* The same, and writes the answer as a row of numbers, as fl_answer_into_row does. Beyond reach it
+   never says that nothing is left to do. */
+int fl_answer_coupled_into_row(const fl_coupled_robot *robot, fl_real *block, fl_work *work,
+                               const fl_question *question, fl_real most_error, fl_real *row);
+
+/* The same for many wrenches, all else as in a question. The outputs are those of fl_answer_many,
+   but for bounds of gaps: nothing is proved of these. */
+int fl_answer_coupled_many(const fl_coupled_robot *robot, fl_real *block, fl_work *work,
+                           const fl_question *question, const fl_real *wrench, int count,
+                           fl_real *force, fl_real *multipliers, fl_real *wrench_served,
+                           fl_real *command, fl_byte *is_attainable, fl_real *error,
+                           fl_byte *is_truncated);
+
 /* The wrench offset of jets, an fl_offset_at.
 
    @param constants  of the water, then of each actuator; finlab/core/src/jets.c has their order */
@@ -415,6 +442,30 @@ void fl_kalman_predict(const fl_real *transition, const fl_real *noise, int size
    @param covariance  P (size, size), symmetric */
 void fl_kalman_correct(const fl_real *variance, const fl_real *innovation, int first, int last,
                        int size, fl_real *state, fl_real *covariance);
+/* Features and vectors of the messages between actuators, and between each and the hull.
+
+   @param constants    of the robot; finlab/core/src/messages.c has their order
+   @param force        (count, n, 3) of the actuators [N], body frame
+   @param count        how many questions
+   @param pair_rows    becomes 11 features and 4 vectors of each pair (count, p, 23)
+   @param pair_slopes  becomes their derivatives by the forces of source and receiver
+                       (count, p, 6, 23); 0 for none
+   @param hull_rows    becomes 6 features and 2 vectors of each actuator (count, n, 12), where there
+                       is a hull
+   @param hull_slopes  becomes their derivatives by its force (count, n, 3, 12); 0 for none */
+void fl_message_rows(const fl_real *constants, const fl_real *force, int count, fl_real *pair_rows,
+                     fl_real *pair_slopes, fl_real *hull_rows, fl_real *hull_slopes);
+
+/* Adds messages up to a wrench offset, whatever model gave the factors of their vectors.
+
+   @param constants      of the robot, as for fl_message_rows
+   @param count          how many questions
+   @param pair_messages  of pairs of actuators
+   @param hull_messages  of each actuator and the hull; not read without one
+   @param offset         becomes the offsets (count, 6) [N, N m]
+   @param slope          becomes their derivatives by the forces (count, n, 3, 6); 0 for none */
+void fl_message_wrench(const fl_real *constants, int count, const fl_messages *pair_messages,
+                       const fl_messages *hull_messages, fl_real *offset, fl_real *slope);
 
 /* @param i      which actuator
    @param force  along its direction; of planes its size, below 0 in reverse [N]

@@ -147,7 +147,20 @@ FL_FIELD(fl_reals, block_uncoupled, , "address", "block of the robot by its laws
 FL_FIELD(fl_reals, frames, , "address",
          "(n, 3, 3) axes of the laws' forces in the body frame, in rows")
 FL_FIELD(fl_real, axis_counts, [6], "1", "1 of axes that count, else 0")
+FL_FIELD(fl_reals, starts, , "address",
+         "(start_count, n, 2) complex factors of the forces by the laws alone: where iterations "
+         "begin anew")
+FL_FIELD(int, start_count, , "1", "how many of these starts there are")
 FL_END(fl_coupled_robot)
+
+FL_BEGIN(fl_messages)
+FL_FIELD(fl_reals, rows, , "address", "(m, f + 3 k) f features, and k vectors [N], of m messages")
+FL_FIELD(fl_reals, slopes, , "address",
+         "(m, d, f + 3 k) their derivatives by d numbers of the forces; 0 for none")
+FL_FIELD(fl_reals, factors, , "address", "(m, k) of the vectors, by a model of interaction")
+FL_FIELD(fl_reals, jacobians, , "address",
+         "(m, k, f) derivatives of the factors by the features; 0 for none")
+FL_END(fl_messages)
 
 FL_BEGIN(fl_outer_limits)
 FL_FIELD(fl_real, penalty_least, , "W",

@@ -10,8 +10,8 @@ derivatives are by the forces, not by the commands.
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, Self
+from collections.abc import Sequence
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -27,8 +27,6 @@ MIN_DISC_AREA = 1e-12
 """Area added to each disc, so that an actuator without one divides by no zero [m^2]."""
 N_CONSTANTS = 10
 """How many constants of the formula of jets the core takes, in the order of its table."""
-IMAGINARY_STEP = 1e-30
-"""Imaginary step of derivatives: those of smooth formulas are exact (Squire and Trapp, 1998)."""
 
 
 class JetGeometry(NamedTuple):
@@ -121,6 +119,14 @@ class Interaction(ABC):
         """
 
 
+def lever_of(position: Array) -> Array:
+    """Returns the wrenches (n, 3, 6) of 1 N along the body's axes at positions (n, 3) [m]."""
+    axes = np.eye(3)
+    torques = np.cross(position[:, None], axes)  # r x a of 1 N along each axis a
+    forces = np.broadcast_to(axes, torques.shape)
+    return np.concatenate([forces, torques], axis=-1)
+
+
 class PointInteraction(Interaction):
     """An interaction that is a further force at the point of each actuator."""
 
@@ -133,10 +139,7 @@ class PointInteraction(Interaction):
                 another one, of which the core then computes the loss by speed alone.
         """
         self.geometry = geometry
-        axes = np.eye(3)
-        torques = np.cross(geometry.position[:, None], axes)  # r x a of 1 N along each axis a
-        forces = np.broadcast_to(axes, torques.shape)
-        self.lever: Array = np.concatenate([forces, torques], axis=-1)
+        self.lever = lever_of(geometry.position)
         """Wrench (n, 3, 6) of 1 N along the body's axes at each point [1, m]."""
         n = len(self.lever)
         has_formula = constants is not None
@@ -226,37 +229,3 @@ class InteractionModel(Checked, ABC):
     def reading(self, path: str) -> Self:
         """Returns the model with another path of its file; itself where it reads none."""
         return self
-
-
-def complex_slope(function: Callable[[AnyArray], Any], values: Array) -> tuple[Array, Array]:
-    """Returns the values of a smooth function and its derivatives, by imaginary steps.
-
-    f'(x) = Im f(x + i h) / h, exact to rounding for a tiny h (Squire and Trapp, 1998).
-
-    Args:
-        function: from vectors (..., n, k) to an array (..., n, m), each row of which depends on one
-            of them; it takes complex numbers.
-        values: vectors (..., n, k).
-
-    Returns:
-        Values (..., n, m) and derivatives (..., n, k, m).
-    """
-    k = values.shape[-1]
-    steps = np.eye(k).reshape(k, *(1,) * (values.ndim - 1), k) * (1j * IMAGINARY_STEP)
-    result = function(values + steps)
-    return result[0].real, np.moveaxis(result.imag, 0, -2) / IMAGINARY_STEP
-
-
-def with_diagonal(slope: Array, diagonal: Array) -> Array:
-    """Returns derivatives of further forces with those by the own forces added.
-
-    Args:
-        slope: derivatives (..., n, 3, n, 3) of the further force of each actuator by the forces of
-            the others [1].
-        diagonal: derivatives (..., n, 3, 3) of each further force by the actuator's own force [1].
-
-    Returns:
-        The sum (..., n, 3, n, 3).
-    """
-    n = diagonal.shape[-3]
-    return slope + diagonal[..., :, :, None, :] * np.eye(n)[:, None, :, None]

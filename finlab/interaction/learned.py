@@ -6,10 +6,10 @@ trained apart, are an ensemble: where they differ, they do not know. Rows of fea
 are those of `finlab.interaction.messages`; `finlab.research.interaction` trains the networks.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from msgspec import Meta
@@ -17,14 +17,8 @@ from msgspec import Meta
 from finlab.arrays import AnyArray, Array
 from finlab.bundle_files import file_stamp, read_named_file
 from finlab.errors import CheckpointError
-from finlab.interaction.interaction import (
-    InteractionModel,
-    JetGeometry,
-    PointInteraction,
-    complex_slope,
-    with_diagonal,
-)
-from finlab.interaction.messages import ROW_SIZES, JetPairs, pack_hull_rows, unpack_rows
+from finlab.interaction.interaction import InteractionModel, JetGeometry, PointInteraction
+from finlab.interaction.messages import ROW_SIZES, Messages, unpack_rows
 
 MEMBERS = 3
 """Networks of the ensemble, each trained from another start."""
@@ -80,24 +74,32 @@ class LearnedInteraction(PointInteraction):
             geometry: points and jets of the n actuators, and the hull.
         """
         super().__init__(geometry)
-        self._weights = weights
+        self._networks = {kind: Networks(weights, kind) for kind in ROW_SIZES}
         self._trust = trust
-        self._pairs = pairs = JetPairs(geometry)
-        self._receives = np.eye(len(geometry.position))[:, pairs.receiver]
+        self._messages = messages = Messages(geometry)
+        self._receives = np.eye(len(geometry.position))[:, messages.receiver]
         """1 where an actuator is the receiver of a pair (n, p): sums messages over pairs."""
-        self._has_hull = bool(geometry.hull[1].all())
 
     def at_rest(self, force: Array) -> Array:
         return np.asarray(self._by_network(force).mean(axis=0))
 
     def offset(self, force: Array, inflow: Array | None = None) -> Array:
-        offset = np.asarray(np.einsum("...ib,ibw->...w", self.at_rest(force), self.lever))
+        rows = self._messages.rows(force)
+        factors = {
+            kind: networks.mean_factors(unpack_rows(kind, rows[kind])[0])
+            for kind, networks in self._networks.items()
+        }
+        offset = self._messages.wrench(rows, factors)
         return offset if inflow is None else offset + self.compute_in_core(force, inflow, False)[1]
 
     def effect(self, force: Array, inflow: Array | None = None) -> tuple[Array, Array]:
-        change, slope = self._slope_at_rest(force)
-        offset = np.asarray(np.einsum("...ib,ibw->...w", change, self.lever))
-        by_force = np.asarray(np.einsum("...jaib,ibw->...jaw", slope, self.lever))
+        rows, slopes = self._messages.rows_and_slopes(force)
+        factors = {}
+        jacobians = {}
+        for kind, networks in self._networks.items():
+            features, _ = unpack_rows(kind, rows[kind])
+            factors[kind], jacobians[kind] = networks.mean_factors_and_jacobian(features)
+        offset, by_force = self._messages.wrench_and_slope(rows, slopes, factors, jacobians)
         if inflow is None:
             return offset, by_force
         _, loss, loss_slope = self.compute_in_core(force, inflow, True)
@@ -109,125 +111,105 @@ class LearnedInteraction(PointInteraction):
 
     def _by_network(self, force: Array) -> Array:
         """Further forces (MEMBERS, ..., n, 3) [N] by each network, body frame."""
-        pairs = self._pairs
-        rows = pairs.rows(force[..., pairs.source, :], force[..., pairs.receiver, :])
-        change = self._receives @ self._messages_by_network("pair", rows)
-        if not self._has_hull:
+        rows = self._messages.rows(force)
+        change: Array = self._receives @ self._messages_by_network("pair", rows["pair"])
+        if self._messages.counts["hull"] == 0:
             return change
-        return change + self._messages_by_network("hull", pack_hull_rows(self.geometry, force))
+        return change + self._messages_by_network("hull", rows["hull"])
 
-    def _messages_by_network(self, name: str, rows: Array) -> Array:
-        """Messages (MEMBERS, ..., p, 3) [N] of packed rows (..., p, m): the networks' factors times
-        the rows' vectors."""
-        features, vectors = unpack_rows(name, rows)
-        factors = ensemble_factors(self._weights, name, features)
+    def _messages_by_network(self, kind: str, rows: Array) -> Array:
+        """Messages (MEMBERS, ..., m, 3) [N] of packed rows: the networks' factors times the rows'
+        vectors."""
+        features, vectors = unpack_rows(kind, rows)
+        factors = self._networks[kind].factors(features)
         return np.asarray((factors[..., None] * vectors).sum(axis=-2))
 
-    def _slope_at_rest(self, force: Array) -> tuple[Array, Array]:
-        """`at_rest`, and its derivatives (..., n, 3, n, 3): by the force of the first axes, of the
-        further force of the last ones."""
-        n = force.shape[-2]
-        pairs = self._pairs
-        source = force[..., pairs.source, :]
-        receiver = force[..., pairs.receiver, :]
-        sent, by_source, by_receiver = self._slopes(
-            "pair",
-            (lambda varied: pairs.rows(varied, receiver), source),
-            (lambda varied: pairs.rows(source, varied), receiver),
-        )
-        change = self._receives @ sent
-        by_own = np.einsum("np,...pab->...nab", self._receives, by_receiver)
-        if self._has_hull:
-            hull_change, by_hull_force = self._slopes(
-                "hull", (lambda varied: pack_hull_rows(self.geometry, varied), force)
-            )
-            change = change + hull_change
-            by_own = by_own + by_hull_force
-        slope = np.zeros((*force.shape[:-2], n * n, 3, 3))
-        slope[..., pairs.source * n + pairs.receiver, :, :] = by_source
-        slope = slope.reshape(*force.shape[:-2], n, n, 3, 3).swapaxes(-3, -2)
-        return change, with_diagonal(slope, by_own)
 
-    def _slopes(
-        self, name: str, *variations: tuple[Callable[[AnyArray], Any], Array]
-    ) -> list[Array]:
-        """Mean messages of the networks, and their derivatives.
+class Networks:
+    """The `MEMBERS` networks for one kind of message: from its features to the factors of its
+    vectors."""
+
+    def __init__(self, weights: Weights, kind: str) -> None:
+        """Takes the weights of the ensemble.
 
         Args:
-            name: which networks and rows, `pair` or `hull`.
-            variations: for each of the forces of a message that is varied, the function that makes
-                packed rows of it, and its values (..., p, 3) [N].
+            weights: of the ensemble.
+            kind: which networks, `pair` or `hull`.
+        """
+        weight = [np.ascontiguousarray(weights[f"{kind}.{k}.weight"]) for k in range(LAYERS)]
+        bias = [weights[f"{kind}.{k}.bias"] for k in range(LAYERS)]
+        self._hidden_layers = list(zip(weight[:-1], bias[:-1], strict=True))
+        """Weights (MEMBERS, in, out) and biases (MEMBERS, 1, out) of the hidden layers."""
+        self._last_weight = weight[-1]
+        """(MEMBERS, width, k)."""
+        self._last_bias = bias[-1]
+        # What the mean over the networks and its derivatives are made of, once for all questions.
+        self._mean_weight = weight[-1] / MEMBERS
+        self._mean_bias = bias[-1].mean(axis=0)
+        self._back_weight = [np.ascontiguousarray(each.swapaxes(1, 2)) for each in weight[:-1]]
+        """Weights (MEMBERS, out, in) by which slopes are propagated back through hidden layers."""
+        self._first_slope = np.ascontiguousarray(self._mean_weight.swapaxes(1, 2))[:, None]
+        """Derivatives (MEMBERS, 1, k, width) of the mean factors by the last hidden layer."""
+
+    def factors(self, features: Array) -> Array:
+        """Returns the factors by each network.
+
+        Args:
+            features: (..., f) of messages.
 
         Returns:
-            Messages (..., p, 3) [N], then for each variation their derivatives (..., p, 3, 3) by
-            that force [1], these first.
+            (MEMBERS, ..., k) [1].
         """
-        rows_and_slopes = [complex_slope(*variation) for variation in variations]
-        features, vectors = unpack_rows(name, rows_and_slopes[0][0])
-        factors, factor_jacobian = mean_factors_and_jacobian(self._weights, name, features)
-        results = [(factors[..., None] * vectors).sum(axis=-2)]
-        for _, row_slopes in rows_and_slopes:
-            feature_slopes, vector_slopes = unpack_rows(name, row_slopes)
-            # Product rule of sum_k factor_k vector_k.
-            by_factors = (feature_slopes @ factor_jacobian.swapaxes(-1, -2)) @ vectors
-            by_vectors = (factors[..., None, :, None] * vector_slopes).sum(axis=-2)
-            results.append(by_factors + by_vectors)
-        return results
+        last_hidden = self._hidden_outputs(features)[-1]
+        factors: Array = last_hidden @ self._last_weight + self._last_bias
+        return factors.reshape(MEMBERS, *features.shape[:-1], -1)
 
+    def mean_factors(self, features: Array) -> Array:
+        """Returns the means over the networks of the factors (..., k) for features (..., f)."""
+        return self._mean_of(self._hidden_outputs(features)[-1], features)
 
-def _layer_outputs(weights: Weights, name: str, features: AnyArray) -> list[AnyArray]:
-    """What each layer of the networks gives (MEMBERS, rows, width) for features (..., m), whose
-    leading axes become rows."""
-    outputs: list[AnyArray] = []
-    inputs: Any = features.reshape(-1, features.shape[-1])
-    for layer in range(LAYERS):
-        sums = inputs @ weights[f"{name}.{layer}.weight"] + weights[f"{name}.{layer}.bias"]
-        inputs = sums if layer == LAYERS - 1 else np.tanh(sums)
-        outputs.append(inputs)
-    return outputs
+    def mean_factors_and_jacobian(self, features: Array) -> tuple[Array, Array]:
+        """Returns the means over the networks of the factors, and their Jacobian.
 
+        Args:
+            features: (..., f) of messages.
 
-def ensemble_factors(weights: Weights, name: str, features: AnyArray) -> AnyArray:
-    """Returns the factors of a message's vectors by each network.
+        Returns:
+            Factors (..., k), and their derivatives (..., k, f) by the features [1].
+        """
+        hidden = self._hidden_outputs(features)
+        factors = self._mean_of(hidden[-1], features)
+        # Backpropagation, for all k factors at once; slope is (MEMBERS, rows * k, width).
+        rows = hidden[-1].shape[1]
+        k = self._first_slope.shape[2]
+        slope = self._first_slope
+        for outputs, back_weight in zip(reversed(hidden), reversed(self._back_weight), strict=True):
+            # d tanh(a) / da = 1 - tanh(a)^2
+            np.multiply(outputs, outputs, out=outputs)
+            np.subtract(1.0, outputs, out=outputs)
+            slope = slope * outputs[:, :, None]
+            slope = (slope.reshape(MEMBERS, rows * k, -1) @ back_weight).reshape(
+                MEMBERS, rows, k, -1
+            )
+        jacobian = slope.sum(axis=0)
+        return factors, jacobian.reshape(*factors.shape, -1)
 
-    Args:
-        weights: of the ensemble.
-        name: which networks, `pair` or `hull`.
-        features: features (..., m) of the messages.
+    def _hidden_outputs(self, features: Array) -> list[Array]:
+        """What each hidden layer gives (MEMBERS, rows, width) for features (..., f), whose leading
+        axes become rows."""
+        outputs: list[Array] = []
+        inputs = features.reshape(-1, features.shape[-1])
+        for weight, bias in self._hidden_layers:
+            sums = np.matmul(inputs, weight)
+            sums += bias
+            inputs = np.tanh(sums, out=sums)
+            outputs.append(inputs)
+        return outputs
 
-    Returns:
-        Factors (MEMBERS, ..., k) [1].
-    """
-    outputs = _layer_outputs(weights, name, features)
-    return outputs[-1].reshape(MEMBERS, *features.shape[:-1], -1)
-
-
-def mean_factors_and_jacobian(weights: Weights, name: str, features: Array) -> tuple[Array, Array]:
-    """Returns the mean over the networks of the factors, and its Jacobian.
-
-    Args:
-        weights: of the ensemble.
-        name: which networks, `pair` or `hull`.
-        features: features (..., m) of the messages.
-
-    Returns:
-        Factors (..., k), and their derivatives (..., k, m) by the features [1].
-    """
-    *hidden, last = _layer_outputs(weights, name, features)
-    # Backpropagation, for all k outputs at once; slope is (MEMBERS, rows, k, width).
-    slope = weights[f"{name}.{LAYERS - 1}.weight"].swapaxes(1, 2)[:, None]
-    for layer in reversed(range(LAYERS - 1)):
-        # d tanh(a) / da = 1 - tanh(a)^2
-        slope = slope * (1.0 - hidden[layer] * hidden[layer])[:, :, None, :]
-        rows = slope.shape[1]
-        k = slope.shape[2]
-        transposed_weight = weights[f"{name}.{layer}.weight"].swapaxes(1, 2)
-        slope = slope.reshape(MEMBERS, rows * k, -1) @ transposed_weight
-        slope = slope.reshape(MEMBERS, rows, k, -1)
-    factors = last.mean(axis=0)
-    jacobian = slope.mean(axis=0)
-    batch = features.shape[:-1]
-    return factors.reshape(*batch, -1), jacobian.reshape(*batch, factors.shape[-1], -1)
+    def _mean_of(self, last_hidden: Array, features: Array) -> Array:
+        """The means (..., k) of the factors, by what the last hidden layer gives."""
+        factors = (last_hidden @ self._mean_weight).sum(axis=0) + self._mean_bias
+        return np.asarray(factors.reshape(*features.shape[:-1], -1))
 
 
 @lru_cache(maxsize=16)

@@ -1,29 +1,30 @@
-"""Features and vectors of the messages between actuators, and between an actuator and the hull.
+"""Messages between the actuators of one robot, and between each actuator and the hull: features,
+vectors, and what they add up to.
 
-The networks of `finlab.interaction.learned` read them; they are trained on the same rows.
+A model of interaction turns the features of a message into one factor for each of its vectors, such
+as the networks of `finlab.interaction.learned`; the receiver adds its messages up.
 
 The choice of frame matters: features are invariants in the frame of a source's jet (distances along
 and across it in diameters, cosines, ratios), and a message is a sum of vectors along the pair's own
-directions. So one network serves robots of any number of actuators. Rows are packed: the features,
-then the vectors.
+directions. So one model serves robots of any number of actuators. Rows are packed: the features,
+then the vectors. The formulas, and their derivatives by the forces, are in
+finlab/core/src/messages.c.
 """
 
-from typing import Any, NamedTuple
+import math
+from typing import NamedTuple
 
 import numpy as np
 
-from finlab.arrays import AnyArray
-from finlab.interaction.interaction import JetGeometry, jets_of
+from finlab.arrays import AnyArray, Array
+from finlab.core import library
+from finlab.core.fields import struct
+from finlab.interaction.interaction import DENSITY, MIN_DISC_AREA, MIN_JET_SPEED, JetGeometry
 
 MIN_DIAMETER = 1e-3
 """Floor of the diameters and half axes that are divisors [m]."""
-SOFTENING = 1e-4
-"""Added to a squared distance from a jet's axis, in squared diameters [1]: the direction away from
-the axis has derivatives on it, too."""
-HULL_SOFTENING = 1e-9
-"""The same of squared lengths in half axes of the hull [1]."""
-FAR = 4.0
-"""Distance along a jet at which it counts as far from its source, in diameters [1]."""
+NORMAL_SOFTENING = 1e-9
+"""Added to the squared gradient of the hull's ellipsoid: its centre has no normal."""
 
 
 class RowSizes(NamedTuple):
@@ -33,127 +34,184 @@ class RowSizes(NamedTuple):
     """Number of features."""
     vectors: int
     """Number of vectors, of three components each."""
+    forces: int
+    """Of how many numbers of forces they depend."""
+
+    @property
+    def numbers(self) -> int:
+        """Numbers of a row."""
+        return self.features + 3 * self.vectors
 
 
-ROW_SIZES = {"pair": RowSizes(11, 4), "hull": RowSizes(6, 2)}
-"""Rows of pairs of actuators, and of an actuator and the hull."""
+ROW_SIZES = {"pair": RowSizes(11, 4, 6), "hull": RowSizes(6, 2, 3)}
+"""Rows of pairs of actuators, and of an actuator and the hull; a pair depends on the forces of
+source and receiver."""
+
+ByKind = dict[str, Array]
+"""Arrays of all messages of a robot, by the keys of `ROW_SIZES`."""
 
 
-class JetPairs:
-    """All pairs of a source that has a jet, and a receiver, of one robot."""
+class Messages:
+    """All messages of one robot of n actuators: p pairs of a source that has a jet and a receiver,
+    and each actuator with the hull, where there is one."""
 
     def __init__(self, geometry: JetGeometry) -> None:
-        """Takes the points and jets of n actuators; p pairs of them have a source with a jet."""
+        """Takes the points and jets of the actuators, and the hull."""
+        n = len(geometry.diameter)
         diameter = np.maximum(geometry.diameter, MIN_DIAMETER)
         has_jet = geometry.diameter > 0.0
-        is_other = ~np.eye(len(diameter), dtype=bool)
+        is_other = ~np.eye(n, dtype=bool)
         self.source, self.receiver = np.nonzero(is_other & has_jet[:, None])
         """Indices (p,) of the two actuators of each pair."""
-        self._source_diameter = diameter[self.source]
-        self._receiver_diameter = diameter[self.receiver]
-        displacement = geometry.position[self.receiver] - geometry.position[self.source]
-        self._displacement = displacement / self._source_diameter[:, None]
-        """From source to receiver (p, 3), body frame, in diameters of the source [1]."""
+        has_hull = bool(geometry.hull[1].all())
+        self.counts = {"pair": len(self.source), "hull": n if has_hull else 0}
+        """How many messages there are of each kind."""
+        self._n = n
+        self._table = self._table_of(geometry, diameter, has_hull)
+        self._table_address = self._table.ctypes.data
 
-    def rows(self, source: AnyArray, receiver: AnyArray) -> Any:
-        """Returns packed rows of the pairs, real or complex.
+    def _table_of(self, geometry: JetGeometry, diameter: Array, has_hull: bool) -> Array:
+        """The numbers that finlab/core/src/messages.c reads."""
+        center = geometry.hull[0]
+        half_axes = np.maximum(geometry.hull[1], MIN_DIAMETER)
+        robot = [self._n, len(self.source), has_hull, *half_axes, half_axes.mean()]
+
+        area = 0.25 * np.pi * diameter**2 + MIN_DISC_AREA
+        thrust_at_rest = 0.5 * DENSITY * area * MIN_JET_SPEED**2
+        # Coordinates in which the ellipsoid is the unit sphere.
+        hull_position = (geometry.position - center) / half_axes
+        gradient = hull_position / half_axes
+        gradient_size = np.sqrt((gradient**2).sum(axis=-1, keepdims=True) + NORMAL_SOFTENING)
+        actuators = np.column_stack(
+            [
+                geometry.position,
+                diameter,
+                thrust_at_rest,
+                hull_position,
+                gradient / gradient_size,
+                np.tanh(2.0 * geometry.diameter / half_axes.mean()),
+            ]
+        )
+
+        displacement = geometry.position[self.receiver] - geometry.position[self.source]
+        diameter_ratio = diameter[self.receiver] / diameter[self.source]
+        pairs = np.column_stack(
+            [
+                self.source,
+                self.receiver,
+                displacement / diameter[self.source, None],
+                diameter_ratio,
+                np.log(diameter_ratio),
+            ]
+        )
+        return np.concatenate([robot, actuators.ravel(), pairs.ravel()], dtype=np.float64)
+
+    def rows(self, force: Array) -> ByKind:
+        """Returns packed rows (..., m, f + 3 k) of forces (..., n, 3) [N], body frame."""
+        return self._rows(force, False)[0]
+
+    def rows_and_slopes(self, force: Array) -> tuple[ByKind, ByKind]:
+        """Returns packed rows of forces, and their derivatives.
 
         Args:
-            source: forces (..., p, 3) of the sources, body frame [N].
-            receiver: forces (..., p, 3) of the receivers, body frame [N].
+            force: (..., n, 3) [N], body frame.
 
         Returns:
-            Rows (..., p, 11 + 4 * 3).
+            Rows (..., m, f + 3 k), and their derivatives (..., m, d, f + 3 k) by the forces on
+            which a message depends: of a pair those of source and receiver.
         """
-        thrust, ahead, _ = jets_of(source, self._source_diameter)
-        receiver_thrust, facing, _ = jets_of(receiver, self._receiver_diameter)
-        # The receiver seen from the source: along the jet, which flows against the force, and off
-        # its axis, in diameters of the source.
-        along = -(self._displacement * ahead).sum(-1)
-        radial = self._displacement + along[..., None] * ahead
-        squared_radius = (radial * radial).sum(-1)
-        radius = np.sqrt(squared_radius + SOFTENING)
-        outward = radial / radius[..., None]
-        distance = np.sqrt(FAR * FAR + along * along)
-        squared_width = 1.0 + 0.05 * along * along  # of a jet that spreads
-        diameter_ratio = self._receiver_diameter / self._source_diameter
-        features = [
-            along / distance,
-            FAR / distance,
-            np.tanh(2.0 * along),
-            radius / np.sqrt(1.0 + squared_radius),
-            np.exp(-squared_radius / squared_width),
-            np.exp(-4.0 * squared_radius / squared_width),
-            (ahead * facing).sum(-1),
-            (outward * facing).sum(-1),
-            (receiver_thrust - thrust) / (receiver_thrust + thrust),
-            np.sqrt(thrust / (receiver_thrust + thrust)),
-            np.log(diameter_ratio),
-        ]
-        # Messages fade out before the source, and away from the axis, whatever the networks give.
-        onset = 0.5 * (1.0 + np.tanh(2.0 * along + 1.0))
-        window = onset * np.exp(-squared_radius / (3.0 + 0.15 * along * along))
-        strength = np.sqrt(thrust * (receiver_thrust + thrust)) * window * diameter_ratio
-        return _pack_rows(features, [ahead, facing, outward, _cross(ahead, outward)], strength)
+        return self._rows(force, True)
+
+    def _rows(self, force: Array, with_slopes: bool) -> tuple[ByKind, ByKind]:
+        """Rows, and where they are asked for their slopes."""
+        shape = force.shape[:-2]
+        force = np.ascontiguousarray(force)
+        rows = {}
+        slopes = {}
+        for kind, size in ROW_SIZES.items():
+            count = self.counts[kind]
+            rows[kind] = np.empty((*shape, count, size.numbers))
+            slopes_shape = (*shape, count, size.forces, size.numbers)
+            slopes[kind] = np.empty(slopes_shape if with_slopes else 0)
+        library().fl_message_rows(
+            self._table_address,
+            force.ctypes.data,
+            math.prod(shape),
+            rows["pair"].ctypes.data,
+            slopes["pair"].ctypes.data if with_slopes else None,
+            rows["hull"].ctypes.data,
+            slopes["hull"].ctypes.data if with_slopes else None,
+        )
+        return rows, slopes
+
+    def wrench(self, rows: ByKind, factors: ByKind) -> Array:
+        """Returns what messages add up to.
+
+        Args:
+            rows: of `rows`.
+            factors: (..., m, k) of the rows' vectors, by a model.
+
+        Returns:
+            The wrench offset (..., 6) [N, N m].
+        """
+        return self._wrench(rows, factors, None, None)[0]
+
+    def wrench_and_slope(
+        self, rows: ByKind, slopes: ByKind, factors: ByKind, jacobians: ByKind
+    ) -> tuple[Array, Array]:
+        """Returns what messages add up to, and its derivatives.
+
+        Args:
+            rows: of `rows_and_slopes`.
+            slopes: of `rows_and_slopes`.
+            factors: (..., m, k) of the rows' vectors, by a model.
+            jacobians: derivatives (..., m, k, f) of the factors by the features.
+
+        Returns:
+            The wrench offset (..., 6) [N, N m], and its derivatives (..., n, 3, 6) by the forces.
+        """
+        return self._wrench(rows, factors, slopes, jacobians)
+
+    def _wrench(
+        self, rows: ByKind, factors: ByKind, slopes: ByKind | None, jacobians: ByKind | None
+    ) -> tuple[Array, Array]:
+        """The offset, and where slopes are given its derivatives."""
+        shape = rows["pair"].shape[:-2]
+        offset = np.empty((*shape, 6))
+        slope = np.empty((*shape, self._n, 3, 6) if slopes is not None else 0)
+        records = np.zeros(2, struct("fl_messages"))
+        arrays = []
+        for record, kind in zip(records, ROW_SIZES, strict=True):
+            fields = {"rows": rows[kind], "factors": factors[kind]}
+            if slopes is not None and jacobians is not None:
+                fields |= {"slopes": slopes[kind], "jacobians": jacobians[kind]}
+            for name, array in fields.items():
+                array = np.ascontiguousarray(array)
+                arrays.append(array)  # which lives as long as the call
+                record[name] = array.ctypes.data
+        address = records.ctypes.data
+        library().fl_message_wrench(
+            self._table_address,
+            math.prod(shape),
+            address,
+            address + records.strides[0],
+            offset.ctypes.data,
+            None if slopes is None else slope.ctypes.data,
+        )
+        return offset, slope
 
 
-def pack_hull_rows(geometry: JetGeometry, force: AnyArray) -> Any:
-    """Returns packed rows of actuators and the hull, real or complex.
-
-    Args:
-        geometry: points and jets of n actuators, and the hull.
-        force: forces (..., n, 3), body frame [N].
-
-    Returns:
-        Rows (..., n, 6 + 2 * 3).
-    """
-    center = geometry.hull[0]
-    half_axes = np.maximum(geometry.hull[1], MIN_DIAMETER)
-    thrust, ahead, _ = jets_of(force, np.maximum(geometry.diameter, MIN_DIAMETER))
-    # Coordinates in which the ellipsoid is the unit sphere.
-    position = (geometry.position - center) / half_axes
-    direction = -ahead / half_axes
-    length = np.sqrt((direction * direction).sum(-1) + HULL_SOFTENING)
-    towards = -(position * direction).sum(-1) / length
-    squared_radius = (position * position).sum(-1)
-    squared_offset = squared_radius - towards * towards  # of the jet's axis from the centre
-    gradient = position / half_axes
-    normal = gradient / np.sqrt((gradient**2).sum(-1, keepdims=True) + HULL_SOFTENING)
-    features = [
-        np.tanh(2.0 * (squared_offset - 1.0)),
-        np.exp(-squared_offset),
-        np.tanh(3.0 * towards),
-        np.tanh(squared_radius - 1.0),
-        (normal * ahead).sum(-1),
-        np.tanh(2.0 * geometry.diameter / half_axes.mean()),
-    ]
-    return _pack_rows(features, [ahead, normal], thrust)
-
-
-def unpack_rows(name: str, rows: AnyArray) -> tuple[AnyArray, AnyArray]:
+def unpack_rows(kind: str, rows: AnyArray) -> tuple[AnyArray, AnyArray]:
     """Returns the contents of packed rows.
 
     Args:
-        name: which rows, a key of `ROW_SIZES`.
-        rows: packed rows (..., m + 3 k), or their derivatives.
+        kind: which rows, a key of `ROW_SIZES`.
+        rows: packed rows (..., f + 3 k).
 
     Returns:
-        Features (..., m) and vectors (..., k, 3) [N].
+        Features (..., f) and vectors (..., k, 3) [N].
     """
-    m, k = ROW_SIZES[name]
-    return rows[..., :m], rows[..., m:].reshape(*rows.shape[:-1], k, 3)
-
-
-def _pack_rows(features: list[Any], vectors: list[Any], strength: Any) -> Any:
-    """Rows (..., m + 3 k) of m features (...,) and k vectors (..., 3), times a strength (...,)
-    [N]."""
-    vectors = [vector * strength[..., None] for vector in vectors]
-    alike = np.broadcast_arrays(*features, strength)[:-1]
-    return np.concatenate([np.stack(alike, axis=-1), *vectors], axis=-1)
-
-
-def _cross(a: AnyArray, b: AnyArray) -> Any:
-    """Cross products (..., 3), also of complex vectors."""
-    next_axis = [1, 2, 0]
-    after_next = [2, 0, 1]
-    return a[..., next_axis] * b[..., after_next] - a[..., after_next] * b[..., next_axis]
+    size = ROW_SIZES[kind]
+    features = rows[..., : size.features]
+    vectors = rows[..., size.features :]
+    return features, vectors.reshape(*rows.shape[:-1], size.vectors, 3)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.dual.compiled import Compiled
+from finlab.allocation.dual.compiled import Compiled, core_policy
 from finlab.allocation.method import Method, Settings, number
 from finlab.allocation.policy import CLOSEST, Policy
 from finlab.allocation.question import MethodQuestion
@@ -306,14 +306,22 @@ class Dual(Method):
 
     def _solve_coupled(
         self, conditions: Conditions, targets: Array, policy: Policy, multipliers: Array | None
-    ) -> Solution:
+    ) -> Solved:
         """Solves as `solve_under`, for a robot whose actuators act on each other."""
-        from finlab.allocation.dual.outer_iterations import outer_answers
+        from finlab.allocation.dual.outer_iterations import finished_answer
 
+        record = core_policy(policy)
+        if len(targets) == 1:
+            row = self.coupled.answer_row(
+                targets[0], record, multipliers, conditions, self._most_core_error
+            )
+            if row.is_finished:
+                return FinishedSolution(self, conditions, targets, row)
+            answer = row.copied()
+        else:
+            answer = self.coupled.answer_many(targets, record, None, conditions)
         problem = self.problem_under(conditions)
-        answer = outer_answers(
-            self.coupled, self.compiled, problem, targets, policy, conditions, multipliers
-        )
+        answer = finished_answer(problem, targets, policy, answer)
         notes = partial(self.notes_of, set(), targets[~answer.is_attainable], conditions)
         return self.solution(
             answer.command,

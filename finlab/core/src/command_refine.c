@@ -37,7 +37,7 @@ static real residual_of(const real *block, const fl_work *work, const real *wren
 }
 
 /* The Jacobian J of the wrench over the wrench scale by the commands over the widths of their
-   limits, into the work area. */
+   limits, into the work area: the rows of numbers that commands use. */
 static void find_jacobian(const real *block, fl_work *work, const fl_box *box, real command[][3]) {
   const unsigned char *counts = work->span.axis_counts;
   for (int i = 0; i < COUNT(block); i++) {
@@ -46,7 +46,8 @@ static void find_jacobian(const real *block, fl_work *work, const fl_box *box, r
     real by[3][3]; /* of the force (second index) by each command */
     fl_force_of_command(block, i, command[i], force, by);
     if (work->span.is_lost[i] || fl_is_in_dead_band(a, command[i])) memset(by, 0, sizeof by);
-    for (int c = 0; c < 3; c++) {
+    const int numbers = fl_form_of(a)->numbers;
+    for (int c = 0; c < numbers; c++) {
       const real width = box->command_max[i][c] - box->command_min[i][c];
       real *row = work->jacobian[i][c];
       for (int k = 0; k < 6; k++) {
@@ -78,7 +79,8 @@ static void damped_step(const real *block, fl_work *work, const real *residual, 
   const int n = COUNT(block);
   real gram[6][6] = {{0}}; /* J J' */
   for (int i = 0; i < n; i++) {
-    for (int c = 0; c < 3; c++) {
+    const int numbers = fl_form_of(ACTUATOR(block, i))->numbers;
+    for (int c = 0; c < numbers; c++) {
       if (!held[i][c]) fl_add_square(gram, work->jacobian[i][c], 1);
     }
   }
@@ -88,8 +90,9 @@ static void damped_step(const real *block, fl_work *work, const real *residual, 
   real multiplier[6] = {0};
   if (fl_factor(gram)) fl_solve(gram, residual, multiplier);
   for (int i = 0; i < n; i++) {
-    for (int c = 0; c < 3; c++) {
-      step[i][c] = 0;
+    const int numbers = fl_form_of(ACTUATOR(block, i))->numbers;
+    memset(step[i], 0, sizeof step[i]);
+    for (int c = 0; c < numbers; c++) {
       if (!held[i][c]) step[i][c] = dot(work->jacobian[i][c], multiplier, 6);
     }
   }

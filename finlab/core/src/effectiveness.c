@@ -166,12 +166,13 @@ int fl_prepare_span(const real *block, fl_work *work, int is_as_prepared) {
     matrices_of(block, span);
   }
   fl_offset_wrench(block, span);
-  work->is_whole = 0;
   if (prepare_newton(block, work)) return 1;
-  memset(span->is_lost, 2,
-         sizeof span->is_lost); /* so that no question is taken for one of this state */
+  fl_forget_span(work);
   return 0;
 }
+
+/* Has the next question prepare its state anew, as after another robot: it is like none. */
+void fl_forget_span(fl_work *work) { memset(work->span.is_lost, 2, sizeof work->span.is_lost); }
 
 /* Prepares the state in which some actuators (n,) are lost and some axes (6,) free, each 0
    for none, unless the last question had the same; 0 where its numbers are out of range. */
@@ -194,5 +195,6 @@ int fl_span_of_question(const real *block, fl_work *work, const unsigned char *l
     span->axis_counts[k] = counts;
   }
   if (is_same) return 1;
+  work->is_whole = 0; /* what is lost has another set */
   return fl_prepare_span(block, work, is_as_prepared);
 }

@@ -87,6 +87,15 @@ static real *write_row(const real *block, const fl_answer *out, real *row) {
   return command;
 }
 
+/* Makes the commands (n, 3) of lost actuators NaN. */
+static void mark_lost(const real *block, const fl_work *work, const fl_question *question,
+                      real *command) {
+  for (int i = 0; question->lost && i < COUNT(block); i++) {
+    if (!work->span.is_lost[i]) continue;
+    for (int k = 0; k < 3; k++) command[3 * i + k] = (real)NAN;
+  }
+}
+
 /* Whether an answer in place of a wrench beyond reach gives a share of it. */
 static int is_on_ray(const real *block, const fl_work *work, const real *wrench,
                      const fl_answer *out) {
@@ -124,11 +133,21 @@ int fl_answer_into_row(const real *block, fl_work *work, const fl_question *ques
   if (!out.is_attainable && !is_best_beyond_reach(block, work, question, &out)) {
     return FL_UNFINISHED;
   }
-  for (int i = 0; question->lost && i < COUNT(block); i++) {
-    if (!work->span.is_lost[i]) continue;
-    for (int k = 0; k < 3; k++) command[3 * i + k] = (real)NAN;
-  }
+  mark_lost(block, work, question, command);
   return out.is_attainable ? FL_OK : FL_BEYOND_REACH;
+}
+
+int fl_answer_coupled_into_row(const fl_coupled_robot *robot, real *block, fl_work *work,
+                               const fl_question *question, real most_error, real *row) {
+  fl_answer out;
+  fl_outer_result result;
+  const int code = fl_answer_coupled(robot, block, work, question, &out, &result);
+  if (code) return code;
+  out.gap_power_bound = 0;
+  real *command = write_row(block, &out, row);
+  if (!out.is_attainable || !(result.error <= most_error)) return FL_UNFINISHED;
+  mark_lost(block, work, question, command);
+  return FL_OK;
 }
 
 int fl_answer_many(const real *block, fl_work *work, const fl_question *question,
@@ -152,6 +171,34 @@ int fl_answer_many(const real *block, fl_work *work, const fl_question *question
     wrench_served += 6;
     command += 3 * n;
     gap_power_bound[k] = out.gap_power_bound;
+    is_attainable[k] = (fl_byte)out.is_attainable;
+    error[k] = out.error;
+    is_truncated[k] = (fl_byte)out.is_truncated;
+  }
+  return FL_OK;
+}
+
+int fl_answer_coupled_many(const fl_coupled_robot *robot, real *block, fl_work *work,
+                           const fl_question *question, const real *wrench, int count, real *force,
+                           real *multipliers, real *wrench_served, real *command,
+                           fl_byte *is_attainable, real *error, fl_byte *is_truncated) {
+  const size_t n = (size_t)COUNT(block);
+  fl_question q = *question;
+  fl_answer out;
+  fl_outer_result result;
+  for (int k = 0; k < count; k++) {
+    memcpy(q.wrench, wrench, sizeof q.wrench);
+    const int code = fl_answer_coupled(robot, block, work, &q, &out, &result);
+    if (code) return code;
+    memcpy(force, out.force, 2 * n * sizeof *force);
+    memcpy(multipliers, out.multipliers, sizeof out.multipliers);
+    memcpy(wrench_served, out.wrench_served, sizeof out.wrench_served);
+    memcpy(command, out.command, 3 * n * sizeof *command);
+    wrench += 6;
+    force += 2 * n;
+    multipliers += 6;
+    wrench_served += 6;
+    command += 3 * n;
     is_attainable[k] = (fl_byte)out.is_attainable;
     error[k] = out.error;
     is_truncated[k] = (fl_byte)out.is_truncated;

@@ -87,6 +87,16 @@ static inline real size_of(const real *force) {
   return SQRT(force[0] * force[0] + force[1] * force[1]);
 }
 
+/* Adds the wrench of a force at a position: f and r x f. */
+static inline void add_wrench(const real *r, const real *f, real *wrench) {
+  for (int k = 0; k < 3; k++) {
+    const int l = (k + 1) % 3;
+    const int m = (k + 2) % 3;
+    wrench[k] += f[k];
+    wrench[3 + k] += r[l] * f[m] - r[m] * f[l];
+  }
+}
+
 real fl_wrap_angle(real angle);
 void fl_add_square(real H[6][6], const real *b, real weight);
 real fl_trace(real H[6][6]);
@@ -169,6 +179,7 @@ void fl_mark_jump(fl_set *set, real one, real other);
 /* effectiveness.c: what the actuators that work span in the axes that count */
 int fl_prepare_span(const real *block, fl_work *work, int is_as_prepared);
 void fl_offset_wrench(const real *block, fl_span *span);
+void fl_forget_span(fl_work *work);
 int fl_span_of_question(const real *block, fl_work *work, const unsigned char *lost,
                         const unsigned char *free);
 
@@ -341,6 +352,16 @@ int fl_nearest_by_normal(const real *block, const fl_work *work, const wide *tar
 int fl_has_lines_alone(const real *block);
 int fl_end_of_ray_by_normal(const real *block, const fl_work *work, const wide *from,
                             const wide *ray, const wide *normal, wide close, fl_mixture *m);
+
+/* outer_iterations.c: answers where actuators act on each other, from one start */
+typedef struct {
+  real (*force)[2]; /* of lines (n, 2) [N] */
+  real power;       /* [W] */
+} known_end;
+int fl_iterations_from(const fl_coupled_robot *robot, real *block, fl_work *work,
+                       const fl_question *question, const fl_outer_limits *limits,
+                       const known_end *known, real force[][2], fl_answer *answer,
+                       fl_outer_result *result);
 
 /* out_of_reach.c: what a policy gives beyond reach */
 void fl_out_of_reach(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,

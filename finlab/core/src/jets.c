@@ -4,8 +4,9 @@
 
 #define NO_AREA R(1e-12)    /* [m^2] beside the disc of an actuator, which may have none */
 #define FLOOR_SHARE R(1e-4) /* squared speed over that of a jet to which its size is rounded off */
-#define FAR_BEHIND 20       /* a jet is nothing at so many `behind` upstream of its outlet */
-#define FAR_ASIDE 40        /* nor where the exponent of its profile is above that */
+#define FAR_BEHIND 14       /* a jet is nothing at so many `behind` upstream of its outlet */
+#define FAR_ASIDE 28        /* nor where the exponent of its profile is above that */
+#define SATURATED_AT 20     /* from here on a sigmoid is 0 or 1 to rounding, in double precision */
 
 /* Numbers of a robot: a `water`, then an `outlet` for each of its n actuators. */
 typedef struct {
@@ -23,11 +24,19 @@ typedef struct {
 } outlet;
 
 typedef struct {
-  real thrust;    /* [N] */
-  real speed;     /* of the water far behind [m/s] */
-  real ahead[3];  /* direction of the force */
-  real mass_flow; /* [kg/s] */
+  real thrust;       /* [N] */
+  real speed;        /* of the water far behind [m/s] */
+  real ahead[3];     /* direction of the force */
+  real mass_flow;    /* [kg/s] */
+  real per_diameter; /* one over the diameter of its outlet [1/m] */
 } jet;
+
+/* (1 + tanh x) / 2; most arguments are far out, where it needs no exponential. */
+static real sigmoid(real x) {
+  if (x > SATURATED_AT) return 1;
+  if (x < -SATURATED_AT) return 0;
+  return 1 / (1 + EXP(-2 * x));
+}
 
 /* The jet of a force, by momentum theory; a little thrust is left where there is none, so
    that it has a direction. */
@@ -40,56 +49,45 @@ static jet jet_of(const water *w, const outlet *from, const real *force) {
   for (int c = 0; c < 3; c++) made.ahead[c] = force[c] / made.thrust;
   made.speed = SQRT(2 * made.thrust / (w->density * area));
   made.mass_flow = w->density * disc * made.speed;
+  made.per_diameter = 0;
+  if (from->diameter > 0) made.per_diameter = 1 / from->diameter;
   return made;
 }
 
-/* Adds the wrench of a force at a position: f and r x f. */
-static void add_wrench(const real *r, const real *f, real *wrench) {
-  for (int k = 0; k < 3; k++) {
-    const int l = (k + 1) % 3;
-    const int m = (k + 2) % 3;
-    wrench[k] += f[k];
-    wrench[3 + k] += r[l] * f[m] - r[m] * f[l];
-  }
-}
-
-/* How a jet meets a position. */
+/* How a jet meets an actuator. */
 typedef struct {
-  real from_outlet[3]; /* in diameters */
+  int from;            /* whose jet it is */
+  real from_outlet[3]; /* way from its outlet, in diameters */
   real along;          /* the same along the jet */
   real speed;          /* [m/s] */
   real slope;          /* of the speed by `along` */
-} jet_at;
+} jet_met;
 
 /* How fast the jet of an actuator is at another one: a Gaussian profile that widens along
-   the jet. */
-static jet_at jet_at_outlet(const water *w, const outlet *from, const jet *j, const outlet *to) {
-  jet_at met;
-  for (int c = 0; c < 3; c++) {
-    met.from_outlet[c] = (to->position[c] - from->position[c]) / from->diameter;
-  }
-  const real x = -dot(met.from_outlet, j->ahead, 3);
-  const real aside_squared = dot(met.from_outlet, met.from_outlet, 3) - x * x;
+   the jet. Returns whether there is anything of it. */
+static int meets(const water *w, const outlet *from, const jet *j, const outlet *to, jet_met *met) {
+  real *way = met->from_outlet;
+  for (int c = 0; c < 3; c++) way[c] = (to->position[c] - from->position[c]) * j->per_diameter;
+  const real x = -dot(way, j->ahead, 3);
+  const real aside_squared = dot(way, way, 3) - x * x;
   const real width_squared = x * x + w->width * w->width;
-  met.along = x;
-  met.speed = 0;
-  met.slope = 0;
-  /* Nothing to rounding, in double precision: */
-  if (x < -FAR_BEHIND * w->behind) return met;
-  if (w->spread * aside_squared > FAR_ASIDE * width_squared) return met;
+  /* Below ROUNDING of what it is in the middle: */
+  if (x < -FAR_BEHIND * w->behind) return 0;
+  if (w->spread * aside_squared > FAR_ASIDE * width_squared) return 0;
 
   const real q = x / w->length;
   const real decay = 1 + q * q * q * q;
-  const real onset = TANH(x / w->behind);
+  const real onset = sigmoid(x / w->behind);
   const real profile = EXP(-w->spread * aside_squared / width_squared);
-  const real half_speed = j->speed * profile / SQRT(SQRT(decay)) / 2;
-  met.speed = half_speed * (1 + onset);
-  /* Logarithmic derivatives of the profile and of the decay. */
+  met->along = x;
+  met->speed = j->speed * profile * onset / SQRT(SQRT(decay));
+  /* Logarithmic derivatives of the onset, of the profile and of the decay. */
+  const real d_onset = 2 * (1 - onset) / w->behind;
   const real d_profile = 2 * w->spread * x * (width_squared + aside_squared) /
                          (width_squared * width_squared);
   const real d_decay = q * q * q / (decay * w->length);
-  met.slope = half_speed * (1 - onset * onset) / w->behind + met.speed * (d_profile - d_decay);
-  return met;
+  met->slope = met->speed * (d_onset + d_profile - d_decay);
+  return 1;
 }
 
 /* Share of a jet that meets the hull, and its derivatives by the direction, in which it is
@@ -104,15 +102,26 @@ static real share_on_hull(const water *w, const outlet *from, const real *ahead,
   const real size = SQRT(dot(course, course, 3) + TINY);
   const real facing = -dot(position, course, 3) / size; /* how far ahead the sphere's middle is */
   const real aside_squared = dot(position, position, 3) - facing * facing;
-  const real rim = TANH((1 - aside_squared) / w->grazing);
-  const real side = TANH(facing / w->grazing);
-  const real d_facing =
-      (2 * facing * (1 - rim * rim) * (1 + side) + (1 + rim) * (1 - side * side)) /
-      (4 * w->grazing);
+  const real rim = sigmoid((1 - aside_squared) / w->grazing);
+  const real side = sigmoid(facing / w->grazing);
+  const real d_facing = 2 * rim * side * (2 * facing * (1 - rim) + (1 - side)) / w->grazing;
   for (int c = 0; c < 3; c++) {
     slope[c] = d_facing * (position[c] + facing * course[c] / size) / (size * w->half[c]);
   }
-  return (1 + rim) * (1 + side) / 4;
+  return rim * side;
+}
+
+/* Adds what the hull takes of a jet that meets it: the share `lost` of the force. */
+static void add_hull(const water *w, const outlet *p, const jet *j, const real *force, real *change,
+                     real by_force[3][3]) {
+  real d_share[3];
+  const real lost = w->hull * share_on_hull(w, p, j->ahead, d_share);
+  for (int b = 0; b < 3; b++) change[b] -= lost * force[b];
+  for (int c = 0; c < 3; c++) {
+    const real d_lost = w->hull * d_share[c] / j->thrust;
+    by_force[c][c] -= lost;
+    for (int b = 0; b < 3; b++) by_force[c][b] -= force[b] * d_lost;
+  }
 }
 
 /* Adds the force that comes of the water u that meets an actuator, and its derivatives by
@@ -126,10 +135,7 @@ static void add_taken(const water *w, const outlet *p, const jet *j, const real 
   const real root = SQRT(share * share + FLOOR_SHARE);
   const real below = w->lag + w->most * root;
   const real d_lost = (w->lag + w->most * FLOOR_SHARE / root) / (below * below);
-  real lost = share / below; /* share of the force */
-  real d_hull[3] = {0};
-  const int has_hull = w->half[0] > 0 && w->half[1] > 0 && w->half[2] > 0;
-  if (has_hull) lost += w->hull * share_on_hull(w, p, a, d_hull);
+  const real lost = share / below; /* share of the force */
 
   const real side_flow = w->side * j->mass_flow;
   const real speed = SQRT(dot(u, u, 3) + ROUNDING);
@@ -139,16 +145,19 @@ static void add_taken(const water *w, const outlet *p, const jet *j, const real 
   for (int b = 0; b < 3; b++) {
     change[b] += side_flow * across[b] + drag * speed * u[b] - lost * force[b];
   }
+  const real d_lost_by_speed = d_lost / j->speed;
+  const real side_per_thrust = side_flow / t;
+  const real drag_per_speed = drag / speed;
   for (int c = 0; c < 3; c++) {
-    const real d_share = across[c] / (t * j->speed) + share * a[c] / (2 * t);
-    const real d_lost_force = w->hull * d_hull[c] / t - d_lost * d_share;
+    const real d_share = (across[c] / j->speed + share * a[c] / 2) / t;
+    const real d_lost_force = -d_lost * d_share;
     for (int b = 0; b < 3; b++) {
       const real identity = (real)(b == c); /* of its matrix */
       const real projection = identity - a[b] * a[c];
-      const real d_drag = drag * (speed * identity + u[b] * u[c] / speed);
-      by_water[c][b] += side_flow * projection + d_drag + force[b] * d_lost * a[c] / j->speed;
+      const real d_drag = drag * speed * identity + drag_per_speed * u[b] * u[c];
+      by_water[c][b] += side_flow * projection + d_drag + force[b] * d_lost_by_speed * a[c];
       const real d_across = a[c] * across[b] / 2 - across[c] * a[b] + against * projection;
-      by_force[c][b] += side_flow / t * d_across - lost * identity - force[b] * d_lost_force;
+      by_force[c][b] += side_per_thrust * d_across - lost * identity - force[b] * d_lost_force;
     }
   }
 }
@@ -169,26 +178,38 @@ static void add_lost(const outlet *p, const jet *j, const real *force, const rea
   }
 }
 
-/* Whether the jet of actuator j may meet actuator i. */
-static int may_meet(const water *w, const outlet *outlets, int j, int i) {
-  return j != i && outlets[j].diameter > 0 && w->formula != 0;
+/* The jets that meet actuator i, into `met`, and the water u [m/s] that they bring. Returns how
+   many there are. */
+static int jets_at(const water *w, const outlet *outlets, const jet *jets, int i, jet_met *met,
+                   real *u) {
+  int count = 0;
+  for (int j = 0; j < (int)w->n; j++) {
+    if (j == i || !(outlets[j].diameter > 0)) continue;
+    if (!meets(w, outlets + j, jets + j, outlets + i, met + count)) continue;
+    met[count].from = j;
+    for (int c = 0; c < 3; c++) u[c] -= met[count].speed * jets[j].ahead[c];
+    count++;
+  }
+  return count;
 }
 
 /* Adds to the derivatives (n, 3, 6) of the wrench those by the forces of the jets that meet
    an actuator, by its own derivatives (3, 6) by the water. */
-static void add_slopes_of_jets(const water *w, const outlet *outlets, const jet *jets,
-                               const jet_at *met, int i, real by[3][6], real *slope) {
-  for (int j = 0; j < (int)w->n; j++) {
-    if (!may_meet(w, outlets, j, i) || met[j].speed == 0) continue;
-    const jet_at *m = &met[j];
-    const real *a = jets[j].ahead;
+static void add_slopes_of_jets(const jet *jets, const jet_met *met, int count, real by[3][6],
+                               real *slope) {
+  for (int m = 0; m < count; m++) {
+    const jet_met *one = met + m;
+    const jet *j = jets + one->from;
+    const real *a = j->ahead;
+    real along[6]; /* derivative by the water along the jet */
+    for (int k = 0; k < 6; k++) along[k] = a[0] * by[0][k] + a[1] * by[1][k] + a[2] * by[2][k];
+    const real across = one->speed / j->thrust;
     for (int c = 0; c < 3; c++) {
-      const real d_speed = m->speed * a[c] / 2 + m->slope * (m->from_outlet[c] + a[c] * m->along);
-      real *row = slope + 18 * j + 6 * c;
-      for (int k = 0; k < 6; k++) {
-        const real along = a[0] * by[0][k] + a[1] * by[1][k] + a[2] * by[2][k];
-        row[k] += (d_speed * along - m->speed * by[c][k]) / jets[j].thrust;
-      }
+      const real d_speed =
+          (one->speed * a[c] / 2 + one->slope * (one->from_outlet[c] + a[c] * one->along)) /
+          j->thrust;
+      real *row = slope + 18 * one->from + 6 * c;
+      for (int k = 0; k < 6; k++) row[k] += d_speed * along[k] - across * by[c][k];
     }
   }
 }
@@ -199,6 +220,8 @@ static void offset_of(const water *w, const real *force, const real *inflow, rea
                       real *wrench, real *slope) {
   const outlet *outlets = (const outlet *)(w + 1);
   const int n = (int)w->n;
+  const int has_jets = w->formula != 0;
+  const int has_hull = has_jets && w->half[0] > 0 && w->half[1] > 0 && w->half[2] > 0;
   jet jets[FL_MOST];
   memset(change, 0, (size_t)3 * (size_t)n * sizeof *change);
   memset(wrench, 0, 6 * sizeof *wrench);
@@ -208,25 +231,22 @@ static void offset_of(const water *w, const real *force, const real *inflow, rea
     const outlet *at = outlets + i;
     const real *f = force + 3 * i;
     real *taken = change + 3 * i;
-    jet_at met[FL_MOST]; /* of each jet that meets this actuator */
-    real u[3] = {0};     /* the water that they bring [m/s] */
+    jet_met met[FL_MOST];
+    int count = 0;
+    real u[3] = {0}; /* the water that the jets bring [m/s] */
     real by_force[3][3] = {{0}};
     real by_water[3][3] = {{0}};
-    for (int j = 0; j < n; j++) {
-      if (!may_meet(w, outlets, j, i)) continue;
-      met[j] = jet_at_outlet(w, outlets + j, jets + j, at);
-      for (int c = 0; c < 3; c++) u[c] -= met[j].speed * jets[j].ahead[c];
-    }
-    if (w->formula != 0) add_taken(w, at, jets + i, f, u, taken, by_force, by_water);
+    if (has_jets) count = jets_at(w, outlets, jets, i, met, u);
+    if (has_hull) add_hull(w, at, jets + i, f, taken, by_force);
+    if (count > 0) add_taken(w, at, jets + i, f, u, taken, by_force, by_water);
     if (inflow) add_lost(at, jets + i, f, inflow + 3 * i, taken, by_force);
     add_wrench(at->position, taken, wrench);
     if (!slope) continue;
+    for (int c = 0; c < 3; c++) add_wrench(at->position, by_force[c], slope + 18 * i + 6 * c);
+    if (count == 0) continue;
     real by[3][6] = {{0}}; /* of the wrench by the water */
-    for (int c = 0; c < 3; c++) {
-      add_wrench(at->position, by_force[c], slope + 18 * i + 6 * c);
-      add_wrench(at->position, by_water[c], by[c]);
-    }
-    add_slopes_of_jets(w, outlets, jets, met, i, by, slope);
+    for (int c = 0; c < 3; c++) add_wrench(at->position, by_water[c], by[c]);
+    add_slopes_of_jets(jets, met, count, by, slope);
   }
 }
 

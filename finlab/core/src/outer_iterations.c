@@ -11,6 +11,17 @@
 #define SHORTEN R(0.3) /* a step that gets no better is shortened to this share */
 /* Error over the wrench scale that commands on the way may leave. */
 #define EXACT_ON_WAY (NEARLY / 10)
+/* Share of power and what the error counts that makes another iteration worth it; of lines, whose
+   iterations settle at once, less. */
+#define GAIN_LEAST (CLOSE / 2)
+#define GAIN_LEAST_OF_LINES (NEARLY / 10)
+#define MUCH_CHEAPER (10 * CLOSE) /* share of a known power below which forces are other ones */
+
+/* Along how many axes the law of an actuator has forces, from the first one on. */
+static int law_axes(const fl_actuator *a) {
+  if (a->command_kind == FL_THRUSTER) return 1;
+  return 3;
+}
 
 /* Forces of commands along the laws' axes, and in the body frame, where a foil's drag at
    rest is on top. */
@@ -23,7 +34,7 @@ static void forces_of_commands(const fl_coupled_robot *robot, const real *block,
     memset(body[i], 0, sizeof body[i]);
     if (span->is_lost[i]) continue;
     if (!fl_is_in_dead_band(a, command[i])) fl_force_of_command(block, i, command[i], force[i], 0);
-    for (int c = 0; c < 3; c++) {
+    for (int c = 0; c < law_axes(a); c++) {
       real along = force[i][c];
       if (fl_form_of(a)->has_drag && c == 1) along += a->pressure_area * a->zero_lift_drag;
       const real *axis = robot->frames + 9 * i + 3 * c;
@@ -55,7 +66,7 @@ static real linearize_at(const fl_coupled_robot *robot, real *block, fl_work *wo
   for (int i = 0; i < n; i++) {
     const fl_actuator *plain = ACTUATOR(robot->block_uncoupled, i);
     fl_actuator *linear = (fl_actuator *)ACTUATOR(block, i);
-    for (int c = 0; c < 3; c++) {
+    for (int c = 0; c < law_axes(plain); c++) {
       const real *axis = robot->frames + 9 * i + 3 * c;
       for (int k = 0; k < 6; k++) {
         const real along = axis[0] * slope[i][0][k] + axis[1] * slope[i][1][k] +
@@ -76,7 +87,7 @@ static real linearize_at(const fl_coupled_robot *robot, real *block, fl_work *wo
 }
 
 /* Has fins of a block commanded by direction and size of the force, without their tables. */
-static void command_fins_by_force(const fl_coupled_robot *robot, real *block) {
+static void command_fins_by_force(const fl_coupled_robot *robot, real *block, fl_work *work) {
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *plain = ACTUATOR(robot->block_uncoupled, i);
     fl_actuator *a = (fl_actuator *)ACTUATOR(block, i);
@@ -87,11 +98,12 @@ static void command_fins_by_force(const fl_coupled_robot *robot, real *block) {
     a->is_free_angle = plain->sector_half_angle >= PI;
     memcpy(a->command_min, low, sizeof low);
     memcpy(a->command_max, high, sizeof high);
+    work->is_whole = 0;
   }
 }
 
 /* Has fins of a block commanded as they are. */
-static void command_fins_by_law(const fl_coupled_robot *robot, real *block) {
+static void command_fins_by_law(const fl_coupled_robot *robot, real *block, fl_work *work) {
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *plain = ACTUATOR(robot->block_uncoupled, i);
     fl_actuator *a = (fl_actuator *)ACTUATOR(block, i);
@@ -100,6 +112,7 @@ static void command_fins_by_law(const fl_coupled_robot *robot, real *block) {
     a->is_free_angle = plain->is_free_angle;
     memcpy(a->command_min, plain->command_min, sizeof a->command_min);
     memcpy(a->command_max, plain->command_max, sizeof a->command_max);
+    work->is_whole = 0;
   }
 }
 
@@ -141,7 +154,7 @@ static void box_now(const real *block, fl_work *work, const fl_question *q, fl_b
   calm.calm = 0;
   if (q->previous)
     fl_limits_of_tick(block, work, &calm);
-  else
+  else if (!work->is_whole)
     fl_limits_without_tick(block, work);
   *box = work->box;
 }
@@ -179,14 +192,17 @@ typedef struct {
   const fl_coupled_robot *robot;
   real *block; /* the linear model */
   fl_work *work;
-  fl_question question; /* whose multipliers become those of the best answer */
-  real lambda[6];       /* that they point at */
-  fl_box box;           /* of the commands by which the block is commanded now */
-  real (*force)[2];     /* (n, 2) the best ones [N] */
-  real power;           /* of these [W] */
-  real penalty;         /* what an error as large as the wrench scale counts [W] */
-  real error;           /* of the wrench, over the wrench scale */
+  const known_end *known; /* of other iterations; 0 for none */
+  fl_question question;   /* whose multipliers become those of the best answer */
+  real lambda[6];         /* that they point at */
+  fl_box box;             /* of the commands by which the block is commanded now */
+  real (*force)[2];       /* (n, 2) the best ones [N] */
+  real power;             /* of these [W] */
+  real penalty;           /* what an error as large as the wrench scale counts [W] */
+  real error;             /* of the wrench, over the wrench scale */
   real newton_steps;
+  int is_known;    /* whether iterations would end at the known forces */
+  real gain_least; /* share of what the best forces cost that makes another iteration worth it */
 } outer_search;
 
 static real merit_of(const outer_search *search) {
@@ -199,10 +215,10 @@ static real steps_of(const outer_search *search) {
 }
 
 /* Error that is enough before the first iteration: a tick begins where the robot is; forces
-   that are only looked at need not be exact. */
-static real enough_to_begin(int most_iterations, const real *previous) {
-  if (previous) return 1 / NOTHING;
-  if (most_iterations == 0) return 10 * CLOSE;
+   that are only looked at need not be exact, nor those that may lead to known ones. */
+static real enough_to_begin(const outer_search *search, int most_iterations) {
+  if (search->question.previous) return 1 / NOTHING;
+  if (most_iterations == 0 || search->known) return 10 * CLOSE;
   return EXACT_ON_WAY;
 }
 
@@ -216,9 +232,9 @@ static int begin_search(outer_search *search, int most_iterations) {
   work->refine_steps = 0;
   search->newton_steps = 0;
   if (previous) {
-    command_fins_by_law(search->robot, block);
+    command_fins_by_law(search->robot, block, work);
   } else {
-    command_fins_by_force(search->robot, block);
+    command_fins_by_force(search->robot, block, work);
   }
   if (!fl_span_of_question(block, work, q->lost, q->free)) return FL_BAD_NUMBER;
   if (previous) fl_power_of_commands(block, work, (real(*)[3])previous, search->force);
@@ -226,7 +242,7 @@ static int begin_search(outer_search *search, int most_iterations) {
 
   real command[FL_MOST][3];
   fl_commands_for_forces(block, &search->box, search->force, previous, command);
-  const real enough = enough_to_begin(most_iterations, previous);
+  const real enough = enough_to_begin(search, most_iterations);
   search->error =
       step_to_wrench(search->robot, block, work, &search->box, q->wrench, enough, command);
   search->power = fl_power_of_commands(block, work, command, search->force);
@@ -262,6 +278,19 @@ static int step_to_answer(outer_search *search, fl_answer *answer, real merit) {
   return 0;
 }
 
+/* Whether iterations would end at known forces again: an answer of the dual has each line push the
+   same way, and costs no less. */
+static int leads_to_known(const outer_search *search, fl_answer *answer) {
+  const known_end *known = search->known;
+  if (!known) return 0;
+  for (int i = 0; i < COUNT(search->block); i++) {
+    if (answer->force[i][0] * known->force[i][0] < 0) return 0;
+  }
+  real unused[FL_MOST][2];
+  const real power = fl_power_of_commands(search->block, search->work, answer->command, unused);
+  return power >= (1 - MUCH_CHEAPER) * known->power;
+}
+
 /* One outer iteration: the dual's answer on the linear model, and a step to its forces. `has_ended`
    becomes whether another one would gain nothing. Returns an error code. */
 static int iterate(outer_search *search, int is_first, fl_answer *out, int *has_ended) {
@@ -269,6 +298,9 @@ static int iterate(outer_search *search, int is_first, fl_answer *out, int *has_
   const int code = answer_linear(search->block, search->work, &search->question, is_first, &answer);
   if (code) return code;
   search->newton_steps += (real)answer.newton_steps;
+  search->is_known = leads_to_known(search, &answer);
+  *has_ended = 1;
+  if (search->is_known) return FL_OK;
   search->penalty = larger(search->penalty, penalty_at(search->block, answer.multipliers));
   const real merit = merit_of(search);
   if (is_first) *out = answer;
@@ -281,14 +313,14 @@ static int iterate(outer_search *search, int is_first, fl_answer *out, int *has_
     search->question.multipliers = search->lambda;
   }
   const real gain = merit - search->power - search->penalty * search->error;
-  *has_ended = !is_better || gain <= CLOSE / 2 * merit;
+  *has_ended = !is_better || gain <= search->gain_least * merit;
   return FL_OK;
 }
 
 /* Commands by the laws for the best forces, as exact as the whole model can tell. */
 static void finish_search(outer_search *search, fl_answer *out) {
   const fl_question *q = &search->question;
-  command_fins_by_law(search->robot, search->block);
+  command_fins_by_law(search->robot, search->block, search->work);
   box_now(search->block, search->work, q, &search->box);
   fl_commands_for_forces(search->block, &search->box, search->force, q->previous, out->command);
   search->error = step_to_wrench(search->robot, search->block, search->work, &search->box,
@@ -297,16 +329,23 @@ static void finish_search(outer_search *search, fl_answer *out) {
   fl_clip_commands(search->block, &search->box, out->command);
 }
 
-int fl_outer_iterations(const fl_coupled_robot *robot, real *block, fl_work *work,
-                        const fl_question *question, const fl_outer_limits *limits, real *force,
-                        fl_answer *answer, fl_outer_result *result) {
+/* As fl_outer_iterations. Where they would end as others did, 0 for none, they end at once, and
+   their error says that nothing better was found. */
+int fl_iterations_from(const fl_coupled_robot *robot, real *block, fl_work *work,
+                       const fl_question *question, const fl_outer_limits *limits,
+                       const known_end *known, real force[][2], fl_answer *answer,
+                       fl_outer_result *result) {
   outer_search search = {0};
   search.robot = robot;
   search.block = block;
   search.work = work;
   search.question = *question;
-  search.force = (real(*)[2])force;
+  search.known = known;
+  search.force = force;
   search.penalty = limits->penalty_least;
+  const int has_lines_alone = fl_has_lines_alone(robot->block_uncoupled);
+  search.gain_least = GAIN_LEAST;
+  if (has_lines_alone) search.gain_least = GAIN_LEAST_OF_LINES;
   int code = begin_search(&search, limits->most_iterations);
   if (code) return code;
   for (int k = 0; k < limits->most_iterations; k++) {
@@ -317,9 +356,20 @@ int fl_outer_iterations(const fl_coupled_robot *robot, real *block, fl_work *wor
     if (has_ended) break;
   }
   result->steps = steps_of(&search);
+  if (search.is_known) {
+    result->error = LARGEST_NUMBER;
+    return FL_OK;
+  }
   if (limits->most_iterations > 0) finish_search(&search, answer);
   result->power = search.power;
   result->penalty = search.penalty;
   result->error = search.error;
   return FL_OK;
+}
+
+int fl_outer_iterations(const fl_coupled_robot *robot, real *block, fl_work *work,
+                        const fl_question *question, const fl_outer_limits *limits, real *force,
+                        fl_answer *answer, fl_outer_result *result) {
+  return fl_iterations_from(robot, block, work, question, limits, 0, (real(*)[2])force, answer,
+                            result);
 }

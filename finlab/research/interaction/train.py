@@ -17,9 +17,9 @@ from finlab.arrays import AnyArray, Array
 from finlab.errors import DataError
 from finlab.fit.interaction.constants import parts_of_error
 from finlab.fit.interaction.samples import Samples, left_by_laws
-from finlab.interaction.interaction import JetGeometry
-from finlab.interaction.learned import LAYERS, MEMBERS, LearnedInteraction
-from finlab.interaction.messages import ROW_SIZES, JetPairs, pack_hull_rows, unpack_rows
+from finlab.interaction.interaction import JetGeometry, lever_of
+from finlab.interaction.learned import LAYERS, MEMBERS
+from finlab.interaction.messages import ROW_SIZES, Messages, unpack_rows
 from finlab.layout.jet_geometry import jet_geometry_of
 from finlab.research.networks.trained import ArraysByName
 from finlab.research.training.device import workplace
@@ -114,16 +114,13 @@ def messages_of(
 ) -> dict[str, tuple[AnyArray, AnyArray, AnyArray]]:
     """Returns for `pair` and `hull` the features (R, m), the vectors as wrenches over the scale (R,
     k, 6), and how many rows each of forces (K, n, 3) [N] has (K,)."""
-    pairs = JetPairs(geometry)
-    lever = LearnedInteraction({}, 1.0, geometry).lever / scale
-    source = force[:, pairs.source]
-    receiver = force[:, pairs.receiver]
-    rows = {"pair": (pairs.rows(source, receiver), lever[pairs.receiver])}
-    rows["hull"] = pack_hull_rows(geometry, force), lever * float(geometry.hull[1].all())
+    messages = Messages(geometry)
+    lever = lever_of(geometry.position) / scale
+    levers = {"pair": lever[messages.receiver], "hull": lever[: messages.counts["hull"]]}
     result = {}
-    for name, (packed, arms) in rows.items():
+    for name, packed in messages.rows(force).items():
         features, vectors = unpack_rows(name, packed)
-        wrenches = np.einsum("kpvb,pbw->kpvw", vectors, arms)
+        wrenches = np.einsum("kpvb,pbw->kpvw", vectors, levers[name])
         counts = np.abs(wrenches).max(axis=(2, 3), initial=0.0) > MESSAGE_MIN
         result[name] = (
             features[counts].astype(np.float32),

@@ -2,34 +2,29 @@
 ray."""
 
 from dataclasses import replace
-from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.optimize import minimize
 
 from finlab.allocation import Allocator
-from finlab.allocation.dual.compiled import Compiled, core_policy
+from finlab.allocation.dual.compiled import core_policy
 from finlab.allocation.dual.outer_iterations import (
     JET_ROTATION,
-    MAX_WORK,
     RANDOM_STARTS,
     WALSH,
-    _best_of_starts,
-    _is_better,
-    _rotated_starts,
+    start_factors,
 )
-from finlab.allocation.levenberg_marquardt import CommandProblem
 from finlab.allocation.policy import CLOSEST
 from finlab.arrays import ROUNDS, Array
 from finlab.core.calls import NOMINAL
-from finlab.core.coupled_core import CoupledCore, OuterResult
+from finlab.core.coupled_core import CoupledCore
 from finlab.interaction.jets import Jets
 from finlab.layout import Layout, load_layout
 from finlab.layout.load import parse_layout
 from finlab.physics import Plant
-from finlab.research.random_layouts import random_jet_robot
+from finlab.research.random_layouts import random_azimuth, random_jet_robot, random_thruster
 from tests.random_robots import bluerov2_heavy
 
 MOST_STEPS = 540.0
@@ -38,18 +33,12 @@ more."""
 
 
 def test_other_starts_rotate_planes_and_change_sizes() -> None:
-    rng = np.random.default_rng(1)
     lines = np.array([False, True, False, False, True, False])
-    force = rng.normal(size=(6, 2))
-    force[lines, 1] = 0.0
-    parts = _rotated_starts(force, lines)
-    starts = parts.all()
+    factors = start_factors(lines)
     patterns = len(WALSH) + 1
-    assert [len(part) for part in parts] == [len(WALSH), 1, RANDOM_STARTS]
-    assert starts.shape == (patterns + RANDOM_STARTS, 6, 2)
+    assert factors.shape == (patterns + RANDOM_STARTS, 6, 2)
 
-    complex_force = force[:, 0] + 1j * force[:, 1]
-    rotation = (starts[..., 0] + 1j * starts[..., 1]) / complex_force
+    rotation = factors[..., 0] + 1j * factors[..., 1]
     # By the patterns each plane turns by the same angle, one way or the other, and keeps its size.
     np.testing.assert_allclose(np.abs(rotation[:patterns, ~lines]), 1.0, rtol=1e-12)
     np.testing.assert_allclose(
@@ -173,99 +162,125 @@ def test_forces_without_an_iteration_come_with_no_answer_of_the_dual() -> None:
     assert only_steps.force.shape == (layout.n, 2)
 
 
-class _ConstantIterations:
-    """Stands for a `CoupledCore`: whatever the start, iterations come to the same power."""
-
-    def __init__(self) -> None:
-        self.starts_without_iteration = 0
-
-    def iterate(
-        self, target: Array, force: Array, most_iterations: int, *_: Any, **__: Any
-    ) -> OuterResult:
-        self.starts_without_iteration += most_iterations == 0
-        return OuterResult(None, force, power=2.0, penalty=1.0, error=0.0, steps=0.0)
+def coupled_with(allocator: Allocator, **changes: Any) -> CoupledCore:
+    """The core of a robot with jets, some of what its actuators do to each other replaced."""
+    dual: Any = allocator._whole.method
+    usual = dual.coupled._wrench_offset
+    return CoupledCore(dual.compiled.block, usual._replace(**changes))
 
 
-def search_from_all_starts(coupled: "_ConstantIterations", n: int, power_by_laws: float) -> None:
-    """Has the best of all starts looked for, of a robot of n actuators without lines, whose answer
-    by the laws alone takes a power [W]."""
-    by_laws = SimpleNamespace(
-        force=np.ones((1, n, 2)), multipliers=np.zeros((1, 6)), command=np.zeros((1, n, 3))
-    )
-    compiled = SimpleNamespace(
-        core=SimpleNamespace(answer_one=lambda *_: by_laws), is_line=np.zeros(n, bool)
-    )
-    problem = SimpleNamespace(
-        plant=SimpleNamespace(power=lambda command: np.full(command.shape[:-1], power_by_laws / n))
-    )
-    _best_of_starts(
-        cast("CoupledCore", coupled),
-        cast("Compiled", compiled),
-        cast("CommandProblem", problem),
-        np.zeros(6),
-        CLOSEST,
-        NOMINAL,
-        None,
-    )
+class _CountedEffect:
+    """The effect of jets, and how often the core asks for it."""
+
+    def __init__(self, allocator: Allocator) -> None:
+        self._interaction: Any = Plant(allocator.layout).interaction
+        self.asked = 0
+
+    def __call__(self, force: Array, inflow: Array | None) -> tuple[Array, Array]:
+        self.asked += 1
+        offset, slope = self._interaction.effect(force, inflow)
+        return np.asarray(offset), np.asarray(slope)
 
 
-def test_starts_that_make_nothing_cheaper_are_reversed_in_one_round_alone() -> None:
-    n = 6
-    coupled = _ConstantIterations()
-    search_from_all_starts(coupled, n, power_by_laws=1.0)
-    rotated = len(WALSH) + 1 + RANDOM_STARTS
-    assert coupled.starts_without_iteration == n + rotated
+def pods_with_jets(seed: int) -> Allocator:
+    """A random robot of pods."""
+    rng = np.random.default_rng([41, seed])
+    layout = random_jet_robot(rng, "robot", (4, 8), [random_azimuth])
+    return Allocator(replace(layout, interaction=Jets()))
 
 
-@pytest.mark.parametrize(
-    ("error", "power", "is_better"),
-    [
-        (0.0, 9.0, True),  # as near at less power
-        (0.0, 11.0, False),
-        (2e-3, 9.0, False),  # cheaper, but off
-        (0.5e-6, 9.0, True),
-        (-0.5e-6, 11.0, False),
-        (-2e-3, 11.0, True),  # dearer, but nearer
-    ],
-)
-def test_the_better_of_two_is_nearer_or_as_near_and_cheaper(
-    error: float, power: float, is_better: bool
-) -> None:
-    """By more than a millionth of the wrench scale."""
-    known = OuterResult(None, np.zeros((1, 2)), power=10.0, penalty=1.0, error=0.01, steps=1.0)
-    other = known._replace(error=0.01 + error, power=power)
-    assert _is_better(other, known) == is_better
+def test_other_starts_are_tried_and_none_makes_an_answer_worse() -> None:
+    """The search of all starts begins as iterations from the forces by the laws alone do."""
+    gains = []
+    for seed in (2, 10, 14):
+        allocator = pods_with_jets(seed)
+        dual = allocator._whole.method
+        plant = Plant(allocator.layout)
+        for target in 0.6 * plant.wrench(plant.sample(np.random.default_rng(seed), (4,))):
+            by_laws = dual.compiled.forces(target[None], CLOSEST, None, NOMINAL)
+            first = dual.coupled.iterate(
+                target, by_laws.force[0], ROUNDS, core_policy(CLOSEST), by_laws.multipliers[0]
+            )
+            assert first.answer is not None
+            best = dual.coupled.answer_many(target[None], core_policy(CLOSEST))
+            power = plant.power(best.command[0]).sum()
+            power_of_first = plant.power(first.answer.command[0]).sum()
+            assert power <= power_of_first * (1.0 + 1e-6)
+            gains.append(1.0 - power / power_of_first)
+    assert max(gains) > 0.01
 
 
-class _CountedIterations(_ConstantIterations):
-    """The same, each with so many steps, where reversed starts are cheaper and cheaper."""
+def test_no_other_start_is_tried_where_jets_cost_nothing() -> None:
+    allocator = pods_with_jets(2)
+    n = allocator.layout.n
+    target = 0.5 * Plant(allocator.layout).wrench(allocator.layout.upper)
+    asked = 0
 
-    def __init__(self, steps: float) -> None:
-        super().__init__()
-        self.steps = steps
-        self.power = 2.0
-        self.followed = 0
-        self.allowed: list[float] = []
+    def nothing(force: Array, inflow: Array | None) -> tuple[Array, Array]:
+        nonlocal asked
+        asked += 1
+        return np.zeros(6), np.zeros((n, 3, 6))
 
-    def iterate(
-        self, target: Array, force: Array, most_iterations: int, *_: Any, **more: Any
-    ) -> OuterResult:
-        if most_iterations == 0:
-            return OuterResult(None, force, power=self.power, penalty=1.0, error=0.0, steps=5.0)
-        self.followed += 1
-        self.allowed.append(more["most_steps"])
-        self.power *= 0.9
-        return OuterResult(None, force, self.power, penalty=1.0, error=0.0, steps=self.steps)
+    free = coupled_with(allocator, core_constants=None, effect=nothing)
+    free.answer_many(target[None], core_policy(CLOSEST))
+    assert asked <= 2 * ROUNDS
 
 
-@pytest.mark.parametrize(("share", "followed"), [(0.3, 4), (0.6, 2), (1.5, 1)])
-def test_steps_of_all_starts_together_bound_how_many_are_followed(
-    share: float, followed: int
-) -> None:
-    n = 4
-    steps = share * MAX_WORK / n
-    coupled = _CountedIterations(steps)
-    search_from_all_starts(coupled, n, power_by_laws=0.1)
-    assert coupled.followed == followed
-    left = MAX_WORK / n - steps * np.arange(followed)
-    np.testing.assert_allclose(coupled.allowed, left)
+@pytest.mark.parametrize("kinds", [[random_thruster], [random_azimuth]])
+def test_without_starts_fewer_are_tried(kinds: list[Any]) -> None:
+    """Of those that rotate forces or change their sizes; one reversed force is always a start."""
+    rng = np.random.default_rng([77, 4])
+    layout = replace(random_jet_robot(rng, "robot", (5, 7), kinds), interaction=Jets())
+    allocator = Allocator(layout)
+    plant = Plant(layout)
+    targets = 0.5 * plant.wrench(plant.sample(rng, (6,)))
+    asked = []
+    for starts in (None, start_factors(allocator._whole.method.compiled.is_line)):
+        effect = _CountedEffect(allocator)
+        core = coupled_with(allocator, core_constants=None, effect=effect, starts=starts)
+        core.answer_many(targets, core_policy(CLOSEST))
+        asked.append(effect.asked)
+    assert asked[0] < asked[1]
+
+
+def test_thrusters_that_would_push_the_same_way_again_are_not_followed() -> None:
+    """Of the twenty other starts of eight thrusters most come to the same forces."""
+    allocator = Allocator(replace(parse_layout(bluerov2_heavy()), interaction=Jets()))
+    plant = Plant(allocator.layout)
+    effect = _CountedEffect(allocator)
+    core = coupled_with(allocator, core_constants=None, effect=effect)
+    targets = 0.5 * plant.wrench(plant.sample(np.random.default_rng(6), (10,)))
+    core.answer_many(targets, core_policy(CLOSEST))
+    assert effect.asked <= 40 * len(targets)
+
+
+def test_one_answer_is_one_of_many() -> None:
+    allocator = pods_with_jets(10)
+    plant = Plant(allocator.layout)
+    core = allocator._whole.method.coupled
+    targets = 0.5 * plant.wrench(plant.sample(np.random.default_rng(5), (3,)))
+    many = core.answer_many(targets, core_policy(CLOSEST))
+    for k, target in enumerate(targets):
+        one = core.answer_many(target[None], core_policy(CLOSEST))
+        np.testing.assert_array_equal(one.command[0], many.command[k])
+        np.testing.assert_array_equal(one.multipliers[0], many.multipliers[k])
+
+
+def test_what_an_effect_raises_reaches_the_caller_once() -> None:
+    allocator = pods_with_jets(2)
+    target = 0.5 * Plant(allocator.layout).wrench(allocator.layout.upper)
+    works = _CountedEffect(allocator)
+    fails = True
+
+    def effect(force: Array, inflow: Array | None) -> tuple[Array, Array]:
+        if fails:
+            raise ZeroDivisionError("no effect")
+        return works(force, inflow)
+
+    core = coupled_with(allocator, core_constants=None, effect=effect)
+    with pytest.raises(ZeroDivisionError, match="no effect"):
+        core.answer_many(target[None], core_policy(CLOSEST))
+    fails = False
+    again = core.answer_many(target[None], core_policy(CLOSEST))
+    usual = allocator._whole.method.coupled.answer_many(target[None], core_policy(CLOSEST))
+    np.testing.assert_allclose(again.command, usual.command, atol=1e-9)
