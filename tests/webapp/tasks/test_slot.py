@@ -163,3 +163,19 @@ def test_an_error_where_it_is_asked_is_told_as_one_of_the_thread(worker: Pool) -
     slot.ask(3)
     until(lambda: not slot.busy)
     assert (slot.error, slot.answer) == (None, 3)
+
+
+def test_a_quick_question_that_rested_first_is_told_to_the_page(worker: Pool) -> None:
+    threads: list[int] = []
+
+    def solve(question: int) -> int:
+        threads.append(threading.get_ident())
+        return question
+
+    slot: Slot[int, int] = Slot(worker, LoneBell(), solve, rest_s=0.01, alike=lambda *_: True)
+    for question in (0, 1):
+        slot.ask(question)
+        assert slot.busy
+        until(lambda: not slot.busy)
+        assert slot.answer == question
+    assert threads[0] != threads[1] == threading.get_ident()
