@@ -16,7 +16,7 @@ from webapp.session import Display, Session
 from webapp.tasks.slot import Pools
 from webapp.tasks.solver import Solver
 from webapp.view import View
-from webapp.viser_internals import disable_sharing, stored
+from webapp.viser_internals import disable_sharing, icons_at_hand, stored
 
 FRAME_S = 1 / 25
 """Time between two poses of robots that swim [s]."""
@@ -145,7 +145,9 @@ class App:
         if key not in remembered:
             remembered = [key, *remembered]
         client.local_storage.set_item(STORAGE_KEY, json.dumps(remembered[:MAX_KEYS]))
-        self.views[client.client_id] = View(client, session, self._solver, self._pools, self._loop)
+        with icons_at_hand():
+            view = View(client, session, self._solver, self._pools, self._loop)
+        self.views[client.client_id] = view
 
     async def _drop_if_gone(self, client_id: int) -> None:
         try:

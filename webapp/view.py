@@ -3,7 +3,8 @@
 browser   a widget changes       viser calls `Intents.do` on the event loop
 loop      the session changes    nothing else ever changes it
 loop      `Jobs.ask`             what can be seen is asked; an old question costs nothing
-thread    `solve(question)`      pure: it knows no widget, no session, no loop
+thread    `solve(question)`      pure: it knows no widget, no session, no loop; on the loop where
+                               that is quicker than to hand it over
 loop      `facts_of`, `Board`    widgets are functions of facts; only what changed is sent
 """
 

@@ -13,10 +13,16 @@ viser-project/viser:
   `atomic_end` and `flush`.
 - `_windows`: messages to one page are sent as they are told, not gathered for 16 ms; it is woken
   six times less. `infra/_async_message_buffer.py`, `_window_loop`.
+- `icons_at_hand`: the list of an archive of thousands of icons read once, not for each icon;
+  `_icons.py`, `svg_from_icon`.
 - `_pack_quickly`: messages of a step packed without asking for the type of each part;
   `infra/_messages.py`, `as_serializable_dict`.
+- `icons_at_hand`: the list of an archive of thousands of icons read once, not for each icon;
+  `_icons.py`, `svg_from_icon`.
 - `_pack_quickly`: messages of a step packed without a look at the type of each of their parts;
   `infra/_messages.py`, `as_serializable_dict`.
+- `icons_at_hand`: the list of an archive of thousands of icons read once, not for each icon;
+  `_icons.py`, `svg_from_icon`.
 - `_pack_quickly`: messages of a step packed without a look at the type of each of their parts;
   `infra/_messages.py`, `as_serializable_dict`.
 - `keep_private`: no message to the other pages about an input of one page; `_gui_api.py`,
@@ -45,15 +51,17 @@ from http import HTTPStatus
 from importlib.resources import files
 from itertools import islice
 from operator import attrgetter
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, get_type_hints
 from unittest.mock import patch
+from zipfile import ZipFile
 
 import numpy as np
 import viser
 import websockets.asyncio.server as websockets_server
 from numpy.typing import NDArray
-from viser import _assignable_props_api, _messages
+from viser import _assignable_props_api, _icons, _messages
 from viser._assignable_props_api import AssignablePropsBase
 from viser.infra._async_message_buffer import AsyncMessageBuffer
 from viser.infra._messages import wire_field_names
@@ -204,6 +212,20 @@ def _stay_awake(loop: asyncio.AbstractEventLoop) -> None:
         return call(callback, *arguments, **options)
 
     loop.call_soon_threadsafe = call_soon  # type: ignore[assignment, method-assign]
+
+
+@contextlib.contextmanager
+def icons_at_hand() -> Iterator[None]:
+    """Icons that a page asks for in this context are read from one open archive; to open it takes
+    as long as to build a tenth of a page."""
+    with contextlib.ExitStack() as opened:
+
+        @cache
+        def archive(path: Path) -> contextlib.nullcontext[ZipFile]:
+            return contextlib.nullcontext(opened.enter_context(ZipFile(path)))
+
+        with patch.object(_icons, "zipfile", SimpleNamespace(ZipFile=archive)):
+            yield
 
 
 _gathered = AsyncMessageBuffer._window_loop

@@ -1,20 +1,27 @@
 """What is put in place of viser's private parts gives what viser gives; strangers stay out."""
 
+import asyncio
 import gzip
 import http.client
+import threading
 from http.client import HTTPConnection
 from itertools import chain
 from typing import Any
 from urllib.request import Request, urlopen
+from zipfile import ZipFile
 
+import numpy as np
 import pytest
 import viser
-from viser import _messages
+from viser import _icons, _messages
+from viser.infra._async_message_buffer import AsyncMessageBuffer
+from viser.infra._messages import Message
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
+from webapp import viser_internals
 from webapp.guard import COOKIE, Guard, is_loopback
-from webapp.viser_internals import hold_uploads, start_server, stop_server
+from webapp.viser_internals import assign, hold_uploads, icons_at_hand, start_server, stop_server
 
 
 def test_property_types_of_a_handle_are_those_of_its_class() -> None:
@@ -191,3 +198,116 @@ def test_real_server_refuses_before_anything_is_shown() -> None:
             pass
     finally:
         stop_server(server)
+
+
+def test_updates_are_packed_as_viser_packs_them() -> None:
+    server = start_server()  # from now on
+    array = np.arange(12.0, dtype=np.float32).reshape(2, 2, 3)
+    updates: list[dict[str, Any]] = [
+        {"content": "<b>ü</b>", "visible": True, "order": 1.5, "count": 3},
+        {"points": array, "scale": 2.0},
+        {"points": array.swapaxes(0, 2), "colors": np.zeros((1, 3), np.uint8)},
+        {"scale": (1.0, 2.0, 3.0), "points": array},
+        {"value": np.float64(0.5)},
+        {"value": None},
+    ]
+    for kind in (_messages.GuiUpdateMessage, _messages.SceneNodeUpdateMessage):
+        for update in updates:
+            message = kind("/node", update)
+            message.redundancy_key()
+            buffers: list[memoryview] = []
+            expected: list[memoryview] = []
+            packed = message.as_serializable_dict(buffers)
+            assert packed == Message.as_serializable_dict(message, expected)
+            assert [buffer.tobytes() for buffer in buffers] == [e.tobytes() for e in expected]
+    stop_server(server)
+
+
+def test_properties_of_a_node_are_one_message_and_what_viser_would_keep() -> None:
+    server = start_server()
+    arrows = server.scene.add_arrows("/arrows", np.zeros((1, 2, 3)), np.zeros((1, 3), np.uint8))
+    sent: list[Any] = []
+    arrows._impl.api._queue_scene_message = sent.append  # type: ignore[method-assign]
+    points = np.ones((2, 2, 3), np.float32)
+    colors = np.full((2, 3), 7, np.uint8)
+    assign(arrows, {"points": points, "colors": colors, "scale": (1.0, 2.0, 3.0)})
+    assert len(sent) == 1 and list(sent[0].updates) == ["points", "colors", "scale"]
+    assert arrows.scale == (1.0, 2.0, 3.0) and (arrows.colors == colors).all()
+    # What viser would cast, or has elsewhere, goes its way.
+    assign(arrows, {"points": np.zeros((1, 2, 3)), "visible": False, "position": np.ones(3)})
+    assert arrows.points.dtype == np.float32 and arrows.points.shape == (1, 2, 3)
+    assert not arrows.visible and (arrows.position == 1.0).all() and len(sent) == 4
+    stop_server(server)
+
+
+def test_messages_to_one_page_come_in_their_order_and_groups_stay_together() -> None:
+    stop_server(start_server())  # from now on
+    loop = asyncio.new_event_loop()
+
+    async def heard() -> list[list[str]]:
+        buffer = AsyncMessageBuffer(loop, persistent_messages=False, max_window_size=3)
+        windows: list[list[str]] = []
+
+        async def listen() -> None:
+            async for window in buffer.window_generator(0):
+                windows.append([message.source for message in window])  # type: ignore[attr-defined]
+
+        listening = loop.create_task(listen())
+        await asyncio.sleep(0.0)
+        for word in "abcd":
+            buffer.push(_messages.RunJavascriptMessage(word))
+        await asyncio.sleep(0.01)
+        buffer.atomic_start()
+        buffer.push(_messages.RunJavascriptMessage("e"))
+        await asyncio.sleep(0.01)
+        buffer.push(_messages.RunJavascriptMessage("f"))
+        buffer.atomic_end()
+        await asyncio.sleep(0.01)
+        thread = threading.Thread(
+            target=buffer.push, args=(_messages.RunJavascriptMessage("from a thread"),)
+        )
+        thread.start()
+        await asyncio.wait_for(loop.run_in_executor(None, thread.join), 30.0)
+        await asyncio.sleep(0.01)
+        buffer.set_done()
+        await asyncio.wait_for(listening, 30.0)
+        return windows
+
+    windows = loop.run_until_complete(heard())
+    loop.close()
+    assert windows == [["a", "b", "c"], ["d"], ["e", "f"], ["from a thread"]]
+
+
+def test_a_loop_wakes_itself_for_other_threads_alone() -> None:
+    server = start_server()
+    loop: Any = server.get_event_loop()
+    woken: list[int] = []
+    wake = loop._write_to_self
+    loop._write_to_self = lambda: (woken.append(threading.get_ident()), wake())
+    called = threading.Event()
+
+    async def call_itself() -> int:
+        before = len(woken)
+        loop.call_soon_threadsafe(called.set)
+        return len(woken) - before
+
+    assert asyncio.run_coroutine_threadsafe(call_itself(), loop).result(30.0) == 0
+    assert called.wait(30.0) and woken == [threading.get_ident()]
+    stop_server(server)
+
+
+def test_icons_of_a_page_are_viser_s_own_from_one_archive(monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[Any] = []
+
+    class Counted(ZipFile):
+        def __init__(self, path: Any) -> None:
+            opened.append(path)
+            super().__init__(path)
+
+    monkeypatch.setattr(viser_internals, "ZipFile", Counted)
+    names: list[Any] = ["anchor", "fish", "ripple"]
+    icon = _icons.svg_from_icon.__wrapped__
+    expected = [icon(name) for name in names]
+    with icons_at_hand():
+        assert [icon(name) for name in names] == expected
+    assert len(opened) == 1 and all("<svg" in text for text in expected)

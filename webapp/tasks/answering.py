@@ -74,7 +74,12 @@ class Answering:
             pool, bell, solver.reply, live=True, title="No answer", alike=State.is_same_but_target
         )
         self.search: Slot[ModeSearch, Modes] = Slot(
-            pool, bell, search_modes, rest_s=SEARCH_REST_S, title="No candidates"
+            pool,
+            bell,
+            search_modes,
+            rest_s=SEARCH_REST_S,
+            title="No candidates",
+            alike=ModeSearch.is_same_but_target,
         )
         self._solver = solver
 

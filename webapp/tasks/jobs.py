@@ -41,7 +41,9 @@ class Jobs:
         solver = context.solver
         self.answering = Answering(context)
         self.refining = Refining(context, self.answering)
-        self.ranging: Slot[State, Ranges] = Slot(pools.brief, bell, find_ranges, rest_s=REST_S)
+        self.ranging: Slot[State, Ranges] = Slot(
+            pools.brief, bell, find_ranges, rest_s=REST_S, alike=State.is_same_but_target
+        )
         self.jet_comparison: Slot[State, JetComparison] = Slot(
             pools.answers, bell, solver.jet_comparison, rest_s=REST_S
         )

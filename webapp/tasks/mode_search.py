@@ -20,6 +20,11 @@ class ModeSearch:
     shifts: tuple[float, ...] = ()
     """How far along the directions of the null space the forces are [N]."""
 
+    def is_same_but_target(self, other: "ModeSearch") -> bool:
+        """Whether both only prove an answer, of the same robot asked in the same way."""
+        is_proof = not self.drawer and not other.drawer
+        return is_proof and self.reply.state.is_same_but_target(other.reply.state)
+
 
 def search_modes(search: ModeSearch) -> Modes:
     """The modes that can be seen; the answer is proved in any case."""

@@ -48,10 +48,10 @@ class Pool:
         return future
 
     def do_now(self, work: Callable[[], Answer]) -> "Future[Answer] | None":
-        """Do a job on the calling thread, in place of the pool's single one; None where that is at
-        work, has something to do, or is not alone."""
+        """Do a job on the calling thread, in place of one of the pool's; None where these have
+        something to do, or a single one is at work."""
         turn = self._turn
-        if turn is None or not self._jobs.empty() or not turn.acquire(blocking=False):
+        if not self._jobs.empty() or (turn is not None and not turn.acquire(blocking=False)):
             return None
         future: Future[Answer] = Future()
         try:
@@ -59,7 +59,8 @@ class Pool:
         except BaseException as error:  # whoever asked is told
             future.set_exception(error)
         finally:
-            turn.release()
+            if turn is not None:
+                turn.release()
         return future
 
     def stop(self) -> None:
@@ -253,7 +254,7 @@ class Slot(Generic[Question, Answer]):
         if at_once or self._rest_s == 0.0:
             self._begin()
         else:
-            self._rest = self._bell.call_later(self._rest_s, self._begin)
+            self._rest = self._bell.call_later(self._rest_s, partial(self._begin, is_late=True))
 
     def attend(self) -> bool:
         """Take an answer that has come."""
@@ -297,8 +298,9 @@ class Slot(Generic[Question, Answer]):
         self.busy = False
         self.question = self.answered = self.answer = self.error = None
 
-    def _begin(self) -> None:
-        """Gives the newest question to a thread."""
+    def _begin(self, is_late: bool = False) -> None:
+        """Gives the newest question to a thread, or answers it here where that is quicker; the page
+        is told where it does not ask just now (`is_late`)."""
         assert self.question is not None
         self._rest = None
         ring = partial(self._bell.ring_from_thread, self)
@@ -313,7 +315,7 @@ class Slot(Generic[Question, Answer]):
         if is_quick:
             work.future = self._pool.do_now(answer)
         self._work = work
-        if work.future is not None and work.future.exception() is None:
+        if work.future is not None and not is_late and work.future.exception() is None:
             self.attend()
             return
         if work.future is None:

@@ -165,7 +165,8 @@ class JetComparison(NamedTuple):
 
 
 class Solver:
-    """Answers states. Used from one thread only, the worker's."""
+    """Answers states. Used from one thread at a time: the worker's, or the loop's while that has
+    nothing to do."""
 
     def __init__(self, checkpoint: str | Path | None = None, load: Load = choose_method) -> None:
         """`checkpoint` is a name or folder for method `mdn` or `paper`, None for the shipped ones;

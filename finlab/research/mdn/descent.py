@@ -85,10 +85,12 @@ def descend(
     yield projected
     mobility_factor = np.ones(force.shape)
     before = projected.force
+    coefficients = np.empty((len(force), len(problem.products)))
     for step in range(steps):
         shift, a, b = _respond(problem, projected, mobility_factor)
         residual = target - wrench(problem, shift)
-        BMB = np.concatenate([a, b.real, b.imag], axis=1) @ problem.products
+        np.concatenate([a, b.real, b.imag], axis=1, out=coefficients)
+        BMB = coefficients @ problem.products
         BMB[:, ::7] += effort_fins.LEAST  # the diagonal
         multiplier = solve_or_nan(BMB.reshape(-1, 6, 6), residual[..., None])[..., 0]
         p = (multiplier @ problem.effectiveness.T).view(complex)  # B^T l
@@ -97,7 +99,7 @@ def descend(
             y = 0.5 * (y + before)
         before = y
         projected = fins.project(y)
-        largest = fins.largest * projected.gauge
+        largest = fins.largest if fins.gauge is None else fins.largest * projected.gauge
         unbounded = np.maximum(projected.wanted, effort_fins.LEAST)
         mobility_factor = np.minimum(mobility_factor * largest / unbounded, 1.0)
         yield projected
@@ -134,23 +136,31 @@ def _respond(
     Returns:
         shift, a and b of y = shift + a p + b conj(p), each (R, n).
     """
-    row = problem.fins.lookup(projected.size / projected.gauge)
-    direction = projected.direction
+    fins = problem.fins
+    is_even = fins.gauge is None
+    scaled = projected.size if is_even else projected.size / projected.gauge
+    log_mobility, stiffness = fins.response(scaled)
     # M across and along the force. The same command gives less in weaker directions, so a newton
     # more costs more there.
-    mobility = np.exp(row[..., effort_fins.MOBILITY])
-    across = mobility * projected.gauge**2 * mobility_factor
-    softness = 1.0 / row[..., effort_fins.STIFFNESS]
+    across = np.exp(log_mobility)
+    if not is_even:
+        across *= projected.gauge**2
+    across *= mobility_factor
+    softness = 1.0 / stiffness
     along = across * softness
-    turn = wrapped(direction - problem.fins.deflection(direction))
+    direction = projected.direction
+    turn = wrapped(direction if fins.is_straight else direction - fins.deflection(direction))
     size = np.maximum(projected.size, effort_fins.LEAST)
     # Turning towards where that costs nothing: the weaker the force, the less of it does.
     restoring = 2.0 * problem.direction_cost * across / size
     turn_factor = 1.0 / (1.0 + restoring / size)
-    across = across * turn_factor
+    across *= turn_factor
     unit = projected.unit
-    shift_along = projected.size * (1.0 - softness) * mobility_factor
-    shift = (shift_along - 1j * restoring * turn * turn_factor) * unit
+    # Along the force and across it, then turned to where it points.
+    shift = np.empty(unit.shape, complex)
+    shift.real = projected.size * (1.0 - softness) * mobility_factor
+    shift.imag = -restoring * turn * turn_factor
+    shift *= unit
     a = 0.5 * (along + across)
     b = 0.5 * (along - across) * unit * unit
     return shift, a, b

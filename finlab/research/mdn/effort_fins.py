@@ -127,6 +127,27 @@ class EffortFins:
         return np.stack([rows, np.diff(rows, axis=0, append=rows[-1:])], axis=1)
 
     @cached_property
+    def _response_steps(self) -> Array:
+        """The same of mobility and stiffness alone, (n * LEVELS, 4): both, then their steps."""
+        columns = self._steps[:, :, [MOBILITY, STIFFNESS]]
+        return np.ascontiguousarray(columns.reshape(len(columns), -1))
+
+    @cached_property
+    def _ones(self) -> Array:
+        """The gauge of even fins (n,)."""
+        return np.ones(len(self.half))
+
+    @cached_property
+    def _span(self) -> Array:
+        """From the smallest to the largest force (n,) [N], never quite zero."""
+        return np.asarray(self.largest - self.smallest + LEAST)
+
+    @cached_property
+    def is_straight(self) -> bool:
+        """Whether no fin's force leans off its zero direction."""
+        return not self.lean.any()
+
+    @cached_property
     def _first_rows(self) -> NDArray[np.intp]:
         """Where each fin's rows begin (n,)."""
         return np.arange(len(self.largest)) * LEVELS
@@ -139,6 +160,8 @@ class EffortFins:
     def deflection(self, direction: Array) -> Array:
         """By how much (..., n) [rad] forces in directions (..., n) [rad] lean off the zero
         directions."""
+        if self.is_straight:
+            return np.zeros(direction.shape)
         cell = np.rint(direction * (POINTS / TURN)).astype(np.intp) % POINTS
         return np.asarray(self.lean.ravel().take(cell + self._circles))
 
@@ -152,9 +175,28 @@ class EffortFins:
     def lookup(self, size: Array) -> Array:
         """Rows (R, n, 5) of the tables for forces of sizes (R, n) [N] in the strongest
         directions."""
+        level, position = self._levels(size)
+        steps = self._steps.take(level, axis=0)
+        rows: Array = steps[..., 1, :] * position[..., None]
+        rows += steps[..., 0, :]
+        return rows
+
+    def response(self, size: Array) -> tuple[Array, Array]:
+        """Logarithms of the mobility, and stiffnesses, each (R, n), for forces of sizes (R, n) [N]
+        in the strongest directions: two columns of `lookup`."""
+        level, position = self._levels(size)
+        steps = self._response_steps.take(level, axis=0)
+        log_mobility = steps[..., 2] * position
+        log_mobility += steps[..., 0]
+        stiffness = steps[..., 3] * position
+        stiffness += steps[..., 1]
+        return log_mobility, stiffness
+
+    def _levels(self, size: Array) -> tuple[NDArray[np.intp], Array]:
+        """Rows of all tables (R, n) at or below sizes (R, n) [N], and how far towards the next."""
         # Levels are even in the angle psi with share = sin^4 psi; in place, since it is a hot loop.
         position = size - self.smallest
-        position /= self.largest - self.smallest + LEAST
+        position /= self._span
         np.minimum(np.maximum(position, 0.0, out=position), 1.0, out=position)
         np.sqrt(np.sqrt(position, out=position), out=position)
         np.arcsin(position, out=position)
@@ -162,10 +204,7 @@ class EffortFins:
         level = position.astype(np.intp)
         position -= level
         level += self._first_rows
-        steps = self._steps.take(level, axis=0)
-        rows: Array = steps[..., 1, :] * position[..., None]
-        rows += steps[..., 0, :]
-        return rows
+        return level, position
 
     def project(self, force: AnyArray) -> Projected:
         """What the fins can do nearest to forces (R, n), complex."""
@@ -177,7 +216,10 @@ class EffortFins:
             excess = np.abs(offset - in_arc)
             wanted = np.where(excess < 0.5 * np.pi, wanted * np.cos(excess), 0.0)
             unit = np.exp(1j * (self.middle + in_arc))
-        gauge = np.ones(len(self.half)) if self.gauge is None else self.gauges(np.angle(unit))
+        if self.gauge is None:
+            size = np.minimum(np.maximum(wanted, self.smallest), self.largest)
+            return Projected(unit, size, wanted, self._ones)
+        gauge = self.gauges(np.angle(unit))
         size = np.minimum(np.maximum(wanted, self.smallest * gauge), self.largest * gauge)
         return Projected(unit, size, wanted, gauge)
 

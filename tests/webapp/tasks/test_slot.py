@@ -7,7 +7,7 @@ import pytest
 
 from finlab.errors import FinlabError
 from tests.webapp.stand_in import LoneBell, until
-from webapp.tasks.slot import Pool, Slot, Work
+from webapp.tasks.slot import QUICK_S, Pool, Slot, Work
 
 
 def test_live_slot_answers_one_question_and_then_the_newest(worker: Pool) -> None:
@@ -105,3 +105,77 @@ def test_slot_says_an_error_and_its_thread_goes_on(
     ) and good.answer == "A"
     printed = capsys.readouterr().err
     assert "ZeroDivisionError" in printed and "FinlabError" not in printed, "a refusal is no fault"
+
+
+def test_a_question_like_a_quick_one_is_answered_where_it_is_asked(worker: Pool) -> None:
+    threads: list[int] = []
+
+    def solve(question: tuple[str, int]) -> int:
+        threads.append(threading.get_ident())
+        if question[0] == "bad":
+            raise FinlabError("not so")
+        end_s = time.thread_time() + (2.0 * QUICK_S if question[0] == "slow" else 0.0)
+        while time.thread_time() < end_s:
+            pass
+        return question[1]
+
+    slot: Slot[tuple[str, int], int] = Slot(
+        worker, LoneBell(), solve, alike=lambda a, b: a[0] == b[0]
+    )
+    own = threading.get_ident()
+
+    def answered_here(question: tuple[str, int]) -> bool:
+        """Whether a question is answered at once, on this thread."""
+        slot.ask(question)
+        is_here = not slot.busy
+        until(lambda: not slot.busy)
+        assert (threads[-1] == own) == is_here and slot.answered == question
+        return is_here
+
+    assert not answered_here(("quick", 1)), "nobody knows yet how long it takes"
+    assert answered_here(("quick", 2)) and slot.answer == 2
+    assert not answered_here(("slow", 3)), "it is another question"
+    assert not answered_here(("slow", 4)), "the one before took long"
+    assert not answered_here(("quick", 5)) and answered_here(("quick", 6))
+    gate = threading.Event()
+    worker.submit(lambda: gate.wait(30))
+    slot.ask(("quick", 7))
+    assert slot.busy, "the thread is at work, and nobody else may use what is its own"
+    gate.set()
+    until(lambda: not slot.busy)
+    assert slot.answer == 7 and threads[-1] != own
+
+
+def test_an_error_where_it_is_asked_is_told_as_one_of_the_thread(worker: Pool) -> None:
+    def solve(question: int) -> int:
+        if question == 2:
+            raise FinlabError("not so")
+        return question
+
+    bell = LoneBell()
+    slot: Slot[int, int] = Slot(worker, bell, solve, title="No answer", alike=lambda *_: True)
+    for question in (0, 1):
+        slot.ask(question)
+        until(lambda: not slot.busy)
+    slot.ask(2)
+    until(lambda: not slot.busy)
+    assert (slot.error, slot.answer, bell.refused) == ("not so", None, ["No answer: not so"])
+    slot.ask(3)
+    until(lambda: not slot.busy)
+    assert (slot.error, slot.answer) == (None, 3)
+
+
+def test_a_quick_question_that_rested_first_is_told_to_the_page(worker: Pool) -> None:
+    threads: list[int] = []
+
+    def solve(question: int) -> int:
+        threads.append(threading.get_ident())
+        return question
+
+    slot: Slot[int, int] = Slot(worker, LoneBell(), solve, rest_s=0.01, alike=lambda *_: True)
+    for question in (0, 1):
+        slot.ask(question)
+        assert slot.busy
+        until(lambda: not slot.busy)
+        assert slot.answer == question
+    assert threads[0] != threads[1] == threading.get_ident()
