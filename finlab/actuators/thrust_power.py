@@ -217,10 +217,12 @@ class ThrustPower:
         return np.asarray(price * force - self.watts(force))
 
 
+@lru_cache(maxsize=256)
 def radial_table(
     model: ThrustModel | PowerCurve, sign: int, least: float, most: float
 ) -> RadialTable:
-    """Returns the response of one propeller to a price, in one sense, as a table.
+    """Returns the response of one propeller to a price, in one sense, as a table; of equal
+    propellers the same one, from a cache.
 
     Args:
         model: its power over the force.

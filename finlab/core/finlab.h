@@ -32,7 +32,7 @@ typedef double fl_real;
 typedef double fl_wide; /* where differences of large numbers matter, in single precision, too */
 
 #ifndef FL_MOST
-#define FL_MOST 64 /* most actuators of a robot */
+#define FL_MOST 256 /* most actuators of a robot */
 #endif
 #ifndef FL_PARTS
 #define FL_PARTS 1000 /* the usual fl_settings.most_parts */

@@ -21,7 +21,7 @@ MEASUREMENT_COLUMNS = {"phi", "pwm", "escsignal", "rpm", "current", "power", "vo
 VECTOR_COLUMNS = {"px", "posx", "dx", "ax", "nx", "ux", *labels.POSITION.split()}
 """Columns by which a table with a row for each thruster is recognized."""
 MAX_ROWS = 1000
-"""Most rows and columns that are read; a robot has up to 64 actuators."""
+"""Most rows and columns that are read; a robot has up to 256 actuators."""
 _LIMIT_LABELS = {
     **dict.fromkeys(labels.LOWER_LIMIT.split(), "least"),
     **dict.fromkeys(labels.UPPER_LIMIT.split(), "most"),

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 else:  # most robots have neither: their modules are imported only for those that do
     Body = InteractionModel = Checked
 
-MAX_ACTUATORS = 64
+MAX_ACTUATORS = 256
 """Most actuators a layout may have."""
 MAX_DESCRIPTION_LENGTH = 4000
 """Most characters of a description."""
@@ -39,7 +39,7 @@ class Layout(Checked):
     name: Name
     """Name of the layout."""
     actuators: tuple[Actuator, ...]
-    """The actuators, 1 to 64, with unique names. Commands and arrays follow this order."""
+    """The actuators, 1 to 256, with unique names. Commands and arrays follow this order."""
     description: Annotated[str, Meta(max_length=MAX_DESCRIPTION_LENGTH)] = ""
     """Description for people."""
     body: "Body | None" = None

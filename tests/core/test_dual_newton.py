@@ -39,17 +39,17 @@ class NewtonSteps(NamedTuple):
 
 
 MOST_STEPS = {
-    "thrusters": NewtonSteps(191, 877, 76),
-    "azimuths": NewtonSteps(86, 588, 38),
-    "fins": NewtonSteps(100, 909, 95),
-    "fins any shaft": NewtonSteps(70, 971, 66),
-    "fins uneven": NewtonSteps(81, 1092, 30),
-    "wide arcs": NewtonSteps(258, 2067, 69),
-    "holes": NewtonSteps(508, 2549, 38),
-    "rudders": NewtonSteps(1744, 4872, 722),
-    "mixed": NewtonSteps(132, 2227, 77),
-    "all": NewtonSteps(134, 1905, 122),
-    "pods either way": NewtonSteps(465, 3741, 333),
+    "thrusters": NewtonSteps(176, 761, 60),
+    "azimuths": NewtonSteps(82, 543, 33),
+    "fins": NewtonSteps(83, 536, 39),
+    "fins any shaft": NewtonSteps(59, 580, 100),
+    "fins uneven": NewtonSteps(80, 1015, 30),
+    "wide arcs": NewtonSteps(258, 1564, 64),
+    "holes": NewtonSteps(490, 1729, 37),
+    "rudders": NewtonSteps(1666, 3848, 691),
+    "mixed": NewtonSteps(132, 1530, 75),
+    "all": NewtonSteps(103, 1216, 88),
+    "pods either way": NewtonSteps(387, 3741, 288),
 }
 """Most steps of each kind of robot: the sum that `newton_steps` counted over its two robots, and a
 tenth more. Robots and wrenches come from seeds, so that the sum changes with the code alone, or by

@@ -100,7 +100,7 @@ def test_matrices_of_every_shape(file: str, text: str, read_as: str) -> None:
         ("a.cpp", "add_motor(1, 0, 0, 0, 1, 0, 0, 1);\n" * 2, "adds a motor twice, motor2; keep"),
         ("a.yaml", "matrix: [[1], [2]]", "matrix: is 2 rows of 1 numbers, expected six"),
         ("a.yaml", "limits: [[0, 1]]\nnames: [a, b]\nmatrix: [1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]", "limits"),
-        ("a.csv", "\n".join([",".join("1" * 65)] * 6), "expected up to 64 columns, got 65"),
+        ("a.csv", "\n".join([",".join("1" * 257)] * 6), "expected up to 256 columns, got 257"),
         ("a.json", "[1", "is not valid JSON"),
         ("a.txt", "Dear all,", "holds no|has no matrix|holds none"),
         ("a.sdf", sdf('<include><uri>model://x</uri></include>' + SCREW + THRUSTER.replace("sj", "x::j")),

@@ -34,7 +34,7 @@
 #define MU_SINGULAR 10        /* mu grows by this where the step's matrix is singular to rounding */
 #define MU_KEPT_LEAST R(0.05) /* mu after a kept step, over that before: at least */
 #define MU_KEPT_EARLY R(0.3)  /* the same where more than half of the slope is left at its end */
-#define SHARE_LEAST R(0.02)   /* of a refused step, the least share that is tried next */
+#define SHARE_LEAST R(0.01)   /* of a refused step, the least share that is tried next */
 #define SHARE_LEAST_DRAG R(1e-3) /* the same where foils drag, whose kinks are many */
 #define SHARE_MOST R(0.7)        /* the largest one */
 #define WRENCH_MIN R(1e-3) /* what a scaled wrench counts at least, in rounding of its range */

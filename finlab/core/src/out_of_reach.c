@@ -308,13 +308,12 @@ static void cheapest_forces(const real *block, fl_work *work, real force[][2], c
                              dot(work->rim_normal, moved, 6), lambda);
     } else if (work->is_rim_exact) {
       fl_first_lambda_at_rim(block, work, target_reduced, work->rim_normal, lambda);
-    } else {
-      real unused;
-      fl_first_lambda(block, work, target_reduced, lambda, &unused);
     }
+    const real *first_lambda = 0; /* Newton's method's own */
+    if (work->is_rim_exact) first_lambda = lambda;
     work->power_of_use = most_power;
     if (!work->is_rim_exact) work->residual_enough = larger(SAME_POINT, TOLERANCE);
-    fl_dual_newton(block, work, target_reduced, lambda, FL_STEPS_AT_KINK);
+    fl_dual_newton(block, work, target_reduced, first_lambda, FL_STEPS_AT_KINK);
     work->power_of_use = INFEASIBLE_COST;
     work->residual_enough = TOLERANCE;
     const real dual_value = work->state_found->dual_value;
