@@ -31,8 +31,11 @@ from finlab.swim.control import (
 )
 from finlab.swim.control.contract import NO_WRENCH
 from finlab.swim.simulation.devices import (
+    DRIVING_POWER,
+    FORCE,
+    INERTIAL_POWER,
+    N_COLUMNS,
     ActuatorForce,
-    ActuatorOutput,
     ActuatorSteps,
     Sensors,
     SensorSettings,
@@ -460,18 +463,19 @@ class ClosedLoop:
         for k, state in enumerate(states[:-1].tolist(), start=1):
             # The sample at the end belongs to the next period.
             self._sensors.sample(time + k * dt, state)
-        delivered = _mean(wrench)
+        delivered = np.add.reduce(wrench) / n_steps
+        mean = np.add.reduce(output) / n_steps
         return MeanOutput(
             delivered,
-            self._forces.in_body(_mean(output.force), delivered),
-            _mean(output.inertial_power),
-            _mean(output.driving_power),
+            self._forces.in_body(mean[:, FORCE], delivered),
+            mean[:, INERTIAL_POWER],
+            mean[:, DRIVING_POWER],
         )
 
-    def _integrated(self, moved: ActuatorSteps, dt: float) -> tuple[ActuatorOutput, Array, Array]:
-        """Returns what the actuators give in K steps, its wrenches (K, 6) [N, N m], and the states
-        (K, 13) of the body after each; what does not depend on how that moves through the water is
-        one call for all steps.
+    def _integrated(self, moved: ActuatorSteps, dt: float) -> tuple[Array, Array, Array]:
+        """Returns what the actuators give in K steps, as `ActuatorForce.output`, its wrenches (K,
+        6) [N, N m], and the states (K, 13) of the body after each; what does not depend on how that
+        moves through the water is one call for all steps.
 
         Args:
             moved: how the actuators move.
@@ -481,26 +485,24 @@ class ClosedLoop:
         vehicle = self.vehicle
         if not forces.feels_flow:
             output = forces.output(moved, dt, self._share, None)
-            wrench = forces.wrench(output.force, None)
+            wrench = forces.wrench(output[..., FORCE], None)
             return output, wrench, vehicle.steps(self.state, wrench, dt)[1:]
         n_steps = len(moved.others)
         wrench = np.empty((n_steps, 6))
         states = np.empty((n_steps, STATE_SIZE))
-        in_steps: list[ActuatorOutput] = []
-        if not forces.laws_feel_flow:
+        if forces.laws_feel_flow:
+            output = np.empty((n_steps, self.layout.n, N_COLUMNS))
+        else:
             output = forces.output(moved, dt, self._share, None)
-            in_steps = [output.at(k) for k in range(n_steps)]
         state = self.state
         for k in range(n_steps):
+            step = slice(k, k + 1)
             water = vehicle.velocity_in_water(state)
             if forces.laws_feel_flow:
-                in_steps.append(forces.output(moved.at(k), dt, self._share, water))
-            wrench[k] = forces.wrench(in_steps[k].force, water)[0]
+                output[step] = forces.output(moved.at(k), dt, self._share, water)
+            wrench[step] = forces.wrench(output[step, :, FORCE], water)
             state = vehicle.step(state, wrench[k], dt)
             states[k] = state
-        if forces.laws_feel_flow:
-            together = zip(*in_steps, strict=True)
-            output = ActuatorOutput(*(np.concatenate(values) for values in together))
         return output, wrench, states
 
 
@@ -515,11 +517,6 @@ class MeanOutput(NamedTuple):
     """(n,) [W]."""
     driving_power: Array
     """(n,) [W]."""
-
-
-def _mean(values: Array) -> Array:
-    """The mean (...) of values (K, ...) over the steps of a period."""
-    return np.asarray(np.add.reduce(values) / len(values))
 
 
 def _constant(values: NDArray[Any]) -> NDArray[Any]:

@@ -269,19 +269,14 @@ class ActuatorSteps(NamedTuple):
         return ActuatorSteps(fins, self.others[step])
 
 
-class ActuatorOutput(NamedTuple):
-    """What n actuators give in K steps."""
-
-    force: Array
-    """Forces (K, n, 3) in own frames [N]."""
-    inertial_power: Array
-    """(K, n) [W]; none of what is no fin."""
-    driving_power: Array
-    """(K, n) [W]; of what is no fin that of its law."""
-
-    def at(self, k: int) -> "ActuatorOutput":
-        """One of the steps."""
-        return ActuatorOutput(*(values[k : k + 1] for values in self))
+FORCE = slice(0, 3)
+"""Columns of what actuators give: forces in own frames [N]."""
+INERTIAL_POWER = 3
+"""Column of it: inertial power [W]; none of what is no fin."""
+DRIVING_POWER = 4
+"""Column of it: driving power [W]; of what is no fin that of its law."""
+N_COLUMNS = 5
+"""How many columns it has."""
 
 
 class ActuatorForce:
@@ -325,10 +320,9 @@ class ActuatorForce:
         values = self.motion.others.steps(of_others, dt, count)
         return ActuatorSteps(fins, 0.5 * (values[:-1] + values[1:]))
 
-    def output(
-        self, steps: ActuatorSteps, dt: float, share: Array, water: Array | None
-    ) -> ActuatorOutput:
-        """Returns what the actuators give in steps that have just been taken.
+    def output(self, steps: ActuatorSteps, dt: float, share: Array, water: Array | None) -> Array:
+        """Returns what the actuators give in steps that have just been taken (K, n, 5): see
+        `FORCE`, `INERTIAL_POWER` and `DRIVING_POWER`.
 
         Args:
             steps: what `move` returned, or part of it in order.
@@ -340,32 +334,33 @@ class ActuatorForce:
         motion = self.motion
         if steps.fins is None:
             return self._output_of_others(steps.others, share, water)
-        fin_share = share[motion.fin_indices]
-        of_fins = ActuatorOutput(
-            self.of_fins(steps.fins, dt) * fin_share[:, None],
-            steps.fins.inertial_power,
-            steps.fins.driving_power,
-        )
         if not self._n_others:
-            return of_fins
+            return self._output_of_fins(steps.fins, dt, share)
+        of_fins = self._output_of_fins(steps.fins, dt, share[motion.fin_indices])
         of_others = self._output_of_others(steps.others, share[motion.other_indices], water)
-        # Actuators first, as the rows of `joined`.
-        return ActuatorOutput(
-            *(
-                motion.joined(fins.swapaxes(0, 1), others.swapaxes(0, 1)).swapaxes(0, 1)
-                for fins, others in zip(of_fins, of_others, strict=True)
-            )
-        )
+        output = np.empty((len(of_fins), len(share), N_COLUMNS))
+        output[:, motion.fin_indices] = of_fins
+        output[:, motion.other_indices] = of_others
+        return output
 
-    def _output_of_others(
-        self, command: Array, share: Array, water: Array | None
-    ) -> ActuatorOutput:
-        """What the actuators that are no fins give by commands (K, n - n_fins, 3); those that have
-        stopped give and take nothing."""
+    def _output_of_fins(self, steps: FinSteps, dt: float, share: Array) -> Array:
+        """What the fins give (K, n_fins, 5)."""
+        output = np.empty((*steps.beats.shape, N_COLUMNS))
+        np.multiply(self.of_fins(steps, dt), share[:, None], out=output[..., FORCE])
+        output[..., INERTIAL_POWER] = steps.inertial_power
+        output[..., DRIVING_POWER] = steps.driving_power
+        return output
+
+    def _output_of_others(self, command: Array, share: Array, water: Array | None) -> Array:
+        """What the actuators that are no fins give (K, n - n_fins, 5) by commands (K, n - n_fins,
+        3); those that have stopped give and take nothing."""
         works = self.motion.others_work
-        force = self._others.force(command, flow=water) * (share * works)[:, None]
-        power = self._others.power(command, flow=water) * works
-        return ActuatorOutput(force, np.zeros_like(power), power)
+        output = np.zeros((*command.shape[:-1], N_COLUMNS))
+        force = self._others.force(command, flow=water)
+        np.multiply(force, (share * works)[:, None], out=output[..., FORCE])
+        power = self._others.power(command, flow=water)
+        np.multiply(power, works, out=output[..., DRIVING_POWER])
+        return output
 
     def wrench(self, force: Array, water: Array | None) -> Array:
         """Returns the wrenches (K, 6) [N, N m] of forces (K, n, 3) [N], with what the actuators do
