@@ -95,7 +95,7 @@ class EffortMeter:
 
     def __call__(self, command: NDArray[np.floating]) -> AnyArray:
         """Returns the efforts (R,) of commands (R, n, 3)."""
-        numbers = command.reshape(len(command), -1)
+        numbers = command.reshape(len(command), len(self._hessian))
         # J = u^T Q u / 2
         effort: AnyArray = 0.5 * (numbers @ self._hessian * numbers).sum(axis=-1)
         return effort
