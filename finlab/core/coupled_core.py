@@ -143,6 +143,7 @@ class CoupledCore:
         self._block_address = self._block_linear.ctypes.data
         self._work_address = ctypes.addressof(self._work)
         self._unfinished = constant("FL_UNFINISHED")
+        self._beyond_reach = constant("FL_BEYOND_REACH")
         self._rows = AnswerRows(n)
         self._force = np.zeros((n, 2))
         """Forces [N] at which the iterations begin, and then those at which they end."""
@@ -225,7 +226,7 @@ class CoupledCore:
             most_error: error up to which commands are exact, by the grids of the laws [1].
 
         Returns:
-            The answer, finished where the wrench is within reach and the commands are exact.
+            The answer, finished where no steps by the laws themselves can better it.
 
         Raises:
             CommandError: the core cannot work with these numbers.
@@ -243,10 +244,11 @@ class CoupledCore:
                 memory.addresses[row],
             )
             self._raise_from_callback()
-        is_exact = code == 0
-        if not is_exact and code != self._unfinished:
+        is_met = code == 0
+        is_best_beyond_reach = code == self._beyond_reach
+        if not is_met and not is_best_beyond_reach and code != self._unfinished:
             raise_refusal(code)
-        return AnswerRow(memory, row, is_exact, is_exact)
+        return AnswerRow(memory, row, is_met or is_best_beyond_reach, is_met)
 
     def answer_many(
         self,

@@ -318,8 +318,7 @@ int fl_outer_iterations(const fl_coupled_robot *robot, fl_real *block, fl_work *
 int fl_answer_coupled(const fl_coupled_robot *robot, fl_real *block, fl_work *work,
                       const fl_question *question, fl_answer *answer, fl_outer_result *result);
 
-/* The same, and writes the answer as a row of numbers, as fl_answer_into_row does. Beyond reach it
-   never says that nothing is left to do. */
+/* The same, and writes the answer as a row of numbers, as fl_answer_into_row does. */
 int fl_answer_coupled_into_row(const fl_coupled_robot *robot, fl_real *block, fl_work *work,
                                const fl_question *question, fl_real most_error, fl_real *row);
 

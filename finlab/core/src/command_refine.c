@@ -137,6 +137,15 @@ static void take_step(const real *block, const fl_box *box, real command[][3], r
   }
 }
 
+/* Commands within a box after one step by a damping mu that reduces a residual. */
+void fl_step_commands(const real *block, fl_work *work, const fl_box *box, const real *residual,
+                      real mu, real command[][3], real stepped[][3]) {
+  real step[FL_MOST][3];
+  find_jacobian(block, work, box, command);
+  step_within(block, work, box, command, residual, mu, step);
+  take_step(block, box, command, step, stepped);
+}
+
 /* Levenberg-Marquardt steps on commands within a box towards a wrench [N, N m]; the error
    over the wrench scale that is left. */
 real fl_refine_commands(const real *block, fl_work *work, const fl_box *box, const real *wrench,

@@ -145,9 +145,10 @@ int fl_answer_coupled_into_row(const fl_coupled_robot *robot, real *block, fl_wo
   if (code) return code;
   out.gap_power_bound = 0;
   real *command = write_row(block, &out, row);
-  if (!out.is_attainable || !(result.error <= most_error)) return FL_UNFINISHED;
+  const int is_met = out.is_attainable && out.error <= most_error;
+  if (!(most_error >= 0) || (out.is_attainable && !is_met)) return FL_UNFINISHED;
   mark_lost(block, work, question, command);
-  return FL_OK;
+  return is_met ? FL_OK : FL_BEYOND_REACH;
 }
 
 int fl_answer_many(const real *block, fl_work *work, const fl_question *question,

@@ -224,6 +224,9 @@ real fl_power_of_commands(const real *block, const fl_work *work, real command[]
 real fl_refine_commands(const real *block, fl_work *work, const fl_box *box, const real *wrench,
                         real command[][3], int steps);
 
+void fl_step_commands(const real *block, fl_work *work, const fl_box *box, const real *residual,
+                      real mu, real command[][3], real stepped[][3]);
+
 /* feasible_set.c: what may be given now */
 void fl_limits_without_tick(const real *block, fl_work *work);
 void fl_limits_of_tick(const real *block, fl_work *work, const fl_question *q);
@@ -353,7 +356,16 @@ int fl_has_lines_alone(const real *block);
 int fl_end_of_ray_by_normal(const real *block, const fl_work *work, const wide *from,
                             const wide *ray, const wide *normal, wide close, fl_mixture *m);
 
+/* outer_reach.c: answers where actuators act on each other, beyond reach */
+void fl_serve_coupled(const fl_coupled_robot *robot, real *block, fl_work *work,
+                      const fl_question *q, fl_answer *answer, const fl_outer_result *result);
+
 /* outer_iterations.c: answers where actuators act on each other, from one start */
+real fl_refine_coupled(const fl_coupled_robot *robot, real *block, fl_work *work, const fl_box *box,
+                       const real *wrench, real enough, int most_steps, real command[][3]);
+void fl_coupled_wrench(const fl_coupled_robot *robot, real *block, fl_work *work, real command[][3],
+                       real *wrench);
+void fl_box_of_question(const real *block, fl_work *work, const fl_question *q, fl_box *box);
 typedef struct {
   real (*force)[2]; /* of lines (n, 2) [N] */
   real power;       /* [W] */

@@ -9,6 +9,8 @@
 #define MODEL_STEPS 4  /* steps on commands that make them exact on the whole model */
 #define TRIALS 4       /* shares of a step that are tried in one iteration */
 #define SHORTEN R(0.3) /* a step that gets no better is shortened to this share */
+#define MU_KEPT R(0.3) /* damping of Levenberg-Marquardt after a kept step, over that before */
+#define MU_REFUSED 30  /* the same after a refused step */
 /* Error over the wrench scale that commands on the way may leave. */
 #define EXACT_ON_WAY (NEARLY / 10)
 /* Share of power and what the error counts that makes another iteration worth it; of lines, whose
@@ -86,6 +88,16 @@ static real linearize_at(const fl_coupled_robot *robot, real *block, fl_work *wo
   return SQRT(dot(residual, residual, 6));
 }
 
+/* The wrench (6,) [N, N m] of commands by the whole model, which the block becomes linear at. */
+void fl_coupled_wrench(const fl_coupled_robot *robot, real *block, fl_work *work, real command[][3],
+                       real *wrench) {
+  const real *sigma = HEAD(block)->wrench_scale;
+  const real nothing[6] = {0};
+  real residual[6];
+  linearize_at(robot, block, work, nothing, command, residual);
+  for (int k = 0; k < 6; k++) wrench[k] = -residual[k] * sigma[k];
+}
+
 /* Has fins of a block commanded by direction and size of the force, without their tables. */
 static void command_fins_by_force(const fl_coupled_robot *robot, real *block, fl_work *work) {
   for (int i = 0; i < COUNT(block); i++) {
@@ -147,9 +159,33 @@ static real step_to_wrench(const fl_coupled_robot *robot, real *block, fl_work *
   return error;
 }
 
+real fl_refine_coupled(const fl_coupled_robot *robot, real *block, fl_work *work, const fl_box *box,
+                       const real *wrench, real enough, int most_steps, real command[][3]) {
+  const size_t size = (size_t)COUNT(block) * sizeof *command;
+  real residual[6];
+  real mu = NEARLY;
+  real error = linearize_at(robot, block, work, wrench, command, residual);
+  for (int k = 0; k < most_steps && error > enough; k++) {
+    real stepped[FL_MOST][3];
+    real residual_stepped[6];
+    fl_step_commands(block, work, box, residual, mu, command, stepped);
+    const real error_stepped = linearize_at(robot, block, work, wrench, stepped, residual_stepped);
+    if (error_stepped <= error) {
+      memcpy(command, stepped, size);
+      memcpy(residual, residual_stepped, sizeof residual);
+      error = error_stepped;
+      mu *= MU_KEPT;
+      continue;
+    }
+    mu = mu * MU_REFUSED + CLOSE;
+    linearize_at(robot, block, work, wrench, command, residual);
+  }
+  return error;
+}
+
 /* The box of commands after the previous ones, or of all, of a block whose fins may be
    commanded by their forces. */
-static void box_now(const real *block, fl_work *work, const fl_question *q, fl_box *box) {
+void fl_box_of_question(const real *block, fl_work *work, const fl_question *q, fl_box *box) {
   fl_question calm = *q;
   calm.calm = 0;
   if (q->previous)
@@ -238,7 +274,7 @@ static int begin_search(outer_search *search, int most_iterations) {
   }
   if (!fl_span_of_question(block, work, q->lost, q->free)) return FL_BAD_NUMBER;
   if (previous) fl_power_of_commands(block, work, (real(*)[3])previous, search->force);
-  box_now(block, work, q, &search->box);
+  fl_box_of_question(block, work, q, &search->box);
 
   real command[FL_MOST][3];
   fl_commands_for_forces(block, &search->box, search->force, previous, command);
@@ -304,7 +340,7 @@ static int iterate(outer_search *search, int is_first, fl_answer *out, int *has_
   search->penalty = larger(search->penalty, penalty_at(search->block, answer.multipliers));
   const real merit = merit_of(search);
   if (is_first) *out = answer;
-  box_now(search->block, search->work, &search->question, &search->box);
+  fl_box_of_question(search->block, search->work, &search->question, &search->box);
 
   const int is_better = step_to_answer(search, &answer, merit);
   if (is_better) {
@@ -321,7 +357,7 @@ static int iterate(outer_search *search, int is_first, fl_answer *out, int *has_
 static void finish_search(outer_search *search, fl_answer *out) {
   const fl_question *q = &search->question;
   command_fins_by_law(search->robot, search->block, search->work);
-  box_now(search->block, search->work, q, &search->box);
+  fl_box_of_question(search->block, search->work, q, &search->box);
   fl_commands_for_forces(search->block, &search->box, search->force, q->previous, out->command);
   search->error = step_to_wrench(search->robot, search->block, search->work, &search->box,
                                  q->wrench, EXACT, out->command);

@@ -314,11 +314,15 @@ static int answer_from_all_starts(const fl_coupled_robot *robot, real *block, fl
 
 int fl_answer_coupled(const fl_coupled_robot *robot, real *block, fl_work *work,
                       const fl_question *question, fl_answer *answer, fl_outer_result *result) {
-  if (!question->previous) {
-    return answer_from_all_starts(robot, block, work, question, answer, result);
+  int code;
+  if (question->previous) {
+    const fl_outer_limits limits = {
+        .penalty_least = 0, .most_steps = LARGEST_NUMBER, .most_iterations = ITERATIONS_IN_TICK};
+    real force[FL_MOST][2];
+    code = fl_outer_iterations(robot, block, work, question, &limits, *force, answer, result);
+  } else {
+    code = answer_from_all_starts(robot, block, work, question, answer, result);
   }
-  const fl_outer_limits limits = {
-      .penalty_least = 0, .most_steps = LARGEST_NUMBER, .most_iterations = ITERATIONS_IN_TICK};
-  real force[FL_MOST][2];
-  return fl_outer_iterations(robot, block, work, question, &limits, *force, answer, result);
+  if (!code) fl_serve_coupled(robot, block, work, question, answer, result);
+  return code;
 }
