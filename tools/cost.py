@@ -201,6 +201,7 @@ experiment = Experiment(
         Column("cheaper", "cheaper than it", "share"),
     ),
     run=run,
+    program="python tools/cost.py",
     note=(
         "The reference is the cheapest exact end of many starts of `ipopt`, of `sqp` for effort "
         "and tables: solvers that know nothing of how `dual` and `mdn` search. Tracked: error up "

@@ -6,19 +6,22 @@ A page holds a table between two marks,
     <!-- figures: NAME KEY... -->
     <!-- end of figures -->
 
-where NAME is an experiment of `finlab eval`, which runs with the sizes of its quick report, and
-KEY... are the columns to show, by default all; OPTION=VALUE among them is an option in place of
-that of the quick report. What stands between the marks is replaced.
+where NAME is an experiment of `finlab eval`, which runs with the sizes of its quick report, or that
+of the tool `tools/NAME.py`. KEY... are the columns to show, by default all; OPTION=VALUE among them
+is an option in place of that of the quick report. What stands between the marks is replaced.
 """
 
 import re
 import sys
 import time
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 
-from finlab.research.evaluation.document import ReportTable, to_markdown
-from finlab.research.evaluation.experiment import begin, load_experiment
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from finlab.research.evaluation.document import ReportBlock, ReportTable, to_markdown
+from finlab.research.evaluation.experiment import Experiment, begin, load_experiment
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = {path.stem: path for path in [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]}
@@ -46,9 +49,19 @@ def main(names: list[str]) -> int:
     return 0
 
 
+def experiment_of(name: str) -> Experiment:
+    """Returns the experiment of a name: of the tool that is called so, else one of `finlab
+    eval`."""
+    if not (ROOT / "tools" / f"{name}.py").exists():
+        return load_experiment(name)
+    experiment = import_module(f"tools.{name}").experiment
+    assert isinstance(experiment, Experiment)
+    return experiment
+
+
 def table_of(name: str, keys: list[str]) -> str:
     """The command and the table, in Markdown, of an experiment's quick sizes."""
-    experiment = load_experiment(name)
+    experiment = experiment_of(name)
     began = time.monotonic()
     begin(name)
     stated = dict(key.split("=") for key in keys if "=" in key)
@@ -58,8 +71,10 @@ def table_of(name: str, keys: list[str]) -> str:
     columns = {column.key: replace(column, interval=None) for column in table.columns}
     shown = ReportTable(tuple(columns[key] for key in keys or columns), table.rows)
     print(f"{name}: {time.monotonic() - began:.0f} s", flush=True)
-    markdown = to_markdown(shown)
-    return f"\n`{experiment.command(chosen)}`:\n\n{markdown.rstrip()}\n\n"
+    blocks: list[ReportBlock] = [f"`{experiment.command(chosen)}`:", shown]
+    if experiment.origin is not None:
+        blocks.append(experiment.origin())
+    return f"\n{to_markdown(*blocks)}\n"
 
 
 def _value(text: str) -> int | str | tuple[int, ...] | tuple[str, ...]:

@@ -70,7 +70,7 @@ def test_make_targets_of_all_pages_exist() -> None:
 
 
 def test_figures_of_pages_are_columns_of_experiments() -> None:
-    from finlab.research.evaluation.experiment import load_experiment
+    from tools.figures import experiment_of
 
     marks = list[tuple[str, str]]()
     for page in PAGES:
@@ -78,4 +78,4 @@ def test_figures_of_pages_are_columns_of_experiments() -> None:
     assert marks
     for name, keys in marks:
         keys = {key for key in keys.split() if "=" not in key}
-        assert keys <= {column.key for column in load_experiment(name).columns}, name
+        assert keys <= {column.key for column in experiment_of(name).columns}, name

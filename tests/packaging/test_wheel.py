@@ -139,6 +139,7 @@ def test_asks_for_the_core_and_offers_extras(wheel: Path) -> None:
         "app",
         "ipopt",
         "bench",
+        "peers",
         "xacro",
         "cluster",
         "logs",

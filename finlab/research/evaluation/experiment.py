@@ -60,8 +60,13 @@ class Experiment:
     their defaults and their words under `Args` in its docstring. An int whose default is 0 may be
     0, any other is at least 1. A parameter `layout` is given by position. Times depend on the
     machine; all other values on the options alone."""
+    program: str = ""
+    """Command line that runs it, without options; `finlab eval` and its name where empty."""
     note: str = ""
     """How the columns are to be read, in Markdown."""
+    origin: Callable[[], str] | None = None
+    """Says what is to be known of one run, such as the machine: a sentence below the table of a
+    page, for figures that depend on it."""
     quick: Mapping[str, Any] = field(default_factory=dict)
     """Options of the quick report where they differ from the defaults."""
     full: Mapping[str, Any] = field(default_factory=dict)
@@ -108,7 +113,7 @@ class Experiment:
         Args:
             options: values by option; those that are the defaults are left out.
         """
-        words = ["finlab", "eval", self.name]
+        words = shlex.split(self.program) if self.program else ["finlab", "eval", self.name]
         for name, option in self.options().items():
             value = options.get(name, option.default)
             if value == option.default or value is None:
@@ -157,6 +162,8 @@ class Experiment:
         blocks: list[ReportBlock] = [self.table(rows)]
         if self.note:
             blocks.append(f"*{self.note}*")
+        if self.origin is not None:
+            blocks.append(self.origin())
         return blocks
 
 

@@ -2,7 +2,6 @@
 
 import json
 import platform
-import subprocess
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -21,6 +20,7 @@ from finlab.research.evaluation.experiment import (
     load_experiment,
     progress,
 )
+from finlab.research.evaluation.origin import commit_words
 from finlab.whole_file import make_folder, write_whole
 
 PAGE_FILE = "report.md"
@@ -65,7 +65,7 @@ def make_report(
     start = time.process_time()
     rows = dict[str, list[Row]]()
     blocks = list[ReportBlock]()
-    commit = _commit()
+    commit = commit_words()
     command = f"finlab eval report -o {out}"
     if size == "quick":
         command += " --quick"
@@ -94,19 +94,6 @@ def make_report(
         write_whole(out / PAGE_FILE, page, DataError)
         write_whole(out / ROWS_FILE, json.dumps(rows, indent=1) + "\n", DataError)
     return out / PAGE_FILE
-
-
-def _commit() -> str:
-    """The commit of the source tree, and whether it was changed since; of an installation the
-    version."""
-    version = f"version {finlab.__version__}"
-    tree = Path(finlab.__file__).parents[1]
-    if not (tree / ".git").exists():
-        return version
-    describe = ["describe", "--always", "--abbrev=12", "--exclude=*"]
-    line = ["git", "-C", str(tree), *describe, "--dirty= and changes"]
-    described = subprocess.run(line, capture_output=True, text=True)
-    return version if described.returncode else f"commit {described.stdout.strip()}"
 
 
 def _origin_blocks(origin: str) -> list[str]:
