@@ -144,12 +144,21 @@ class RadialTable:
     @cached_property
     def numbers(self) -> Array:
         """The table as the core takes it, at as few of the grid's prices as keep its values."""
-        step = CELLS
-        while step > 1 and not self._keeps_values(step):
-            step //= 2
+        step = self._step
         return table_numbers(
             self.price_max, self.force[::step], self.slope[::step], self.power_at_least
         )
+
+    @cached_property
+    def _step(self) -> int:
+        """Every how many of the grid's prices are enough to keep its values."""
+        table, _, _ = self.origin
+        if table is not self:
+            return table._step  # a scale changes nothing about it
+        step = CELLS
+        while step > 1 and not self._keeps_values(step):
+            step //= 2
+        return step
 
     def _keeps_values(self, step: int) -> bool:
         """Whether the cubics between every `step`-th of the grid's prices pass through all

@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 
 LAW_SAMPLES = 64
 """Random commands of each actuator at which the core's grids are compared with the laws."""
+NOT_MEASURED = -1.0
+"""Stands for the error up to which the core's grids are exact where they were not measured."""
 MAX_BASES = 32
 """States of losses and free axes of which the basis of what is driven is kept."""
 _TRUNCATED = (
@@ -157,6 +159,9 @@ class Dual(Method):
         self._bases: dict[bytes, Array] = {}
         self._conditions = NOMINAL
         """Those of the last question outside of ticks."""
+        self._was_asked = True
+        """Whether the core's grids are worth to be measured: not for the first question in a flow,
+        which is mostly the last one in it."""
 
     @cached_property
     def problem(self) -> "CommandProblem":
@@ -186,6 +191,7 @@ class Dual(Method):
             other._in_last_flow = None
             other._bases = {}
             other._flow_key = key
+            other._was_asked = False
             self._in_last_flow = other
         return other
 
@@ -256,9 +262,9 @@ class Dual(Method):
         if self.plant.interaction is not None:
             return self._solve_coupled(conditions, targets, policy, multipliers)
         if len(targets) == 1:
-            row = self.compiled.answer_row(
-                targets[0], policy, multipliers, conditions, self._most_core_error
-            )
+            most_error = self._most_core_error if self._was_asked else NOT_MEASURED
+            self._was_asked = True
+            row = self.compiled.answer_row(targets[0], policy, multipliers, conditions, most_error)
             if row.is_finished:
                 return FinishedSolution(self, conditions, targets, row)
             answer = row.copied()
@@ -312,9 +318,9 @@ class Dual(Method):
 
         record = core_policy(policy)
         if len(targets) == 1:
-            row = self.coupled.answer_row(
-                targets[0], record, multipliers, conditions, self._most_core_error
-            )
+            most_error = self._most_core_error if self._was_asked else NOT_MEASURED
+            self._was_asked = True
+            row = self.coupled.answer_row(targets[0], record, multipliers, conditions, most_error)
             if row.is_finished:
                 return FinishedSolution(self, conditions, targets, row)
             answer = row.copied()
