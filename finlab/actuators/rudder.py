@@ -53,6 +53,9 @@ LEAST_DRAG = 1e-3
 price is unique."""
 CURVE_END = 0.3 * math.pi
 """Angle up to which the curve of lift is searched for its peak [rad]; a plate's lies below."""
+GRID_CELLS = 3072
+"""Cells of the grid of a foil's coefficients over half a turn: with as many it is off by less than
+commands may be."""
 REFINED = 16
 """Intervals of deflection in each of the finer searches for the conjugate."""
 NO_CURVATURE = 1e-300
@@ -259,13 +262,18 @@ class RudderGroup(Group):
 
     def _coefficient_grids(self, count: int) -> list[Array]:
         """Lift and drag of each of `count` foils over all angles, as grids for the core."""
-        angle = np.linspace(-0.5 * np.pi, 0.5 * np.pi, CELLS, endpoint=False)
+        angle = np.linspace(-0.5 * np.pi, 0.5 * np.pi, GRID_CELLS, endpoint=False)
         foil = self._law.coefficients(np.repeat(angle[:, None], count, axis=1))
         no_axis = np.zeros(1)
         grids = []
+        grid_of_values: dict[bytes, Array] = {}
         for lift, drag in zip(foil.lift.T, foil.drag.T, strict=True):
             values = np.stack([lift, drag], axis=-1)[None, None]
-            grids.append(grid_numbers((no_axis, no_axis, angle), values, period=np.pi))
+            key = values.tobytes()
+            if key not in grid_of_values:
+                axes = (no_axis, no_axis, angle)
+                grid_of_values[key] = grid_numbers(axes, values, period=np.pi)
+            grids.append(grid_of_values[key])  # equal foils share one
         return grids
 
     def at(self, inflow: Array | None) -> RudderGroup:
