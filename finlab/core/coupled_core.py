@@ -250,7 +250,7 @@ class CoupledCore:
         is_best_beyond_reach = code == self._beyond_reach
         if not is_met and not is_best_beyond_reach and code != self._unfinished:
             raise_refusal(code)
-        return AnswerRow(memory, row, is_met or is_best_beyond_reach, is_met)
+        return AnswerRow(memory, row, is_met, is_met or is_best_beyond_reach)
 
     def answer_many(
         self,
