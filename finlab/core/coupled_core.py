@@ -59,6 +59,8 @@ class WrenchOffset(NamedTuple):
     effect: Callable[[Array, Array | None], tuple[Array, Array]]
     """For forces (n, 3) [N], body frame, and `inflow`: the offset (6,) [N, N m], and its
     derivatives (n, 3, 6) by the forces."""
+    offset: Callable[[Array, Array | None], Array] | None = None
+    """The same without derivatives; None where `effect` gives both."""
     starts: Array | None = None
     """Where iterations begin anew (K, n, 2): real and imaginary parts of factors, by which the
     forces by the laws alone are multiplied as complex numbers. None for nowhere."""
@@ -248,7 +250,7 @@ class CoupledCore:
         is_best_beyond_reach = code == self._beyond_reach
         if not is_met and not is_best_beyond_reach and code != self._unfinished:
             raise_refusal(code)
-        return AnswerRow(memory, row, is_met or is_best_beyond_reach, is_met)
+        return AnswerRow(memory, row, is_met, is_met or is_best_beyond_reach)
 
     def answer_many(
         self,
@@ -321,18 +323,29 @@ class CoupledCore:
             raise raised
 
     def _effect(
-        self, _: int, force: int, count: int, inflow: int, change: int, wrench: int, slope: int
+        self,
+        _: int,
+        force: int,
+        count: int,
+        inflow: int,
+        change: int,
+        wrench: int,
+        slope: int | None,
     ) -> None:
         """Writes the offset and its derivatives for C; the arguments are those of the callback."""
         n = self._n
         if self._raised is not None:
             return  # the answer is lost already: C only has to come to its end
+        asked = self._wrench_offset
         try:
-            offset, derivatives = self._wrench_offset.effect(
-                _numbers_at(force, (n, 3)), self._wrench_offset.inflow
-            )
+            forces = _numbers_at(force, (n, 3))
+            if slope is None and asked.offset is not None:
+                _numbers_at(wrench, (6,))[:] = asked.offset(forces, asked.inflow)
+                return
+            offset, derivatives = asked.effect(forces, asked.inflow)
             _numbers_at(wrench, (6,))[:] = offset
-            _numbers_at(slope, (n, 3, 6))[:] = derivatives
+            if slope is not None:
+                _numbers_at(slope, (n, 3, 6))[:] = derivatives
         except BaseException as error:  # an exception cannot pass through C
             self._raised = error
 

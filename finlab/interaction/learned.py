@@ -146,9 +146,9 @@ class Networks:
         # What the mean over the networks and its derivatives are made of, once for all questions.
         self._mean_weight = weight[-1] / MEMBERS
         self._mean_bias = bias[-1].mean(axis=0)
-        self._back_weight = [np.ascontiguousarray(each.swapaxes(1, 2)) for each in weight[:-1]]
+        self._back_weight = [_transposed_single(each) for each in weight[:-1]]
         """Weights (MEMBERS, out, in) by which slopes are propagated back through hidden layers."""
-        self._first_slope = np.ascontiguousarray(self._mean_weight.swapaxes(1, 2))[:, None]
+        self._first_slope = _transposed_single(self._mean_weight)[:, None]
         """Derivatives (MEMBERS, 1, k, width) of the mean factors by the last hidden layer."""
 
     def factors(self, features: Array) -> Array:
@@ -179,19 +179,20 @@ class Networks:
         """
         hidden = self._hidden_outputs(features)
         factors = self._mean_of(hidden[-1], features)
-        # Backpropagation, for all k factors at once; slope is (MEMBERS, rows * k, width).
+        # Backpropagation, for all k factors at once; slope is (MEMBERS, rows, k, width). In single
+        # precision it takes half the time: what reads slopes are steps, which end at the values.
         rows = hidden[-1].shape[1]
         k = self._first_slope.shape[2]
         slope = self._first_slope
         for outputs, back_weight in zip(reversed(hidden), reversed(self._back_weight), strict=True):
             # d tanh(a) / da = 1 - tanh(a)^2
-            np.multiply(outputs, outputs, out=outputs)
-            np.subtract(1.0, outputs, out=outputs)
-            slope = slope * outputs[:, :, None]
+            outputs_single = outputs.astype(np.float32)
+            slope_of_tanh = 1.0 - outputs_single * outputs_single
+            slope = slope * slope_of_tanh[:, :, None]
             slope = (slope.reshape(MEMBERS, rows * k, -1) @ back_weight).reshape(
                 MEMBERS, rows, k, -1
             )
-        jacobian = slope.sum(axis=0)
+        jacobian = slope.sum(axis=0).astype(np.float64)
         return factors, jacobian.reshape(*factors.shape, -1)
 
     def _hidden_outputs(self, features: Array) -> list[Array]:
@@ -210,6 +211,11 @@ class Networks:
         """The means (..., k) of the factors, by what the last hidden layer gives."""
         factors = (last_hidden @ self._mean_weight).sum(axis=0) + self._mean_bias
         return np.asarray(factors.reshape(*features.shape[:-1], -1))
+
+
+def _transposed_single(weight: AnyArray) -> AnyArray:
+    """Weights (MEMBERS, in, out) as (MEMBERS, out, in), in single precision."""
+    return np.ascontiguousarray(weight.swapaxes(1, 2), np.float32)
 
 
 @lru_cache(maxsize=16)

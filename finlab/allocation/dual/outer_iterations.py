@@ -53,6 +53,7 @@ def coupled_core(plant: Plant, compiled: Compiled) -> CoupledCore:
             inflow=plant.met_by_all(None),
             core_constants=interaction.core_constants,
             effect=interaction.effect,
+            offset=interaction.offset,
             starts=start_factors(compiled.is_line),
         ),
     )

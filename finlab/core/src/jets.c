@@ -6,7 +6,7 @@
 #define FLOOR_SHARE R(1e-4) /* squared speed over that of a jet to which its size is rounded off */
 #define FAR_BEHIND 14       /* a jet is nothing at so many `behind` upstream of its outlet */
 #define FAR_ASIDE 28        /* nor where the exponent of its profile is above that */
-#define SATURATED_AT 20     /* from here on a sigmoid is 0 or 1 to rounding, in double precision */
+#define SATURATED_AT 14     /* from here on a sigmoid is 0 or 1 but for less than ROUNDING */
 
 /* Numbers of a robot: a `water`, then an `outlet` for each of its n actuators. */
 typedef struct {

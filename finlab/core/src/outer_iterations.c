@@ -46,10 +46,11 @@ static void forces_of_commands(const fl_coupled_robot *robot, const real *block,
 }
 
 /* Makes the wrench of a block linear at commands: its effectiveness becomes that of the laws
-   and the slope of what the actuators do to each other, its offset what is left. Their
-   residual from a wrench, over the wrench scale; its size. */
+   and the slope of what the actuators do to each other, its offset what is left. By a chord the
+   slope stays that of the commands before, and the offset alone is evaluated. Their residual from
+   a wrench, over the wrench scale; its size. */
 static real linearize_at(const fl_coupled_robot *robot, real *block, fl_work *work,
-                         const real *wrench, real command[][3], real *residual) {
+                         const real *wrench, real command[][3], int is_chord, real *residual) {
   const fl_span *span = &work->span;
   const int n = COUNT(block);
   fl_head *head = (fl_head *)block;
@@ -59,7 +60,7 @@ static real linearize_at(const fl_coupled_robot *robot, real *block, fl_work *wo
   real offset[6];
   real slope[FL_MOST][3][6];
   forces_of_commands(robot, block, span, command, force, body);
-  robot->offset(robot->constants, *body, 1, robot->inflow, *unused, offset, **slope);
+  robot->offset(robot->constants, *body, 1, robot->inflow, *unused, offset, is_chord ? 0 : **slope);
   for (int k = 0; k < 6; k++) {
     head->wrench_offset[k] = HEAD(robot->block_uncoupled)->wrench_offset[k] +
                              robot->axis_counts[k] * offset[k];
@@ -70,14 +71,17 @@ static real linearize_at(const fl_coupled_robot *robot, real *block, fl_work *wo
     fl_actuator *linear = (fl_actuator *)ACTUATOR(block, i);
     for (int c = 0; c < law_axes(plain); c++) {
       const real *axis = robot->frames + 9 * i + 3 * c;
+      const real *by_laws = plain->effectiveness_normalized[c];
+      real *by_model = linear->effectiveness_normalized[c];
       for (int k = 0; k < 6; k++) {
-        const real along = axis[0] * slope[i][0][k] + axis[1] * slope[i][1][k] +
-                           axis[2] * slope[i][2][k];
-        const real more = robot->axis_counts[k] * along;
-        linear->effectiveness_normalized[c][k] = plain->effectiveness_normalized[c][k] +
-                                                 more / head->wrench_scale[k];
+        if (!is_chord) {
+          const real along = axis[0] * slope[i][0][k] + axis[1] * slope[i][1][k] +
+                             axis[2] * slope[i][2][k];
+          by_model[k] = by_laws[k] + robot->axis_counts[k] * along / head->wrench_scale[k];
+        }
+        const real more = (by_model[k] - by_laws[k]) * head->wrench_scale[k];
         head->wrench_offset[k] -= force[i][c] * more;
-        residual[k] -= force[i][c] * plain->effectiveness_normalized[c][k];
+        residual[k] -= force[i][c] * by_laws[k];
       }
     }
   }
@@ -94,7 +98,7 @@ void fl_coupled_wrench(const fl_coupled_robot *robot, real *block, fl_work *work
   const real *sigma = HEAD(block)->wrench_scale;
   const real nothing[6] = {0};
   real residual[6];
-  linearize_at(robot, block, work, nothing, command, residual);
+  linearize_at(robot, block, work, nothing, command, 0, residual);
   for (int k = 0; k < 6; k++) wrench[k] = -residual[k] * sigma[k];
 }
 
@@ -129,13 +133,14 @@ static void command_fins_by_law(const fl_coupled_robot *robot, real *block, fl_w
 }
 
 /* Steps on commands to a wrench, by the whole model, which the block is linear at where they
-   end, until an error is enough; the error that is left. */
+   end, or by a chord where they begin, until an error is enough; the error that is left. */
 static real step_to_wrench(const fl_coupled_robot *robot, real *block, fl_work *work,
-                           const fl_box *box, const real *wrench, real enough, real command[][3]) {
+                           const fl_box *box, const real *wrench, real enough, int is_chord,
+                           real command[][3]) {
   const size_t size = (size_t)COUNT(block) * sizeof *command;
   real residual[6];
   real share = 1;
-  real error = linearize_at(robot, block, work, wrench, command, residual);
+  real error = linearize_at(robot, block, work, wrench, command, 0, residual);
   for (int k = 0; k < MODEL_STEPS && error > enough; k++) {
     real stepped[FL_MOST][3];
     real nearer[6]; /* than the wrench, by a share of the way */
@@ -145,7 +150,8 @@ static real step_to_wrench(const fl_coupled_robot *robot, real *block, fl_work *
       nearer[c] = wrench[c] - (1 - share) * residual[c] * HEAD(block)->wrench_scale[c];
     }
     fl_refine_commands(block, work, box, nearer, stepped, 1);
-    const real error_stepped = linearize_at(robot, block, work, wrench, stepped, residual_stepped);
+    const real error_stepped =
+        linearize_at(robot, block, work, wrench, stepped, is_chord, residual_stepped);
     if (error_stepped < error) {
       memcpy(command, stepped, size);
       memcpy(residual, residual_stepped, sizeof residual);
@@ -154,7 +160,7 @@ static real step_to_wrench(const fl_coupled_robot *robot, real *block, fl_work *
       continue;
     }
     share *= SHORTEN;
-    linearize_at(robot, block, work, wrench, command, residual);
+    linearize_at(robot, block, work, wrench, command, is_chord, residual);
   }
   return error;
 }
@@ -164,12 +170,13 @@ real fl_refine_coupled(const fl_coupled_robot *robot, real *block, fl_work *work
   const size_t size = (size_t)COUNT(block) * sizeof *command;
   real residual[6];
   real mu = NEARLY;
-  real error = linearize_at(robot, block, work, wrench, command, residual);
+  real error = linearize_at(robot, block, work, wrench, command, 0, residual);
   for (int k = 0; k < most_steps && error > enough; k++) {
     real stepped[FL_MOST][3];
     real residual_stepped[6];
     fl_step_commands(block, work, box, residual, mu, command, stepped);
-    const real error_stepped = linearize_at(robot, block, work, wrench, stepped, residual_stepped);
+    const real error_stepped =
+        linearize_at(robot, block, work, wrench, stepped, 0, residual_stepped);
     if (error_stepped <= error) {
       memcpy(command, stepped, size);
       memcpy(residual, residual_stepped, sizeof residual);
@@ -178,7 +185,7 @@ real fl_refine_coupled(const fl_coupled_robot *robot, real *block, fl_work *work
       continue;
     }
     mu = mu * MU_REFUSED + CLOSE;
-    linearize_at(robot, block, work, wrench, command, residual);
+    linearize_at(robot, block, work, wrench, command, 0, residual);
   }
   return error;
 }
@@ -279,8 +286,11 @@ static int begin_search(outer_search *search, int most_iterations) {
   real command[FL_MOST][3];
   fl_commands_for_forces(block, &search->box, search->force, previous, command);
   const real enough = enough_to_begin(search, most_iterations);
-  search->error =
-      step_to_wrench(search->robot, block, work, &search->box, q->wrench, enough, command);
+  /* Of lines at rest the slopes where a start begins are near enough to tell what it costs. */
+  const int has_lines_alone = fl_has_lines_alone(search->robot->block_uncoupled);
+  const int is_chord = most_iterations == 0 && has_lines_alone && !search->robot->inflow;
+  search->error = step_to_wrench(search->robot, block, work, &search->box, q->wrench, enough,
+                                 is_chord, command);
   search->power = fl_power_of_commands(block, work, command, search->force);
   return FL_OK;
 }
@@ -301,7 +311,7 @@ static int step_to_answer(outer_search *search, fl_answer *answer, real merit) {
       fl_commands_for_forces(block, &search->box, force_wanted, q->previous, stepped);
     }
     const real error = step_to_wrench(search->robot, block, search->work, &search->box, q->wrench,
-                                      EXACT_ON_WAY, stepped);
+                                      EXACT_ON_WAY, 0, stepped);
     const real power = fl_power_of_commands(block, search->work, stepped, force_stepped);
     if (power + search->penalty * error < merit) {
       search->power = power;
@@ -359,8 +369,13 @@ static void finish_search(outer_search *search, fl_answer *out) {
   command_fins_by_law(search->robot, search->block, search->work);
   fl_box_of_question(search->block, search->work, q, &search->box);
   fl_commands_for_forces(search->block, &search->box, search->force, q->previous, out->command);
-  search->error = step_to_wrench(search->robot, search->block, search->work, &search->box,
-                                 q->wrench, EXACT, out->command);
+  real unused[6];
+  search->error =
+      linearize_at(search->robot, search->block, search->work, q->wrench, out->command, 1, unused);
+  if (search->error > EXACT) {
+    search->error = step_to_wrench(search->robot, search->block, search->work, &search->box,
+                                   q->wrench, EXACT, 0, out->command);
+  }
   fl_rest_in_dead_bands(search->block, &search->box, out->command);
   fl_clip_commands(search->block, &search->box, out->command);
 }

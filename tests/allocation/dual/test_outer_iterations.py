@@ -16,7 +16,8 @@ from finlab.allocation.dual.outer_iterations import (
     WALSH,
     start_factors,
 )
-from finlab.allocation.policy import CLOSEST
+from finlab.allocation.levenberg_marquardt import refine
+from finlab.allocation.policy import CLOSEST, Policy
 from finlab.arrays import ROUNDS, Array
 from finlab.core.calls import NOMINAL
 from finlab.core.coupled_core import CoupledCore
@@ -284,3 +285,34 @@ def test_what_an_effect_raises_reaches_the_caller_once() -> None:
     again = core.answer_many(target[None], core_policy(CLOSEST))
     usual = allocator._whole.method.coupled.answer_many(target[None], core_policy(CLOSEST))
     np.testing.assert_allclose(again.command, usual.command, atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["closest", "direction"])
+def test_beyond_reach_the_core_finishes_answers_of_thrusters(kind: str) -> None:
+    """Their laws are those of the core: what it serves is what the plant gives."""
+    allocator = Allocator(replace(parse_layout(bluerov2_heavy()), interaction=Jets()))
+    dual = allocator._whole.method
+    plant = Plant(allocator.layout)
+    drawn = plant.wrench(plant.sample(np.random.default_rng(9), (8,)))
+    finished = 0
+    for target in 8.0 * drawn:
+        row = dual.coupled.answer_row(
+            target, core_policy(Policy(kind)), None, NOMINAL, dual._most_core_error
+        )
+        if row.is_met or not row.is_finished:
+            continue  # the last linear model has the target within reach
+        finished += 1
+        wrench = plant.wrench(row.command[0])
+        served = row.wrench_served[0]
+        if kind == "direction":
+            along = target / allocator.scale
+            share = float(served / allocator.scale @ along / (along @ along))
+            assert 0.05 < share < 1.0
+            np.testing.assert_allclose(served, share * target, atol=1e-9)
+            assert np.linalg.norm((wrench - served) / allocator.scale) <= 1e-6
+        # Steps by the laws themselves find nothing nearer to what is served.
+        problem = dual.problem_under(NOMINAL)
+        refined = refine(problem, served[None] / problem.error_scale, row.command, ROUNDS)
+        error = problem.error(row.command, served[None] / problem.error_scale)
+        assert error[0] <= refined.error[0] * 1.05 + 1e-6
+    assert finished >= 4
