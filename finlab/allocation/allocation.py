@@ -3,9 +3,10 @@
 `Allocator` makes one; it is plain data, and can be read where no allocator is.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, NamedTuple, Self, TypeVar
 
 import numpy as np
@@ -578,6 +579,18 @@ def _read_only_candidates(candidates: Candidates | None) -> Candidates | None:
     return replace(candidates, **arrays)
 
 
-def chunks(n: int) -> Iterator[slice]:
-    """Yields slices of at most `CHUNK` of n rows."""
-    return (slice(start, start + CHUNK) for start in range(0, n, CHUNK))
+def chunks(n: int, threads: int = 1) -> list[slice]:
+    """Divides rows into parts of at most `CHUNK`, all alike in size.
+
+    Args:
+        n: how many rows there are.
+        threads: among which the parts are shared: their number is a multiple of it.
+
+    Returns:
+        Slices of the n rows in their order, none of which is empty.
+    """
+    if 0 < n <= CHUNK and threads == 1:
+        return [slice(0, n)]
+    count = threads * -(-n // (CHUNK * threads))
+    ends = [n * part // max(count, 1) for part in range(count + 1)]
+    return [slice(start, end) for start, end in pairwise(ends) if start < end]

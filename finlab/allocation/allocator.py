@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, Self
 
@@ -23,12 +23,13 @@ from finlab.allocation.question import (
     check_reference,
     check_seed,
     check_target,
+    check_threads,
     check_wrenches,
     damage_of,
     free_mask,
 )
 from finlab.allocation.robot_state import RobotState, without_lost, working_actuators
-from finlab.allocation.solution import Candidates, Rows, Solved, joined
+from finlab.allocation.solution import Candidates, Rows, Solved, joined, written
 from finlab.arrays import Array
 from finlab.axes import Axis, axes_in
 from finlab.errors import AllocationError
@@ -307,6 +308,7 @@ class Allocator:
         policy: Policy | PolicyName = CLOSEST,
         flow: ArrayLike | None = None,
         seed: int = 0,
+        threads: int = 1,
     ) -> BatchAllocation:
         """Finds the commands for many targets.
 
@@ -318,6 +320,8 @@ class Allocator:
             policy: what to do where a wrench is out of reach.
             flow: velocity (6,) of the body relative to the water [m/s, rad/s]; None at rest.
             seed: the same target and seed give the same answer, whatever the batch.
+            threads: how many threads share the targets; each keeps a core busy. The answers do not
+                depend on it.
 
         Returns:
             The targets and the commands; what else there is to tell is computed when it is first
@@ -325,11 +329,13 @@ class Allocator:
 
         Raises:
             CommandError: the wrenches are no (N, 6) of finite numbers, or as in `allocate`.
-            AllocationError: the method does not know the policy.
+            AllocationError: the method does not know the policy, or `threads` is no whole number
+                from 1.
             LayoutError: an unknown actuator, or none left.
             DataError: a fin's force table cannot be read.
         """
         wrenches_asked = check_wrenches(wrenches)
+        thread_count = check_threads(threads)
         state = self._state_of_question(damage, lost, free)
         checked_policy = as_policy(policy)
         checked_seed = check_seed(seed)
@@ -337,11 +343,20 @@ class Allocator:
         start = time.perf_counter()
         question = state.question(wrenches_asked, checked_policy, checked_flow, checked_seed)
 
-        def parts() -> Iterator[tuple[Rows, Solved]]:
-            for rows in chunks(len(wrenches_asked)):
-                yield rows, state.solve(question.part(rows))
+        parts = chunks(len(wrenches_asked), thread_count)
+        command = np.empty((len(wrenches_asked), len(state.works), 3)) if len(parts) > 1 else None
 
-        solution = joined(parts(), len(wrenches_asked), state.works)
+        def solved(rows: slice) -> tuple[Rows, Solved]:
+            part = state.solve(question.part(rows))
+            return rows, part if command is None else written(part, command[rows])
+
+        if thread_count == 1:
+            solutions = [solved(rows) for rows in parts]
+        else:
+            from finlab.allocation.shared_work import in_threads
+
+            solutions = in_threads(solved, parts, thread_count)
+        solution = joined(solutions, len(wrenches_asked), state.works, command)
         targets_shown = state.shown(wrenches_asked)
         elapsed_ms = (time.perf_counter() - start) * 1e3
         count = len(targets_shown)
@@ -350,7 +365,7 @@ class Allocator:
             **answered.fields(),
             target=targets_shown,
             command=solution.command,
-            solve_ms=np.broadcast_to(elapsed_ms / max(count, 1), count),
+            solve_ms=np.full(count, elapsed_ms / max(count, 1)),
             wrench_expected=solution.wrench,
             answered=answered,
         )

@@ -63,6 +63,8 @@ class MethodQuestion(NamedTuple):
     def part(self, rows: slice) -> MethodQuestion:
         """Returns the question for some of the targets. The seed is shifted by their first index,
         so that a target gets the same answer in any batch."""
+        if rows == slice(0, len(self.targets)):
+            return self
         return self._replace(targets=self.targets[rows], seed=self.seed + rows.start)
 
 
@@ -89,6 +91,19 @@ def check_seed(seed: object) -> int:
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
         raise AllocationError(f"seed: expected a whole number from 0, got {seed!r}")
     return int(seed)
+
+
+def check_threads(threads: object) -> int:
+    """Returns a number of threads, a whole number from 1.
+
+    Raises:
+        AllocationError: it is none.
+    """
+    if type(threads) is int and threads >= 1:
+        return threads
+    if isinstance(threads, bool) or not isinstance(threads, int | np.integer) or threads < 1:
+        raise AllocationError(f"threads: expected a whole number from 1, got {threads!r:.60}")
+    return int(threads)
 
 
 def damage_of(damage: Damage | None, lost: Sequence[str]) -> Damage:

@@ -3,7 +3,7 @@
 `Method.solve` returns a `Solution`; `robot_state.py` and `allocation.py` make results of it.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, NamedTuple, Protocol, Self
 
@@ -204,22 +204,61 @@ def among_all(command: Array, works: NDArray[np.bool_]) -> Array:
     return full
 
 
+def _no_notes() -> tuple[str, ...]:
+    """The notes of an answer of which there is nothing to say."""
+    return ()
+
+
 Rows = slice | NDArray[np.intp]
 """Indices of targets."""
 
 
-def joined(parts: Iterable[tuple[Rows, Solved]], count: int, works: NDArray[np.bool_]) -> Solution:
+def written(part: Solved, command: Array) -> Solved:
+    """Writes the commands of a part of the targets where they belong.
+
+    Args:
+        part: solution for N of the targets, of the actuators that work or of all n.
+        command: (N, n, 3), a part of the commands for all targets; becomes those of the solution.
+
+    Returns:
+        The same solution, whose own commands need no memory any more where it is of all actuators:
+        those of the next part take it, which is quicker than memory that the system has to give.
+    """
+    if not isinstance(part, Solution) or part.command.shape != command.shape:
+        return part
+    command[:] = part.command
+    return part._replace(command=command)
+
+
+def _is_whole(rows: Rows, part: Solved, count: int, works: NDArray[np.bool_]) -> bool:
+    """Whether the solution for some rows is one for all N targets and all n actuators."""
+    are_all_rows = isinstance(rows, slice) and rows == slice(0, count)
+    return are_all_rows and part.command.shape[-2] == len(works)
+
+
+def joined(
+    parts: Sequence[tuple[Rows, Solved]],
+    count: int,
+    works: NDArray[np.bool_],
+    memory: Array | None = None,
+) -> Solution:
     """Joins solutions for parts of the targets.
 
     Args:
         parts: which targets each is for, and the solution, of the actuators that work or of all.
         count: N, how many targets there are.
         works: which actuators (n,) work.
+        memory: commands (N, n, 3), where `written` has written those of some parts; None for new
+            ones.
 
     Returns:
         One solution for N targets and all n actuators, with commands, bound, wrenches and notes.
     """
-    command = np.full((count, len(works), 3), np.nan)
+    if len(parts) == 1 and _is_whole(*parts[0], count, works):
+        whole = parts[0][1]
+        notes_of_whole = whole.notes or _no_notes
+        return Solution(whole.command, whole.bound, wrench=whole.wrench, notes=notes_of_whole)
+    command = np.full((count, len(works), 3), np.nan) if memory is None else memory
     working = np.flatnonzero(works)
     parts_have_all = True
     bounds: list[tuple[Rows, Callable[[Array, Array], Array]]] = []
@@ -227,7 +266,8 @@ def joined(parts: Iterable[tuple[Rows, Solved]], count: int, works: NDArray[np.b
     notes_of_parts: list[Callable[[], tuple[str, ...]]] = []
     for rows, part in parts:
         parts_have_all = part.command.shape[-2] == len(works)
-        command[rows] = among_all(part.command, works)
+        if part.command.base is not command:
+            command[rows] = among_all(part.command, works)
         if part.notes is not None:
             notes_of_parts.append(part.notes)
         if part.bound is not None:

@@ -5,10 +5,11 @@ import ctypes
 import sys
 from functools import cache
 from pathlib import Path
+from typing import TypeVar
 
 from finlab.errors import FinlabError
 
-VERSION = 12
+VERSION = 13
 """What `fl_version()` of the C files returns; both rise together where a signature or a struct
 changes."""
 SIGNATURES = {
@@ -20,7 +21,8 @@ SIGNATURES = {
     "fl_prepare": "ipp",
     "fl_answer_one": "ipppp",
     "fl_answer_into_row": "ippprp",
-    "fl_answer_many": "ippppipppppppp",
+    "fl_widest_lanes": "i",
+    "fl_answer_many": "ipppipipppppppp",
     "fl_commands": "vpppipp",
     "fl_forces_of_commands": "vppip",
     "fl_conjugates": "ippppipp",
@@ -58,19 +60,38 @@ _SUFFIX = {"win32": "dll", "darwin": "dylib"}.get(sys.platform, "so")
 PATH = Path(__file__).with_name(f"libfinlab.{_SUFFIX}")
 """Where the compiled core stands."""
 
+_Library = TypeVar("_Library", bound=ctypes.CDLL)
+
 
 @cache
 def library() -> ctypes.PyDLL:
     """Returns the library.
 
-    Its functions keep the interpreter's lock: most calls take microseconds; those of batches and of
-    coupled robots hold it for up to a tenth of a second.
+    Its functions keep the interpreter's lock: most calls take microseconds; those of coupled robots
+    hold it for up to a tenth of a second.
 
     Raises:
         FinlabError: it is missing, does not load here, or was compiled from other C files.
     """
+    return _loaded(ctypes.PyDLL)
+
+
+@cache
+def unlocked_library() -> ctypes.CDLL:
+    """Returns the same library, whose functions release the interpreter's lock while they run: for
+    calls so long that other threads should go on. To release it and take it again costs a
+    microsecond, and more where other threads want it.
+
+    Raises:
+        FinlabError: as `library`.
+    """
+    return _loaded(ctypes.CDLL)
+
+
+def _loaded(kind: type[_Library]) -> _Library:
+    """Loads the library, with the types of its functions."""
     try:
-        core = ctypes.PyDLL(str(PATH))
+        core = kind(str(PATH))
     except OSError as error:
         problem = f"cannot be loaded ({error})" if PATH.exists() else "is missing"
     else:
@@ -78,7 +99,7 @@ def library() -> ctypes.PyDLL:
         if version == VERSION:
             for name, kinds in SIGNATURES.items():
                 function = getattr(core, name)
-                function.argtypes = [_TYPES[kind] for kind in kinds[1:]]
+                function.argtypes = [_TYPES[letter] for letter in kinds[1:]]
                 function.restype = _TYPES[kinds[0]]
             return core
         problem = f"has version {version}, and this finlab needs {VERSION}"

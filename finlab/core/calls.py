@@ -6,6 +6,7 @@ commands that give their forces. The structs are those of finlab/core/fl_fields.
 
 import ctypes
 from collections.abc import Sequence
+from functools import cache
 from threading import Lock
 from typing import NamedTuple
 
@@ -13,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.arrays import Array
-from finlab.core import library
+from finlab.core import library, unlocked_library
 from finlab.core.fields import Record, constant, count_of, struct
 from finlab.errors import CommandError, DataError
 
@@ -379,8 +380,29 @@ def prepared_work(block: Array) -> ctypes.Array[ctypes.c_char]:
     return work
 
 
+@cache
+def widest_lanes() -> int:
+    """Returns how many wrenches of a batch this machine answers at once, in lanes of vectors."""
+    return int(library().fl_widest_lanes())
+
+
+class WorkArea:
+    """What one thread needs to ask the core about a robot: a prepared `fl_work`, and a question."""
+
+    def __init__(self, block: Array, n: int) -> None:
+        """Prepares it for the block of a robot of n actuators.
+
+        Raises:
+            DataError: the numbers of the block are out of the range that the core works with.
+        """
+        self._work = prepared_work(block)
+        self.address = ctypes.addressof(self._work)
+        self.question = QuestionRecord(n)
+
+
 class Core:
-    """One robot in the core. Threads may share it: one call after the other is made."""
+    """One robot in the core. Threads may share it: of single questions one is answered after the
+    other, batches at the same time."""
 
     def __init__(self, block: Array, n: int) -> None:
         """Takes the block of a robot.
@@ -393,6 +415,8 @@ class Core:
             DataError: its numbers are out of the range that the core works with.
         """
         self._core = library()
+        self._unlocked_core = unlocked_library()
+        self._lanes = widest_lanes()
         self._block = block
         self._n = n
         self._work = prepared_work(block)
@@ -407,6 +431,8 @@ class Core:
         self._memory = AnswerMemory(n)
         self._rows_used = 0
         """Rows of the memory that hold answers."""
+        self._spare_areas: list[WorkArea] = []
+        """Work areas of batches that were answered at the same time, which nobody uses now."""
 
     def answer_row(
         self,
@@ -483,7 +509,8 @@ class Core:
     def answer_many(
         self, wrenches: Array, policy: Record | None, conditions: Conditions = NOMINAL
     ) -> CoreAnswer:
-        """Answers many wrenches, one after the other in C.
+        """Answers many wrenches in one call of C, which releases the interpreter's lock. Threads
+        that ask at the same time are answered at the same time.
 
         Args:
             wrenches: desired (N, 6) [N, N m].
@@ -492,49 +519,85 @@ class Core:
             conditions: what holds of the robot.
 
         Returns:
-            The same N answers as `answer_one` gives.
+            The same N answers as `answer_one` gives, to 1e-9.
 
         Raises:
             CommandError: the core cannot work with these numbers.
         """
         wrenches = np.ascontiguousarray(wrenches)
         count = len(wrenches)
-        force = np.empty((count, self._n, 2))
-        multipliers = np.empty((count, 6))
-        wrench_served = np.empty((count, 6))
-        gap_power_bound = np.empty(count)
-        command = np.empty((count, self._n, 3))
-        is_attainable = np.empty(count, np.bool_)
-        error = np.empty(count)
-        is_truncated = np.empty(count, np.bool_)
-        with self._lock:
-            self._question.write(policy, None, conditions)
-            code = self._core.fl_answer_many(
-                self._block_address,
-                self._work_address,
-                self._question.address,
-                wrenches.ctypes.data,
-                count,
-                force.ctypes.data,
-                multipliers.ctypes.data,
-                wrench_served.ctypes.data,
-                gap_power_bound.ctypes.data,
-                command.ctypes.data,
-                is_attainable.ctypes.data,
-                error.ctypes.data,
-                is_truncated.ctypes.data,
-            )
-        raise_refusal(code)
-        return CoreAnswer(
-            force,
-            multipliers,
-            wrench_served,
-            gap_power_bound,
-            is_attainable,
-            command,
-            error,
-            bool(is_truncated.any()),
+        answer = CoreAnswer(
+            force=np.empty((count, self._n, 2)),
+            multipliers=np.empty((count, 6)),
+            wrench_served=np.empty((count, 6)),
+            gap_power_bound=np.empty(count),
+            is_attainable=np.empty(count, np.bool_),
+            command=np.empty((count, self._n, 3)),
+            error=np.empty(count),
+            is_truncated=False,
         )
+        is_truncated = np.empty(count, np.bool_)
+        if self._lock.acquire(blocking=False):
+            try:
+                self._answer_many(
+                    self._work_address,
+                    self._question,
+                    wrenches,
+                    policy,
+                    conditions,
+                    answer,
+                    is_truncated,
+                )
+            finally:
+                self._lock.release()
+        else:
+            # Another thread is answered at this moment.
+            area = self._spare_area()
+            try:
+                self._answer_many(
+                    area.address, area.question, wrenches, policy, conditions, answer, is_truncated
+                )
+            finally:
+                self._spare_areas.append(area)
+        return answer._replace(is_truncated=bool(is_truncated.any()))
+
+    def _spare_area(self) -> WorkArea:
+        """A work area that no thread uses; whoever has asked for it puts it back."""
+        try:
+            return self._spare_areas.pop()
+        except IndexError:
+            return WorkArea(self._block, self._n)
+
+    def _answer_many(
+        self,
+        work_address: int,
+        question: QuestionRecord,
+        wrenches: Array,
+        policy: Record | None,
+        conditions: Conditions,
+        answer: CoreAnswer,
+        is_truncated: NDArray[np.bool_],
+    ) -> None:
+        """Answers wrenches (N, 6) in a work area; the arrays of `answer`, and `is_truncated` (N,),
+        become the answers."""
+        question.write(policy, None, conditions)
+        code = self._unlocked_core.fl_answer_many(
+            self._block_address,
+            work_address,
+            question.address,
+            self._lanes,
+            wrenches.ctypes.data,
+            len(wrenches),
+            answer.force.ctypes.data,
+            answer.multipliers.ctypes.data,
+            answer.wrench_served.ctypes.data,
+            answer.gap_power_bound.ctypes.data,
+            answer.command.ctypes.data,
+            answer.is_attainable.ctypes.data,
+            answer.error.ctypes.data,
+            is_truncated.ctypes.data,
+        )
+        raise_refusal(code)
 
     def commands(self, force: Array, previous: Array | None = None) -> Array:
         """Finds the commands for forces, by the grids of the laws.

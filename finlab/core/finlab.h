@@ -68,7 +68,7 @@ typedef double fl_wide; /* where differences of large numbers matter, in single 
 #define FL_FOILS (FL_FOIL_STEPS * FL_STEPS_AT_KINK * 2 * (FL_STARTS + FL_RAY_SHARES))
 #define FL_BOUND (2 * (FL_FORCES + FL_FOILS))
 
-#define FL_VERSION 12  /* of all structs and functions here */
+#define FL_VERSION 13  /* of all structs and functions here */
 #define FL_MAGIC 41721 /* first number of a block */
 
 /* The structs that cross the border of the library. */
@@ -201,8 +201,15 @@ int fl_answer_one(const fl_real *block, fl_work *work, const fl_question *questi
 int fl_answer_into_row(const fl_real *block, fl_work *work, const fl_question *question,
                        fl_real most_error, fl_real *row);
 
-/* Finds commands for many wrenches, all else as in a question. The outputs are those of fl_answer.
+/* @return how many lanes the widest vectors of this machine have that fl_answer_many knows; 1 where
+           it knows none. Asking the processor may take microseconds: ask once. */
+int fl_widest_lanes(void);
 
+/* Finds commands for many wrenches, all else as in a question. The outputs are those of fl_answer,
+   to rounding, and their bits depend neither on `lanes`, from 2 on, nor on the other wrenches.
+
+   @param lanes            how many wrenches are answered at once where that can be: 2, 4 or 8, no
+                           more than fl_widest_lanes(); 1 for one after the other
    @param wrench           (count, 6) desired [N, N m]
    @param force            (count, n, 2) [N]
    @param multipliers      (count, 6) lambda of the wrenches [W/N, W/(N m)]
@@ -214,7 +221,7 @@ int fl_answer_into_row(const fl_real *block, fl_work *work, const fl_question *q
                            wrench scale
    @param is_truncated     (count,) whether a search ended at its bound of parts or steps
    @return                 as fl_answer_one, of the first wrench that has no answer */
-int fl_answer_many(const fl_real *block, fl_work *work, const fl_question *question,
+int fl_answer_many(const fl_real *block, fl_work *work, const fl_question *question, int lanes,
                    const fl_real *wrench, int count, fl_real *force, fl_real *multipliers,
                    fl_real *wrench_served, fl_real *gap_power_bound, fl_real *command,
                    fl_byte *is_attainable, fl_real *error, fl_byte *is_truncated);

@@ -40,14 +40,21 @@ FILES_LEFT_OUT = (
     "outer_starts.c",
     "ray_reach.c",
     "for_python.c",
+    "answer_many.c",
+    "lanes.h",
+    "lanes_vector.h",
+    "lanes_kernel.h",
+    "lanes_baseline.c",
+    "lanes_avx2.c",
+    "lanes_avx512.c",
     "vehicle.c",
     "fin_motion.c",
     "first_order_lag.c",
     "kalman_filter.c",
     "path_wrench.c",
 )
-"""Files of the core that an export does not need: `interaction`, attainable sets, what Python
-alone calls, and what swims in a simulation."""
+"""Files of the core that an export does not need: `interaction`, attainable sets, batches, what
+Python alone calls, and what swims in a simulation."""
 QUESTIONS: tuple[tuple[PolicyName, float], ...] = (
     ("closest", 0.9),
     ("closest", 3.0),

@@ -65,6 +65,7 @@ NO_CHOICE = {
     "LATTICE",
     "KINDS",
     "WALSH",
+    "ROUNDER",
 }
 """Constants that nobody has chosen: sizes, versions, mathematics, and what follows from others."""
 OPERATORS: dict[type, Callable[[Any, Any], Any]] = {

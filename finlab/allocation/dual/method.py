@@ -21,7 +21,7 @@ from finlab.allocation.question import MethodQuestion
 from finlab.allocation.solution import Solution, Solved
 from finlab.arrays import EXACT, NEARLY, NOTHING, ROUNDING, Array
 from finlab.axes import axes_in
-from finlab.core.calls import NOMINAL, AnswerRow, Conditions
+from finlab.core.calls import NOMINAL, AnswerRow, Conditions, CoreAnswer
 from finlab.layout.effectiveness import wrench_of_forces
 from finlab.physics.objective import judged_power
 
@@ -270,6 +270,8 @@ class Dual(Method):
             answer = row.copied()
         else:
             answer = self.compiled.forces(targets, policy, None, conditions)
+            if self._are_finished(answer, conditions):
+                return self._solution_of_finished(answer, targets, conditions)
         from finlab.allocation.levenberg_marquardt import exact_commands
 
         problem = self.problem_under(conditions)
@@ -289,6 +291,27 @@ class Dual(Method):
             answer.gap_power_bound,
             partial(self.notes_of, sentences, targets[~answer.is_attainable], conditions),
             conditions,
+        )
+
+    def _are_finished(self, answer: CoreAnswer, conditions: Conditions) -> bool:
+        """Whether all targets are met by the commands as the core gives them, outside of ticks."""
+        if conditions.previous is not None or answer.is_truncated:
+            return False
+        largest_error = float(answer.error.max())
+        return largest_error <= self._most_core_error and bool(answer.is_attainable.all())
+
+    def _solution_of_finished(
+        self, answer: CoreAnswer, targets: Array, conditions: Conditions
+    ) -> Solution:
+        """The solution for targets (N, 6) that the core's commands meet; there is nothing to say of
+        them."""
+        if conditions.lost is not None:
+            answer.command[:, conditions.lost] = np.nan
+        bound = partial(self.bound, targets, answer.multipliers, answer.gap_power_bound, conditions)
+        return Solution(
+            answer.command,
+            bound=None if self.has_no_bound else bound,
+            multipliers=answer.multipliers,
         )
 
     @cached_property

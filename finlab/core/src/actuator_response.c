@@ -13,8 +13,7 @@
    Prices are in W/N along the actuator's own rows, forces in N. */
 #include "internal.h"
 
-#define SOFT R(0.2)         /* rho of Eq. 20: r of a foil below which it is softened */
-#define BLEND_REST R(1e-12) /* least width omega [W] of a blend */
+#define SOFT R(0.2) /* rho of Eq. 20: r of a foil below which it is softened */
 
 /* A direction in which a plane may push. */
 typedef struct {
@@ -100,9 +99,6 @@ static void blend(response *own, const response *other, real omega) {
   own->yy = p * own->yy + q * other->yy + dp * dy * dy;
   own->conjugate += (root - delta) / 2; /* c1 + (R - delta) / 2 = (c1 + c2 + R) / 2 */
 }
-
-/* omega [W] of a blend of two responses whose largest force costs so much. */
-static real blend_width(real high_cost) { return FINE * high_cost + BLEND_REST; }
 
 /* The response of a size T along a direction g: y = T g, dy/ds = T' g g' + T dg/ds. */
 static response along_direction(line_response T, const push_direction *g) {

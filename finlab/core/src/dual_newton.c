@@ -24,20 +24,11 @@
        l       share of the slope that is left at the end of a step                Eq. 10 */
 #include "internal.h"
 
-#define SATURATED R(1e-1)  /* share c of M */
-#define FELL R(0.9)        /* a residual above this share of the last one has not improved */
 #define JUMPS 4            /* trials with a jump after which Newton's method stands still */
 #define JUMP_STEP R(1e-3)  /* squared step, over squared multipliers, too long to judge */
 #define SHORT_STEP R(1e-7) /* the same, in which any large change of a force is a jump */
 /* What squared multipliers count at least in these two, over NOTHING and the squared cost C. */
 #define MULTIPLIERS_MIN 100
-#define MU_SINGULAR 10        /* mu grows by this where the step's matrix is singular to rounding */
-#define MU_KEPT_LEAST R(0.05) /* mu after a kept step, over that before: at least */
-#define MU_KEPT_EARLY R(0.3)  /* the same where more than half of the slope is left at its end */
-#define SHARE_LEAST R(0.01)   /* of a refused step, the least share that is tried next */
-#define SHARE_LEAST_DRAG R(1e-3) /* the same where foils drag, whose kinks are many */
-#define SHARE_MOST R(0.7)        /* the largest one */
-#define WRENCH_MIN R(1e-3) /* what a scaled wrench counts at least, in rounding of its range */
 
 /* Scaled wrench in the basis. */
 void fl_reduce_wrench(const fl_work *work, const real *wrench, real *target_reduced) {

@@ -2,9 +2,6 @@
    rim of the attainable set. */
 #include "internal.h"
 
-/* First mu where an actuator may be at its limit; NEARLY elsewhere. */
-#define MU_NEAR_LIMIT R(1e-1)
-#define NEAR_LIMIT R(0.8) /* share of the largest force from which an actuator may be there */
 /* Multipliers along a normal of the rim, over those at which all forces are the largest: where a
    turn of forces is measured, and the most. */
 #define LARGE_T R(1e3)

@@ -151,34 +151,6 @@ int fl_answer_coupled_into_row(const fl_coupled_robot *robot, real *block, fl_wo
   return is_met ? FL_OK : FL_BEYOND_REACH;
 }
 
-int fl_answer_many(const real *block, fl_work *work, const fl_question *question,
-                   const real *wrench, int count, real *force, real *multipliers,
-                   real *wrench_served, real *gap_power_bound, real *command,
-                   fl_byte *is_attainable, real *error, fl_byte *is_truncated) {
-  const size_t n = (size_t)COUNT(block);
-  fl_question q = *question;
-  fl_answer out;
-  for (int k = 0; k < count; k++) {
-    memcpy(q.wrench, wrench, sizeof q.wrench);
-    const int code = fl_answer_one(block, work, &q, &out);
-    if (code) return code;
-    memcpy(force, out.force, 2 * n * sizeof *force);
-    memcpy(multipliers, out.multipliers, sizeof out.multipliers);
-    memcpy(wrench_served, out.wrench_served, sizeof out.wrench_served);
-    memcpy(command, out.command, 3 * n * sizeof *command);
-    wrench += 6;
-    force += 2 * n;
-    multipliers += 6;
-    wrench_served += 6;
-    command += 3 * n;
-    gap_power_bound[k] = out.gap_power_bound;
-    is_attainable[k] = (fl_byte)out.is_attainable;
-    error[k] = out.error;
-    is_truncated[k] = (fl_byte)out.is_truncated;
-  }
-  return FL_OK;
-}
-
 int fl_answer_coupled_many(const fl_coupled_robot *robot, real *block, fl_work *work,
                            const fl_question *question, const real *wrench, int count, real *force,
                            real *multipliers, real *wrench_served, real *command,

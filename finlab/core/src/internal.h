@@ -165,6 +165,9 @@ typedef struct {
   real angle;      /* at which it pushes, where turning costs [rad] */
 } response;
 response fl_response(const real *block, int i, const fl_set *set, const real *price);
+#define BLEND_REST R(1e-12) /* least width omega [W] of a blend */
+/* omega [W] of a blend of two responses whose largest force costs so much. */
+static inline real blend_width(real high_cost) { return FINE * high_cost + BLEND_REST; }
 real fl_support_of_set(const real *block, int i, const fl_set *set, const real *price, wide *force,
                        real *slope);
 real fl_drag_of_lift(const real *block, int i, real force);
@@ -232,7 +235,11 @@ void fl_limits_without_tick(const real *block, fl_work *work);
 void fl_limits_of_tick(const real *block, fl_work *work, const fl_question *q);
 int fl_prepare_question(const real *block, fl_work *work, const fl_question *q);
 
-/* first_multipliers.c: where Newton's method on the dual begins */
+/* first_multipliers.c: where Newton's method on the dual begins. The numbers are those of lanes,
+   too. */
+/* First mu where an actuator may be at its limit; NEARLY elsewhere. */
+#define MU_NEAR_LIMIT R(1e-1)
+#define NEAR_LIMIT R(0.8) /* share of the largest force from which an actuator may be there */
 void fl_first_lambda(const real *block, const fl_work *work, const real *target_reduced,
                      real *lambda, real *mu);
 void fl_first_lambda_at_rim(const real *block, fl_work *work, const real *target_reduced,
@@ -240,7 +247,16 @@ void fl_first_lambda_at_rim(const real *block, fl_work *work, const real *target
 void fl_first_lambda_inside(const real *block, fl_work *work, const real *target_reduced,
                             const real *normal, real inside, real *lambda);
 
-/* dual_newton.c: Newton's method on the dual, Eq. 8 */
+/* dual_newton.c: Newton's method on the dual, Eq. 8. The numbers are those of lanes, too. */
+#define SATURATED R(1e-1)     /* share c of M */
+#define FELL R(0.9)           /* a residual above this share of the last one has not improved */
+#define MU_SINGULAR 10        /* mu grows by this where the step's matrix is singular to rounding */
+#define MU_KEPT_LEAST R(0.05) /* mu after a kept step, over that before: at least */
+#define MU_KEPT_EARLY R(0.3)  /* the same where more than half of the slope is left at its end */
+#define SHARE_LEAST R(0.01)   /* of a refused step, the least share that is tried next */
+#define SHARE_LEAST_DRAG R(1e-3) /* the same where foils drag, whose kinks are many */
+#define SHARE_MOST R(0.7)        /* the largest one */
+#define WRENCH_MIN R(1e-3) /* what a scaled wrench counts at least, in rounding of its range */
 void fl_prepare_sets(const real *block, fl_work *work);
 void fl_restore_sets(const real *block, fl_work *work, const fl_set *set);
 void fl_dual_start(const real *block, fl_work *work, const real *target_reduced,

@@ -1,0 +1,22 @@
+/* Vectors of LANES numbers, which the file that includes this one defines: what all widths write
+   alike. No guard: each kernel has its own. */
+typedef real vector __attribute__((vector_size(sizeof(real) * LANES)));
+typedef long long mask __attribute__((vector_size(sizeof(real) * LANES))); /* -1 or 0 */
+
+#define ROUNDER 0x1.8p52 /* 1.5 * 2^52: a number plus it, less it, is rounded to an integer */
+
+/* The same number in all lanes. */
+static inline vector lanes_of(real x) { return x - (vector){0}; }
+
+/* Sets one lane of a vector in memory: compilers make a number of a vector's element by an index
+   that they know, and work on the whole vector for another one. */
+static inline void set_lane(vector *x, int lane, real number) { ((real *)x)[lane] = number; }
+
+static inline void set_mask(mask *m, int lane, int is_set) { ((long long *)m)[lane] = -is_set; }
+
+/* A number for each lane, by its index. */
+static inline vector gather(const real *numbers, mask index) {
+  vector gathered = {0};
+  for (int l = 0; l < LANES; l++) gathered[l] = numbers[index[l]];
+  return gathered;
+}
