@@ -8,7 +8,7 @@ from pathlib import Path
 
 from finlab.errors import FinlabError
 
-VERSION = 12
+VERSION = 13
 """What `fl_version()` of the C files returns; both rise together where a signature or a struct
 changes."""
 SIGNATURES = {

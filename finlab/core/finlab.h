@@ -68,7 +68,7 @@ typedef double fl_wide; /* where differences of large numbers matter, in single 
 #define FL_FOILS (FL_FOIL_STEPS * FL_STEPS_AT_KINK * 2 * (FL_STARTS + FL_RAY_SHARES))
 #define FL_BOUND (2 * (FL_FORCES + FL_FOILS))
 
-#define FL_VERSION 12  /* of all structs and functions here */
+#define FL_VERSION 13  /* of all structs and functions here */
 #define FL_MAGIC 41721 /* first number of a block */
 
 /* The structs that cross the border of the library. */
