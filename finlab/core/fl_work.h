@@ -133,6 +133,7 @@ struct fl_work {
   int has_forks;                /* whether one is forked, or pushes either way */
   int has_drag;                 /* whether a foil drags */
   int has_turn_cost;            /* whether turning costs */
+  int has_kinks;                /* whether any of these is so, or a plane cannot rest */
   int newton_steps;             /* of this question */
   int is_truncated;             /* whether a search ended at its bound of steps */
 

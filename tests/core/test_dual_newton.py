@@ -40,16 +40,16 @@ class NewtonSteps(NamedTuple):
 
 MOST_STEPS = {
     "thrusters": NewtonSteps(176, 761, 60),
-    "azimuths": NewtonSteps(82, 543, 33),
-    "fins": NewtonSteps(83, 536, 39),
-    "fins any shaft": NewtonSteps(59, 580, 100),
-    "fins uneven": NewtonSteps(80, 1015, 30),
-    "wide arcs": NewtonSteps(258, 1564, 64),
-    "holes": NewtonSteps(490, 1729, 37),
-    "rudders": NewtonSteps(1666, 3848, 691),
-    "mixed": NewtonSteps(132, 1530, 75),
-    "all": NewtonSteps(103, 1216, 88),
-    "pods either way": NewtonSteps(387, 3741, 288),
+    "azimuths": NewtonSteps(82, 543, 34),
+    "fins": NewtonSteps(99, 888, 94),
+    "fins any shaft": NewtonSteps(69, 838, 66),
+    "fins uneven": NewtonSteps(80, 1015, 29),
+    "wide arcs": NewtonSteps(257, 1853, 68),
+    "holes": NewtonSteps(507, 2549, 37),
+    "rudders": NewtonSteps(1743, 4283, 721),
+    "mixed": NewtonSteps(132, 2118, 77),
+    "all": NewtonSteps(123, 1532, 117),
+    "pods either way": NewtonSteps(464, 3713, 332),
 }
 """Most steps of each kind of robot: the sum that `newton_steps` counted over its two robots, and a
 tenth more. Robots and wrenches come from seeds, so that the sum changes with the code alone, or by

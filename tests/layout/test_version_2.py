@@ -175,7 +175,7 @@ def test_the_effectiveness_is_force_and_lever():
 
 BAD_LAYOUTS = [
     ("actuators[2].name", edited(2, name="tail"), "'tail' is already the name of actuator 2"),
-    ("actuators", {**GOOD_LAYOUT, "actuators": []}, "a list of 1 to 64 values, got 0"),
+    ("actuators", {**GOOD_LAYOUT, "actuators": []}, "a list of 1 to 256 values, got 0"),
     (
         "actuators",
         {**GOOD_LAYOUT, "actuators": [{**LIFT, "name": f"t{i}"} for i in range(257)]},

@@ -70,8 +70,8 @@ def test_ring_around_the_vertical_axis(session: Session) -> None:
     turned = new[0].mounting_angle - first.mounting_angle
     assert math.cos(turned) == pytest.approx(0.0, abs=1e-9)
     session.ring(8)
-    with pytest.raises(FinlabError, match="at most 64"):
-        session.ring(64)
+    with pytest.raises(FinlabError, match=f"at most {MAX_ACTUATORS}"):
+        session.ring(MAX_ACTUATORS)
     assert session.state.layout.n_fins == 12
 
 

@@ -93,6 +93,7 @@ void fl_prepare_sets(const real *block, fl_work *work) {
   work->has_forks = 0;
   work->has_drag = 0;
   work->has_turn_cost = 0;
+  work->has_kinks = 0;
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
     const fl_set *set = work->set + i;
@@ -105,6 +106,8 @@ void fl_prepare_sets(const real *block, fl_work *work) {
     }
     work->has_forks |= set->is_forked || set->force_max_reverse > 0;
     work->has_drag |= is_foil(a) && !work->span.is_lost[i];
+    work->has_kinks |= work->has_forks || work->has_drag || work->has_turn_cost;
+    work->has_kinks |= is_plane(a) && set->force_min > 0;
     if (work->has_forks || work->has_drag || work->has_turn_cost || a->dead_band > 0)
       work->is_convex = 0;
   }
@@ -279,19 +282,24 @@ static real mu_after_kept(real mu, const step_result *result) {
   return larger(mu * factor, ROUNDING);
 }
 
-/* The mu at which the step, were it as long along its direction as its curvature says, would be the
-   share of itself where the cubic along it, of both values and slopes, is largest. `damping` is
-   what mu weighs in that curvature. */
-static real mu_after_refused(real mu, real nu, const step_result *result, real damping,
-                             real share_least) {
+/* The mu at which the share of a step is tried at which the cubic along it, of both values and
+   slopes, is largest. `damping` is what mu weighs in the curvature along the step: with it the mu
+   is the one at which the step would be that share of itself, were it as long as its curvature
+   says. Where it is not known (0), as sets have kinks and steps of other mu other directions, mu is
+   divided by the share. */
+static real mu_after_refused(real mu, real nu, const step_result *result, real damping) {
   const real a = 3 * (result->slope_begin + result->slope_end - 2 * result->rise);
   const real b = result->slope_end - result->slope_begin - a;
   const real discriminant = b * b - 4 * a * result->slope_begin;
   real share = R(0.5);
   if (discriminant > 0) share = 2 * result->slope_begin / (SQRT(discriminant) - b);
-  const real shorter = 1 / clipped(share, share_least, SHARE_MOST);
+  if (!(damping > 0)) {
+    const real factor = larger(nu, 1 / clipped(share, SHARE_LEAST_AT_KINK, SHARE_MOST));
+    return larger(mu * factor, ROUNDING);
+  }
+  const real shorter = 1 / clipped(share, SHARE_LEAST, SHARE_MOST);
   /* Along the step its curvature is its slope at the beginning. */
-  const real more = (shorter - 1) * result->slope_begin / larger(damping, TINY);
+  const real more = (shorter - 1) * result->slope_begin / damping;
   return larger(larger(mu * nu, mu + more), ROUNDING);
 }
 
@@ -311,8 +319,6 @@ int fl_dual_newton(const real *block, fl_work *work, const real *target_reduced,
     fl_first_lambda(block, work, target_reduced, lambda_first, &mu);
     lambda = lambda_first;
   }
-  real share_least = SHARE_LEAST;
-  if (work->has_drag) share_least = SHARE_LEAST_DRAG;
   fl_dual_start(block, work, target_reduced, lambda);
   fl_state *at = work->state;
   fl_state *trial = work->state + 1;
@@ -362,8 +368,9 @@ int fl_dual_newton(const real *block, fl_work *work, const real *target_reduced,
       trial = at;
       at = work->state_found;
     } else {
-      const real damping = damping_along(block, work, at, trace, step);
-      mu = mu_after_refused(mu, nu, &result, damping, share_least);
+      real damping = 0;
+      if (!work->has_kinks) damping = damping_along(block, work, at, trace, step);
+      mu = mu_after_refused(mu, nu, &result, damping);
       nu *= 2;
       /* A refused step does not count as idle: its growing mu ends the loop. */
       idle--;

@@ -38,12 +38,12 @@ static quadratic_cost quadratic_of(const real *block, const fl_actuator *a, real
 
 /* Force over price at a share of the largest force, over the secant of that [1]. Where the cost is
    ~ T^1.5, as of all laws nearly, it is the root of the share; the table of a line whose cost is
-   another one says it. */
-static real secant_at(const real *block, int i, real price, real share,
+   another one says it. Where foils drag their kinks decide of the steps. */
+static real secant_at(const real *block, const fl_work *work, int i, real price, real share,
                       const quadratic_cost *cost) {
   const fl_actuator *a = ACTUATOR(block, i);
   const int has_cells = table_for(block, a, price)[1] > 1;
-  if (a->rows != 1 || !has_cells) return SQRT(share);
+  if (a->rows != 1 || !has_cells || work->has_drag) return SQRT(share);
   const real size = share * cost->most;
   real force = size;
   if (price < 0) force = -size;
@@ -64,7 +64,7 @@ static real add_secants(const real *block, const fl_work *work, int i, const rea
   const real size_y = a->secant[0] * size_s;
   const quadratic_cost cost = quadratic_of(block, a, s[0]);
   const real share = size_y / cost.most;
-  real weight = secant_at(block, i, s[0], clipped(share, CLOSE, 1), &cost);
+  real weight = secant_at(block, work, i, s[0], clipped(share, CLOSE, 1), &cost);
   if (share > 1 && !work->has_drag) weight = 1 / share; /* at a limit the force stays */
   for (int row = 0; row < (int)a->rows; row++) {
     fl_add_square(H, work->span.effectiveness_reduced[i][row], weight * cost.secant[row]);

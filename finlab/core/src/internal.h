@@ -254,8 +254,8 @@ void fl_first_lambda_inside(const real *block, fl_work *work, const real *target
 #define MU_KEPT_LEAST R(0.05) /* mu after a kept step, over that before: at least */
 #define MU_KEPT_EARLY R(0.3)  /* the same where more than half of the slope is left at its end */
 #define SHARE_LEAST R(0.01)   /* of a refused step, the least share that is tried next */
-#define SHARE_LEAST_DRAG R(1e-3) /* the same where foils drag, whose kinks are many */
-#define SHARE_MOST R(0.7)        /* the largest one */
+#define SHARE_LEAST_AT_KINK R(1e-3) /* the same where sets have kinks */
+#define SHARE_MOST R(0.7)           /* the largest one */
 #define WRENCH_MIN R(1e-3) /* what a scaled wrench counts at least, in rounding of its range */
 void fl_prepare_sets(const real *block, fl_work *work);
 void fl_restore_sets(const real *block, fl_work *work, const fl_set *set);

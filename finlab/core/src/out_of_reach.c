@@ -462,8 +462,10 @@ void fl_out_of_reach(const real *block, fl_work *work, const real *wrench, const
   fl_reduce_wrench(work, out->wrench_served, target_reduced);
   /* Another part of the sets may give it for less. */
   real lambda[6];
+  const real *first_lambda = 0; /* Newton's method's own, where a fork may have led astray */
   memcpy(lambda, out->lambda_reduced, sizeof lambda);
-  const int status = fl_dual_newton(block, work, target_reduced, lambda, FL_STEPS);
+  if (!work->has_forks) first_lambda = lambda;
+  const int status = fl_dual_newton(block, work, target_reduced, first_lambda, FL_STEPS);
   if (!work->has_drag) {
     cheapen_by_parts(block, work, target_reduced, status, out);
     return;
