@@ -116,6 +116,22 @@ def test_peers_answer_the_same_question(peer: peers.Peer) -> None:
         np.testing.assert_allclose(forces, targets @ np.linalg.pinv(robot.B).T, atol=1e-5)
 
 
+@pytest.mark.parametrize(
+    "peer",
+    [peer for peer in peers.PEERS_BEYOND if "least squares" in peer.words],
+    ids=lambda peer: peer.package,
+)
+def test_peers_beyond_reach_give_the_nearest_wrench(peer: peers.Peer) -> None:
+    if not peers.is_installed(peer.package):
+        pytest.skip(f"{peer.package} is not installed")
+    robot = Thrusters.of(load_layout("bluerov2_heavy"))
+    solve = peer.make(robot)
+    allocator = allocator_of("bluerov2_heavy")
+    for target in rim_targets(allocator, 1.5, 3):
+        nearest = allocator.allocate(target).wrench
+        np.testing.assert_allclose(robot.B @ solve(target), nearest, atol=1e-4 * robot.scale.max())
+
+
 def test_a_peer_that_is_not_installed_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     gone = peers.Peer("squared force", peers.PEERS[0].make, "no_such_solver")
     monkeypatch.setattr(peers, "PEERS", (gone, peers.PEERS[-1]))
@@ -125,8 +141,11 @@ def test_a_peer_that_is_not_installed_is_left_out(monkeypatch: pytest.MonkeyPatc
     assert left_out["met"] == "left out: no_such_solver is not installed"
     assert "figure" not in left_out and pseudo_inverse["figure"] > 0.0
     assert pseudo_inverse["watts"] > 1.0
-    near_rim = rows[-1]
+    near_rim = rows[5]
     assert near_rim["missed"] > 0.0 and near_rim["error"] > 1e-3
+    beyond = [row for row in rows if "1.5" in row["measured"] and "error" in row]
+    assert beyond[0]["over"] == "itself"
+    assert all(row["error"] >= beyond[0]["error"] * (1.0 - 1e-6) for row in beyond)
 
 
 def test_rows_of_calls(monkeypatch: pytest.MonkeyPatch) -> None:
