@@ -19,7 +19,7 @@ from tools.speed_groups.questions import thruster_effectiveness
 
 TOLERANCE = 1e-9
 """Of solvers that end at one."""
-LEAST_SQUARES_WEIGHT = 1e-10
+LEAST_SQUARES_WEIGHT = 1e-13
 """Of the squared forces, beside the squared distance from the wrench, where a solver knows no
 constraints but limits."""
 DAQP_WEIGHT = 1e-9
