@@ -85,6 +85,19 @@ def test_the_core_solves_what_allocate_answers() -> None:
     np.testing.assert_allclose(memory.command[:3, 0], answers, atol=1e-9)
 
 
+def test_the_core_solves_in_a_flow_what_allocate_answers() -> None:
+    robot, flow = calls.IN_FLOW
+    allocator = allocator_of(robot)
+    targets = rim_targets(allocator, 0.5, 3, flow=flow)
+    answers = allocator.allocate_batch(targets, flow=flow)
+    assert answers.reachable.all()
+    solve, questions = core_side(allocator.layout, targets, flow=flow)
+    for question in questions:
+        solve(*question)
+    *_, memory, _ = solve.__kwdefaults__["keep"]
+    np.testing.assert_allclose(memory.command[:3, 0], answers.command, atol=1e-6)
+
+
 def test_the_unit_is_the_clipped_pseudo_inverse() -> None:
     call, questions = unit_side(4)
     layout = load_layout("bluerov2_heavy")
@@ -153,8 +166,9 @@ def test_rows_of_calls(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(calls, "GOALS_BEYOND", {"bluerov2_heavy": {"closest": Goal(2)}})
     monkeypatch.setattr(calls, "READ_ROBOTS", ("bluerov2_heavy",))
     rows = list(calls.call_rows(TINY))
-    assert len(rows) == 7 + 3 + 1 + 3 + 2
-    assert all(row["figure"] > 0.0 and row["robot"] == "bluerov2_heavy" for row in rows)
+    assert len(rows) == 7 + 3 + 3 + 1 + 3 + 2
+    assert all(row["figure"] > 0.0 for row in rows)
+    assert {row["robot"] for row in rows} == {"bluerov2_heavy", "torpedo"}
     assert [row["goal"] for row in rows if "policy `closest`" in row["measured"]] == ["≤ 2"]
 
 
