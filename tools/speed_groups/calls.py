@@ -35,6 +35,10 @@ GOALS_OVER_CORE = dict.fromkeys(("bluerov2_heavy", "A", "turtle_hybrid"), Goal(3
 """Goals of `allocate` over a solve in C."""
 SHARES = (0.3, 0.97)
 """Of reach."""
+IN_FLOW = ("torpedo", np.array([1.5, 0.0, 0.0, 0.0, 0.0, 0.0]))
+"""A robot of foils, and its velocity through the water [m/s, rad/s]."""
+MOST_IN_FLOW = Goal(4)
+"""Of its solve in C over the unit: 15 us where the unit takes 3.7 us."""
 MOST_TAIL = Goal(4)
 """Of the 99th percentile over the median, near the rim."""
 MOST_TICK_TAIL = Goal(6)
@@ -65,6 +69,7 @@ def call_rows(sizes: Sizes) -> Iterator[Row]:
     """Returns the rows of the call."""
     for robot in GOALS_OVER_UNIT:
         yield from _rows_within(robot, sizes)
+    yield from _rows_in_flow(sizes)
     for robot in GOALS_OVER_UNIT:
         yield from _rows_of_ticks(robot, sizes)
     yield _row_with_loss(sizes)
@@ -94,6 +99,26 @@ def _rows_within(robot: str, sizes: Sizes) -> Iterator[Row]:
         yield ratio_row(f"{CORE} at {share:g} of reach", robot, UNIT, times[CORE], times[UNIT])
         if share == SHARES[-1]:
             yield tail_row(at_share, robot, answer, MOST_TAIL)
+
+
+def _rows_in_flow(sizes: Sizes) -> Iterator[Row]:
+    """Rows of foils in a flow."""
+    robot, flow = IN_FLOW
+    allocator = allocator_of(robot)
+    targets = rim_targets(allocator, WITHIN, sizes.questions, flow=flow)
+    times = least_times(
+        {
+            UNIT: unit_side(sizes.questions),
+            CORE: core_side(allocator.layout, targets, flow=flow),
+            "allocate": Side(partial(allocator.allocate, flow=flow), as_questions(targets)),
+        },
+        sizes.repeats,
+    )
+    place = f"at {WITHIN:g} of reach, {flow[0]:g} m/s"
+    answer = times["allocate"]
+    yield ratio_row(f"`allocate` {place}", robot, UNIT, answer, times[UNIT])
+    yield ratio_row(f"`allocate` {place}", robot, CORE, answer, times[CORE])
+    yield ratio_row(f"{CORE} {place}", robot, UNIT, times[CORE], times[UNIT], MOST_IN_FLOW)
 
 
 def _rows_of_ticks(robot: str, sizes: Sizes) -> Iterator[Row]:

@@ -14,13 +14,16 @@ import numpy as np
 from finlab import Allocator, Thruster
 from finlab.arrays import Array
 from finlab.layout import Layout
+from finlab.physics.objective import wrench_scale_of
 from tools.speed_groups.questions import thruster_effectiveness
 
 TOLERANCE = 1e-9
 """Of solvers that end at one."""
-LEAST_SQUARES_WEIGHT = 1e-10
+LEAST_SQUARES_WEIGHT = 1e-13
 """Of the squared forces, beside the squared distance from the wrench, where a solver knows no
 constraints but limits."""
+DAQP_WEIGHT = 1e-9
+"""The same for DAQP, over the trace of the Hessian: it needs one that is positive definite."""
 MOST_ITERATIONS = 100_000
 """Of solvers that stop at a number."""
 
@@ -44,6 +47,8 @@ class Thrusters:
     """Watts (n,) of 1 N ahead."""
     reverse: Array
     """The same in reverse."""
+    scale: Array
+    """Wrench scale (6,) [N, N m], by which distances between wrenches are divided."""
     exponent: float
     """p of the watts k |u|^p, the same of all."""
 
@@ -64,10 +69,11 @@ class Thrusters:
         return cls(
             layout=layout,
             B=thruster_effectiveness(layout),
-            low=layout.lower[:, 0],
-            high=layout.upper[:, 0],
+            low=layout.lower[:, 0].copy(),
+            high=layout.upper[:, 0].copy(),
             ahead=np.array([model.forward for model in models]),
             reverse=np.array([model.reverse for model in models]),
+            scale=wrench_scale_of(layout),
             exponent=exponents.pop(),
         )
 
@@ -90,6 +96,29 @@ def daqp_model(robot: Thrusters) -> Solve:
         upper[n:] = w
         lower[n:] = w
         model.update(bupper=upper, blower=lower)
+        x: Array = model.solve()[0]
+        return x
+
+    return solve
+
+
+def daqp_least_squares(robot: Thrusters) -> Solve:
+    """DAQP on the distance from a wrench that is out of reach, over the wrench scale: least squares
+    with limits alone, and a small weight of the squared forces."""
+    import daqp
+
+    n = robot.n
+    scaled = robot.B / robot.scale[:, None]
+    hessian = scaled.T @ scaled
+    regularized = hessian + DAQP_WEIGHT * np.trace(hessian) * np.eye(n)
+    model = daqp.Model()
+    nothing = np.zeros((0, n))
+    sense = np.zeros(n, np.int32)
+    model.setup(regularized, np.zeros(n), nothing, robot.high, robot.low, sense)
+    to_linear = -scaled.T / robot.scale
+
+    def solve(w: Array) -> Array:
+        model.update(f=to_linear @ w)
         x: Array = model.solve()[0]
         return x
 
@@ -231,16 +260,16 @@ def _clarabel_settings() -> Any:
 
 def scipy_lsq_linear(robot: Thrusters) -> Solve:
     """SciPy's `lsq_linear`, an active-set method of least squares with limits alone: the squared
-    forces have a small weight beside the distance from the wrench."""
+    forces have a small weight beside the distance from the wrench, over the wrench scale."""
     from scipy.optimize import lsq_linear
 
     weighted = np.sqrt(LEAST_SQUARES_WEIGHT) * np.eye(robot.n)
-    rows = np.vstack([robot.B, weighted])
+    rows = np.vstack([robot.B / robot.scale[:, None], weighted])
     right = np.zeros(6 + robot.n)
     limits = (robot.low, robot.high)
 
     def solve(w: Array) -> Array:
-        right[:6] = w
+        right[:6] = w / robot.scale
         return np.asarray(lsq_linear(rows, right, limits, method="bvls", tol=1e-14).x)
 
     return solve

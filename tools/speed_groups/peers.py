@@ -1,6 +1,6 @@
 """Solvers of others beside `allocate`, on the same robot and the same wrenches."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from importlib.metadata import version
 from importlib.util import find_spec
 from typing import NamedTuple
@@ -26,6 +26,8 @@ from tools.speed_groups.timing import (
 
 SHARES = (0.3, 0.97)
 """Of reach."""
+BEYOND = 1.5
+"""Of reach, where the nearest wrench is asked for."""
 MET = 1e-6
 """Largest error of an answer that meets its wrench, over the wrench scale."""
 
@@ -57,21 +59,31 @@ PEERS = (
 """Solvers of others, those without an optimum last."""
 
 
+PEERS_BEYOND = (
+    Peer("`Model`, least squares", peer_solvers.daqp_least_squares, "daqp"),
+    Peer("`lsq_linear`, least squares", peer_solvers.scipy_lsq_linear, "scipy"),
+    Peer("PX4's allocation, method `px4`", peer_solvers.px4, ""),
+    Peer("`clip(pinv @ w)`, the unit", peer_solvers.pseudo_inverse, ""),
+)
+"""Solvers of others that answer beyond reach."""
+
+
 def peer_rows(sizes: Sizes) -> Iterator[Row]:
     """Returns the rows of peers."""
     robot = Thrusters.of(load_layout(UNIT_ROBOT))
     for share in SHARES:
-        yield from _rows_at(robot, share, sizes)
+        yield from _rows_at(robot, PEERS, share, sizes)
+    yield from _rows_at(robot, PEERS_BEYOND, BEYOND, sizes)
 
 
-def _rows_at(robot: Thrusters, share: float, sizes: Sizes) -> Iterator[Row]:
-    """Rows of all peers at a share of reach."""
+def _rows_at(robot: Thrusters, peers: Sequence[Peer], share: float, sizes: Sizes) -> Iterator[Row]:
+    """Rows of peers at a share of reach."""
     allocator = allocator_of(UNIT_ROBOT)
     targets = rim_targets(allocator, share, sizes.questions)
     questions = as_questions(targets)
     sides = {"allocate": Side(allocator.allocate, questions)}
     forces = {"allocate": allocator.allocate_batch(targets).command[:, :, 0]}
-    for peer in PEERS:
+    for peer in peers:
         if is_installed(peer.package):
             solve = peer.make(robot)
             sides[_name(peer)] = Side(solve, questions)
@@ -79,16 +91,16 @@ def _rows_at(robot: Thrusters, share: float, sizes: Sizes) -> Iterator[Row]:
     times = least_times(sides, sizes.repeats)
     watts = _watts(robot, forces["allocate"])
     measured = f"`allocate` at {share:g} of reach"
-    error = _errors(robot, allocator.scale, targets, forces["allocate"])
-    own = figure_row(measured, UNIT_ROBOT, "itself, watts", 1.0)
+    error = _errors(robot, targets, forces["allocate"])
+    own = figure_row(measured, UNIT_ROBOT, "itself", 1.0)
     yield own | _accuracy(error, watts, watts)
-    for peer in PEERS:
+    for peer in peers:
         over = _name(peer)
         if not is_installed(peer.package):
             yield left_out_row(measured, UNIT_ROBOT, over, peer.package)
             continue
         row = ratio_row(measured, UNIT_ROBOT, over, times["allocate"], times[over], peer.goal)
-        error = _errors(robot, allocator.scale, targets, forces[over])
+        error = _errors(robot, targets, forces[over])
         yield row | _accuracy(error, _watts(robot, forces[over]), watts)
 
 
@@ -106,9 +118,9 @@ def _name(peer: Peer) -> str:
     return f"{peer.package} {version(peer.package)}, {peer.words}"
 
 
-def _errors(robot: Thrusters, scale: Array, targets: Array, forces: Array) -> Array:
+def _errors(robot: Thrusters, targets: Array, forces: Array) -> Array:
     """Distance (N,) of what forces (N, n) [N] give from targets (N, 6), over the wrench scale."""
-    missing = (forces @ robot.B.T - targets) / scale
+    missing = (forces @ robot.B.T - targets) / robot.scale
     return np.asarray(np.linalg.norm(missing, axis=1))
 
 

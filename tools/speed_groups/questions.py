@@ -33,7 +33,9 @@ def allocator_of(robot: str) -> Allocator:
     return Allocator(load_layout(robot))
 
 
-def rim_targets(allocator: Allocator, share: float, count: int, seed: int = 2) -> Array:
+def rim_targets(
+    allocator: Allocator, share: float, count: int, seed: int = 2, flow: Array | None = None
+) -> Array:
     """Returns wrenches (N, 6) [N, N m] in drawn directions, in the axes that the robot commands.
 
     Args:
@@ -41,11 +43,12 @@ def rim_targets(allocator: Allocator, share: float, count: int, seed: int = 2) -
         share: their size over the most that the robot gives in their direction.
         count: how many, N.
         seed: of the draws.
+        flow: velocity (6,) of the body through the water [m/s, rad/s]; None at rest.
     """
     drawn = np.random.default_rng(seed).normal(size=(count, 6))
     commanded = allocator.layout.commanded
     direction = drawn * allocator.scale * commanded
-    rim = allocator.allocate_batch(FAR * direction, policy="direction").wrench
+    rim = allocator.allocate_batch(FAR * direction, flow=flow, policy="direction").wrench
     return np.asarray(share * rim * commanded)
 
 
@@ -95,7 +98,9 @@ def thruster_effectiveness(layout: Layout) -> Array:
     return np.asarray(plant_of(layout).effectiveness[:, 0].T)
 
 
-def core_side(layout: Layout, targets: Array, previous: Array | None = None) -> Side:
+def core_side(
+    layout: Layout, targets: Array, previous: Array | None = None, flow: Array | None = None
+) -> Side:
     """Returns solves of the core in C: what `allocate` asks of it, through ctypes, with questions
     that are written before and addresses that are known.
 
@@ -103,8 +108,9 @@ def core_side(layout: Layout, targets: Array, previous: Array | None = None) -> 
         layout: the robot.
         targets: (N, 6) [N, N m].
         previous: commands (N, n, 3) of the ticks before; None outside of ticks.
+        flow: velocity (6,) of the body through the water [m/s, rad/s]; None at rest.
     """
-    compiled = Compiled.of(layout)
+    compiled = Compiled.of(layout).at(plant_of(layout).inflow(flow))
     work = prepared_work(compiled.block)
     memory = AnswerMemory(layout.n)
     policy = core_policy(CLOSEST)

@@ -28,7 +28,7 @@ class Sizes(NamedTuple):
 
     questions: int = 200
     """Targets of each robot; ticks of a walk."""
-    repeats: int = 5
+    repeats: int = 9
     """Times that each question is asked."""
     batch: int = 5000
     """Targets of a batch."""
