@@ -7,7 +7,7 @@ for the commands that give forces.
 
 from copy import copy
 from functools import cached_property, lru_cache
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +37,13 @@ _NO_FORCE = 1e-12
 """Added to largest forces [N], so that nothing is divided by 0."""
 _LEAST_POSITIVE = 1e-300
 """Stands for 0 where a number is divided by."""
+
+
+class _PolicyRecord(NamedTuple):
+    """A policy, and the same as the core reads it; both None where there is none."""
+
+    policy: Policy | None
+    record: Record | None
 
 
 class Compiled:
@@ -151,10 +158,8 @@ class Compiled:
         """The numbers that the core reads; see finlab/core/fl_fields.h."""
         self.core = Core(self.block, self.count)
         """The robot in the core."""
-        self._last_policy: Policy | None = None
+        self._last_policy = _PolicyRecord(None, None)
         """Of the last single target."""
-        self._last_record: Record | None = None
-        """The same as the core reads it."""
 
     def _uncertainty_cost(self, i: int, response: Response) -> float:
         """What a squared force of actuator i costs beside its power [W/N^2]."""
@@ -262,10 +267,11 @@ class Compiled:
         most_error: float,
     ) -> AnswerRow:
         """Asks the core for one target, as `forces` does; see `Core.answer_row`."""
-        if policy is not self._last_policy:
-            self._last_record = None if policy is None else core_policy(policy)
-            self._last_policy = policy
-        return self.core.answer_row(target, self._last_record, multipliers, conditions, most_error)
+        last = self._last_policy  # read once: threads may share the robot
+        if policy is not last.policy:
+            last = _PolicyRecord(policy, None if policy is None else core_policy(policy))
+            self._last_policy = last
+        return self.core.answer_row(target, last.record, multipliers, conditions, most_error)
 
     @cached_property
     def _directions(self) -> Array:
