@@ -79,6 +79,7 @@ typedef struct {
   fl_wide r[FL_POINTS][FL_POINTS]; /* R of these; on the diagonal its inverse, 0 where a point
                                       depends on those before */
   int count;                       /* points */
+  int actuators;                   /* whose forces a point has */
   int basis_count;                 /* how many of them the basis knows */
 } fl_mixture;
 

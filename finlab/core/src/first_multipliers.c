@@ -184,8 +184,11 @@ void fl_first_lambda_at_rim(const real *block, fl_work *work, const real *target
   const real least = TOLERANCE / 2 * SQRT(dot(normal, normal, 6));
   real t = (1 - NEARLY) * rim.t;
   real nu[6] = {0};
+  const int is_box = fl_has_lines_alone(block); /* no force turns */
   if (rim.others > 0) {
     multipliers_of_others(block, work, &rim, state->residual, nu);
+  }
+  if (rim.others > 0 && !is_box) {
     for (int j = 0; j < 6; j++) lambda[j] += nu[j];
     fl_dual_start(block, work, target_reduced, lambda);
     const real lost = dot(normal, state->residual, 6) - to_target; /* along n, by the turn */
@@ -193,7 +196,7 @@ void fl_first_lambda_at_rim(const real *block, fl_work *work, const real *target
     if (lost > 0) t = clipped(t_large * SQRT(lost / may_lose), t, LARGEST_T * t);
   }
   /* The last share of a force may have a price without end. */
-  for (int k = 0; k < SEARCH_STEPS; k++) {
+  for (int k = 0; k < SEARCH_STEPS && !is_box; k++) {
     const real shorter = t / SEARCH_FACTOR;
     const real lost = lost_along(block, work, target_reduced, normal, nu, shorter, -to_target);
     if (lost > least) break;

@@ -67,6 +67,7 @@ static void append_farthest(const real *block, const fl_work *work, const wide *
                             fl_mixture *m) {
   const int last = m->count;
   wide(*force)[2] = m->force[last];
+  m->actuators = COUNT(block);
   for (int i = 0; i < COUNT(block); i++) {
     const wide(*column)[6] = work->effectiveness_weighted[i];
     const real s[2] = {(real)dot_wide(column[0], normal, 6), (real)dot_wide(column[1], normal, 6)};
@@ -88,7 +89,9 @@ static void drop(fl_mixture *m, int k) {
   m->count--;
   if (m->basis_count > k) m->basis_count = k;
   const size_t behind = (size_t)(m->count - k);
-  memmove(m->force + k, m->force + k + 1, behind * sizeof m->force[0]);
+  for (int p = k; p < m->count; p++) {
+    memcpy(m->force[p], m->force[p + 1], (size_t)m->actuators * sizeof m->force[0][0]);
+  }
   memmove(m->point + k, m->point + k + 1, behind * sizeof m->point[0]);
   memmove(m->weight + k, m->weight + k + 1, behind * sizeof m->weight[0]);
   memmove(m->ray_share + k, m->ray_share + k + 1, behind * sizeof m->ray_share[0]);

@@ -362,30 +362,28 @@ static fl_cut *last_better_cut(const real *block, fl_work *work, int *depth, con
   }
 }
 
-/* The best part of sets with gaps for a policy: its forces; its sets become those of the
-   work area, and those that it began with are kept. Of a ray the share that it gives, and
-   the most that all parts could. */
+/* The best part of sets with gaps for a policy, from the forces, score and gap of all sets on: its
+   forces; its sets become those of the work area, and those that it began with are kept. */
 static void best_part(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,
-                      real force[][2], real *ray_share, real *most_ray_share) {
-  const size_t size_of_sets = (size_t)COUNT(block) * sizeof *work->set_before;
+                      int gap, real force[][2], real *best) {
   const int most_parts = most_parts_of_policy(block, work);
   real score[FL_SCORES];
-  real best[FL_SCORES] = {0};
   real force_part[FL_MOST][2];
   int depth = 0;
   int has_found = 0; /* a part whose best answer lies in no gap */
-  copy_sets(block, work->set, work->set_before);
-  work->distance_enough = SAME_POINT;
-  serve(block, work, wrench, policy, force_part, score);
-  *most_ray_share = 1 - score[MISSING_RAY_SHARE];
+  int is_whole = 1;  /* whether the best part is that of all sets */
+  memcpy(score, best, sizeof score);
+  copy_forces(block, force, force_part);
+  copy_sets(block, work->set, work->best_set);
   work->distance_enough = ROUGHLY;
   for (int parts = 0;; parts += 2) {
-    const int gap = fl_worst_gap(block, work, force_part, 0);
+    if (parts > 0) gap = fl_worst_gap(block, work, force_part, 0);
     if (gap < 0 || !has_found) { /* of parts with a gap the last one, until there is one without */
-      memcpy(best, score, sizeof best);
+      memcpy(best, score, sizeof score);
       copy_forces(block, force_part, force);
       copy_sets(block, work->set, work->best_set);
       has_found |= gap < 0;
+      is_whole = parts == 0;
     }
     fl_cut *cut = 0;
     if (gap >= 0 && parts < most_parts) {
@@ -402,10 +400,7 @@ static void best_part(const real *block, fl_work *work, const real *wrench, cons
   }
   fl_restore_sets(block, work, work->best_set);
   work->distance_enough = SAME_POINT;
-  if (!are_same(work->best_set, work->set_before, size_of_sets)) {
-    serve(block, work, wrench, policy, force, best);
-  }
-  *ray_share = 1 - best[MISSING_RAY_SHARE];
+  if (!is_whole) serve(block, work, wrench, policy, force, best);
 }
 
 /* What a policy wants of forces: their wrench, but exactly the one that was asked for in the
@@ -442,10 +437,18 @@ void fl_out_of_reach(const real *block, fl_work *work, const real *wrench, const
                      fl_answer *out) {
   const int keeps_direction = policy->kind == FL_DIRECTION;
   real force[FL_MOST][2];
-  real ray_share;
-  real most_ray_share;
+  real score[FL_SCORES];
   memcpy(work->rim_normal, work->state_found->lambda_reduced, sizeof work->rim_normal);
-  best_part(block, work, wrench, policy, force, &ray_share, &most_ray_share);
+  work->distance_enough = SAME_POINT;
+  serve(block, work, wrench, policy, force, score);
+  const real most_ray_share = 1 - score[MISSING_RAY_SHARE]; /* that all parts could give */
+  const int gap = fl_worst_gap(block, work, force, 0);
+  const int has_parts = gap >= 0;
+  if (has_parts) {
+    copy_sets(block, work->set, work->set_before);
+    best_part(block, work, wrench, policy, gap, force, score);
+  }
+  const real ray_share = 1 - score[MISSING_RAY_SHARE];
   real inside[6] = {0};
   if (!keeps_direction) {
     real middle[FL_MOST][2];
@@ -455,7 +458,7 @@ void fl_out_of_reach(const real *block, fl_work *work, const real *wrench, const
   real wanted[6];
   wrench_wanted_of(block, work, wrench, force, wanted);
   cheapest_forces(block, work, force, inside, wanted, out);
-  fl_restore_sets(block, work, work->set_before);
+  if (has_parts) fl_restore_sets(block, work, work->set_before);
   if (!fl_may_have_gaps(block, work, out->force)) return;
 
   real target_reduced[6];

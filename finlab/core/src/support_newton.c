@@ -339,6 +339,7 @@ static int has_room(support_problem *p, fl_mixture *m) {
 /* Makes the mixture one point, that of the forces. */
 static void make_mixture(const support_problem *p, fl_mixture *m) {
   m->count = 1;
+  m->actuators = COUNT(p->block);
   m->basis_count = 0;
   m->weight[0] = 1;
   m->ray_share[0] = 0;
