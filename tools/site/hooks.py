@@ -150,7 +150,7 @@ def on_post_build(config: Any) -> None:
     site = Path(config.site_dir)
     index = site / "search" / "search_index.json"
     found = json.loads(index.read_text())
-    # Every page loads them: words alone, and of the reference and of reports' tables the first ones.
+    # Every page loads them: words alone, of the reference and of reports the first ones.
     for each in found["docs"]:
         words = " ".join(re.sub(r"<[^<>]*>", " ", each["text"]).split())
         is_long = each["location"].startswith(("reference/", "report/"))
