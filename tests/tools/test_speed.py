@@ -176,7 +176,7 @@ def test_rows_of_batches(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(batches, "GOALS", {"bluerov2_heavy": Goal(0.2)})
     monkeypatch.setattr(batches, "THREADED", ("bluerov2_heavy",))
     rows = list(batches.batch_rows(TINY))
-    assert [row["over"] for row in rows] == ["the unit", "`allocate`", "one after the other"]
+    assert [row["over"] for row in rows] == ["the unit", "`allocate`", "one thread"]
     assert all(row["figure"] > 0.0 for row in rows)
 
 

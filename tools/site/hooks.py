@@ -150,11 +150,11 @@ def on_post_build(config: Any) -> None:
     site = Path(config.site_dir)
     index = site / "search" / "search_index.json"
     found = json.loads(index.read_text())
-    for each in found[
-        "docs"
-    ]:  # every page loads them: words alone, and of the reference its first ones
+    # Every page loads them: words alone, of the reference and of reports the first ones.
+    for each in found["docs"]:
         words = " ".join(re.sub(r"<[^<>]*>", " ", each["text"]).split())
-        each["text"] = words[:300] if each["location"].startswith("reference/") else words
+        is_long = each["location"].startswith(("reference/", "report/"))
+        each["text"] = words[:300] if is_long else words
     index.write_text(json.dumps(found, separators=(",", ":")))
     first = (site / "index.html").read_text()
     loaded = {
