@@ -579,18 +579,19 @@ def _read_only_candidates(candidates: Candidates | None) -> Candidates | None:
     return replace(candidates, **arrays)
 
 
-def chunks(n: int, threads: int = 1) -> list[slice]:
-    """Divides rows into parts of at most `CHUNK`, all alike in size.
+def chunks(n: int, threads: int = 1, most: int = CHUNK) -> list[slice]:
+    """Divides rows into parts, all alike in size.
 
     Args:
         n: how many rows there are.
         threads: among which the parts are shared: their number is a multiple of it.
+        most: rows of a part.
 
     Returns:
         Slices of the n rows in their order, none of which is empty.
     """
-    if 0 < n <= CHUNK and threads == 1:
+    if 0 < n <= most and threads == 1:
         return [slice(0, n)]
-    count = threads * -(-n // (CHUNK * threads))
+    count = threads * -(-n // (most * threads))
     ends = [n * part // max(count, 1) for part in range(count + 1)]
     return [slice(start, end) for start, end in pairwise(ends) if start < end]

@@ -343,7 +343,7 @@ class Allocator:
         start = time.perf_counter()
         question = state.question(wrenches_asked, checked_policy, checked_flow, checked_seed)
 
-        parts = chunks(len(wrenches_asked), thread_count)
+        parts = chunks(len(wrenches_asked), thread_count, state.method.most_targets)
         command = np.empty((len(wrenches_asked), len(state.works), 3)) if len(parts) > 1 else None
 
         def solved(rows: slice) -> tuple[Rows, Solved]:

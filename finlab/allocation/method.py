@@ -191,6 +191,8 @@ class Method(ABC):
     """What the method is called."""
     settings_class: ClassVar[type[Settings]] = Settings
     """What can be set."""
+    most_targets: ClassVar[int] = 1024
+    """How many targets of a batch are solved at once; keeps memory flat for any number of them."""
     policy_under_way: ClassVar[PolicyName] = "closest"
     """What a control loop asks for by default where a wrench is out of reach."""
     takes: ClassVar[Takes] = "any actuator"

@@ -117,11 +117,12 @@ def test_an_error_in_another_thread_is_raised_here() -> None:
 def test_parts_of_a_long_batch_have_their_own_commands(method: str) -> None:
     """Also where an actuator is lost, which one of the methods leaves out of its commands."""
     allocator = Allocator(load_layout("A"), method)  # type: ignore[arg-type]
-    wrenches = wrenches_of(allocator, 2 * CHUNK + 5, 0.1)
+    most = allocator._whole.method.most_targets
+    wrenches = wrenches_of(allocator, most + 5, 0.1)
     lost = [allocator.layout.names[0]]
     for names in ([], lost):
         batch = allocator.allocate_batch(wrenches, lost=names)
-        for row in (0, CHUNK - 1, CHUNK, len(wrenches) - 1):
+        for row in (0, most // 2, most // 2 + 3, len(wrenches) - 1):
             single = allocator.allocate(wrenches[row], lost=names)
             np.testing.assert_allclose(batch.command[row], single.command, 1e-9, 1e-9)
         assert (batch.bound is None) == (method == "analytic")

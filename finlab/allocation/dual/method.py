@@ -135,6 +135,9 @@ class Dual(Method):
     # A smaller wrench in the same direction still turns a robot to where it should go; the nearest
     # one may only push it on.
     policy_under_way = "direction"
+    # Of each target there are a few hundred bytes; the fewer calls, the less do threads of a batch
+    # wait for each other.
+    most_targets = 4096
     reads = frozenset({"policy", "losses", "multipliers", "reference"})
     keeps_limits = True
     settings_class = DualSettings

@@ -623,8 +623,12 @@ static inline vector mu_after_refused_lanes(vector mu, vector nu, vector slope_b
   const vector vertex = 2 * slope_begin / (root_of(discriminant) - b);
   const vector share = select_lanes(discriminant > 0, vertex, lanes_of(R(0.5)));
   const vector shorter = 1 / clipped_lanes(share, lanes_of(SHARE_LEAST), lanes_of(SHARE_MOST));
-  const vector more = (shorter - 1) * slope_begin / larger_of(damping, lanes_of(TINY));
-  return larger_of(larger_of(mu * nu, mu + more), lanes_of(ROUNDING));
+  const vector more = (shorter - 1) * slope_begin / damping;
+  const vector by_damping = larger_of(mu * nu, mu + more);
+  const vector shorter_at_kink =
+      1 / clipped_lanes(share, lanes_of(SHARE_LEAST_AT_KINK), lanes_of(SHARE_MOST));
+  const vector by_share = mu * larger_of(nu, shorter_at_kink);
+  return larger_of(select_lanes(damping > 0, by_damping, by_share), lanes_of(ROUNDING));
 }
 
 /* Lanes on their way: which candidate each has, and its numbers. */
@@ -729,7 +733,8 @@ static void newton_in_lanes(const lanes_robot *robot, candidate *candidates, con
     const mask is_refused = ~(is_kept | lanes.is_fresh) & lanes.is_taken;
     const vector mu_kept = mu_after_kept_lanes(lanes.mu, slope_left);
     if (bits_of(is_refused)) {
-      const vector damping = damping_along_lanes(robot, at, trace, step);
+      vector damping = lanes_of(0);
+      if (!robot->work->has_kinks) damping = damping_along_lanes(robot, at, trace, step);
       vector mu_refused =
           mu_after_refused_lanes(lanes.mu, lanes.nu, slope_begin, slope_end, rise, damping);
       mu_refused = select_lanes(is_singular, lanes.mu * MU_SINGULAR, mu_refused);

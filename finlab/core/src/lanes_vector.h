@@ -8,8 +8,8 @@ typedef long long mask __attribute__((vector_size(sizeof(real) * LANES))); /* -1
 /* The same number in all lanes. */
 static inline vector lanes_of(real x) { return x - (vector){0}; }
 
-/* Sets one lane of a vector that lies in memory. By its number there: for an index that compilers do
-   not know, v[lane] = ... selects among all lanes. */
+/* Sets one lane of a vector that lies in memory: where compilers do not know the index,
+   v[lane] = ... would select among all lanes. */
 static inline void set_lane(vector *x, int lane, real number) { ((real *)x)[lane] = number; }
 
 static inline void set_mask(mask *m, int lane, int is_set) { ((long long *)m)[lane] = -is_set; }
