@@ -110,7 +110,8 @@ void fl_prepare_sets(const real *block, fl_work *work) {
   }
 }
 
-/* Sets whether the sets of a question have kinks: for all its parts, though a cut may leave none. */
+/* Sets whether the sets of a question have kinks: for all its parts, though a cut may leave
+   none. */
 void fl_find_kinks(const real *block, fl_work *work) {
   work->has_kinks = work->has_forks || work->has_drag || work->has_turn_cost;
   for (int i = 0; i < COUNT(block); i++) {
