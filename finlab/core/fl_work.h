@@ -134,9 +134,9 @@ struct fl_work {
   int has_forks;                /* whether one is forked, or pushes either way */
   int has_drag;                 /* whether a foil drags */
   int has_turn_cost;            /* whether turning costs */
-  int has_kinks;                /* whether any of these is so, or a plane cannot rest */
-  int newton_steps;             /* of this question */
-  int is_truncated;             /* whether a search ended at its bound of steps */
+  int has_kinks;    /* whether one of these is so of a question, or a plane cannot rest */
+  int newton_steps; /* of this question */
+  int is_truncated; /* whether a search ended at its bound of steps */
 
   /* Points of the attainable set near to a wrench out of reach. */
   fl_mixture mixture;                            /* that comes nearest */

@@ -93,7 +93,6 @@ void fl_prepare_sets(const real *block, fl_work *work) {
   work->has_forks = 0;
   work->has_drag = 0;
   work->has_turn_cost = 0;
-  work->has_kinks = 0;
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
     const fl_set *set = work->set + i;
@@ -106,10 +105,17 @@ void fl_prepare_sets(const real *block, fl_work *work) {
     }
     work->has_forks |= set->is_forked || set->force_max_reverse > 0;
     work->has_drag |= is_foil(a) && !work->span.is_lost[i];
-    work->has_kinks |= work->has_forks || work->has_drag || work->has_turn_cost;
-    work->has_kinks |= is_plane(a) && set->force_min > 0;
     if (work->has_forks || work->has_drag || work->has_turn_cost || a->dead_band > 0)
       work->is_convex = 0;
+  }
+}
+
+/* Sets whether the sets of a question have kinks: for all its parts, though a cut may leave
+   none. */
+void fl_find_kinks(const real *block, fl_work *work) {
+  work->has_kinks = work->has_forks || work->has_drag || work->has_turn_cost;
+  for (int i = 0; i < COUNT(block); i++) {
+    work->has_kinks |= is_plane(ACTUATOR(block, i)) && work->set[i].force_min > 0;
   }
 }
 

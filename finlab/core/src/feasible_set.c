@@ -198,6 +198,7 @@ void fl_limits_without_tick(const real *block, fl_work *work) {
   }
   work->is_whole = 1;
   fl_prepare_sets(block, work);
+  fl_find_kinks(block, work);
 }
 
 /* kappa of an actuator [W/rad^2], Eq. 16: calm P / step, with `power` the mean power P of the
@@ -240,6 +241,7 @@ void fl_limits_of_tick(const real *block, fl_work *work, const fl_question *q) {
   }
   work->is_whole = 0;
   fl_prepare_sets(block, work);
+  fl_find_kinks(block, work);
   if (work->has_turn_cost) begin_as_before(block, work, q->previous, price);
 }
 

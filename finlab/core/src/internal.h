@@ -258,6 +258,7 @@ void fl_first_lambda_inside(const real *block, fl_work *work, const real *target
 #define SHARE_MOST R(0.7)           /* the largest one */
 #define WRENCH_MIN R(1e-3) /* what a scaled wrench counts at least, in rounding of its range */
 void fl_prepare_sets(const real *block, fl_work *work);
+void fl_find_kinks(const real *block, fl_work *work);
 void fl_restore_sets(const real *block, fl_work *work, const fl_set *set);
 void fl_dual_start(const real *block, fl_work *work, const real *target_reduced,
                    const real *lambda);
