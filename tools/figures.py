@@ -7,7 +7,7 @@ A page holds a table between two marks,
     <!-- end of figures -->
 
 where NAME is an experiment of `finlab eval`, which runs with the sizes of its quick report, or that
-of the tool `tools/NAME.py`. KEY... are the columns to show, by default all; OPTION=VALUE among them
+of a tool of that name. KEY... are the columns to show, by default all; OPTION=VALUE among them
 is an option in place of that of the quick report. What stands between the marks is replaced.
 """
 

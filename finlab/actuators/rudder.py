@@ -53,7 +53,7 @@ LEAST_DRAG = 1e-3
 price is unique."""
 CURVE_END = 0.3 * math.pi
 """Angle up to which the curve of lift is searched for its peak [rad]; a plate's lies below."""
-GRID_CELLS = 3072
+GRID_CELLS = 2048
 """Cells of the grid of a foil's coefficients over half a turn: with as many it is off by less than
 commands may be."""
 REFINED = 16

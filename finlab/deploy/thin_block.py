@@ -21,6 +21,9 @@ CELLS = 128
 """Most cells of a table; of a foil's angles and lifts twice as many knots."""
 POINTS = 64
 """Most directions of a gauge."""
+ANGLES = 1024
+"""Angles over its period from which those of a grid of foils are chosen; more say nothing in single
+precision."""
 TABLES = ("force_table", "force_table_reverse", "gauge_table", "law_grid", "command_table")
 """Fields of an actuator that name a table: force over price, the same in reverse, gauge, law, and a
 fin's beat or a foil's curve."""
@@ -151,7 +154,8 @@ def _grid(grid: Array, users: Record) -> Array:
     values = grid[7 + count.sum() :].reshape(*count, -1)
     period = grid[3]
     if count[0] == count[1] == 1 < count[2]:
-        axes[2], value, period = _reached(axes[2], values[0, 0], period, users)
+        step = max(count[2] // ANGLES, 1)
+        axes[2], value, period = _reached(axes[2][::step], values[0, 0, ::step], period, users)
         chosen = _angles(axes[2], value, period)
         axes[2] = axes[2][chosen]
         values = value[None, None, chosen]

@@ -87,12 +87,12 @@ static void forces_of_start(const start_search *search, int is_reversed, int sta
 /* Keeps a start among the cheapest ones, which are sorted by merit. */
 static void keep_cheapest(const real *block, const tried_start *one, int followed,
                           tried_start *cheapest) {
-  int place = followed;
-  while (place > 0 && one->merit < cheapest[place - 1].merit) place--;
-  for (int k = followed - 1; k > place; k--) cheapest[k] = cheapest[k - 1];
-  if (place == followed) return;
-  memcpy(cheapest[place].force, one->force, (size_t)COUNT(block) * sizeof one->force[0]);
-  cheapest[place].merit = one->merit;
+  int index = followed;
+  while (index > 0 && one->merit < cheapest[index - 1].merit) index--;
+  for (int k = followed - 1; k > index; k--) cheapest[k] = cheapest[k - 1];
+  if (index == followed) return;
+  memcpy(cheapest[index].force, one->force, (size_t)COUNT(block) * sizeof one->force[0]);
+  cheapest[index].merit = one->merit;
 }
 
 /* Finds the matrix N = I - J' (J J')^-1 J, J the linear model at the best forces: a start y becomes
