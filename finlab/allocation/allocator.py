@@ -39,7 +39,9 @@ from finlab.physics.objective import wrench_scale_of
 from finlab.physics.plant import plant_of
 
 _NAME_LISTS = (tuple, list)
-"""Types of lists of names that are compared with those of the last question."""
+"""Types of lists of names by which states are found."""
+MAX_NAMED = 32
+"""Sets of names by which states are found; where they are more, all are forgotten."""
 MAX_STATES = 32
 """States of the robot, other than undamaged with all axes, that an allocator keeps prepared."""
 
@@ -141,8 +143,12 @@ class Allocator:
         self._whole = self._make_state(NO_DAMAGE)
         self._states: dict[object, RobotState] = {}
         """States that were asked for, by damage and free axes; the one asked for last is last."""
-        self._last_names: tuple[tuple[object, ...], RobotState] | None = None
-        """What the last question said of damage and free axes, if anything, and its state."""
+        self._states_by_names: dict[tuple[object, ...], RobotState] = {}
+        """States by what questions have named: damage, lost actuators, free axes."""
+        if "losses" in choice.kind.reads and 1 < layout.n <= MAX_STATES:
+            # A control loop that loses an actuator is to answer as soon as ever.
+            for name in layout.names:
+                self._state_of_question(None, (name,), ())
 
     def __getstate__(self) -> dict[str, Any]:
         return {"layout": self._layout, "choice": self._choice}
@@ -387,15 +393,25 @@ class Allocator:
         if damage is None and not len(lost) and not len(free):
             return self._whole
         # A control loop names the same in each tick, as tuples or lists.
-        names = None
+        names: tuple[object, ...] | None = None
         if type(lost) in _NAME_LISTS and type(free) in _NAME_LISTS:
             names = damage, tuple(lost), tuple(free)
-            if self._last_names is not None and names == self._last_names[0]:
-                return self._last_names[1]
+            state = self._state_named(names)
+            if state is not None:
+                return state
         state = self._state(damage_of(damage, lost), free)
         if names is not None:
-            self._last_names = names, state
+            if len(self._states_by_names) >= MAX_NAMED:
+                self._states_by_names.clear()
+            self._states_by_names[names] = state
         return state
+
+    def _state_named(self, names: tuple[object, ...]) -> RobotState | None:
+        """Returns the state that a question has named so before; None for another one."""
+        try:
+            return self._states_by_names.get(names)
+        except TypeError:  # what cannot be hashed is no list of names, which is said later
+            return None
 
     def _state(self, damage: Damage, free: Sequence[str] = ()) -> RobotState:
         """Returns the robot with a damage, asked for all axes but some: from the cache, or prepared
