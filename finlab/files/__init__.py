@@ -13,7 +13,7 @@ from typing import Any
 from finlab.errors import DataError, FinlabError
 
 MAX_EVENTS = 30_000
-"""Most YAML events (keys, values, brackets); a layout of 64 fins has about four thousand."""
+"""Most YAML events (keys, values, brackets); a layout of 256 fins has about sixteen thousand."""
 MAX_DEPTH = 20
 """Deepest nesting of YAML; a layout needs five levels."""
 MAX_DIGITS = 100

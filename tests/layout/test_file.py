@@ -60,7 +60,7 @@ def changed(key, value):
 
 
 BAD_VALUES = [
-    ("actuators", [], "expected a list of 1 to 64 values, got 0"),
+    ("actuators", [], "expected a list of 1 to 256 values, got 0"),
     ("actuators", "left", "expected a list, got 'left'"),
     ("actuators", ..., "required key is missing"),
     ("version", 99, "this finlab reads version 2, got 99"),
@@ -171,7 +171,7 @@ HOSTILE_FILES = {
     "wide": ("[" + "1," * 400_000 + "1]", "too many to be read"),
     "many": (
         yaml.safe_dump(edited("actuators", value=[{"name": f"f{i}"} for i in range(5000)])),
-        "1 to 64 values, got 5000",
+        "1 to 256 values, got 5000",
     ),
     "twice": ("name: a\nversion: 1\nname: b\n", "line 3: key 'name' is given twice"),
     "list_key": ("? [1, 2]\n: 3\n", "a key must be plain text"),
