@@ -76,6 +76,10 @@ static real add_secants(const real *block, const fl_work *work, int i, const rea
 static void solve_regular(real H[6][6], real ridge_share, const real *target_reduced,
                           real *lambda) {
   const real trace = fl_trace(H);
+  if (!(trace > 0)) { /* nobody pushes, such as lost actuators: any multipliers are as good */
+    memset(lambda, 0, 6 * sizeof *lambda);
+    return;
+  }
   for (int j = 0; j < 6; j++) H[j][j] += ridge_share * trace;
   if (fl_factor(H)) {
     fl_solve(H, target_reduced, lambda);

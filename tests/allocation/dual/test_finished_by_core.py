@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 import finlab
+from finlab.allocation.dual.compiled import Compiled
 from finlab.allocation.dual.method import Dual
-from finlab.allocation.policy import POLICY_NAMES
+from finlab.allocation.policy import POLICY_NAMES, Policy
 from finlab.arrays import EXACT, Array
 from finlab.assets import shipped_layouts
+from finlab.core.calls import Conditions
 from finlab.layout import Layout
 from tests.random_robots import KINDS, load, random_robot
 
@@ -129,3 +131,24 @@ def test_fields_that_nobody_has_read_are_those_of_the_question() -> None:
     np.testing.assert_array_equal(answer.flow, flow)
     with pytest.raises(AttributeError, match="wrenches"):
         _ = answer.wrenches
+
+
+@pytest.mark.parametrize("policy", POLICY_NAMES)
+@pytest.mark.parametrize("name", [name for name in ROBOTS if name != "rudders"])
+def test_beyond_reach_without_an_actuator_the_forces_give_what_is_served(
+    name: str, policy: Any
+) -> None:
+    """The forces themselves, before steps on commands could make up for them."""
+    layout = layout_called(name)
+    compiled = Compiled.of(layout)
+    targets = targets_of(layout, (1.6,))
+    for index in range(layout.n):
+        lost = np.arange(layout.n) == index
+        offset = compiled.wrench_offset_of(~lost)
+        conditions = Conditions(None, lost, None)
+        for target in targets[:3]:
+            answer = compiled.forces(target[None], Policy(policy), None, conditions)
+            assert not answer.force[0, index].any()
+            given = np.einsum("nk,nkw->w", answer.force[0], compiled.effectiveness) + offset
+            missing = (given - answer.wrench_served[0]) * layout.commanded
+            assert np.abs(missing / compiled.axis_scale).max() < 1e-5
