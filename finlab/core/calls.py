@@ -62,6 +62,8 @@ class AnswerRows:
         self._memory = AnswerMemory(n)
         self._used = 0
         """Rows of the memory that hold answers."""
+        self._unfinished = constant("FL_UNFINISHED")
+        self._beyond_reach = constant("FL_BEYOND_REACH")
 
     def next(self) -> tuple[AnswerMemory, int]:
         """Returns a memory, and the index of a row of it that is free."""
@@ -71,6 +73,24 @@ class AnswerRows:
             row = 0
         self._used = row + 1
         return self._memory, row
+
+    def written(self, memory: AnswerMemory, row: int, code: int) -> "AnswerRow":
+        """Returns the answer in a row.
+
+        Args:
+            memory: of the row.
+            row: its index.
+            code: what the core has returned with it.
+
+        Raises:
+            CommandError: the core could not work with the numbers of the question.
+        """
+        if code == 0:
+            return AnswerRow(memory, row, True, True)
+        is_best_beyond_reach = code == self._beyond_reach
+        if not is_best_beyond_reach and code != self._unfinished:
+            raise_refusal(code)
+        return AnswerRow(memory, row, False, is_best_beyond_reach)
 
 
 class AnswerRow:
@@ -425,12 +445,8 @@ class Core:
         self._block_address = block.ctypes.data
         self._work_address = ctypes.addressof(self._work)
         self._answer_into_row = self._core.fl_answer_into_row
-        self._unfinished = constant("FL_UNFINISHED")
-        self._beyond_reach = constant("FL_BEYOND_REACH")
         self._question = QuestionRecord(n)
-        self._memory = AnswerMemory(n)
-        self._rows_used = 0
-        """Rows of the memory that hold answers."""
+        self._rows = AnswerRows(n)
         self._spare_areas: list[WorkArea] = []
         """Work areas of batches that were answered at the same time, which nobody uses now."""
 
@@ -458,13 +474,7 @@ class Core:
             CommandError: the core cannot work with these numbers.
         """
         with self._lock:
-            memory = self._memory
-            row = self._rows_used
-            if row == ROWS:
-                memory = AnswerMemory(self._n)
-                self._memory = memory
-                row = 0
-            self._rows_used = row + 1
+            memory, row = self._rows.next()
             question = self._question
             question.write_wrench(wrench)
             question.write(policy, multipliers, conditions)
@@ -475,11 +485,7 @@ class Core:
                 most_error,
                 memory.addresses[row],
             )
-        if code == 0:
-            return AnswerRow(memory, row, True, True)
-        if code != self._unfinished and code != self._beyond_reach:
-            raise_refusal(code)
-        return AnswerRow(memory, row, False, code == self._beyond_reach)
+        return self._rows.written(memory, row, code)
 
     def answer_one(
         self,

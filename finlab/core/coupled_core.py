@@ -27,7 +27,7 @@ from finlab.core.calls import (
     prepared_work,
     raise_refusal,
 )
-from finlab.core.fields import Record, constant, struct
+from finlab.core.fields import Record, struct
 
 _OFFSET_CALLBACK = ctypes.CFUNCTYPE(
     None,
@@ -144,8 +144,6 @@ class CoupledCore:
         self._robot_address = robot.ctypes.data
         self._block_address = self._block_linear.ctypes.data
         self._work_address = ctypes.addressof(self._work)
-        self._unfinished = constant("FL_UNFINISHED")
-        self._beyond_reach = constant("FL_BEYOND_REACH")
         self._rows = AnswerRows(n)
         self._force = np.zeros((n, 2))
         """Forces [N] at which the iterations begin, and then those at which they end."""
@@ -246,11 +244,7 @@ class CoupledCore:
                 memory.addresses[row],
             )
             self._raise_from_callback()
-        is_met = code == 0
-        is_best_beyond_reach = code == self._beyond_reach
-        if not is_met and not is_best_beyond_reach and code != self._unfinished:
-            raise_refusal(code)
-        return AnswerRow(memory, row, is_met, is_met or is_best_beyond_reach)
+        return self._rows.written(memory, row, code)
 
     def answer_many(
         self,

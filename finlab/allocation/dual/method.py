@@ -265,8 +265,7 @@ class Dual(Method):
         if self.plant.interaction is not None:
             return self._solve_coupled(conditions, targets, policy, multipliers)
         if len(targets) == 1:
-            most_error = self._most_core_error if self._was_asked else NOT_MEASURED
-            self._was_asked = True
+            most_error = self._error_allowed()
             row = self.compiled.answer_row(targets[0], policy, multipliers, conditions, most_error)
             if row.is_finished:
                 return FinishedSolution(self, conditions, targets, row)
@@ -317,6 +316,13 @@ class Dual(Method):
             multipliers=answer.multipliers,
         )
 
+    def _error_allowed(self) -> float:
+        """Error by the core's grids up to which the answer to a single target is exact."""
+        if self._was_asked:
+            return self._most_core_error
+        self._was_asked = True
+        return NOT_MEASURED
+
     @cached_property
     def _most_core_error(self) -> float:
         """Error by the core's grids of the laws up to which it is at most `EXACT` by the laws
@@ -344,8 +350,7 @@ class Dual(Method):
 
         record = core_policy(policy)
         if len(targets) == 1:
-            most_error = self._most_core_error if self._was_asked else NOT_MEASURED
-            self._was_asked = True
+            most_error = self._error_allowed()
             row = self.coupled.answer_row(targets[0], record, multipliers, conditions, most_error)
             if row.is_finished:
                 return FinishedSolution(self, conditions, targets, row)
