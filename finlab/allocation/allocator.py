@@ -204,6 +204,20 @@ class Allocator:
         """Returns an allocator by the same method, networks and settings, for another robot."""
         return self.of_choice(layout, self._choice)
 
+    def with_settings(self, **settings: Any) -> Allocator:
+        """Returns an allocator for the same robot, by the same method and networks, with other
+        settings; those that are not named stay as they are.
+
+        Args:
+            **settings: of the method, by name, such as `period_s=0.02`.
+
+        Raises:
+            AllocationError: the method knows no such setting, or a value is out of its range.
+        """
+        kind = self._choice.kind
+        checked = methods.checked_settings(kind, {**vars(self.settings), **settings})
+        return self.of_choice(self._layout, replace(self._choice, settings=checked))
+
     def allocate(
         self,
         wrench: ArrayLike,

@@ -23,7 +23,6 @@ is dropped. However the service ends, a neutral command is the last that it send
 import json
 import math
 import time
-import traceback
 from collections.abc import Mapping
 from typing import Any
 
@@ -32,9 +31,10 @@ from msgspec import Struct
 from finlab.allocation import Allocation
 from finlab.allocation.report import command_record, plain_target
 from finlab.arrays import Array
+from finlab.deploy.command_stream import REFUSED, CommandStream, unanswered
 from finlab.deploy.deployed_robot import DeployedRobot
 from finlab.deploy.transport import MAX_LINE, StandardStreams, Unsent
-from finlab.errors import AllocationError, CommandError, LayoutError
+from finlab.errors import CommandError
 from finlab.files import parse_json
 from finlab.files.guarded import decoded
 from finlab.files.schema import checked
@@ -44,8 +44,6 @@ RECENT_S = 0.5
 """Age up to which the last commands limit the next ones by the drives' rates [s]."""
 MAX_ID = 1_000
 """Longest `id`, as JSON [characters]."""
-_REFUSED = (CommandError, LayoutError, AllocationError)
-"""Errors of a request; any other one is a fault of the robot's files or of finlab."""
 
 
 class Request(Struct, forbid_unknown_fields=True):
@@ -82,11 +80,9 @@ class Server:
     def __init__(self, robot: DeployedRobot, watchdog: float | None = 1.0) -> None:
         """Takes the robot, and the longest silence before its fins rest [s]; without one they never
         do."""
-        self._robot = robot
+        self._stream = CommandStream(robot)
         self._watchdog = watchdog
-        self._sent: Allocation | Array | None = None  # the last answer, or commands of rest (n, 3)
         self._sent_at = 0.0
-        self._lost: tuple[str, ...] = ()
 
     def run(self, transport: StandardStreams) -> None:
         """Serve until the requests end or a signal asks to stop; then the fins rest. Raises Unsent:
@@ -139,39 +135,29 @@ class Server:
             values = parse_values(line)
             name = id_of(values)
             request = checked(values, Request, CommandError, "request")
-            answer = self._robot.allocate(
+            answer = self._stream.answer(
                 request.wrench,
                 lost=request.lost,
+                follows=fresh,
                 free=request.free,
-                previous=self._sent if fresh else None,
                 reference=request.reference,
                 policy=request.policy,
                 flow=request.flow,
             )
             reply = self._reply(name, "ok", answer.command, answer.forces) | _answer_record(answer)
             _line(reply)
-        except _REFUSED as error:
+        except REFUSED as error:
             return [_error(name, str(error))]
         except Exception as error:  # the robot goes on, whatever is wrong
-            frame = traceback.extract_tb(error.__traceback__)[-1]
-            problem = f"{type(error).__name__}, {frame.name}, line {frame.lineno}: {error!s:.200}"
-            return [
-                self._rest_reply(),
-                _error(
-                    name,
-                    f"the target could not be answered ({problem}); the robot rests, ask again",
-                ),
-            ]
-        self._lost = tuple(request.lost)
-        self._sent = answer
+            return [self._rest_reply(), _error(name, unanswered(error))]
+        self._stream.note(answer, request.lost)
         self._sent_at = time.monotonic()
         return [reply]
 
     def _rest_reply(self) -> dict[str, Any]:
-        sent = self._sent.command if isinstance(self._sent, Allocation) else self._sent
-        neutral = self._robot.neutral(self._lost, sent)
-        if self._sent is not None:  # what follows begins at rest
-            self._sent = neutral
+        neutral = self._stream.neutral()
+        if self._stream.last is not None:  # what follows begins at rest
+            self._stream.note(neutral)
             self._sent_at = time.monotonic()
         return self._reply(None, "neutral", neutral)
 
@@ -180,7 +166,7 @@ class Server:
     ) -> dict[str, Any]:
         """Commands (n, 3), and the forces (n, 3) [N], body frame, that they give; at rest where not
         told."""
-        layout = self._robot.layout
+        layout = self._stream.robot.layout
         forces = plant_of(layout).body_forces(command) if forces is None else forces
         return {"id": name, "status": status, **command_record(layout, command, forces)}
 

@@ -1,0 +1,282 @@
+"""What the robot is commanded, and when: answers to wrenches while they come, else neutral.
+
+Needs no ROS: times come in as arguments, commands go out as return values.
+
+==========  =======================================================================
+state       what is commanded
+==========  =======================================================================
+inactive    neutral, repeated every `watchdog_s`; wrenches are left unanswered
+waiting     neutral, repeated: no wrench has come yet
+answering   an answer to each wrench
+silent      neutral, repeated: no good wrench for `watchdog_s`
+failed      neutral, repeated: the last wrench met an error that is no fault of it
+==========  =======================================================================
+
+A wrench that is refused commands nothing and keeps no robot from going to neutral. On the way to
+neutral commands change within the drives' rates, too; `stop` alone, the last command of all, is
+neutral at once, since nothing could follow it.
+"""
+
+import time
+from collections import deque
+from collections.abc import Mapping
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from finlab.allocation.allocation import Allocation
+from finlab.arrays import Array
+from finlab.deploy.command_stream import REFUSED, CommandStream, unanswered
+from finlab.deploy.deployed_robot import DeployedRobot
+from finlab.errors import CommandError
+from finlab.layout import Damage, Layout
+from finlab_allocator.frames import StaticFrames
+from finlab_allocator.parameters import Parameters
+from finlab_allocator.robot_source import read_robot
+from finlab_allocator.ticks import Ticks
+from finlab_allocator.wrench_input import WrenchInput, target_of
+
+State = Literal["inactive", "waiting", "answering", "silent", "failed"]
+"""See above."""
+TIMES_KEPT = 1000
+"""Answers whose times are kept."""
+
+
+class Sent(NamedTuple):
+    """Commands to send."""
+
+    command: Array
+    """(n, 3), NaN for lost actuators."""
+    answer: Allocation | None
+    """What they come from; None on the way to neutral."""
+
+
+class Commander:
+    """Commands of one robot."""
+
+    def __init__(self, parameters: Parameters, frames: StaticFrames) -> None:
+        """Reads the robot of the parameters; nothing has been commanded yet.
+
+        Args:
+            parameters: of the node.
+            frames: static transforms, to which others may be added later.
+
+        Raises:
+            FinlabError: the robot cannot be read, or does not fit the parameters.
+        """
+        self.parameters = parameters
+        """The node's parameters."""
+        self._frames = frames
+        self.damage: Damage | None = None
+        """What a fault monitor has found beside `lost`; None for nothing."""
+        self.state: State = "inactive"
+        """What is commanded now."""
+        self.failure = ""
+        """The error of state `failed`, in a sentence."""
+        self.refusals = 0
+        """How many wrenches were refused."""
+        self.last_refusal = ""
+        """Why the last of them was, in a sentence; empty where none was."""
+        self.is_refused = False
+        """Whether the newest wrench was refused."""
+        self.answers = 0
+        """How many wrenches were answered."""
+        self.times_s: deque[float] = deque(maxlen=TIMES_KEPT)
+        """Times that the last answers took [s], sending not included."""
+        self._robot = read_robot(parameters.robot)
+        self.ticks = self._prepared(self._robot, parameters)
+        """The robot, prepared for ticks of several lengths."""
+        self._stream = CommandStream(self.ticks.whole)
+        self._stream.lost = parameters.lost
+        self._good_at_s = 0.0  # when the last wrench came that was answered
+        self._sent_at_s = 0.0
+
+    @property
+    def layout(self) -> Layout:
+        """The robot's layout."""
+        return self.ticks.whole.layout
+
+    @property
+    def robot(self) -> DeployedRobot:
+        """The robot as it answers."""
+        return self.ticks.whole
+
+    @property
+    def lost(self) -> tuple[str, ...]:
+        """Actuators that are lost, by the parameters or by the bundle."""
+        named = self.parameters.lost
+        return (*self._robot.lost, *(name for name in named if name not in self._robot.lost))
+
+    @property
+    def answer(self) -> Allocation | None:
+        """The answer that is in force; None at neutral."""
+        last = self._stream.last
+        return last if isinstance(last, Allocation) else None
+
+    @property
+    def command(self) -> Array | None:
+        """The commands (n, 3) that were sent last; None where there are none."""
+        return self._stream.command
+
+    def change(self, values: Mapping[str, Any]) -> Array | None:
+        """Changes parameters, all of them or none.
+
+        Args:
+            values: new values by name.
+
+        Returns:
+            Where the robot is another one now: neutral commands (n, 3) for the one before.
+
+        Raises:
+            FinlabError: a value is not acceptable, or a robot cannot be read; nothing has changed.
+        """
+        parameters = self.parameters.changed(values)
+        robot = self._robot
+        if "robot" in values:  # a file may have changed under the same name
+            robot = read_robot(parameters.robot)
+        of_ticks = (parameters.period_s, parameters.calm)
+        if robot is self._robot and of_ticks == (self.parameters.period_s, self.parameters.calm):
+            ticks = self.ticks
+            self._check(ticks.whole, parameters)
+        else:
+            ticks = self._prepared(robot, parameters)
+        is_other = ticks.whole.layout != self.layout
+        rest_before = self._stream.neutral()
+        self.parameters = parameters
+        self._robot = robot
+        self.ticks = ticks
+        self._stream.robot = ticks.whole
+        self._stream.lost = parameters.lost
+        if is_other:  # what was sent to another robot says nothing of this one
+            self._stream = CommandStream(ticks.whole)
+            self._stream.lost = parameters.lost
+            self.damage = None
+            if self.state != "inactive":
+                self.state = "waiting"
+        return rest_before if is_other else None
+
+    def activate(self) -> None:
+        """Answers wrenches from now on."""
+        self.state = "waiting"
+
+    def deactivate(self) -> None:
+        """Leaves wrenches unanswered from now on; the next ticks lead to neutral."""
+        self.state = "inactive"
+
+    def on_wrench(self, given: WrenchInput, now_s: float, clock_s: float) -> Sent | None:
+        """Answers a wrench.
+
+        Args:
+            given: as it came.
+            now_s: now, by a clock that is never set [s].
+            clock_s: now, by the clock of stamps [s].
+
+        Returns:
+            What to send; None where the wrench is refused or left unanswered.
+        """
+        if self.state == "inactive":
+            return None
+        start = time.perf_counter()
+        try:
+            target = target_of(given, clock_s, self.parameters, self._frames)
+            _, self._stream.robot = self.ticks.spend(now_s)
+            answer = self._stream.answer(
+                target.wrench,
+                lost=self.parameters.lost,
+                free=target.free,
+                policy=self.parameters.policy,
+                damage=self.damage,
+            )
+        except REFUSED as error:
+            self.refuse(str(error))
+            return None
+        except Exception as error:  # the node goes on, whatever is wrong
+            return self.fail(unanswered(error), now_s)
+        self.times_s.append(time.perf_counter() - start)
+        self.answers += 1
+        self.is_refused = False
+        self.state = "answering"
+        self._good_at_s = now_s
+        return self._sent(answer, answer.command, now_s)
+
+    def refuse(self, sentence: str) -> None:
+        """Notes a message that is not answered.
+
+        Args:
+            sentence: why.
+        """
+        self.refusals += 1
+        self.last_refusal = sentence
+        self.is_refused = True
+
+    def fail(self, sentence: str, now_s: float) -> Sent | None:
+        """Begins the way to neutral after an error.
+
+        Args:
+            sentence: the error.
+            now_s: now [s].
+
+        Returns:
+            What to send.
+        """
+        self.failure = sentence
+        if self.state != "inactive":
+            self.state = "failed"
+        return self.on_time(now_s)
+
+    def on_time(self, now_s: float) -> Sent | None:
+        """Keeps the watchdog, and the robot at neutral where it does not answer; to be called a few
+        times in `watchdog_s`, and once in `period_s`.
+
+        Args:
+            now_s: now, by a clock that is never set [s].
+
+        Returns:
+            What to send; None where nothing is due.
+        """
+        if self.state == "answering":
+            if now_s - self._good_at_s <= self.parameters.watchdog_s:
+                return None
+            self.state = "silent"
+        neutral = self._stream.neutral()
+        last = self._stream.command
+        is_there = last is not None and np.array_equal(last, neutral, equal_nan=True)
+        if is_there and 0.0 <= now_s - self._sent_at_s < self.parameters.watchdog_s:
+            return None
+        length_s, _ = self.ticks.spend(now_s)
+        command = self.ticks.towards(neutral, last, length_s)
+        return self._sent(command, command, now_s)
+
+    def stop(self) -> Sent:
+        """Returns the last commands of all: neutral at once."""
+        self.state = "inactive"
+        neutral = self._stream.neutral()
+        return self._sent(neutral, neutral, self._sent_at_s)
+
+    def _sent(self, noted: Allocation | Array, command: Array, now_s: float) -> Sent:
+        """Takes down what is sent now."""
+        self._stream.note(noted, self.parameters.lost)
+        self._sent_at_s = now_s
+        return Sent(command, noted if isinstance(noted, Allocation) else None)
+
+    def _prepared(self, robot: DeployedRobot, parameters: Parameters) -> Ticks:
+        """A robot prepared for its ticks. Raises FinlabError: it does not fit the parameters."""
+        ticks = Ticks(robot, parameters.period_s, parameters.calm)
+        self._check(ticks.whole, parameters)
+        return ticks
+
+    def _check(self, robot: DeployedRobot, parameters: Parameters) -> None:
+        """Refuses parameters that name what a robot has not, by a first question; what is prepared
+        at a first question, such as tables, then waits for none later."""
+        all_lost = {*robot.lost, *parameters.lost}
+        if all_lost >= set(robot.layout.names):
+            raise CommandError(
+                f"lost: names each actuator of {robot.layout.name:.60}, expected one that works"
+            )
+        robot.allocate(
+            np.zeros(6),
+            lost=parameters.lost,
+            free=parameters.free,
+            policy=parameters.policy,
+            previous=robot.neutral(parameters.lost),
+        )

@@ -1,0 +1,96 @@
+"""The checks of a wrench before it is answered: its age, its frame, and what is NaN."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from finlab.arrays import Array
+from finlab.axes import AXES
+from finlab.errors import CommandError
+from finlab_allocator.frames import StaticFrames
+from finlab_allocator.parameters import Parameters
+
+NO_STAMP = 0.0
+"""Time of a message that has no stamp [s]."""
+
+
+class WrenchInput(NamedTuple):
+    """A wrench as it came."""
+
+    wrench: Array
+    """Fx, Fy, Fz, Tx, Ty, Tz (6,) [N, N m]."""
+    frame: str
+    """Frame of force and torque; empty for that of the robot."""
+    stamp_s: float
+    """When it was made, by the clock of ROS [s]; `NO_STAMP` where it does not say."""
+
+
+class Target(NamedTuple):
+    """A wrench to answer."""
+
+    wrench: Array
+    """(6,) [N, N m] in the frame of the robot, 0 along axes that were NaN."""
+    free: tuple[str, ...]
+    """Axes that may take any wrench."""
+
+
+def target_of(
+    given: WrenchInput, now_s: float, parameters: Parameters, frames: StaticFrames
+) -> Target:
+    """Returns the target that a wrench asks for.
+
+    Args:
+        given: the wrench.
+        now_s: now, by the clock of ROS [s].
+        parameters: of the node.
+        frames: static transforms that are known.
+
+    Raises:
+        CommandError: it is stale, of an unknown frame, or holds NaN or infinity.
+    """
+    _check_age(given.stamp_s, now_s, parameters.watchdog_s)
+    wrench = given.wrench
+    for axis, value in zip(AXES, wrench.tolist(), strict=True):
+        if math.isinf(value):
+            raise CommandError(f"wrench: {axis} is infinite, expected a number in N or N m")
+    is_nan = np.isnan(wrench)
+    if is_nan.any():
+        return _freed(given, is_nan, parameters)
+    if given.frame not in ("", parameters.frame):
+        wrench = frames.wrench_in(parameters.frame, given.frame, wrench)
+    return Target(wrench, parameters.free)
+
+
+def _check_age(stamp_s: float, now_s: float, most_s: float) -> None:
+    """Refuses a stamp that is too old, or lies ahead of the clock as far."""
+    if stamp_s == NO_STAMP:
+        return
+    age_s = now_s - stamp_s
+    if age_s > most_s:
+        raise CommandError(
+            f"wrench: its stamp is {age_s:.3g} s old, expected at most watchdog_s = {most_s:g} s; "
+            "send newer ones, or set the clocks of both computers"
+        )
+    if age_s < -most_s:
+        raise CommandError(
+            f"wrench: its stamp lies {-age_s:.3g} s ahead of this computer's clock, expected at "
+            f"most watchdog_s = {most_s:g} s; set the clocks of both computers"
+        )
+
+
+def _freed(given: WrenchInput, is_nan: Array, parameters: Parameters) -> Target:
+    """The target of a wrench of which some components are NaN."""
+    names = tuple(axis for axis, flag in zip(AXES, is_nan, strict=True) if flag)
+    if parameters.nan == "refuse":
+        raise CommandError(
+            f"wrench: {', '.join(names)} is NaN, expected numbers; with nan := free such an axis "
+            "may take any wrench"
+        )
+    if given.frame not in ("", parameters.frame):
+        raise CommandError(
+            f"wrench: {', '.join(names)} is NaN in frame {given.frame!r:.60}, and an axis can be "
+            f"free in {parameters.frame!r:.60} alone; send it in that frame"
+        )
+    free = tuple(axis for axis in AXES if axis in parameters.free or axis in names)
+    return Target(np.where(is_nan, 0.0, given.wrench), free)
