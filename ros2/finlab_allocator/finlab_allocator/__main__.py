@@ -48,11 +48,11 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _run(signals: list[signal.Signals]) -> int:
-    """Runs the node until one of some signals. Raises FinlabError: it cannot begin."""
+    """Runs the node until one of some signals. Raises FinlabError: a parameter is not acceptable."""
     node = AllocatorNode()
     if node.settings.autostart:
         if node.trigger_configure() != TransitionCallbackReturn.SUCCESS:
-            raise FinlabError(node.problem)
+            return EXIT_ERROR  # the node has said why
         node.trigger_activate()
     executor = SingleThreadedExecutor()
     executor.add_node(node)

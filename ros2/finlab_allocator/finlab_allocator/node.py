@@ -144,8 +144,6 @@ class AllocatorNode(LifecycleNode):
         super().__init__(NODE_NAME, **options)
         self.commander: Commander | None = None
         """What commands the robot; None while unconfigured."""
-        self.problem = ""
-        """Why the node could not be configured, in a sentence."""
         self._robot_topics: RobotTopics | None = None
         self._watchdog: Any = None
         self._authority_of: object = None
@@ -195,10 +193,12 @@ class AllocatorNode(LifecycleNode):
         try:
             self.commander = Commander(self.settings, self.frames)
         except FinlabError as error:
-            self.problem = str(error)
-            self.get_logger().error(self.problem)
+            self.get_logger().error(str(error))
             return TransitionCallbackReturn.FAILURE
         self._robot_topics = RobotTopics(self, self.commander)
+        layout = self.commander.layout
+        method = self.commander.robot.allocator.method
+        self.get_logger().info(f"{layout.name}: {layout.counts_in_words}, method {method}")
         self._start_watchdog()
         self._guarded(self._keep_time)
         return TransitionCallbackReturn.SUCCESS
