@@ -11,15 +11,15 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-PATH = re.compile(r"(?<![\w/.-])(?:finlab|tests|webapp|tools)/[\w./*\[\]-]*\.(?:py|c|h)\b")
+PATH = re.compile(r"(?<![\w/.-])(?:finlab|tests|webapp|tools|ros2)/[\w./*\[\]-]*\.(?:py|c|h)\b")
 """A path from the top of the tree, or a pattern of paths: `*` stands for a part of a name."""
 SHORT_PATH = re.compile(r"`((?:[\w.-]+/)*[\w-]+\.(?:py|c|h))`")
 """A file on a page, by its name alone or with some of its folders."""
-FOLDER = re.compile(r"`((?:finlab|tests|webapp|tools|docs)(?:/\w+)*)(?:/|/\*\.py)?`")
+FOLDER = re.compile(r"`((?:finlab|tests|webapp|tools|docs|ros2)(?:/\w+)*)(?:/|/\*\.py)?`")
 """A folder on a page, or all Python files in it, from the top of the tree."""
 NOT_OF_THE_TREE = {"math.h", "robot.c", "robot.h", "water_jet.py"}
 """Files that pages name and that are no files of ours: C's own, exported ones, a reader's."""
-FOLDERS = ("finlab", "tests", "webapp", "tools", "examples", "docs")
+FOLDERS = ("finlab", "tests", "webapp", "tools", "examples", "docs", "ros2")
 """Folders whose comments and pages are read."""
 HISTORY = {"CHANGELOG.md"}
 """Pages that name what was there once."""

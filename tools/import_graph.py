@@ -19,8 +19,9 @@ from collections.abc import Iterable
 from functools import cache, cached_property
 from pathlib import Path
 
-ROOMS = ("finlab", "webapp", "tests")
-"""Folders whose Python files are in the graph."""
+ROOMS = {"finlab": "", "webapp": "", "tests": "", "ros2/finlab_allocator": "ros2/finlab_allocator"}
+"""Folders whose Python files are in the graph, each with the folder that the names of its modules
+begin in: of most the top of the tree."""
 CORE = "finlab/core/"
 """The folder of the C files."""
 LOADER = "finlab/core/__init__.py"
@@ -42,14 +43,15 @@ class ImportGraph:
             SyntaxError: a file is no Python.
         """
         self.root = root
-        paths = [path for room in ROOMS for path in sorted((root / room).rglob("*.py"))]
         self.trees: dict[str, ast.Module] = {}
         self.file_of: dict[str, str] = {}
-        for path in paths:
-            relative = path.relative_to(root)
-            module = ".".join(relative.with_suffix("").parts).removesuffix(".__init__")
-            self.file_of[module] = relative.as_posix()
-            self.trees[relative.as_posix()] = ast.parse(path.read_text(encoding="utf-8"))
+        for room, start in ROOMS.items():
+            for path in sorted((root / room).rglob("*.py")):
+                inside = path.relative_to(root / start).with_suffix("")
+                module = ".".join(inside.parts).removesuffix(".__init__")
+                file = path.relative_to(root).as_posix()
+                self.file_of[module] = file
+                self.trees[file] = ast.parse(path.read_text(encoding="utf-8"))
         core = sorted((root / CORE).rglob("*"))
         self.c_files = [
             path.relative_to(root).as_posix() for path in core if path.suffix in (".c", ".h")

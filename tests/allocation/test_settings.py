@@ -95,3 +95,20 @@ def test_impossible_settings_are_refused(method: str, wrong: dict[str, Any], mes
         AllocatorCache(method, **wrong)
     with pytest.raises(AllocationError, match=message):
         AllocatorCache(method).with_settings(**wrong)
+
+
+def test_other_settings_for_the_same_robot() -> None:
+    allocator = Allocator(load_layout("catamaran"), robust=0.5, calm=0.0)
+    quicker = allocator.with_settings(period_s=0.02)
+    assert quicker.layout is allocator.layout
+    assert vars(quicker.settings) == {**vars(allocator.settings), "period_s": 0.02}
+    before = allocator.allocate(np.zeros(6))
+    turned = quicker.allocate([0, 30, 0, 0, 0, 0], previous=before).command - before.command
+    step = 0.02 * allocator.layout.rates[:2, 0]
+    assert np.abs(turned[:2, 0]).max() <= step.max() * (1 + 1e-9)
+    with pytest.raises(AllocationError, match="period_s"):
+        allocator.with_settings(period_s=0.0)
+    with pytest.raises(AllocationError, match="knows the settings"):
+        allocator.with_settings(speed=1.0)
+    network = Allocator(load_layout("A"), "mdn")
+    assert network.with_settings(period_s=0.2).networks is network.networks

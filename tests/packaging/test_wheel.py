@@ -140,6 +140,7 @@ def test_asks_for_the_core_and_offers_extras(wheel: Path) -> None:
         "ipopt",
         "bench",
         "peers",
+        "ros",
         "xacro",
         "cluster",
         "logs",

@@ -48,7 +48,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _run(signals: list[signal.Signals]) -> int:
-    """Runs the node until one of some signals. Raises FinlabError: a parameter is not acceptable."""
+    """Runs the node until one of some signals. Raises FinlabError: a parameter is refused."""
     node = AllocatorNode()
     if node.settings.autostart:
         if node.trigger_configure() != TransitionCallbackReturn.SUCCESS:

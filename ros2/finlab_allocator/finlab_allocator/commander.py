@@ -17,8 +17,6 @@ neutral commands change within the drives' rates, too; `stop` alone, the last co
 neutral at once, since nothing could follow it.
 """
 
-import time
-from collections import deque
 from collections.abc import Mapping
 from typing import Any, Literal, NamedTuple
 
@@ -30,6 +28,7 @@ from finlab.deploy.command_stream import REFUSED, CommandStream, unanswered
 from finlab.deploy.deployed_robot import DeployedRobot
 from finlab.errors import CommandError
 from finlab.layout import Damage, Layout
+from finlab_allocator.answer_times import AnswerTimes
 from finlab_allocator.frames import StaticFrames
 from finlab_allocator.parameters import Parameters
 from finlab_allocator.robot_source import read_robot
@@ -38,8 +37,6 @@ from finlab_allocator.wrench_input import WrenchInput, target_of
 
 State = Literal["inactive", "waiting", "answering", "silent", "failed"]
 """See above."""
-TIMES_KEPT = 1000
-"""Answers whose times are kept."""
 
 
 class Sent(NamedTuple):
@@ -79,10 +76,8 @@ class Commander:
         """Why the last of them was, in a sentence; empty where none was."""
         self.is_refused = False
         """Whether the newest wrench was refused."""
-        self.answers = 0
-        """How many wrenches were answered."""
-        self.times_s: deque[float] = deque(maxlen=TIMES_KEPT)
-        """Times that the last answers took [s], sending not included."""
+        self.times = AnswerTimes()
+        """Times of answers, which whoever sends them takes down."""
         self._robot = read_robot(parameters.robot)
         self.ticks = self._prepared(self._robot, parameters)
         """The robot, prepared for ticks of several lengths."""
@@ -176,7 +171,6 @@ class Commander:
         """
         if self.state == "inactive":
             return None
-        start = time.perf_counter()
         try:
             target = target_of(given, clock_s, self.parameters, self._frames)
             _, self._stream.robot = self.ticks.spend(now_s)
@@ -192,8 +186,6 @@ class Commander:
             return None
         except Exception as error:  # the node goes on, whatever is wrong
             return self.fail(unanswered(error), now_s)
-        self.times_s.append(time.perf_counter() - start)
-        self.answers += 1
         self.is_refused = False
         self.state = "answering"
         self._good_at_s = now_s

@@ -13,7 +13,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from finlab.arrays import Array
 from finlab.layout import Layout
-from finlab_allocator.report import Report
+from finlab_allocator.status_report import Report
 from finlab_allocator.topics import number_names
 from finlab_allocator.wrench_input import NO_STAMP, WrenchInput
 

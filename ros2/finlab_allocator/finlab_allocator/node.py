@@ -33,7 +33,7 @@ from finlab_allocator import messages
 from finlab_allocator.commander import Commander, Sent
 from finlab_allocator.frames import StaticFrames
 from finlab_allocator.parameters import Parameters, descriptions
-from finlab_allocator.report import NO_POWER_BUDGET, AuthorityLeft, status_report
+from finlab_allocator.status_report import NO_POWER_BUDGET, AuthorityLeft, status_report
 from finlab_allocator.topics import NumberTopic, number_topics, values_to_send
 
 try:
@@ -253,9 +253,15 @@ class AllocatorNode(LifecycleNode):
         """Answers a wrench."""
         if self.commander is None:
             return
+        start_s = time.perf_counter()
+        processor_start_s = time.thread_time()
         clock_s = 1e-9 * self.get_clock().now().nanoseconds
         given = messages.wrench_input_of(message)
-        self._send(self.commander.on_wrench(given, self._now_s(), clock_s))
+        sent = self.commander.on_wrench(given, self._now_s(), clock_s)
+        self._send(sent)
+        if sent is not None and sent.answer is not None:
+            passed_s = time.perf_counter() - start_s
+            self.commander.times.add(passed_s, time.thread_time() - processor_start_s)
 
     def _on_frames(self, message: Any) -> None:
         """Takes static transforms."""

@@ -3,8 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from finlab.allocation.allocation import Allocation
 from finlab.analysis.authority import Authority, authority
 from finlab.axes import AXES, MOTIONS, UNITS
@@ -54,14 +52,15 @@ def status_report(commander: Commander, warnings: Sequence[str] = ()) -> Report:
     if answer is not None:
         values += _answer_values(answer)
     values += [
-        ("answers", str(commander.answers)),
         ("refusals", str(commander.refusals)),
         ("last refusal", commander.last_refusal),
+        ("answers", str(commander.times.count)),
     ]
-    if commander.times_s:
-        times_ms = 1e3 * np.array(commander.times_s)
-        values.append(("answer time p50 [ms]", f"{np.median(times_ms):.3f}"))
-        values.append(("answer time p99 [ms]", f"{np.quantile(times_ms, 0.99):.3f}"))
+    if commander.times.count:
+        for percent in (50, 99):
+            passed_ms, processor_ms = commander.times.quantiles_ms(percent / 100.0)
+            values.append((f"answer time p{percent} [ms]", f"{passed_ms:.3f}"))
+            values.append((f"processor time p{percent} [ms]", f"{processor_ms:.3f}"))
     if parameters.power_w is not None:
         warnings = (*warnings, NO_POWER_BUDGET)
     if warnings:
