@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from finlab_allocator.commander import Commander, Sent
 from finlab_allocator.frames import StaticFrames
+from finlab_allocator.input_checks import NO_STAMP, StampedInput
 from finlab_allocator.parameters import Parameters
 from finlab_allocator.status_report import ERROR, OK, WARN, AuthorityLeft, Report, status_report
 from finlab_allocator.ticks import ACCOUNT_PERIODS
-from finlab_allocator.wrench_input import NO_STAMP, WrenchInput
 
 import finlab
 from finlab.axes import AXES
@@ -41,7 +41,7 @@ class Robot:
     def ask(self, wrench: Any, **given: Any) -> Sent | None:
         """Sends a wrench now."""
         frame, stamp = given.get("frame", "base_link"), given.get("stamp", NO_STAMP)
-        asked = WrenchInput(np.array(wrench, float), frame, stamp)
+        asked = StampedInput(np.array(wrench, float), frame, stamp)
         return self._note(self.commander.on_wrench(asked, self.now, self.now))
 
     def wait(self, seconds: float, step: float = 0.05) -> list[Sent]:
@@ -259,6 +259,35 @@ def test_what_a_monitor_has_found_is_asked_with() -> None:
     np.testing.assert_allclose(sent.command, expected, atol=1e-9)
     left = AuthorityLeft.of(heavy.commander.layout, heavy.commander)
     assert left.largest[0] < left.whole.largest[0]
+
+
+def test_rudders_push_while_a_velocity_is_known() -> None:
+    torpedo = Robot("torpedo")
+    wrench = [10.0, 0, 0, 0, 2.0, 0]
+    velocity = np.array([1.5, 0, 0, 0, 0, 0])
+    at_rest = torpedo.ask(wrench)
+    torpedo.commander.on_velocity(
+        StampedInput(velocity, "base_link", NO_STAMP), torpedo.now, torpedo.now
+    )
+    torpedo.now += 1.0
+    torpedo.commander.on_velocity(
+        StampedInput(velocity, "base_link", NO_STAMP), torpedo.now, torpedo.now
+    )
+    torpedo.wait(0.1)
+    swimming = torpedo.ask(wrench)
+    assert at_rest is not None and swimming is not None
+    assert at_rest.answer is not None and swimming.answer is not None
+    assert swimming.answer.flow is not None and at_rest.answer.flow is None
+    assert swimming.answer.err_norm < 0.9 * at_rest.answer.err_norm
+    torpedo.now += 0.6
+    late = torpedo.ask(wrench)
+    assert late is not None and late.answer is not None and late.answer.flow is None
+    bad = StampedInput(np.full(6, math.nan), "base_link", NO_STAMP)
+    torpedo.commander.on_velocity(bad, torpedo.now, torpedo.now)
+    assert "flow: each component must be finite" in torpedo.values["last refusal"]
+    heavy = Robot("bluerov2_heavy")
+    heavy.commander.on_velocity(bad, heavy.now, heavy.now)
+    assert not heavy.values["last refusal"], "a robot without rudders does not read it"
 
 
 @pytest.mark.parametrize(

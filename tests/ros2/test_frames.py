@@ -49,12 +49,26 @@ def test_a_wrench_does_the_same_work_in_each_frame() -> None:
         moved = frames.wrench_in("base_link", "tip", wrench)
         velocity, rates = rng.normal(size=(2, 3))  # of the hull's origin, in the hull
         work = []
+        twists = []
         for frame, each in (("tip", wrench), ("base_link", moved)):
             turn, place = poses[frame]
             local_velocity = turn.inv().apply(velocity + np.cross(rates, place))
-            local_rates = turn.inv().apply(rates)
-            work.append(each[:3] @ local_velocity + each[3:] @ local_rates)
+            twist = np.concatenate([local_velocity, turn.inv().apply(rates)])
+            twists.append(twist)
+            work.append(each @ twist)
         assert work[0] == pytest.approx(work[1], abs=1e-10)
+        np.testing.assert_allclose(
+            frames.twist_in("base_link", "tip", twists[0]), twists[1], atol=1e-10
+        )
+
+
+def test_the_velocity_of_a_mast_is_that_of_the_base_and_a_lever() -> None:
+    frames = StaticFrames()
+    frames.add("base_link", "dvl", (0.0, 0.0, -2.0), (0.0, 0.0, HALF, HALF))
+    # At the DVL, which looks to the left: 1 m/s along its x, while the robot pitches by 0.5 rad/s
+    # about y, which is the DVL's x: the lever of 2 m adds nothing along y, and 1 m/s along x.
+    moved = frames.twist_in("base_link", "dvl", np.array([1.0, 0, 0, 0.5, 0, 0]))
+    np.testing.assert_allclose(moved, [1.0, 1.0, 0, 0, 0.5, 0], atol=1e-12)
 
 
 def test_the_base_may_be_the_child_or_stand_apart() -> None:

@@ -310,14 +310,23 @@ def test_a_bundle_its_end_and_a_start_in_three_seconds(ros: None, tmp_path: Path
     """In a namespace, beside the other node: a bundle is answered from, may go while the node runs,
     and a node that is to begin without it says so."""
     folder = tmp_path / "robot"
-    make_bundle(finlab.Allocator(finlab.load_layout("bluerov2"))).write(folder)
+    layout = finlab.load_layout("bluerov2")  # whose thrusters have a table
+    make_bundle(finlab.Allocator(layout)).write(folder)
     own = Listener("auv")
     start = time.monotonic()
     first = NodeProcess(f"robot:={folder}", namespace="auv")
     try:
         own.until_answered()
         seconds = time.monotonic() - start
+        lost = layout.names[0]
+        assert own.set(lost=[lost])[0]
         own.ask([10, 0, 0, 0, 0, 0])
+        own.spin(0.1)
+        expected = finlab.Allocator(layout).allocate([10, 0, 0, 0, 0, 0], lost=[lost]).commands
+        inputs = dict(zip(own.pwm[-1].name, own.pwm[-1].position, strict=True))
+        assert set(inputs) == set(layout.names) and inputs.pop(lost) == pytest.approx(1500, abs=20)
+        for name, value in inputs.items():
+            assert value == pytest.approx(expected[name].input, abs=1e-6)
         for file in sorted(folder.rglob("*"), reverse=True):
             file.unlink() if file.is_file() else file.rmdir()
         folder.rmdir()

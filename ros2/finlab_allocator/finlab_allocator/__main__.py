@@ -49,15 +49,15 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _run(signals: list[signal.Signals]) -> int:
     """Runs the node until one of some signals. Raises FinlabError: a parameter is refused."""
+    executor = SingleThreadedExecutor()
+    stopped: Future = Future(executor=executor)
+    Thread(target=_wait, args=(signals, stopped), daemon=True).start()
     node = AllocatorNode()
     if node.settings.autostart:
         if node.trigger_configure() != TransitionCallbackReturn.SUCCESS:
             return EXIT_ERROR  # the node has said why
         node.trigger_activate()
-    executor = SingleThreadedExecutor()
     executor.add_node(node)
-    stopped: Future = Future(executor=executor)
-    Thread(target=_wait, args=(signals, stopped), daemon=True).start()
     # What is here now stays: the garbage collector need not walk through it at a wrench.
     gc.collect()
     gc.freeze()

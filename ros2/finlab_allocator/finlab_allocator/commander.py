@@ -17,6 +17,7 @@ neutral commands change within the drives' rates, too; `stop` alone, the last co
 neutral at once, since nothing could follow it.
 """
 
+import math
 from collections.abc import Mapping
 from typing import Any, Literal, NamedTuple
 
@@ -30,10 +31,10 @@ from finlab.errors import CommandError
 from finlab.layout import Damage, Layout
 from finlab_allocator.answer_times import AnswerTimes
 from finlab_allocator.frames import StaticFrames
+from finlab_allocator.input_checks import StampedInput, target_of, velocity_of
 from finlab_allocator.parameters import Parameters
 from finlab_allocator.robot_source import read_robot
 from finlab_allocator.ticks import Ticks
-from finlab_allocator.wrench_input import WrenchInput, target_of
 
 State = Literal["inactive", "waiting", "answering", "silent", "failed"]
 """See above."""
@@ -83,6 +84,8 @@ class Commander:
         """The robot, prepared for ticks of several lengths."""
         self._stream = CommandStream(self.ticks.whole)
         self._stream.lost = parameters.lost
+        self._flow: Array | None = None
+        self._flow_at_s = -math.inf
         self._good_at_s = 0.0  # when the last wrench came that was answered
         self._sent_at_s = 0.0
 
@@ -146,6 +149,7 @@ class Commander:
             self._stream = CommandStream(ticks.whole)
             self._stream.lost = parameters.lost
             self.damage = None
+            self._flow_at_s = -math.inf
             if self.state != "inactive":
                 self.state = "waiting"
         return rest_before if is_other else None
@@ -158,7 +162,35 @@ class Commander:
         """Leaves wrenches unanswered from now on; the next ticks lead to neutral."""
         self.state = "inactive"
 
-    def on_wrench(self, given: WrenchInput, now_s: float, clock_s: float) -> Sent | None:
+    @property
+    def reads_velocity(self) -> bool:
+        """Whether the robot's forces depend on its velocity through the water."""
+        return bool(self.layout.flow_driven) or self.layout.interaction is not None
+
+    def on_velocity(self, given: StampedInput, now_s: float, clock_s: float) -> None:
+        """Takes the velocity of the robot relative to the water.
+
+        Args:
+            given: as it came.
+            now_s: now, by a clock that is never set [s].
+            clock_s: now, by the clock of stamps [s].
+        """
+        if not self.reads_velocity:
+            return
+        try:
+            self._flow = velocity_of(given, clock_s, self.parameters, self._frames)
+        except CommandError as error:
+            self.refuse(str(error))
+            return
+        self._flow_at_s = now_s
+
+    def _flow_of(self, now_s: float) -> Array | None:
+        """The velocity (6,) relative to the water [m/s, rad/s]; None at rest, and where the last
+        one is older than `watchdog_s`."""
+        is_new = 0.0 <= now_s - self._flow_at_s <= self.parameters.watchdog_s
+        return self._flow if is_new else None
+
+    def on_wrench(self, given: StampedInput, now_s: float, clock_s: float) -> Sent | None:
         """Answers a wrench.
 
         Args:
@@ -180,6 +212,7 @@ class Commander:
                 free=target.free,
                 policy=self.parameters.policy,
                 damage=self.damage,
+                flow=self._flow_of(now_s),
             )
         except REFUSED as error:
             self.refuse(str(error))

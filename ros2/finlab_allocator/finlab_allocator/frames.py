@@ -96,6 +96,24 @@ class StaticFrames:
         torque = rotation @ wrench[3:] + np.cross(origin, force)
         return np.concatenate([force, torque])
 
+    def twist_in(self, base: str, frame: str, twist: Array) -> Array:
+        """Returns the velocity of the robot, a rigid body, at the origin of its own frame.
+
+        With `R` and `t` as for a wrench, `w' = R w` and `v' = R v + t x w'`.
+
+        Args:
+            base: the robot's frame.
+            frame: the frame of the velocity, that of its origin.
+            twist: linear and angular velocity (6,) [m/s, rad/s].
+
+        Raises:
+            CommandError: as for `wrench_in`.
+        """
+        linear, angular = twist[:3], twist[3:]
+        # What a force is to its torque, the rates are to the velocity.
+        moved = self.wrench_in(base, frame, np.concatenate([angular, linear]))
+        return np.concatenate([moved[3:], moved[:3]])
+
     def _pose_in_root(self, frame: str) -> tuple[Transform, str]:
         """The pose of a frame in the outermost frame of its tree, and that one's name."""
         rotation = np.eye(3)

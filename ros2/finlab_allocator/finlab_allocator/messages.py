@@ -6,16 +6,16 @@ from collections.abc import Sequence
 import numpy as np
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from geometry_msgs.msg import Point, WrenchStamped
+from geometry_msgs.msg import Point, TwistStamped, Vector3, WrenchStamped
 from sensor_msgs.msg import JointState
-from std_msgs.msg import ColorRGBA
+from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
 from finlab.arrays import Array
 from finlab.layout import Layout
+from finlab_allocator.input_checks import NO_STAMP, StampedInput
 from finlab_allocator.status_report import Report
 from finlab_allocator.topics import number_names
-from finlab_allocator.wrench_input import NO_STAMP, WrenchInput
 
 ARROW_SHARE = 0.6
 """Length of the arrow of the largest force, over the size of the robot."""
@@ -25,13 +25,21 @@ LEAST_ARROW = 1e-3
 """Share of the largest force below which no arrow is drawn."""
 
 
-def wrench_input_of(message: WrenchStamped) -> WrenchInput:
+def wrench_of(message: WrenchStamped) -> StampedInput:
     """Returns a wrench as the node takes it."""
-    force, torque = message.wrench.force, message.wrench.torque
-    wrench = np.array([force.x, force.y, force.z, torque.x, torque.y, torque.z])
-    stamp = message.header.stamp
-    stamp_s = stamp.sec + 1e-9 * stamp.nanosec
-    return WrenchInput(wrench, message.header.frame_id, stamp_s if stamp_s else NO_STAMP)
+    return _stamped(message.header, message.wrench.force, message.wrench.torque)
+
+
+def velocity_of(message: TwistStamped) -> StampedInput:
+    """Returns a velocity as the node takes it."""
+    return _stamped(message.header, message.twist.linear, message.twist.angular)
+
+
+def _stamped(header: Header, first: Vector3, second: Vector3) -> StampedInput:
+    """Six numbers with their frame and stamp."""
+    numbers = np.array([first.x, first.y, first.z, second.x, second.y, second.z])
+    stamp_s = header.stamp.sec + 1e-9 * header.stamp.nanosec
+    return StampedInput(numbers, header.frame_id, stamp_s if stamp_s else NO_STAMP)
 
 
 def wrench_stamped(wrench: Sequence[float], frame: str, stamp: Time) -> WrenchStamped:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import WrenchStamped
+from geometry_msgs.msg import TwistStamped, WrenchStamped
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
@@ -162,6 +162,7 @@ class AllocatorNode(LifecycleNode):
             NEWEST,
             qos_overriding_options=QoSOverridingOptions.with_default_policies(),
         )
+        self.create_subscription(TwistStamped, "velocity", self._on_velocity, NEWEST)
         self._status = self.create_publisher(DiagnosticArray, "status", 10)
         self._markers = self.create_publisher(MarkerArray, "markers", 1)
         self._authority = self.create_publisher(DiagnosticArray, "authority", LATCHED)
@@ -249,15 +250,20 @@ class AllocatorNode(LifecycleNode):
     def _on_wrench(self, message: WrenchStamped) -> None:
         self._guarded(partial(self._answer, message))
 
+    def _on_velocity(self, message: TwistStamped) -> None:
+        if self.commander is None:
+            return
+        given = messages.velocity_of(message)
+        self._guarded(partial(self.commander.on_velocity, given, self._now_s(), self._clock_s()))
+
     def _answer(self, message: WrenchStamped) -> None:
         """Answers a wrench."""
         if self.commander is None:
             return
         start_s = time.perf_counter()
         processor_start_s = time.thread_time()
-        clock_s = 1e-9 * self.get_clock().now().nanoseconds
-        given = messages.wrench_input_of(message)
-        sent = self.commander.on_wrench(given, self._now_s(), clock_s)
+        given = messages.wrench_of(message)
+        sent = self.commander.on_wrench(given, self._now_s(), self._clock_s())
         self._send(sent)
         if sent is not None and sent.answer is not None:
             passed_s = time.perf_counter() - start_s
@@ -350,21 +356,27 @@ class AllocatorNode(LifecycleNode):
 
     def _warnings(self, topics: RobotTopics) -> list[str]:
         """Sentences about what is around the node."""
+        warnings = []
         others = self.count_publishers(topics.command.topic_name) - 1
-        if others < 1:
-            return []
-        return [
-            f"{others} more publish {topics.command.topic_name}, too; stop them, or start each "
-            "node in a namespace of its own"
-        ]
+        if others > 0:
+            warnings.append(
+                f"{others} more publish {topics.command.topic_name}, too; stop them, or start each "
+                "node in a namespace of its own"
+            )
+        wrench = self._wrenches.topic_name
+        if not self.count_publishers(wrench):
+            warnings.append(f"nobody publishes {wrench}")
+        return warnings
 
     # What both need.
 
     def _now_s(self) -> float:
         """Now [s]: by a clock that is never set, or by that of the simulation."""
-        if self._is_simulated:
-            return 1e-9 * float(self.get_clock().now().nanoseconds)
-        return time.monotonic()
+        return self._clock_s() if self._is_simulated else time.monotonic()
+
+    def _clock_s(self) -> float:
+        """Now, by the clock of stamps [s]."""
+        return 1e-9 * float(self.get_clock().now().nanoseconds)
 
     def _start_watchdog(self) -> None:
         """Starts the timer that looks for silence, anew where its period has changed."""

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from finlab_allocator.frames import StaticFrames
+from finlab_allocator.input_checks import NO_STAMP, StampedInput, Target, target_of, velocity_of
 from finlab_allocator.parameters import Parameters
-from finlab_allocator.wrench_input import NO_STAMP, Target, WrenchInput, target_of
 
 from finlab.errors import CommandError
 
@@ -24,7 +24,7 @@ def asked(
     """The target of a wrench that is looked at now."""
     frames = StaticFrames()
     frames.add("base_link", "mast", (0.0, 0.0, 2.0), (0.0, 0.0, 0.0, 1.0))
-    return target_of(WrenchInput(np.array(wrench), frame, stamp), NOW, parameters, frames)
+    return target_of(StampedInput(np.array(wrench), frame, stamp), NOW, parameters, frames)
 
 
 @pytest.mark.parametrize("frame", ["base_link", ""])
@@ -70,3 +70,21 @@ def test_nan_is_refused_or_frees_its_axis() -> None:
 def test_infinity_is_refused(value: float, nan: str) -> None:
     with pytest.raises(CommandError, match="wrench: Tz is infinite"):
         asked([math.nan, 0, 0, 0, 0, value], parameters=replace(PARAMETERS, nan=nan))
+
+
+def test_a_velocity_is_checked_too() -> None:
+    frames = StaticFrames()
+    frames.add("base_link", "mast", (0.0, 0.0, 2.0), (0.0, 0.0, 0.0, 1.0))
+
+    def taken(numbers: list[float], frame: str = "", stamp: float = NOW) -> np.ndarray | None:
+        return velocity_of(StampedInput(np.array(numbers), frame, stamp), NOW, PARAMETERS, frames)
+
+    np.testing.assert_array_equal(taken([1, 0, 0, 0, 0, 0.1]), [1, 0, 0, 0, 0, 0.1])
+    np.testing.assert_allclose(taken([1, 0, 0, 0, 0.1, 0], "mast"), [0.8, 0, 0, 0, 0.1, 0])
+    assert taken([0.0] * 6) is None
+    with pytest.raises(CommandError, match="flow: each component must be finite"):
+        taken([math.nan, 0, 0, 0, 0, 0])
+    with pytest.raises(CommandError, match="velocity: its stamp is 2 s old"):
+        taken([1, 0, 0, 0, 0, 0], stamp=NOW - 2.0)
+    with pytest.raises(CommandError, match="frame 'map'"):
+        taken([1, 0, 0, 0, 0, 0], "map")

@@ -1,10 +1,12 @@
-"""The checks of a wrench before it is answered: its age, its frame, and what is NaN."""
+"""The checks of a wrench before it is answered, and of a velocity before it is used: their age,
+their frame, and what is NaN."""
 
 import math
 from typing import NamedTuple
 
 import numpy as np
 
+from finlab.allocation.question import check_flow
 from finlab.arrays import Array
 from finlab.axes import AXES
 from finlab.errors import CommandError
@@ -15,13 +17,13 @@ NO_STAMP = 0.0
 """Time of a message that has no stamp [s]."""
 
 
-class WrenchInput(NamedTuple):
-    """A wrench as it came."""
+class StampedInput(NamedTuple):
+    """A wrench, or a velocity, as it came."""
 
-    wrench: Array
-    """Fx, Fy, Fz, Tx, Ty, Tz (6,) [N, N m]."""
+    numbers: Array
+    """Fx, Fy, Fz, Tx, Ty, Tz (6,) [N, N m]; of a velocity VX, VY, VZ, WX, WY, WZ [m/s, rad/s]."""
     frame: str
-    """Frame of force and torque; empty for that of the robot."""
+    """Its frame; empty for that of the robot."""
     stamp_s: float
     """When it was made, by the clock of ROS [s]; `NO_STAMP` where it does not say."""
 
@@ -36,7 +38,7 @@ class Target(NamedTuple):
 
 
 def target_of(
-    given: WrenchInput, now_s: float, parameters: Parameters, frames: StaticFrames
+    given: StampedInput, now_s: float, parameters: Parameters, frames: StaticFrames
 ) -> Target:
     """Returns the target that a wrench asks for.
 
@@ -49,8 +51,8 @@ def target_of(
     Raises:
         CommandError: it is stale, of an unknown frame, or holds NaN or infinity.
     """
-    _check_age(given.stamp_s, now_s, parameters.watchdog_s)
-    wrench = given.wrench
+    _check_age("wrench", given.stamp_s, now_s, parameters.watchdog_s)
+    wrench = given.numbers
     for axis, value in zip(AXES, wrench.tolist(), strict=True):
         if math.isinf(value):
             raise CommandError(f"wrench: {axis} is infinite, expected a number in N or N m")
@@ -62,24 +64,44 @@ def target_of(
     return Target(wrench, parameters.free)
 
 
-def _check_age(stamp_s: float, now_s: float, most_s: float) -> None:
+def velocity_of(
+    given: StampedInput, now_s: float, parameters: Parameters, frames: StaticFrames
+) -> Array | None:
+    """Returns a velocity (6,) of the robot [m/s, rad/s] in its own frame; None of one at rest.
+
+    Args:
+        given: the velocity.
+        now_s: now, by the clock of ROS [s].
+        parameters: of the node.
+        frames: static transforms that are known.
+
+    Raises:
+        CommandError: it is stale, of an unknown frame, or holds NaN or infinity.
+    """
+    _check_age("velocity", given.stamp_s, now_s, parameters.watchdog_s)
+    if given.frame in ("", parameters.frame):
+        return check_flow(given.numbers)
+    return check_flow(frames.twist_in(parameters.frame, given.frame, given.numbers))
+
+
+def _check_age(what: str, stamp_s: float, now_s: float, most_s: float) -> None:
     """Refuses a stamp that is too old, or lies ahead of the clock as far."""
     if stamp_s == NO_STAMP:
         return
     age_s = now_s - stamp_s
     if age_s > most_s:
         raise CommandError(
-            f"wrench: its stamp is {age_s:.3g} s old, expected at most watchdog_s = {most_s:g} s; "
+            f"{what}: its stamp is {age_s:.3g} s old, expected at most watchdog_s = {most_s:g} s; "
             "send newer ones, or set the clocks of both computers"
         )
     if age_s < -most_s:
         raise CommandError(
-            f"wrench: its stamp lies {-age_s:.3g} s ahead of this computer's clock, expected at "
+            f"{what}: its stamp lies {-age_s:.3g} s ahead of this computer's clock, expected at "
             f"most watchdog_s = {most_s:g} s; set the clocks of both computers"
         )
 
 
-def _freed(given: WrenchInput, is_nan: Array, parameters: Parameters) -> Target:
+def _freed(given: StampedInput, is_nan: Array, parameters: Parameters) -> Target:
     """The target of a wrench of which some components are NaN."""
     names = tuple(axis for axis, flag in zip(AXES, is_nan, strict=True) if flag)
     if parameters.nan == "refuse":
@@ -93,4 +115,4 @@ def _freed(given: WrenchInput, is_nan: Array, parameters: Parameters) -> Target:
             f"free in {parameters.frame!r:.60} alone; send it in that frame"
         )
     free = tuple(axis for axis in AXES if axis in parameters.free or axis in names)
-    return Target(np.where(is_nan, 0.0, given.wrench), free)
+    return Target(np.where(is_nan, 0.0, given.numbers), free)
