@@ -4,17 +4,16 @@ import gc
 import os
 import signal
 import sys
-from threading import Thread
+from threading import Event, Thread
 
 # Before numpy is loaded: every product here is too small to be shared among cores.
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
 import rclpy  # noqa: E402
-from rclpy.executors import SingleThreadedExecutor  # noqa: E402
+from rclpy.executors import Executor, SingleThreadedExecutor  # noqa: E402
 from rclpy.lifecycle import TransitionCallbackReturn  # noqa: E402
 from rclpy.signals import SignalHandlerOptions  # noqa: E402
-from rclpy.task import Future  # noqa: E402
 from rclpy.utilities import try_shutdown  # noqa: E402
 
 from finlab.errors import EXIT_ERROR, FinlabError  # noqa: E402
@@ -50,8 +49,8 @@ def main(arguments: list[str] | None = None) -> int:
 def _run(signals: list[signal.Signals]) -> int:
     """Runs the node until one of some signals. Raises FinlabError: a parameter is refused."""
     executor = SingleThreadedExecutor()
-    stopped: Future = Future(executor=executor)
-    Thread(target=_wait, args=(signals, stopped), daemon=True).start()
+    is_stopped = Event()
+    Thread(target=_wait, args=(signals, is_stopped, executor), daemon=True).start()
     node = AllocatorNode()
     if node.settings.autostart:
         if node.trigger_configure() != TransitionCallbackReturn.SUCCESS:
@@ -62,7 +61,8 @@ def _run(signals: list[signal.Signals]) -> int:
     gc.collect()
     gc.freeze()
     try:
-        executor.spin_until_future_complete(stopped)
+        while not is_stopped.is_set():  # a future to spin for would grow with each message
+            executor.spin_once()
     finally:
         node.stop()
         executor.remove_node(node)
@@ -70,10 +70,11 @@ def _run(signals: list[signal.Signals]) -> int:
     return 0
 
 
-def _wait(signals: list[signal.Signals], stopped: Future) -> None:
+def _wait(signals: list[signal.Signals], is_stopped: Event, executor: Executor) -> None:
     """Waits for the first signal; a second one ends the process at once."""
     signal.sigwait(signals)
-    stopped.set_result(None)
+    is_stopped.set()
+    executor.create_task(lambda: None)  # wakes it
     os._exit(128 + signal.sigwait(signals))
 
 

@@ -287,6 +287,12 @@ class AllocatorNode(LifecycleNode):
         """Changes parameters, or says why not."""
         own = descriptions()
         values = {each.name: each.value for each in parameters if each.name in own}
+        for name, value in values.items():
+            if value is None:  # ROS would forget that there is such a parameter
+                reason = (
+                    f"{name}: cannot be deleted; set it to another value, a list to one empty text"
+                )
+                return SetParametersResult(successful=False, reason=reason)
         try:
             if self.commander is None:
                 self.settings = self.settings.changed(values)

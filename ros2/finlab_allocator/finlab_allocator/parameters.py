@@ -2,7 +2,7 @@
 names of actuators, is checked where there is one (`commander.py`)."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
@@ -40,8 +40,12 @@ class Parameters:
     nan: str = _parameter(
         "refuse", "what becomes of a wrench with NaN: refuse it, or free the axes that are NaN"
     )
-    calm: float | None = _parameter(None, "what turning costs; the method's own where not set")
-    power_w: float | None = _parameter(None, "budget of power [W]; no limit where not set")
+    calm: float | None = _parameter(
+        None, "what turning costs; the method's own where not set, or NaN"
+    )
+    power_w: float | None = _parameter(
+        None, "budget of power [W]; no limit where not set, or infinite"
+    )
     autostart: bool = _parameter(
         True, "whether it configures and activates itself, without a lifecycle manager", True
     )
@@ -79,9 +83,9 @@ def _checked(name: str, value: Any) -> Any:
     if name in ("period_s", "watchdog_s"):
         return _number(name, value, SHORTEST_S, LONGEST_S, "s")
     if name == "calm":
-        return None if value is None else _number(name, value, 0.0, math.inf, "")
+        return None if _is_unset(value, math.isnan) else _number(name, value, 0.0, math.inf, "")
     if name == "power_w":
-        return None if value is None else _number(name, value, 0.0, math.inf, "W")
+        return None if _is_unset(value, math.isinf) else _number(name, value, 0.0, math.inf, "W")
     if name in ("lost", "free"):
         return _names(name, value)
     if name == "autostart":
@@ -90,6 +94,11 @@ def _checked(name: str, value: Any) -> Any:
         raise CommandError(f"autostart: expected true or false, got {value!r:.60}")
     known = ", ".join(each.name for each in fields(Parameters))
     raise CommandError(f"{name:.60}: no such parameter, expected one of {known}")
+
+
+def _is_unset(value: Any, is_unset_by: Callable[[float], bool]) -> bool:
+    """Whether there is no value, or the number that stands for none."""
+    return value is None or (isinstance(value, float) and is_unset_by(value))
 
 
 def _text(name: str, value: Any) -> str:
