@@ -105,6 +105,16 @@ def test_silence_leads_to_neutral_and_a_wrench_back() -> None:
     assert heavy.ask(PUSH) is not None and heavy.status.level == OK
 
 
+def test_a_clock_that_goes_back_leads_to_neutral() -> None:
+    heavy = Robot("bluerov2_heavy")
+    heavy.ask(PUSH)
+    heavy.now -= 500.0
+    sent = heavy.wait(0.05)
+    assert len(sent) == 1 and not sent[0].command.any()
+    assert len(heavy.wait(1.05)) == 2
+    assert heavy.ask(PUSH) is not None
+
+
 def test_refused_wrenches_keep_nobody_from_neutral() -> None:
     heavy = Robot("bluerov2_heavy")
     heavy.ask(PUSH)

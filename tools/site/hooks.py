@@ -150,10 +150,11 @@ def on_post_build(config: Any) -> None:
     site = Path(config.site_dir)
     index = site / "search" / "search_index.json"
     found = json.loads(index.read_text())
-    # Every page loads them: words alone, of the reference and of reports the first ones.
+    # Every page loads them: words alone, of the reference, reports and the table of numbers the
+    # first ones.
     for each in found["docs"]:
         words = " ".join(re.sub(r"<[^<>]*>", " ", each["text"]).split())
-        is_long = each["location"].startswith(("reference/", "report/"))
+        is_long = each["location"].startswith(("reference/", "report/", "theory/numbers/"))
         each["text"] = words[:300] if is_long else words
     index.write_text(json.dumps(found, separators=(",", ":")))
     first = (site / "index.html").read_text()

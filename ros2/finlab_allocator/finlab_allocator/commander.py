@@ -260,7 +260,8 @@ class Commander:
             What to send; None where nothing is due.
         """
         if self.state == "answering":
-            if now_s - self._good_at_s <= self.parameters.watchdog_s:
+            silence_s = now_s - self._good_at_s  # negative where a simulation's clock went back
+            if 0.0 <= silence_s <= self.parameters.watchdog_s:
                 return None
             self.state = "silent"
         neutral = self._stream.neutral()
