@@ -72,7 +72,9 @@ class DeployedRobot:
         """
         all_lost = (*self.lost, *(name for name in lost if name not in self.lost))
         answer = self.allocator.allocate(wrench, lost=all_lost, **options)
-        works = [name not in all_lost for name in self.layout.names]
+        damage = options.get("damage")
+        broken = all_lost if damage is None else (*all_lost, *damage.lost)
+        works = [name not in broken for name in self.layout.names]
         if not np.isfinite(answer.command[works]).all():
             raise DataError(
                 "the bundle answers with NaN; export it again, and run `finlab-runtime check` on it"

@@ -180,6 +180,15 @@ def test_answer_says_what_is_missing(robot: DeployedRobot) -> None:
         robot.allocate([0] * 6, lost=["nobody"])
 
 
+def test_what_is_lost_by_damage_is_no_broken_bundle(shipped_allocator: AllocatorCache) -> None:
+    robot = DeployedRobot(shipped_allocator.on(finlab.load_layout("A")))
+    wrench = [0.5, 0, 0.2, 0, 0, 0.05]
+    answer = robot.allocate(wrench, damage=finlab.Damage(lost=["back_left"]))
+    expected = robot.allocate(wrench, lost=["back_left"])
+    np.testing.assert_array_equal(answer.command, expected.command)
+    assert np.isnan(answer.command[robot.layout.index("back_left")]).all()
+
+
 def test_lost_fins_of_the_bundle_stay_lost(shipped_allocator: AllocatorCache) -> None:
     layout = finlab.load_layout("A")
     robot = parse_robot(make_bundle(shipped_allocator.on(layout), ("back_left",)).files)

@@ -278,6 +278,29 @@ def test_another_robot_under_way(
     assert listener.until(lambda: set(listener.ask(PUSH).name) == set(layout.names))
 
 
+def test_the_monitor_hears_the_imu(node: NodeProcess, listener: Listener) -> None:
+    from sensor_msgs.msg import Imu
+
+    assert listener.set(monitor=True)[0]
+    listener.next_status(lambda: "no sample of the IMU yet" in listener.words)
+    publisher = listener.node.create_publisher(Imu, "imu", 10)
+    sample = Imu()
+    sample.header.frame_id = "base_link"
+
+    def is_heard() -> bool:
+        publisher.publish(sample)
+        listener.ask([0] * 6, wait_s=0.05)
+        return "found" in listener.values and "sample of the IMU" not in listener.words
+
+    assert listener.until(is_heard)
+    sample.orientation.w = 0.0
+    publisher.publish(sample)
+    assert listener.until(lambda: "imu: expected finite rates" in listener.values["last refusal"])
+    assert listener.set(monitor=False)[0]
+    listener.next_status(lambda: "found" not in listener.values)
+    listener.node.destroy_publisher(publisher)
+
+
 def test_a_second_node_is_told_of(node: NodeProcess, listener: Listener) -> None:
     """Then SIGTERM ends it with a neutral command."""
     second_robot = finlab.load_layout("A")

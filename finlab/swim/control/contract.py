@@ -17,6 +17,7 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.axes import mask_of
 from finlab.layout import Layout
+from finlab.layout.damage import Damage
 from finlab.layout.effectiveness import layout_effectiveness
 
 NO_WRENCH = np.zeros(6)
@@ -121,6 +122,24 @@ class Learner(Protocol):
             command: of the drives until the next call (n, 3), NaN for those at rest.
         """
         ...
+
+
+def asked_of_weak(layout: Layout, damage: Damage, command: Array) -> Array:
+    """Returns what drives are told for a command (n, 3): weak thrusters are asked for more than
+    they are to give.
+
+    Args:
+        layout: the robot.
+        damage: its damage; a fin that is torn has a smaller law instead.
+        command: of the allocator, forces that the actuators are to give.
+    """
+    if not damage.weak:
+        return command
+    result = command.copy()
+    for name, share in damage.weak.items():
+        index = layout.index(name)
+        result[index, layout.actuators[index].KIND.force_number or 0] /= share
+    return result
 
 
 LEVER_M = 0.25

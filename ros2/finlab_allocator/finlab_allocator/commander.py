@@ -29,7 +29,10 @@ from finlab.deploy.command_stream import REFUSED, CommandStream, unanswered
 from finlab.deploy.deployed_robot import DeployedRobot
 from finlab.errors import CommandError
 from finlab.layout import Damage, Layout
+from finlab.layout.damage import NO_DAMAGE
+from finlab.swim.control.contract import asked_of_weak
 from finlab_allocator.answer_times import AnswerTimes
+from finlab_allocator.fault_watch import FaultWatch
 from finlab_allocator.frames import StaticFrames
 from finlab_allocator.input_checks import StampedInput, target_of, velocity_of
 from finlab_allocator.parameters import Parameters
@@ -66,7 +69,9 @@ class Commander:
         """The node's parameters."""
         self._frames = frames
         self.damage: Damage | None = None
-        """What a fault monitor has found beside `lost`; None for nothing."""
+        """What the fault monitor has found beside `lost`; None for nothing."""
+        self.watch: FaultWatch | None = None
+        """Feeds the fault monitor; None where it is off."""
         self.state: State = "inactive"
         """What is commanded now."""
         self.failure = ""
@@ -84,8 +89,10 @@ class Commander:
         """The robot, prepared for ticks of several lengths."""
         self._stream = CommandStream(self.ticks.whole)
         self._stream.lost = parameters.lost
+        self._watch_as(parameters)
         self._flow: Array | None = None
         self._flow_at_s = -math.inf
+        self._commanded: Array | None = None  # weak ones are asked for more than they give
         self._good_at_s = 0.0  # when the last wrench came that was answered
         self._sent_at_s = 0.0
 
@@ -114,7 +121,7 @@ class Commander:
     @property
     def command(self) -> Array | None:
         """The commands (n, 3) that were sent last; None where there are none."""
-        return self._stream.command
+        return self._commanded
 
     def change(self, values: Mapping[str, Any]) -> Array | None:
         """Changes parameters, all of them or none.
@@ -140,6 +147,7 @@ class Commander:
             ticks = self._prepared(robot, parameters)
         is_other = ticks.whole.layout != self.layout
         rest_before = self._stream.neutral()
+        before = self.parameters
         self.parameters = parameters
         self._robot = robot
         self.ticks = ticks
@@ -150,8 +158,14 @@ class Commander:
             self._stream.lost = parameters.lost
             self.damage = None
             self._flow_at_s = -math.inf
+            self._commanded = None
             if self.state != "inactive":
                 self.state = "waiting"
+        if is_other or (before.monitor, before.frame) != (parameters.monitor, parameters.frame):
+            self._watch_as(parameters)
+        elif self.watch is not None:
+            for name in set(before.lost) ^ set(parameters.lost):
+                self.watch.tell(name, is_lost=name in parameters.lost)
         return rest_before if is_other else None
 
     def activate(self) -> None:
@@ -162,10 +176,44 @@ class Commander:
         """Leaves wrenches unanswered from now on; the next ticks lead to neutral."""
         self.state = "inactive"
 
+    def _watch_as(self, parameters: Parameters) -> None:
+        """Begins to look for faults anew, or ends it."""
+        self.watch = None
+        self.damage = None
+        if not parameters.monitor:
+            return
+        self.watch = FaultWatch(self.layout, parameters.frame, self._frames)
+        for name in self.lost:
+            self.watch.tell(name, is_lost=True)
+
     @property
     def reads_velocity(self) -> bool:
         """Whether the robot's forces depend on its velocity through the water."""
         return bool(self.layout.flow_driven) or self.layout.interaction is not None
+
+    def on_imu(self, rates: Array, orientation: Array, frame: str, now_s: float) -> None:
+        """Takes a sample of the IMU; arguments as for `FaultWatch.on_imu`."""
+        if self.watch is None:
+            return
+        try:
+            self.watch.on_imu(rates, orientation, frame, now_s)
+        except CommandError as error:
+            self.refuse(str(error))
+
+    def on_watch(self, now_s: float) -> None:
+        """Looks for faults; to be called once in the watch's period.
+
+        Args:
+            now_s: now, by a clock that is never set [s].
+        """
+        if self.watch is None or not self.watch.hears(now_s, self.parameters.watchdog_s):
+            return
+        found = self.watch.step(now_s, self.command)
+        if found is None or found == (self.damage or NO_DAMAGE):
+            return
+        if set(self.layout.names) <= {*found.lost, *self.lost}:
+            return  # then it is the body that moves otherwise, and not its actuators
+        self.damage = None if found == NO_DAMAGE else found
 
     def on_velocity(self, given: StampedInput, now_s: float, clock_s: float) -> None:
         """Takes the velocity of the robot relative to the water.
@@ -175,18 +223,23 @@ class Commander:
             now_s: now, by a clock that is never set [s].
             clock_s: now, by the clock of stamps [s].
         """
-        if not self.reads_velocity:
+        if not self.reads_velocity and self.watch is None:
             return
         try:
-            self._flow = velocity_of(given, clock_s, self.parameters, self._frames)
+            velocity = velocity_of(given, clock_s, self.parameters, self._frames)
         except CommandError as error:
             self.refuse(str(error))
             return
+        if self.watch is not None:
+            self.watch.on_velocity(velocity)
+        self._flow = velocity
         self._flow_at_s = now_s
 
     def _flow_of(self, now_s: float) -> Array | None:
         """The velocity (6,) relative to the water [m/s, rad/s]; None at rest, and where the last
         one is older than `watchdog_s`."""
+        if not self.reads_velocity:
+            return None
         is_new = 0.0 <= now_s - self._flow_at_s <= self.parameters.watchdog_s
         return self._flow if is_new else None
 
@@ -222,7 +275,10 @@ class Commander:
         self.is_refused = False
         self.state = "answering"
         self._good_at_s = now_s
-        return self._sent(answer, answer.command, now_s)
+        command = answer.command
+        if self.damage is not None:
+            command = asked_of_weak(self.layout, self.damage, command)
+        return self._sent(answer, command, now_s)
 
     def refuse(self, sentence: str) -> None:
         """Notes a message that is not answered.
@@ -281,8 +337,10 @@ class Commander:
 
     def _sent(self, noted: Allocation | Array, command: Array, now_s: float) -> Sent:
         """Takes down what is sent now."""
-        self._stream.note(noted, self.parameters.lost)
+        found = () if self.damage is None else self.damage.lost
+        self._stream.note(noted, (*self.parameters.lost, *found))
         self._sent_at_s = now_s
+        self._commanded = command
         return Sent(command, noted if isinstance(noted, Allocation) else None)
 
     def _prepared(self, robot: DeployedRobot, parameters: Parameters) -> Ticks:

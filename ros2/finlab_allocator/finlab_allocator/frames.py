@@ -80,18 +80,7 @@ class StaticFrames:
         Raises:
             CommandError: no chain of static transforms leads from one frame to the other.
         """
-        to_root, root = self._pose_in_root(frame)
-        base_to_root, base_root = self._pose_in_root(base)
-        if root != base_root:
-            known = ", ".join(sorted({base, *self._connected(base_root)}))
-            raise CommandError(
-                f"frame {frame!r:.60}: no static transform leads from it to {base!r:.60}; expected "
-                f"one of {known:.200}"
-            )
-        # Pose of the frame in the base: R = Rb^T Rf, t = Rb^T (tf - tb).
-        turn_back = base_to_root.rotation.T
-        rotation = turn_back @ to_root.rotation
-        origin = turn_back @ (to_root.translation - base_to_root.translation)
+        rotation, origin = self._pose_in(base, frame)
         force = rotation @ wrench[:3]
         torque = rotation @ wrench[3:] + np.cross(origin, force)
         return np.concatenate([force, torque])
@@ -113,6 +102,28 @@ class StaticFrames:
         # What a force is to its torque, the rates are to the velocity.
         moved = self.wrench_in(base, frame, np.concatenate([angular, linear]))
         return np.concatenate([moved[3:], moved[:3]])
+
+    def rotation(self, base: str, frame: str) -> Array:
+        """Returns the orientation (3, 3) of a frame in that of the robot; arguments and errors as
+        for `wrench_in`."""
+        return self._pose_in(base, frame)[0]
+
+    def _pose_in(self, base: str, frame: str) -> tuple[Array, Array]:
+        """Orientation (3, 3) and origin (3,) [m] of a frame in another one; errors as for
+        `wrench_in`."""
+        to_root, root = self._pose_in_root(frame)
+        base_to_root, base_root = self._pose_in_root(base)
+        if root != base_root:
+            known = ", ".join(sorted({base, *self._connected(base_root)}))
+            raise CommandError(
+                f"frame {frame!r:.60}: no static transform leads from it to {base!r:.60}; expected "
+                f"one of {known:.200}"
+            )
+        # R = Rb^T Rf, t = Rb^T (tf - tb).
+        turn_back = base_to_root.rotation.T
+        rotation: Array = turn_back @ to_root.rotation
+        origin: Array = turn_back @ (to_root.translation - base_to_root.translation)
+        return rotation, origin
 
     def _pose_in_root(self, frame: str) -> tuple[Transform, str]:
         """The pose of a frame in the outermost frame of its tree, and that one's name."""

@@ -66,8 +66,8 @@ def target_of(
 
 def velocity_of(
     given: StampedInput, now_s: float, parameters: Parameters, frames: StaticFrames
-) -> Array | None:
-    """Returns a velocity (6,) of the robot [m/s, rad/s] in its own frame; None of one at rest.
+) -> Array:
+    """Returns a velocity (6,) of the robot [m/s, rad/s] in its own frame.
 
     Args:
         given: the velocity.
@@ -79,9 +79,11 @@ def velocity_of(
         CommandError: it is stale, of an unknown frame, or holds NaN or infinity.
     """
     _check_age("velocity", given.stamp_s, now_s, parameters.watchdog_s)
-    if given.frame in ("", parameters.frame):
-        return check_flow(given.numbers)
-    return check_flow(frames.twist_in(parameters.frame, given.frame, given.numbers))
+    velocity = given.numbers
+    if given.frame not in ("", parameters.frame):
+        velocity = frames.twist_in(parameters.frame, given.frame, velocity)
+    check_flow(velocity)
+    return velocity
 
 
 def _check_age(what: str, stamp_s: float, now_s: float, most_s: float) -> None:

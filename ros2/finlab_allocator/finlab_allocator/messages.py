@@ -7,7 +7,7 @@ import numpy as np
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Point, TwistStamped, Vector3, WrenchStamped
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -33,6 +33,16 @@ def wrench_of(message: WrenchStamped) -> StampedInput:
 def velocity_of(message: TwistStamped) -> StampedInput:
     """Returns a velocity as the node takes it."""
     return _stamped(message.header, message.twist.linear, message.twist.angular)
+
+
+def imu_of(message: Imu) -> tuple[Array, Array]:
+    """Returns the rates (3,) [rad/s] of a sample, and its quaternion x, y, z, w (4,), which is 0
+    where the sensor says that it has none."""
+    rates, turn = message.angular_velocity, message.orientation
+    orientation = np.array([turn.x, turn.y, turn.z, turn.w])
+    if message.orientation_covariance[0] < 0.0:
+        orientation[:] = 0.0
+    return np.array([rates.x, rates.y, rates.z]), orientation
 
 
 def _stamped(header: Header, first: Vector3, second: Vector3) -> StampedInput:

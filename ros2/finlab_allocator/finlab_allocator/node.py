@@ -20,7 +20,7 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Float64
 from visualization_msgs.msg import MarkerArray
 
@@ -51,6 +51,8 @@ ACKNOWLEDGED_S = 0.5
 """Time that the last command is given to arrive [s]."""
 NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
 """Of wrenches: the newest alone counts."""
+NEWEST_OF_SENSOR = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+"""Of samples of the IMU."""
 LATCHED = QoSProfile(
     depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
 )
@@ -146,6 +148,8 @@ class AllocatorNode(LifecycleNode):
         """What commands the robot; None while unconfigured."""
         self._robot_topics: RobotTopics | None = None
         self._watchdog: Any = None
+        self._imu: Any = None
+        self._watch_timer: Any = None
         self._authority_of: object = None
         self.frames = StaticFrames()
         """Static transforms that are known."""
@@ -201,6 +205,7 @@ class AllocatorNode(LifecycleNode):
         method = self.commander.robot.allocator.method
         self.get_logger().info(f"{layout.name}: {layout.counts_in_words}, method {method}")
         self._start_watchdog()
+        self._start_watch()
         self._guarded(self._keep_time)
         return TransitionCallbackReturn.SUCCESS
 
@@ -224,6 +229,7 @@ class AllocatorNode(LifecycleNode):
             self.settings = self.commander.parameters
         if self._watchdog is not None:
             self.destroy_timer(self._watchdog)
+        self._stop_watch()
         if self._robot_topics is not None:
             self._robot_topics.destroy()
         self.commander = self._robot_topics = self._watchdog = self._authority_of = None
@@ -255,6 +261,14 @@ class AllocatorNode(LifecycleNode):
             return
         given = messages.velocity_of(message)
         self._guarded(partial(self.commander.on_velocity, given, self._now_s(), self._clock_s()))
+
+    def _on_imu(self, message: Imu) -> None:
+        if self.commander is not None:
+            rates, orientation = messages.imu_of(message)
+            take = partial(
+                self.commander.on_imu, rates, orientation, message.header.frame_id, self._now_s()
+            )
+            self._guarded(take)
 
     def _answer(self, message: WrenchStamped) -> None:
         """Answers a wrench."""
@@ -314,6 +328,8 @@ class AllocatorNode(LifecycleNode):
             self._robot_topics = RobotTopics(self, commander)
         if {"period_s", "watchdog_s"} & set(values):
             self._start_watchdog()
+        if {"robot", "monitor"} & set(values):
+            self._start_watch()
         if commander.parameters.power_w is not None and "power_w" in values:
             self.get_logger().warning(NO_POWER_BUDGET)
 
@@ -394,6 +410,36 @@ class AllocatorNode(LifecycleNode):
         self._watchdog = self.create_timer(
             period_s, partial(self._guarded, self._keep_time), clock=self._timer_clock
         )
+
+    def _start_watch(self) -> None:
+        """Listens to the IMU and looks for faults, where the monitor is on."""
+        self._stop_watch()
+        if self.commander is None or self.commander.watch is None:
+            return
+        self._imu = self.create_subscription(Imu, "imu", self._on_imu, NEWEST_OF_SENSOR)
+        self._watch_timer = self.create_timer(
+            self.commander.watch.period_s,
+            partial(self._guarded, self._look_for_faults),
+            clock=self._timer_clock,
+        )
+
+    def _stop_watch(self) -> None:
+        """Ends both."""
+        if self._imu is not None:
+            self.destroy_subscription(self._imu)
+            self.destroy_timer(self._watch_timer)
+        self._imu = self._watch_timer = None
+
+    def _look_for_faults(self) -> None:
+        """Lets the monitor look, and tells of what it has found."""
+        commander = self.commander
+        if commander is None or commander.watch is None:
+            return
+        before = commander.damage
+        commander.on_watch(self._now_s())
+        if commander.damage != before:
+            found = ", ".join(commander.watch.findings()) or "all whole"
+            self.get_logger().warning(f"monitor: {found}")
 
     def _guarded(self, work: Callable[[], None]) -> None:
         """Does some work; an unforeseen error leads the robot to neutral, and the node goes on."""

@@ -46,6 +46,9 @@ class Parameters:
     power_w: float | None = _parameter(
         None, "budget of power [W]; no limit where not set, or infinite"
     )
+    monitor: bool = _parameter(
+        False, "whether actuators that the monitor takes for broken are done without"
+    )
     autostart: bool = _parameter(
         True, "whether it configures and activates itself, without a lifecycle manager", True
     )
@@ -88,10 +91,10 @@ def _checked(name: str, value: Any) -> Any:
         return None if _is_unset(value, math.isinf) else _number(name, value, 0.0, math.inf, "W")
     if name in ("lost", "free"):
         return _names(name, value)
-    if name == "autostart":
+    if name in ("autostart", "monitor"):
         if isinstance(value, bool):
             return value
-        raise CommandError(f"autostart: expected true or false, got {value!r:.60}")
+        raise CommandError(f"{name}: expected true or false, got {value!r:.60}")
     known = ", ".join(each.name for each in fields(Parameters))
     raise CommandError(f"{name:.60}: no such parameter, expected one of {known}")
 

@@ -61,6 +61,13 @@ def status_report(commander: Commander, warnings: Sequence[str] = ()) -> Report:
             passed_ms, processor_ms = commander.times.quantiles_ms(percent / 100.0)
             values.append((f"answer time p{percent} [ms]", f"{passed_ms:.3f}"))
             values.append((f"processor time p{percent} [ms]", f"{processor_ms:.3f}"))
+    if commander.watch is not None:
+        found = commander.watch.findings()
+        values.append(("found", ", ".join(found)))
+        if commander.watch.diagnosis is None:
+            warnings = (*warnings, "the monitor has no sample of the IMU yet")
+        if commander.damage is not None:
+            warnings = (*warnings, f"found: {', '.join(found)}")
     if parameters.power_w is not None:
         warnings = (*warnings, NO_POWER_BUDGET)
     if warnings:
