@@ -5,12 +5,16 @@ Needs no ROS: times come in as arguments, commands go out as return values.
 ==========  =======================================================================
 state       what is commanded
 ==========  =======================================================================
-inactive    neutral, repeated every `watchdog_s`; wrenches are left unanswered
-waiting     neutral, repeated: no wrench has come yet
+inactive    neutral; wrenches are left unanswered
+waiting     neutral: no wrench has come yet
 answering   an answer to each wrench
-silent      neutral, repeated: no good wrench for `watchdog_s`
-failed      neutral, repeated: the last wrench met an error that is no fault of it
+silent      neutral: no good wrench for `watchdog_s`
+failed      neutral: the last wrench met an error that is no fault of it
 ==========  =======================================================================
+
+Neutral is repeated every `watchdog_s` where the node is inactive, or nobody is there to send
+wrenches: drives may have been started later, or have missed it. A sender that is there and silent
+is sent nothing that it might take for an answer.
 
 A wrench that is refused commands nothing and keeps no robot from going to neutral. On the way to
 neutral commands change within the drives' rates, too; `stop` alone, the last command of all, is
@@ -305,12 +309,13 @@ class Commander:
             self.state = "failed"
         return self.on_time(now_s)
 
-    def on_time(self, now_s: float) -> Sent | None:
+    def on_time(self, now_s: float, has_sender: bool = True) -> Sent | None:
         """Keeps the watchdog, and the robot at neutral where it does not answer; to be called a few
         times in `watchdog_s`, and once in `period_s`.
 
         Args:
             now_s: now, by a clock that is never set [s].
+            has_sender: whether somebody is there who may send wrenches.
 
         Returns:
             What to send; None where nothing is due.
@@ -323,7 +328,9 @@ class Commander:
         neutral = self._stream.neutral()
         last = self._stream.command
         is_there = last is not None and np.array_equal(last, neutral, equal_nan=True)
-        if is_there and 0.0 <= now_s - self._sent_at_s < self.parameters.watchdog_s:
+        is_recent = 0.0 <= now_s - self._sent_at_s < self.parameters.watchdog_s
+        is_repeated = self.state == "inactive" or not has_sender
+        if is_there and (is_recent or not is_repeated):
             return None
         length_s, _ = self.ticks.spend(now_s)
         command = self.ticks.towards(neutral, last, length_s)

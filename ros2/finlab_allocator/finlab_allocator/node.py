@@ -48,7 +48,7 @@ STATUS_S = 0.2
 WATCHDOG_TICKS = 4
 """How often silence is looked for within `watchdog_s`."""
 ACKNOWLEDGED_S = 0.5
-"""Time that the last command is given to arrive [s]."""
+"""Time that the last commands are given to arrive [s]."""
 NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
 """Of wrenches: the newest alone counts."""
 NEWEST_OF_SENSOR = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -115,13 +115,25 @@ class RobotTopics:
         forces = self._plant.body_forces(np.nan_to_num(command))
         return np.where(is_lost[:, None], 0.0, forces)
 
+    def flush(self) -> None:
+        """Waits until what was sent has arrived, for `ACKNOWLEDGED_S` at most."""
+        end_s = time.monotonic() + ACKNOWLEDGED_S
+        for publisher in self._publishers():
+            left_s = max(end_s - time.monotonic(), 0.0)
+            publisher.wait_for_all_acked(Duration(seconds=left_s))
+
     def destroy(self) -> None:
-        """Takes the publishers away."""
-        publishers = [publisher for _, publisher in self._numbers] + [self.command]
+        """Takes the publishers away, once what they have sent has arrived."""
+        self.flush()
+        for publisher in self._publishers():
+            self._node.destroy_publisher(publisher)
+
+    def _publishers(self) -> list[Any]:
+        """All of them, that of all commands first."""
+        publishers = [self.command, *(publisher for _, publisher in self._numbers)]
         if self._pwm is not None:
             publishers.append(self._pwm)
-        for publisher in publishers:
-            self._node.destroy_publisher(publisher)
+        return publishers
 
 
 def _input(actuator: Actuator, row: Array) -> float | None:
@@ -207,6 +219,7 @@ class AllocatorNode(LifecycleNode):
         self._start_watchdog()
         self._start_watch()
         self._guarded(self._keep_time)
+        self._guarded(self._publish_status)  # what is computed at first keeps no wrench waiting
         return TransitionCallbackReturn.SUCCESS
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -249,7 +262,7 @@ class AllocatorNode(LifecycleNode):
         if self.commander is None or self._robot_topics is None:
             return
         self._robot_topics.publish(self.commander.stop().command)
-        self._robot_topics.command.wait_for_all_acked(Duration(seconds=ACKNOWLEDGED_S))
+        self._robot_topics.flush()
 
     # What comes in.
 
@@ -338,7 +351,8 @@ class AllocatorNode(LifecycleNode):
     def _keep_time(self) -> None:
         """Keeps the watchdog."""
         if self.commander is not None:
-            self._send(self.commander.on_time(self._now_s()))
+            has_sender = self.count_publishers(self._wrenches.topic_name) > 0
+            self._send(self.commander.on_time(self._now_s(), has_sender))
 
     def _send(self, sent: Sent | None) -> None:
         if sent is not None and self._robot_topics is not None:
