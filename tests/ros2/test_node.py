@@ -326,6 +326,7 @@ def test_a_second_node_is_told_of(node: NodeProcess, listener: Listener) -> None
     finally:
         second.process.kill()
     listener.next_status(lambda: "1 more" not in listener.words)
+    listener.spin(0.3)  # each spin takes one message, and some have waited
     is_heard()
     for name in second_robot.names:
         assert of_second[-1][f"{name}/amplitude"] == second_robot.lower[0, 0]
