@@ -84,7 +84,7 @@ def test_silence_leads_to_neutral(
 ) -> None:
     listener.ask(PUSH)
     sent_at = listener.commands[-1][0]
-    listener.spin(WATCHDOG_S + 0.3)
+    assert listener.until(lambda: listener.commands[-1][0] > sent_at, 2.0)
     at, command = next(each for each in listener.commands if each[0] > sent_at)
     assert not forces(command, layout.names).any()
     assert at - sent_at + 0.02 >= WATCHDOG_S and at - sent_at < 2 * WATCHDOG_S
@@ -186,21 +186,33 @@ def test_garbage_on_the_wire_is_survived(node: NodeProcess, listener: Listener) 
     assert node.lives
 
 
-def test_200_hz_and_a_flood(node: NodeProcess, listener: Listener, layout: finlab.Layout) -> None:
+def test_200_hz_and_a_flood(
+    node: NodeProcess, listener: Listener, allocator: finlab.Allocator, layout: finlab.Layout
+) -> None:
+    sent = np.zeros((200, 6))
+    sent[:, 0] = np.linspace(5.0, 45.0, 200)
+    expected = allocator.allocate_batch(sent).command[:, :, 0]
     before = len(listener.commands)
-    for k in range(200):
-        listener.send([10 + 5 * math.sin(0.05 * k), 0, 0, 0, 0, 0])
+    for wrench in sent:
+        listener.send(wrench)
         listener.spin(0.005)
-    assert len(listener.commands) - before >= 150
+    listener.spin(0.1)
+    answered: list[int] = []
+    for _, command in listener.commands[before:]:
+        differences = np.abs(expected - forces(command, layout.names)).max(axis=1)
+        if differences.min() < 1e-6:
+            answered.append(int(differences.argmin()))
+    # On a busy machine some were replaced by newer ones before they were looked at.
+    assert len(answered) > 40 and answered == sorted(set(answered))
     rng = np.random.default_rng(6)
     for _ in range(500):
         listener.send(rng.normal(size=6))
     listener.send([30, 0, 0, 0, 0, 0])
-    newest = finlab.Allocator(layout).allocate([30, 0, 0, 0, 0, 0]).command[:, 0]
+    newest = allocator.allocate([30, 0, 0, 0, 0, 0]).command[:, 0]
 
     def is_answered() -> bool:
-        sent = [forces(command, layout.names) for _, command in listener.commands[-50:]]
-        return any(np.allclose(each, newest, atol=1e-6) for each in sent)
+        last = [forces(command, layout.names) for _, command in listener.commands[-50:]]
+        return any(np.allclose(each, newest, atol=1e-6) for each in last)
 
     assert listener.until(is_answered, 2.0)
 
@@ -227,7 +239,7 @@ def test_the_sender_is_killed(node: NodeProcess, listener: Listener, layout: fin
         sender.wait()
     killed_at = time.monotonic()
     assert listener.until(lambda: not any(listener.commands[-1][1].effort), 3.0)
-    assert listener.commands[-1][0] - killed_at < WATCHDOG_S + 0.5
+    assert listener.commands[-1][0] - killed_at < WATCHDOG_S + 1.0
 
 
 def test_lifecycle(node: NodeProcess, listener: Listener) -> None:
