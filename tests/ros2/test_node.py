@@ -271,14 +271,16 @@ def test_another_robot_under_way(
     node: NodeProcess, listener: Listener, layout: finlab.Layout
 ) -> None:
     listener.ask(PUSH)
-    before = len(listener.commands)
     assert listener.set(robot="turtle_hybrid")[0]
-    listener.spin(0.1)
-    rest = next(m for _, m in listener.commands[before:] if set(m.name) == set(layout.names))
-    assert not any(rest.effort), "the old robot is left at neutral"
+
+    def last_of_old() -> np.ndarray:
+        old = [m for _, m in listener.commands if set(m.name) == set(layout.names)]
+        return forces(old[-1], layout.names)
+
+    assert listener.until(lambda: not last_of_old().any(), 3.0), "the old robot is left at neutral"
     wrench = [1.0, 0, 20.0, 0, 0, 0.1]
     answer = listener.ask(wrench)
-    while answer.name[0] != "front_right":
+    while set(answer.name) == set(layout.names):
         answer = listener.ask(wrench)
     hybrid = finlab.load_layout("turtle_hybrid")
     assert answer.name[: hybrid.n] == list(hybrid.names)
