@@ -148,3 +148,11 @@ def test_all_lost_is_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(commander.watch, "step", lambda *_: everything)
     commander.on_watch(1.0)
     assert commander.damage is None
+    all_but_one = finlab.Damage(lost=commander.layout.names[1:])
+    monkeypatch.setattr(commander.watch, "step", lambda *_: all_but_one)
+    commander.on_watch(1.0)
+    assert commander.damage == all_but_one
+    commander.change({"lost": [commander.layout.names[0]]})
+    assert commander.damage is None, "what is said counts more than what was found"
+    sent = commander.on_wrench(StampedInput(np.ones(6), "", NO_STAMP), 1.0, 1.0)
+    assert sent is not None and sent.answer is not None

@@ -167,9 +167,8 @@ class Commander:
                 self.state = "waiting"
         if is_other or (before.monitor, before.frame) != (parameters.monitor, parameters.frame):
             self._watch_as(parameters)
-        elif self.watch is not None:
-            for name in set(before.lost) ^ set(parameters.lost):
-                self.watch.tell(name, is_lost=name in parameters.lost)
+        elif self.watch is not None and before.lost != parameters.lost:
+            self._tell_watch(self.watch, before.lost)
         return rest_before if is_other else None
 
     def activate(self) -> None:
@@ -189,6 +188,18 @@ class Commander:
         self.watch = FaultWatch(self.layout, parameters.frame, self._frames)
         for name in self.lost:
             self.watch.tell(name, is_lost=True)
+
+    def _tell_watch(self, watch: FaultWatch, lost_before: tuple[str, ...]) -> None:
+        """Tells the monitor what parameter `lost` says now."""
+        lost = self.parameters.lost
+        for name in set(lost_before) ^ set(lost):
+            watch.tell(name, is_lost=name in lost)
+        if self.damage is not None and self._is_all_lost(self.damage):
+            self._watch_as(self.parameters)
+
+    def _is_all_lost(self, found: Damage) -> bool:
+        """Whether no actuator would be left with what the monitor has found."""
+        return set(self.layout.names) <= {*found.lost, *self.lost}
 
     @property
     def reads_velocity(self) -> bool:
@@ -215,7 +226,7 @@ class Commander:
         found = self.watch.step(now_s, self.command)
         if found is None or found == (self.damage or NO_DAMAGE):
             return
-        if set(self.layout.names) <= {*found.lost, *self.lost}:
+        if self._is_all_lost(found):
             return  # then it is the body that moves otherwise, and not its actuators
         self.damage = None if found == NO_DAMAGE else found
 

@@ -98,7 +98,8 @@ class StaticFrames:
         Raises:
             CommandError: as for `wrench_in`.
         """
-        linear, angular = twist[:3], twist[3:]
+        linear = twist[:3]
+        angular = twist[3:]
         # What a force is to its torque, the rates are to the velocity.
         moved = self.wrench_in(base, frame, np.concatenate([angular, linear]))
         return np.concatenate([moved[3:], moved[:3]])

@@ -38,7 +38,8 @@ def velocity_of(message: TwistStamped) -> StampedInput:
 def imu_of(message: Imu) -> tuple[Array, Array]:
     """Returns the rates (3,) [rad/s] of a sample, and its quaternion x, y, z, w (4,), which is 0
     where the sensor says that it has none."""
-    rates, turn = message.angular_velocity, message.orientation
+    rates = message.angular_velocity
+    turn = message.orientation
     orientation = np.array([turn.x, turn.y, turn.z, turn.w])
     if message.orientation_covariance[0] < 0.0:
         orientation[:] = 0.0
@@ -57,8 +58,9 @@ def wrench_stamped(wrench: Sequence[float], frame: str, stamp: Time) -> WrenchSt
     message = WrenchStamped()
     message.header.frame_id = frame
     message.header.stamp = stamp
-    force, torque = message.wrench.force, message.wrench.torque
-    force.x, force.y, force.z, torque.x, torque.y, torque.z = (float(value) for value in wrench)
+    numbers = [float(value) for value in wrench]
+    message.wrench.force = Vector3(x=numbers[0], y=numbers[1], z=numbers[2])
+    message.wrench.torque = Vector3(x=numbers[3], y=numbers[4], z=numbers[5])
     return message
 
 
@@ -106,7 +108,8 @@ class JointStates:
         effort: list[float] = []
         position: list[float] = []
         for index, row in enumerate(rows):
-            number, angle = self._forces[index], self._angles[index]
+            number = self._forces[index]
+            angle = self._angles[index]
             if number is not None:
                 effort.append(row[number])
             elif math.isnan(row[0]) or sizes is None:
@@ -179,7 +182,7 @@ def arrows(layout: Layout, forces: Array, frame: str, stamp: Time) -> MarkerArra
         end = start + force * (ARROW_SHARE * size_m / max(largest, 1e-9))
         marker.points = [_point(start), _point(end)]
         shaft_m = 0.02 * size_m
-        marker.scale.x, marker.scale.y, marker.scale.z = shaft_m, 2.0 * shaft_m, 3.0 * shaft_m
+        marker.scale = Vector3(x=shaft_m, y=2.0 * shaft_m, z=3.0 * shaft_m)
         marker.pose.orientation.w = 1.0
         red = min(share, 1.0)
         marker.color = ColorRGBA(r=red, g=1.0 - red, b=0.1, a=1.0)

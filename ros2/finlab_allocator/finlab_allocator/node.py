@@ -4,6 +4,7 @@ It is a lifecycle node. Unconfigured it has no robot, inactive it keeps the robo
 it answers. With `autostart` it goes there by itself.
 """
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -98,7 +99,7 @@ class RobotTopics:
                 value = 0.0 if sizes is None else float(sizes[topic.actuator])
             else:
                 value = float(sent[topic.actuator, topic.number])
-            if value == value:  # an angle of a lost one is NaN, and is not sent
+            if not math.isnan(value):  # the angle of a lost one is not sent
                 publisher.publish(Float64(data=value))
         if self._pwm is not None:
             names: list[str] = []
@@ -245,7 +246,10 @@ class AllocatorNode(LifecycleNode):
         self._stop_watch()
         if self._robot_topics is not None:
             self._robot_topics.destroy()
-        self.commander = self._robot_topics = self._watchdog = self._authority_of = None
+        self.commander = None
+        self._robot_topics = None
+        self._watchdog = None
+        self._authority_of = None
         return TransitionCallbackReturn.SUCCESS
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -276,12 +280,12 @@ class AllocatorNode(LifecycleNode):
         self._guarded(partial(self.commander.on_velocity, given, self._now_s(), self._clock_s()))
 
     def _on_imu(self, message: Imu) -> None:
-        if self.commander is not None:
-            rates, orientation = messages.imu_of(message)
-            take = partial(
-                self.commander.on_imu, rates, orientation, message.header.frame_id, self._now_s()
-            )
-            self._guarded(take)
+        if self.commander is None:
+            return
+        rates, orientation = messages.imu_of(message)
+        frame = message.header.frame_id
+        take = partial(self.commander.on_imu, rates, orientation, frame, self._now_s())
+        self._guarded(take)
 
     def _answer(self, message: WrenchStamped) -> None:
         """Answers a wrench."""
@@ -299,7 +303,8 @@ class AllocatorNode(LifecycleNode):
     def _on_frames(self, message: Any) -> None:
         """Takes static transforms."""
         for each in message.transforms:
-            origin, turn = each.transform.translation, each.transform.rotation
+            origin = each.transform.translation
+            turn = each.transform.rotation
             try:
                 self.frames.add(
                     each.header.frame_id,
@@ -363,7 +368,8 @@ class AllocatorNode(LifecycleNode):
 
     def _publish_status(self) -> None:
         """Sends what is said of the state, arrows, and of the authority where it has changed."""
-        commander, topics = self.commander, self._robot_topics
+        commander = self.commander
+        topics = self._robot_topics
         if commander is None or topics is None:
             return
         stamp = self.get_clock().now().to_msg()
@@ -442,7 +448,8 @@ class AllocatorNode(LifecycleNode):
         if self._imu is not None:
             self.destroy_subscription(self._imu)
             self.destroy_timer(self._watch_timer)
-        self._imu = self._watch_timer = None
+        self._imu = None
+        self._watch_timer = None
 
     def _look_for_faults(self) -> None:
         """Lets the monitor look, and tells of what it has found."""

@@ -9,8 +9,12 @@ from finlab.axes import AXES, MOTIONS, UNITS
 from finlab.layout import Layout
 from finlab_allocator.commander import Commander
 
-OK, WARN, ERROR = 0, 1, 2
-"""Levels, those of diagnostic_msgs/DiagnosticStatus."""
+OK = 0
+"""Level of a state that is as it should be, by diagnostic_msgs/DiagnosticStatus."""
+WARN = 1
+"""Level of one to look at."""
+ERROR = 2
+"""Level of one that is wrong."""
 NO_POWER_BUDGET = "power_w has no effect: this finlab has no budget of power yet"
 """What is said where parameter `power_w` is set."""
 MUCH_LEFT = 0.999
@@ -78,21 +82,23 @@ def status_report(commander: Commander, warnings: Sequence[str] = ()) -> Report:
 
 def _state_words(commander: Commander) -> tuple[int, str]:
     """Level and sentence of the state, with the newest refusal."""
-    level, message = OK, ""
+    level = WARN
     answer = commander.answer
     if commander.state == "inactive":
-        level, message = WARN, "neutral: the node is not active"
+        message = "neutral: the node is not active"
     elif commander.state == "waiting":
+        level = OK
         message = "neutral: no wrench has come yet"
     elif commander.state == "silent":
-        level = WARN
         message = f"neutral: no good wrench for {commander.parameters.watchdog_s:g} s"
     elif commander.state == "failed":
-        level, message = ERROR, f"neutral: {commander.failure}"
+        level = ERROR
+        message = f"neutral: {commander.failure}"
     elif answer is None or answer.reachable:
+        level = OK
         message = "the wrench is delivered"
     else:
-        level, message = WARN, f"not reached: {'; '.join(answer.binding)}"
+        message = f"not reached: {'; '.join(answer.binding)}"
     if commander.is_refused:
         level = max(level, WARN)
         message = f"refused: {commander.last_refusal}; before that: {message}"
