@@ -24,7 +24,7 @@ from finlab.display import html, text
 from finlab.layout.damage import Damage
 from finlab.layout.effectiveness import body_force
 from finlab.layout.layout import Layout
-from finlab.physics.objective import REACHED, judged_effort, judged_power
+from finlab.physics.objective import REACHED, effort_of_one, judged_effort, judged_power
 from finlab.physics.plant import Plant, plant_of
 
 if TYPE_CHECKING:
@@ -501,6 +501,10 @@ class Allocation(Answer[float]):
     def power(self) -> float:
         figures = self._figures
         return self._power() if figures is None else figures.power
+
+    @cached_property
+    def effort(self) -> float | None:
+        return effort_of_one(self.layout, self.command) if self.layout.is_of_fins else None
 
     @cached_property
     def err_norm(self) -> float:
