@@ -328,8 +328,8 @@ class Plant:
     @cached_property
     def _formulas(self) -> Formulas | None:
         """The laws of all actuators as the core evaluates them; None where one is no formula there,
-        or actuators act on each other."""
-        if self.interaction is not None:
+        feels the flow, or actuators act on each other."""
+        if self.feels_flow:
             return None
         laws = np.zeros(self.n, struct("fl_formula"))
         for indices, law in self._laws:
