@@ -42,6 +42,8 @@ STEPS = 20
 """Steps of a drag."""
 QUIET_S = 1.5
 """After so long without a message a page has opened [s]."""
+DIGITS = 4
+"""Digits behind the point to which a page rounds what a slider says."""
 HEAD = 16
 """Bytes before what is compressed: its size as plain and as compressed bytes, eight each."""
 
@@ -259,7 +261,8 @@ class Hand:
         for value in values:
             self._key_s = None
             began_s = time.monotonic()
-            self._send(type="GuiUpdateMessage", uuid=self._slider, updates={"value": value})
+            updates = {"value": round(value, DIGITS)}
+            self._send(type="GuiUpdateMessage", uuid=self._slider, updates=updates)
             time.sleep(pause_s)
             if self._key_s is not None:
                 keys_ms.append(1e3 * (self._key_s - began_s))

@@ -23,6 +23,7 @@ from webapp.session import Session
 from webapp.tasks.context import Context
 from webapp.tasks.slot import Attended, Bell, Pools, Slot
 from webapp.tasks.solver import Solver
+from webapp.viser_internals import Outbox
 
 PATIENCE_S = 0.025
 """How long a change waits for its answer before the page is written without it [s]: a browser takes
@@ -31,9 +32,6 @@ TOGETHER_S = 0.4
 """How long what comes beside an answer waits for the rest of it [s]."""
 Slots = frozenset[Slot[Any, Any]]
 NO_SLOTS: Slots = frozenset()
-DRAWN_S = 0.004
-"""How long after its words the view is drawn [s]: a browser shows what comes without nodes of the
-view at once, and the rest with its next picture."""
 
 
 class View:
@@ -52,6 +50,7 @@ class View:
         self.client = client
         self.session = session
         self._loop = loop
+        self._outbox = Outbox(client)
         self.bell = Bell(loop)
         self.intents = Intents(client, self.bell)
         page = self.page = Page(client, Context(session, solver, pools, self.bell), self.intents)
@@ -91,9 +90,10 @@ class View:
         while True:
             try:
                 self._look()
-                if self._is_due and not self._is_held():
-                    self._end_hold()
-                    await self._write()
+                if self._is_due and not (self._held_for and self._is_held()):
+                    if self._patience is not None:
+                        self._end_hold()
+                    self._write()
             except Exception as error:  # the page must go on, whatever we have got wrong
                 self.intents.fault(error)
             await self.bell.rung.wait()
@@ -120,7 +120,7 @@ class View:
         self._revision = self.session.revision
         if is_revised and self.busy:
             self._hold(PATIENCE_S, jobs.first)
-        else:
+        elif self._patience is not None:
             self._end_hold()
 
     def _attend(self, waiting: Attended) -> bool:
@@ -163,20 +163,22 @@ class View:
         """Wait for no answer any longer, nor for the time after which the page would be written
         without it."""
         self._held_for = NO_SLOTS
-        if self._patience is not None:
-            self._patience.cancel()
-            self._patience = None
+        assert self._patience is not None
+        self._patience.cancel()
+        self._patience = None
 
-    async def _write(self) -> None:
-        """Words first, then the view."""
-        with self.client.atomic():
-            self._write_words()
-        self.client.flush()
-        if self.board.view.is_due:
-            await asyncio.sleep(DRAWN_S)
-            with self.client.atomic():
-                self.board.draw()
-            self.client.flush()
+    def _write(self) -> None:
+        """Words first, then the view: a browser shows a group without nodes of the view at once,
+        and the rest with its next picture."""
+        outbox = self._outbox
+        try:
+            with outbox:
+                self._write_words()
+            if self.board.view.is_due:
+                with outbox:
+                    self.board.draw()
+        finally:
+            outbox.send()
         self._is_due = False
 
     def _write_words(self) -> None:

@@ -11,19 +11,14 @@ viser-project/viser:
   made once; `_assignable_props_api.py`, `_prop_hints` and `_cast_value_recursive`.
 - `_stay_awake`: no wake-up of a loop by its own thread; `infra/_async_message_buffer.py`, `push`,
   `atomic_end` and `flush`.
-- `_windows`: messages to one page are sent as they are told, not gathered for 16 ms; it is woken
-  six times less. `infra/_async_message_buffer.py`, `_window_loop`.
+- `Outbox`: messages to one page are packed and written in the turn of the loop in which they are
+  told, not gathered for 16 ms by a task that is woken six times; `infra/_infra.py`,
+  `_message_producer`, and `infra/_async_message_buffer.py`, `_window_loop`.
 - `icons_at_hand`: the list of an archive of thousands of icons read once, not for each icon;
   `_icons.py`, `svg_from_icon`.
-- `_pack_quickly`: messages of a step packed without asking for the type of each part;
-  `infra/_messages.py`, `as_serializable_dict`.
-- `icons_at_hand`: the list of an archive of thousands of icons read once, not for each icon;
-  `_icons.py`, `svg_from_icon`.
-- `_pack_quickly`: messages of a step packed without a look at the type of each of their parts;
-  `infra/_messages.py`, `as_serializable_dict`.
-- `icons_at_hand`: the list of an archive of thousands of icons read once, not for each icon;
-  `_icons.py`, `svg_from_icon`.
-- `_pack_quickly`: messages of a step packed without a look at the type of each of their parts;
+- `_consume`: an input's change heard without a task for each listener; `infra/_infra.py`,
+  `_message_consumer` and `handle_incoming`.
+- `_frame`: messages of a step packed without a look at the type of each of their parts;
   `infra/_messages.py`, `as_serializable_dict`.
 - `keep_private`: no message to the other pages about an input of one page; `_gui_api.py`,
   `sync_other_clients`.
@@ -45,8 +40,9 @@ import io
 import logging
 import secrets
 import threading
-from collections.abc import AsyncGenerator, Callable, Iterator, Sequence
-from functools import cache, partialmethod
+import time
+from collections.abc import Callable, Coroutine, Iterator, Sequence
+from functools import cache
 from http import HTTPStatus
 from importlib.resources import files
 from itertools import islice
@@ -60,12 +56,17 @@ from zipfile import ZipFile
 import numpy as np
 import viser
 import websockets.asyncio.server as websockets_server
+from msgspec import msgpack
 from numpy.typing import NDArray
 from viser import _assignable_props_api, _icons, _messages
 from viser._assignable_props_api import AssignablePropsBase
+from viser.infra import _infra
 from viser.infra._async_message_buffer import AsyncMessageBuffer
 from viser.infra._messages import wire_field_names
+from websockets.asyncio.server import ServerConnection
 from websockets.http11 import Request, Response
+from websockets.protocol import State
+from zstandard import ZstdCompressor
 
 from webapp.guard import SECURE, Guard
 from webapp.guard import answer as status_page
@@ -84,9 +85,7 @@ def start_server(guard: Guard = LOCAL, port: int = 0) -> viser.ViserServer:
     """A server behind a guard, without a banner of viser's own; `verbose=False` alone would leave
     it."""
     _keep_property_types()
-    buffers: Any = AsyncMessageBuffer
-    buffers._window_loop = _window_loop
-    _pack_quickly()
+    _serve_quickly()
     with _STARTING, _guarded(guard), contextlib.redirect_stdout(io.StringIO()):
         server = viser.ViserServer(host=guard.host, port=port, label="finlab", verbose=False)
     _stay_awake(server.get_event_loop())
@@ -228,72 +227,197 @@ def icons_at_hand() -> Iterator[None]:
             yield
 
 
-_gathered = AsyncMessageBuffer._window_loop
-"""The windows of messages that viser makes."""
+_produced_by_viser = _infra._message_producer
+"""Sends the messages that go to all pages, and are kept for pages to come."""
 
 
-def _window_loop(
-    buffer: AsyncMessageBuffer, client_id: int, last_known: int, end_of_known: Any
-) -> AsyncGenerator[Sequence[Any], None]:
-    """Windows of messages; arguments as in viser, which makes those that go to all pages, and are
-    kept for pages to come."""
+@cache
+def _serve_quickly() -> None:
+    """Let the messages to one page be sent by `_produce`, and those from it be heard by
+    `_consume`."""
+    infra: Any = _infra
+    infra._message_producer = _produce
+    infra._message_consumer = _consume
+
+
+class _Knock(asyncio.Event):
+    """Wakes `_produce`, but not while a group is told: that is sent at its end."""
+
+    def __init__(self, buffer: AsyncMessageBuffer) -> None:
+        super().__init__()
+        self._buffer = buffer
+
+    def set(self) -> None:
+        if not self._buffer.atomic_counter:
+            super().set()
+
+
+def _produce(
+    websocket: ServerConnection, buffer: AsyncMessageBuffer, *arguments: Any, **options: Any
+) -> Coroutine[Any, Any, None]:
+    """Sends messages to a page, until it has gone; arguments as in viser, which sends those that go
+    to all pages."""
     if buffer.persistent_messages:
-        return _gathered(buffer, client_id, last_known, end_of_known)
-    return _windows(buffer)
+        return _produced_by_viser(websocket, buffer, *arguments, **options)
+    return _produce_for_page(websocket, buffer)
 
 
-async def _windows(buffer: AsyncMessageBuffer) -> AsyncGenerator[Sequence[Any], None]:
-    """Windows of the messages to one page, each with all that was told until the loop came to
-    it."""
+async def _produce_for_page(websocket: ServerConnection, buffer: Any) -> None:
+    """Sends what no `Outbox` has sent: what is told beside groups, and while the socket takes no
+    more."""
+    buffer.finlab_socket = websocket
+    buffer.message_event = _Knock(buffer)
+    compressor = ZstdCompressor(level=1)
     while not buffer.done:
         buffer.message_event.clear()
-        window = _take(buffer)
+        window = [] if buffer.atomic_counter else _take(buffer)
         if window:
-            yield window
+            await websocket.send(_frame(window, compressor))
         else:
             await buffer.message_event.wait()
 
 
+async def _consume(
+    websocket: ServerConnection, hear: Callable[[Any], None], kind: type[Any]
+) -> None:
+    """Hears messages of a page until it has gone; arguments as in viser, which makes two tasks of
+    each. What a user has changed is heard at once: nothing waits that we do then."""
+    while True:
+        raw = await websocket.recv()
+        message = kind.deserialize(raw)
+        client: Any = vars(websocket).get("finlab_client")
+        is_change = client is not None and type(message) is _messages.GuiUpdateMessage
+        if not is_change or message.uuid not in client.gui._gui_input_handle_from_uuid:
+            hear(message)
+            continue
+        try:
+            await client.gui._handle_gui_updates(client.client_id, message)
+        except Exception as error:  # a page may send anything
+            loop = asyncio.get_running_loop()
+            loop.call_exception_handler({"message": "of a page's input", "exception": error})
+
+
 def _take(buffer: AsyncMessageBuffer) -> list[Any]:
-    """The first messages of a buffer, as many as a window has; none while a group is told."""
+    """The first messages of a buffer, as many as a window has."""
     with buffer.buffer_lock:
-        if buffer.atomic_counter:
-            return []
         first = list(islice(buffer.message_from_id, buffer.max_window_size))
         return [buffer.pop_message_locked(number) for number in first]
 
 
-PLAIN = (str, float, bool, int)
+PLAIN = (str, float, bool, int, tuple)
 """Types of values that are packed as they are."""
+UPDATES = (_messages.GuiUpdateMessage, _messages.SceneNodeUpdateMessage)
+"""Messages of which a step of a slider consists."""
 
 
-@cache
-def _pack_quickly() -> None:
-    """Let updates, of which a step of a slider consists, be packed in a few operations where all
-    that they hold is plain; viser compares the type of each part with ten others."""
-    for kind in (_messages.GuiUpdateMessage, _messages.SceneNodeUpdateMessage):
-        updates: Any = kind
-        updates.as_serializable_dict = partialmethod(_packed, kind.as_serializable_dict)
+def _frame(window: Sequence[Any], compressor: ZstdCompressor) -> bytes:
+    """Some messages in the format of viser's `_message_producer`: compressed messages, and arrays
+    as they are.
+
+    Updates are packed here where all that they hold is plain; viser compares the type of each part
+    with ten others.
+    """
+    arrays: list[memoryview] = []
+    messages: list[dict[str, Any]] = []
+    for message in window:
+        kind: Any = type(message)
+        values: dict[str, Any] = {}
+        is_plain = kind in UPDATES
+        for name, value in message.updates.items() if is_plain else ():
+            if type(value) in PLAIN:
+                values[name] = value
+            elif type(value) is np.ndarray and value.flags.c_contiguous:
+                values[name] = {"__binary_index": len(arrays), "dtype": value.dtype.str}
+                arrays.append(value.data)
+            else:
+                is_plain = False
+                break
+        if not is_plain:
+            messages.append(message.as_serializable_dict(arrays))
+            continue
+        packed: dict[str, Any] = {"type": kind.__name__}
+        for name in wire_field_names(kind):
+            packed[name] = values if name == "updates" else getattr(message, name)
+        messages.append(packed)
+    plain = msgpack.encode(
+        {
+            "messages": messages,
+            "timestampSec": time.perf_counter(),
+            "binaryBufferLengths": [array.nbytes for array in arrays],
+        }
+    )
+    compressed = compressor.compress(plain)
+    lengths = len(plain).to_bytes(8, "little") + len(compressed).to_bytes(8, "little")
+    parts: list[bytes | memoryview] = [lengths, compressed]
+    _infra._append_aligned_buffers(parts, arrays, len(lengths) + len(compressed))
+    return b"".join(parts)
 
 
-def _packed(
-    message: Any, pack: Callable[..., dict[str, Any]], buffers: list[memoryview] | None = None
-) -> dict[str, Any]:
-    """An update as a dictionary, with its arrays in `buffers`; `pack` is viser's own function."""
-    values: dict[str, Any] = {}
-    for name, value in message.updates.items():
-        if type(value) in PLAIN:
-            values[name] = value
-        elif buffers is not None and type(value) is np.ndarray and value.flags.c_contiguous:
-            values[name] = {"__binary_index": len(buffers), "dtype": value.dtype.str}
-            buffers.append(value.data)
-        else:
-            return pack(message, buffers)
-    kind: Any = type(message)
-    packed: dict[str, Any] = {"type": kind.__name__}
-    for name in wire_field_names(kind):
-        packed[name] = values if name == "updates" else getattr(message, name)
-    return packed
+class Outbox:
+    """What one page is told, in groups that it applies as a whole; a `with` block is one. Belongs
+    to the event loop."""
+
+    def __init__(self, client: viser.ClientHandle) -> None:
+        buffer: Any = client.gui._websock_interface.get_message_buffer()
+        buffer.finlab_group = None
+        self._buffer = buffer
+        self._compressor = ZstdCompressor(level=1)
+        self._websocket: Any = vars(buffer).get("finlab_socket")
+        """The socket of the page; None where viser sends what it is told."""
+        self._is_idle = False
+        """Whether the socket takes a group at once."""
+        if self._websocket is not None:
+            self._websocket.finlab_client = client
+
+    def __enter__(self) -> None:
+        buffer = self._buffer
+        websocket = self._websocket
+        buffer.atomic_start()
+        self._is_idle = (
+            websocket is not None
+            and not buffer.done
+            and websocket.protocol.state is State.OPEN
+            and websocket.send_in_progress is None
+            and not websocket.transport.get_write_buffer_size()
+        )
+        if self._is_idle and not buffer.message_from_id:
+            buffer.finlab_group = []
+
+    def __exit__(self, *_: object) -> None:
+        buffer = self._buffer
+        if not self._is_idle:  # viser's buffer keeps the newest of what is told until it is
+            buffer.atomic_end()
+            buffer.flush()
+            return
+        with buffer.buffer_lock:
+            buffer.atomic_counter -= 1
+        window = buffer.finlab_group or []
+        buffer.finlab_group = None
+        if buffer.message_from_id:
+            window += _take(buffer)
+        while window:
+            self._websocket.protocol.send_binary(_frame(window, self._compressor))
+            window = _take(buffer) if buffer.message_from_id else []
+
+    def send(self) -> None:
+        """Write all groups at once: a call of the system takes as long as to pack a group."""
+        if self._websocket is None:
+            return
+        frames = self._websocket.protocol.data_to_send()
+        if frames:
+            self._websocket.transport.write(b"".join(frames))
+
+
+def _tell(interface: Any, message: Any) -> None:
+    """Tell a page, or all of them, a message: in the group that an `Outbox` has begun, if any.
+    Viser's buffer, which looks for older messages that it replaces, keeps it else, and from the
+    first message on that others have put there: the order is that in which they are told."""
+    buffer = interface.get_message_buffer()
+    group = vars(buffer).get("finlab_group")
+    if group is None or buffer.message_from_id:
+        interface.queue_message(message)
+    else:
+        group.append(message)
 
 
 def keep_private(handle: Any) -> None:
@@ -309,12 +433,18 @@ def assign(handle: Any, values: dict[str, Any]) -> None:
     if isinstance(handle, viser.SceneNodeHandle):
         props = handle._impl.props
         for name, value in values.items():
-            if _is_of_same_type(vars(props).get(name, UNKNOWN), value):
+            # Viser would take a new value of the same type as it is.
+            old = vars(props).get(name, UNKNOWN)
+            is_array = isinstance(value, np.ndarray)
+            is_same_type = isinstance(old, np.ndarray) == is_array and old is not UNKNOWN
+            if is_same_type and (not is_array or old.dtype == value.dtype):
                 setattr(props, name, value)
                 own[name] = value
         if own:
             update = _messages.SceneNodeUpdateMessage(handle.name, own)
-            handle._impl.api._queue_scene_message(update)
+            api = handle._impl.api
+            update.owner = api._owner_id
+            _tell(api._websock_interface, update)
     for name, value in values.items():
         if name not in own:
             setattr(handle, name, value)
@@ -323,18 +453,12 @@ def assign(handle: Any, values: dict[str, Any]) -> None:
 def write_content(handle: Any, content: str) -> None:
     """Let markup of the page be another one."""
     handle._impl.props.content = content
-    handle._queue_update("content", content)
+    update = _messages.GuiUpdateMessage(handle._impl.uuid, {"content": content})
+    _tell(handle._impl.gui_api._websock_interface, update)
 
 
 UNKNOWN = object()
 """In place of a property that a handle has elsewhere."""
-
-
-def _is_of_same_type(old: Any, new: Any) -> bool:
-    """Whether viser would take a new value of a property as it is."""
-    if isinstance(new, np.ndarray):
-        return isinstance(old, np.ndarray) and old.dtype == new.dtype
-    return not isinstance(old, np.ndarray) and old is not UNKNOWN
 
 
 def uuid_of(handle: Any) -> str:
@@ -344,7 +468,7 @@ def uuid_of(handle: Any) -> str:
 
 def run_script(gui: viser.GuiApi, source: str) -> None:
     """Run a script in the page, as viser does to bring its plots."""
-    gui._websock_interface.queue_message(_messages.RunJavascriptMessage(source=source))
+    _tell(gui._websock_interface, _messages.RunJavascriptMessage(source=source))
 
 
 def run_file(gui: viser.GuiApi, name: str, more: str = "") -> None:

@@ -41,6 +41,7 @@ from finlab.actuators.propeller import (
     Threshold,
     force_words,
     form_of,
+    power_law_margins,
     usable_force,
 )
 from finlab.actuators.response import Form, Group, Plane
@@ -62,6 +63,7 @@ class AzimuthLaw(PropellerLaw):
     second and third own axis."""
 
     column = 1
+    formula_kind = "FL_TURNING_PROPELLER"
 
     def force(self, command: Values, inflow: Array | None = None) -> Values:
         force = np.zeros_like(command)
@@ -98,11 +100,16 @@ class AzimuthGroup(Group):
         low, high = np.array([azimuth.arc for azimuth in azimuths]).T
         self._limits = np.array([usable_force(azimuth) for azimuth in azimuths])
         self._power = ThrustPower([azimuth.model for azimuth in azimuths])
+        self._margins = power_law_margins(azimuths)
         center, half_angle = _arcs(low, high)
         self.responses = []
         for i, azimuth in enumerate(azimuths):
             matrix = effectiveness[i, 1:]
             self.responses.append(_plane(azimuth, matrix, float(center[i]), float(half_angle[i])))
+
+    @property
+    def conjugate_margins(self) -> list[Array | None]:
+        return self._margins
 
     @property
     def forms(self) -> list[Form]:

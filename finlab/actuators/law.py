@@ -13,9 +13,10 @@ has the closed form used here: driving ends where sin = s0 with (K A / J) cos^2 
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, final
+from typing import Any, NamedTuple, final
 
 import numpy as np
 
@@ -118,6 +119,15 @@ class Blade:
         return drag, inertia
 
 
+class Formula(NamedTuple):
+    """A law as the core evaluates it, see `finlab/core/src/actuator_formulas.c`."""
+
+    kind: str
+    """Its name there: `FL_DRAG` ..."""
+    numbers: Mapping[str, Any]
+    """Fields of `fl_formula` by name, numbers or arrays (n,)."""
+
+
 class ActuatorLaw(ABC):
     """Command to force and power of one actuator, or of n actuators that share a law.
 
@@ -170,6 +180,10 @@ class ActuatorLaw(ABC):
     @abstractmethod
     def power_gradient(self, command: Array, inflow: Array | None = None) -> Array:
         """Returns the derivatives (..., n, 3) of `power` by each number of the command."""
+
+    def formula(self) -> Formula | None:
+        """Returns the law as the core evaluates it; None of one that is no formula there."""
+        return None
 
 
 class FinLaw(ActuatorLaw):
@@ -254,6 +268,10 @@ class PlanarLaw(FinLaw):
             return np.asarray(self.thrust(amplitude, frequency, phi_e) / (1.0 + e))
 
         return size_numbers(size, lower, upper)
+
+    def blade_numbers(self) -> dict[str, Any]:
+        """Returns the fields of a `Formula` that tell of the blade."""
+        return {"blade_drag": self.blade.drag, "blade_inertia": self.blade.inertia}
 
     @abstractmethod
     def thrust(self, amplitude: Values, frequency: Values, zero_direction: Values) -> Values:

@@ -11,7 +11,7 @@ from msgspec import Meta
 from numpy.typing import ArrayLike
 
 from finlab.actuators.actuator import Actuator, Command
-from finlab.actuators.law import ActuatorLaw
+from finlab.actuators.law import ActuatorLaw, Formula
 from finlab.actuators.response import Form
 from finlab.actuators.thrust_model import MAX_FORCE, PowerLaw, PowerTable, ThrustModel
 from finlab.actuators.thrust_power import ThrustPower
@@ -254,6 +254,8 @@ class PropellerLaw(ActuatorLaw):
 
     column: int
     """Index of that number in a command (3,)."""
+    formula_kind: str
+    """Name of the law in the core, where its power is one, too."""
 
     def __init__(self, propellers: Sequence[Propeller]) -> None:
         """Takes n thrusters, or n that turn."""
@@ -272,6 +274,39 @@ class PropellerLaw(ActuatorLaw):
         gradient = np.zeros(command.shape)
         gradient[..., self.column] = self.power_curve.marginal(self.thrust(command))
         return gradient
+
+    def formula(self) -> Formula | None:
+        laws = self.power_curve.power_laws
+        if laws is None:
+            return None
+        numbers = {
+            "coefficient": laws.forward,
+            "coefficient_reverse": laws.reverse,
+            "power_exponent": laws.exponent,
+            "dead_band": self.dead_band,
+        }
+        return Formula(self.formula_kind, numbers)
+
+
+def power_law_margins(propellers: Sequence[Propeller]) -> list[Array | None]:
+    """Returns the power laws of propellers as `Group.conjugate_margins` has them.
+
+    Args:
+        propellers: m thrusters, or m that turn.
+
+    Returns:
+        Of each -1, power at 1 N ahead and in reverse [W], and exponent [1]; None of one with a
+        table, and of one with a dead band, in which a tick may leave it.
+    """
+    margins: list[Array | None] = []
+    for propeller in propellers:
+        model = propeller.model
+        margin: Array | None = None
+        if isinstance(model, PowerLaw) and propeller.dead_band == 0.0:
+            reverse = model.forward if model.reverse is None else model.reverse
+            margin = np.array([-1.0, model.forward, reverse, model.exponent])
+        margins.append(margin)
+    return margins
 
 
 def outside_dead_band(force: AnyArray, dead_band: Array, inside: Array | float = 0.0) -> AnyArray:

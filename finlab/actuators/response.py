@@ -396,7 +396,8 @@ class Group(ABC):
         `conjugate_bound` says it, or the law is the table.
 
         `power_bound` of `finlab/allocation/dual/bound.py` asks, by `Compiled.conjugate_margins`.
-        Fins by a formula answer, whose conjugates would take long for each bound.
+        Fins by a formula answer, whose conjugates would take long for each bound, and propellers
+        with a power law, whose conjugate the core evaluates.
         """
         return [None] * len(self.responses)
 
@@ -408,7 +409,8 @@ class Group(ABC):
 
         `power_bound` of `finlab/allocation/dual/bound.py` asks, by `Compiled.conjugates_by_laws`.
         Thrusters, azimuths and tilts answer: what they give has the directions of their responses,
-        and their laws tell the power at each size. Fins by a formula have `conjugate_margins`.
+        and their laws tell the power at each size. Those with `conjugate_margins` need no answer
+        where all of a robot have them.
         Fins with measured tables and rudders give other directions too, see `conjugate_bound`.
 
         Args:

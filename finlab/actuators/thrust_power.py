@@ -181,6 +181,13 @@ class ThrustPower:
                 curve = key
             self._groups.append((indices, curve))
 
+    @property
+    def power_laws(self) -> PowerLaws | None:
+        """The power laws of all n propellers; None where one has another model."""
+        _, curve = self._groups[0]
+        is_only_group = len(self._groups) == 1
+        return curve if is_only_group and isinstance(curve, PowerLaws) else None
+
     def watts(self, force: AnyArray) -> AnyArray:
         """Returns the power (..., n) [W] of forces (..., n) [N], negative ones in reverse."""
         power: AnyArray = np.empty(np.shape(force))

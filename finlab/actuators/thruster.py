@@ -35,6 +35,7 @@ from finlab.actuators.propeller import (
     Threshold,
     force_words,
     form_of,
+    power_law_margins,
     usable_force,
 )
 from finlab.actuators.response import Form, Group, Line
@@ -50,6 +51,7 @@ class ThrusterLaw(PropellerLaw):
     """Law of n thrusters with a fixed axis: force along the first own axis [N]."""
 
     column = 0
+    formula_kind = "FL_FIXED_PROPELLER"
 
     def force(self, command: Values, inflow: Array | None = None) -> Values:
         force = np.zeros_like(command)
@@ -81,6 +83,11 @@ class ThrusterGroup(Group):
             self.responses.append(_line(thruster, sign * matrix[0]))
         self._limits = np.array([usable_force(thruster) for thruster in thrusters])
         self._power = ThrustPower([thruster.model for thruster in thrusters])
+        self._margins = power_law_margins(thrusters)
+
+    @property
+    def conjugate_margins(self) -> list[Array | None]:
+        return self._margins
 
     @property
     def forms(self) -> list[Form]:

@@ -3,6 +3,7 @@
 `Allocator` makes one; it is plain data, and can be read where no allocator is.
 """
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
@@ -18,11 +19,12 @@ from finlab.allocation.question import MethodQuestion
 from finlab.allocation.report import allocation_blocks, answer_notes, doubts, next_measurement
 from finlab.allocation.solution import CANDIDATE_ARRAYS, Candidates, PlainData, Solved
 from finlab.arrays import Array, has_nan
+from finlab.core.calls import CommandFigures
 from finlab.display import html, text
 from finlab.layout.damage import Damage
 from finlab.layout.effectiveness import body_force
 from finlab.layout.layout import Layout
-from finlab.physics.objective import REACHED, judged_effort, judged_power
+from finlab.physics.objective import REACHED, effort_of_one, judged_effort, judged_power
 from finlab.physics.plant import Plant, plant_of
 
 if TYPE_CHECKING:
@@ -231,6 +233,10 @@ class Answer(PlainData, Generic[Number]):
     @cached_property
     def forces(self) -> Array:
         """Force (n, 3) or (N, n, 3) of each actuator [N], body frame, by its own law; 0 if lost."""
+        return self._body_forces()
+
+    def _body_forces(self) -> Array:
+        """The forces in the body frame, by the plant."""
         return self._of_forces(lambda plant, force: body_force(force, plant.layout.frames))
 
     @cached_property
@@ -281,6 +287,10 @@ class Answer(PlainData, Generic[Number]):
     @cached_property
     def power(self) -> Number:
         """Mean power [W] of a command, by the actuators' own models: of fins mechanical."""
+        return self._power()
+
+    def _power(self) -> Number:
+        """The power by the plant."""
         return self._number(self._judged(judged_power))
 
     @cached_property
@@ -398,7 +408,7 @@ class Allocation(Answer[float]):
 
     LAZY: ClassVar[tuple[str, ...]] = (*Answer.LAZY, "calm_power", "candidates", "samples")
     ARRAYS: ClassVar[tuple[str, ...]] = (*Answer.ARRAYS, "previous", "multipliers")
-    NOT_COPIED: ClassVar[tuple[str, ...]] = (*Answer.NOT_COPIED, "_own_forces")
+    NOT_COPIED: ClassVar[tuple[str, ...]] = (*Answer.NOT_COPIED, "_figures", "_own_forces")
 
     solve_ms: float = field(compare=False)
     """Time spent solving [ms], judging not included."""
@@ -473,9 +483,43 @@ class Allocation(Answer[float]):
         return None if self.answered is None else _read_only_candidates(self.answered.samples())
 
     @cached_property
+    def _figures(self) -> CommandFigures | None:
+        """All that the core judges at once; None where the plant judges each by itself."""
+        return self._plant.figures(self.command)
+
+    @cached_property
+    def forces(self) -> Array:
+        figures = self._figures
+        return self._body_forces() if figures is None else figures.force
+
+    @cached_property
+    def wrench(self) -> Array:
+        figures = self._figures
+        return self._of_forces(Plant.wrench_of) if figures is None else figures.wrench
+
+    @cached_property
+    def power(self) -> float:
+        figures = self._figures
+        return self._power() if figures is None else figures.power
+
+    @cached_property
+    def effort(self) -> float | None:
+        return effort_of_one(self.layout, self.command) if self.layout.is_of_fins else None
+
+    @cached_property
+    def err_norm(self) -> float:
+        # Numbers one by one: arrays of six take four times as long.
+        squares = 0.0
+        for missing, scale in zip(self.unallocated.tolist(), self.scale.tolist(), strict=True):
+            share = missing / scale
+            squares += share * share
+        return math.sqrt(squares)
+
+    @cached_property
     def _own_forces(self) -> Array:
         """Forces (1, n, 3) [N], own frames, of which several figures are made."""
-        return self._plant.forces(self.command[None])
+        figures = self._figures
+        return self._plant.forces(self.command[None]) if figures is None else figures.own_force
 
     def _of_forces(self, figure: Callable[[Plant, Array], Array]) -> Array:
         return read_only(np.asarray(figure(self._plant, self._own_forces)[0]))

@@ -1,11 +1,24 @@
 """Work that several threads share."""
 
+import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
+from functools import cache
 from typing import TypeVar
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
+
+
+@cache
+def _pool(size: int) -> ThreadPoolExecutor:
+    """Threads that wait for work: to start some for each batch takes as long as a hundred
+    answers."""
+    return ThreadPoolExecutor(size, "finlab-batch")
+
+
+if hasattr(os, "register_at_fork"):  # a child has none of the threads of its parent
+    os.register_at_fork(after_in_child=_pool.cache_clear)
 
 
 def in_threads(
@@ -33,9 +46,11 @@ def in_threads(
         return results_of(items)
     ends = [len(items) * k // count for k in range(count + 1)]
     runs = [items[ends[k] : ends[k + 1]] for k in range(count)]
-    with ThreadPoolExecutor(count - 1) as pool:
-        others = [pool.submit(results_of, run) for run in runs[1:]]
+    others = [_pool(count - 1).submit(results_of, run) for run in runs[1:]]
+    try:
         results = results_of(runs[0])
-        for other in others:
-            results += other.result()
+    finally:
+        wait(others)  # nobody writes to the arrays of the caller afterwards
+    for other in others:
+        results += other.result()
     return results

@@ -9,7 +9,7 @@ from typing import TypeVar
 
 from finlab.errors import FinlabError
 
-VERSION = 13
+VERSION = 17
 """What `fl_version()` of the C files returns; both rise together where a signature or a struct
 changes."""
 SIGNATURES = {
@@ -25,6 +25,7 @@ SIGNATURES = {
     "fl_answer_many": "ipppipipppppppp",
     "fl_commands": "vpppipp",
     "fl_forces_of_commands": "vppip",
+    "fl_figures_of_command": "ipipppp",
     "fl_conjugates": "ippppipp",
     "fl_power_bounds": "ipppppipp",
     "fl_reach": "vpppppirppp",

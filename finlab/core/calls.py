@@ -727,6 +727,72 @@ class Core:
         return bound
 
 
+class CommandFigures(NamedTuple):
+    """What one command of n actuators gives and takes."""
+
+    own_force: Array
+    """Forces (1, n, 3) [N], own frames, 0 of lost actuators."""
+    force: Array
+    """The same (n, 3) [N] in the body frame."""
+    wrench: Array
+    """Wrench (6,) [N, N m], body frame."""
+    power: float
+    """Power of all actuators [W]."""
+
+
+class Formulas:
+    """The laws of n actuators in the core, where all of them are formulas. Threads may share it."""
+
+    def __init__(self, laws: Record, effectiveness: Array, frames: Array) -> None:
+        """Takes the laws of a robot.
+
+        Args:
+            laws: of its actuators, an `fl_formula` (n,).
+            effectiveness: wrench (n, 3, 6) of 1 N along own axes [1, m].
+            frames: own axes (n, 3, 3) in the body frame, in rows.
+        """
+        n = len(laws)
+        self._n = n
+        self._laws = laws
+        self._effectiveness = np.ascontiguousarray(effectiveness)
+        self._frames = np.ascontiguousarray(frames)
+        self._command = np.empty((n, 3))
+        self._figures = np.empty(6 * n + 7)
+        arrays = (self._effectiveness, self._frames, self._command, self._figures)
+        self._addresses = [array.ctypes.data for array in arrays]
+        self._laws_address = laws.ctypes.data
+        self._figures_of_command = library().fl_figures_of_command
+        self._lock = Lock()
+        """Held during a call: command and figures are the same for all threads."""
+
+    def figures(self, command: Array) -> CommandFigures | None:
+        """Evaluates a command.
+
+        Args:
+            command: (n, 3), NaN of lost actuators.
+
+        Returns:
+            Its figures, whose arrays are read-only; None where it is no command of the robot.
+        """
+        n = self._n
+        if command.shape != (n, 3):
+            return None
+        with self._lock:
+            self._command[:] = command
+            code = self._figures_of_command(self._laws_address, n, *self._addresses)
+            numbers = self._figures.copy()
+        if code:
+            return None
+        numbers.setflags(write=False)
+        begin_of_wrench = 6 * n
+        return CommandFigures(
+            numbers[: 3 * n].reshape(1, n, 3),
+            numbers[3 * n : begin_of_wrench].reshape(n, 3),
+            numbers[begin_of_wrench:-1],
+            numbers.item(-1),
+        )
+
+
 def error_text(code: int) -> str:
     """Returns what a code that the core has returned means, and what to do."""
     text: bytes = library().fl_error_text(code)

@@ -68,7 +68,7 @@ typedef double fl_wide; /* where differences of large numbers matter, in single 
 #define FL_FOILS (FL_FOIL_STEPS * FL_STEPS_AT_KINK * 2 * (FL_STARTS + FL_RAY_SHARES))
 #define FL_BOUND (2 * (FL_FORCES + FL_FOILS))
 
-#define FL_VERSION 13  /* of all structs and functions here */
+#define FL_VERSION 17  /* of all structs and functions here */
 #define FL_MAGIC 41721 /* first number of a block */
 
 /* The structs that cross the border of the library. */
@@ -107,6 +107,16 @@ enum {
   FL_FIN,      /* amplitude, frequency and direction of a beat */
   FL_FOIL,     /* an angle */
   FL_KINDS     /* how many kinds there are */
+};
+
+/* Laws that are formulas: fl_formula.kind. */
+enum {
+  FL_DRAG,              /* of a fin: T = c f^2 sin^2 A */
+  FL_LIGHTHILL,         /* of a fin: T = c f^2 A J1(A) */
+  FL_SOFT,              /* of a fin that saturates, and then declines */
+  FL_FIXED_PROPELLER,   /* a force along an axis, power c |F|^e */
+  FL_TURNING_PROPELLER, /* the same at an angle */
+  FL_FORMULAS           /* how many there are */
 };
 
 /* What to give for a wrench beyond reach: fl_policy.kind. */
@@ -240,6 +250,19 @@ void fl_commands(const fl_real *block, fl_work *work, const fl_real *force, int 
    @param force    becomes the forces (count, n, 3) along the axes of the laws [N] */
 void fl_forces_of_commands(const fl_real *block, const fl_real *command, int count, fl_real *force);
 
+/* Evaluates what a command gives and takes, where the laws of all actuators are formulas.
+
+   @param laws           (n,) of the actuators
+   @param n              how many actuators there are
+   @param effectiveness  (n, 3, 6) wrench per newton along own axes [1, m]
+   @param frames         (n, 3, 3) own axes in the body frame, in rows
+   @param command        (n, 3), NaN of lost actuators, which give and take nothing
+   @param figures        become (6 n + 7,): forces (n, 3) along own axes and in the body frame [N],
+                         wrench (6,) [N, N m], and power [W]
+   @return               FL_OK, or FL_BAD_ARGUMENT where a command is neither finite nor lost */
+int fl_figures_of_command(const fl_formula *laws, int n, const fl_real *effectiveness,
+                          const fl_real *frames, const fl_real *command, fl_real *figures);
+
 /* Evaluates the conjugates of all costs at multipliers of the wrench, Eq. 4, for proofs of a lower
    bound of the power.
 
@@ -249,7 +272,9 @@ void fl_forces_of_commands(const fl_real *block, const fl_real *command, int cou
                       that of its table: price_max of the largest force [W/N], N and M; by how much
                       the law may give less than the table's least force [N]; the largest difference
                       at prices between price_max (j / N)^4 and the next (N) [W]; and beyond them
-                      the difference over the price, at price_max / (1 - j / M) (M + 1) [N]
+                      the difference over the price, at price_max / (1 - j / M) (M + 1) [N]. Or of a
+                      propeller without a dead band: -1, then c ahead and c in reverse [W], and e
+                      [1] of its law P = c |F|^e, whose own conjugate it is then
    @param conjugates  becomes those of each actuator (count, n), of one with a margin an upper bound
                       of that of its law over all that its limits allow, rates left out
    @return            FL_OK or FL_BAD_NUMBER */

@@ -128,6 +128,23 @@ FL_FIELD(fl_real, force_min, , "N", "least force, of planes below 0 in reverse")
 FL_FIELD(fl_real, force_max, , "N", "largest force")
 FL_END(fl_actuator_conjugate)
 
+FL_BEGIN(fl_formula)
+FL_FIELD(fl_real, kind, , "1", "of the law: FL_DRAG ...")
+FL_FIELD(fl_real, coefficient, , "N s^2, N or W",
+         "of a fin's thrust, or power of a propeller at 1 N ahead")
+FL_FIELD(fl_real, coefficient_reverse, , "W", "power of a propeller at 1 N in reverse")
+FL_FIELD(fl_real, power_exponent, , "1", "of a propeller's power over its force")
+FL_FIELD(fl_real, dead_band, , "N", "commanded forces smaller than this give none")
+FL_FIELD(fl_real, rise_exponent, , "1", "p of a soft fin")
+FL_FIELD(fl_real, fall_begin, , "rad Hz", "x0 of a soft fin")
+FL_FIELD(fl_real, fall_exponent, , "1", "q of a soft fin")
+FL_FIELD(fl_real, unevenness, , "1", "e of a soft fin")
+FL_FIELD(fl_real, unevenness_angle, , "rad", "phi_e of a soft fin")
+FL_FIELD(fl_real, lean_angle, , "rad", "of a fin: angle from command to force")
+FL_FIELD(fl_real, blade_drag, , "N m s^2", "K of a fin's blade")
+FL_FIELD(fl_real, blade_inertia, , "kg m^2", "J of the blade and of the water that it carries")
+FL_END(fl_formula)
+
 FL_BEGIN(fl_settings)
 FL_FIELD(int, most_parts, , "1",
          "parts of sets with gaps that are looked at for one wrench: bounds its time")

@@ -33,6 +33,7 @@ MAX_CORE_ERROR = 3e-7
 """Largest normalized error of the core's commands for a question of the self-test: beyond it the
 library would refine them, and its answer were not the core's."""
 FILES_LEFT_OUT = (
+    "actuator_formulas.c",
     "jets.c",
     "messages.c",
     "outer_iterations.c",
@@ -53,8 +54,8 @@ FILES_LEFT_OUT = (
     "kalman_filter.c",
     "path_wrench.c",
 )
-"""Files of the core that an export does not need: `interaction`, attainable sets, batches, what
-Python alone calls, and what swims in a simulation."""
+"""Files of the core that an export does not need: judgement by formulas, `interaction`, attainable
+sets, batches, what Python alone calls, and what swims in a simulation."""
 QUESTIONS: tuple[tuple[PolicyName, float], ...] = (
     ("closest", 0.9),
     ("closest", 3.0),

@@ -5,7 +5,8 @@ wrench scale of a robot, by which errors are normalized.
 the judge of logs and the experiments use this module.
 """
 
-from functools import lru_cache
+import math
+from functools import cached_property, lru_cache
 from typing import Literal
 
 import numpy as np
@@ -98,6 +99,25 @@ class EffortMeter:
         numbers = command.reshape(len(command), len(self._hessian))
         # J = u^T Q u / 2
         effort: AnyArray = 0.5 * (numbers @ self._hessian * numbers).sum(axis=-1)
+        return effort
+
+    @cached_property
+    def _weights(self) -> list[tuple[float, float, float, float]]:
+        """Of each fin what its effort is for a squared number of its command, three, and for the
+        product of the first two."""
+        squares = (0.5 * self._hessian_diagonal).tolist()
+        products = self._hessian_product.tolist()
+        return [(*own, product) for own, product in zip(squares, products, strict=True)]
+
+    def of_one(self, command: Array) -> float:
+        """Returns the effort of one command (n, 3), of which a row of NaN is a lost fin and adds
+        nothing; fin by fin, which takes a fifth of the time of arrays."""
+        effort = 0.0
+        for numbers, weights in zip(command.tolist(), self._weights, strict=True):
+            A, f, phi = numbers
+            by_A, by_f, by_phi, by_A_f = weights
+            if not math.isnan(A):
+                effort += by_A * A * A + by_f * f * f + by_phi * phi * phi + by_A_f * A * f
         return effort
 
     def gradient(self, command: NDArray[np.floating]) -> AnyArray:
@@ -220,6 +240,12 @@ def judged_effort(layout: Layout, command: Array) -> Array:
         is_lost = np.isnan(command).any(axis=-1, keepdims=True)
         effort = _effort_meter(layout)(np.where(is_lost, 0.0, command))
     return np.asarray(effort)
+
+
+def effort_of_one(layout: Layout, command: Array) -> float:
+    """Returns the effort `J_en` of one command (n, 3) of a robot of fins; a row of NaN is a lost
+    fin and adds nothing."""
+    return _effort_meter(layout).of_one(command)
 
 
 def costs(layout: Layout, command: Array) -> tuple[Array, Array]:

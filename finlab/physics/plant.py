@@ -21,6 +21,8 @@ from finlab.actuators.kinds import free_angles, laws_of, wrapping_angles
 from finlab.actuators.law import ActuatorLaw, Blade, FinLaw, PlanarLaw, planar_force
 from finlab.arrays import Array
 from finlab.axes import feasible, is_full_turn
+from finlab.core.calls import CommandFigures, Formulas
+from finlab.core.fields import constant, struct
 from finlab.errors import CommandError
 from finlab.layout.effectiveness import body_force, own_effectiveness, wrench_of_forces
 from finlab.layout.layout import Layout
@@ -91,6 +93,7 @@ class Plant:
         plant = copy(self)
         plant.effectiveness = np.where(axes, self.effectiveness, 0.0)
         plant.counts = axes
+        plant.__dict__.pop("_formulas", None)  # they have the effectiveness
         return plant
 
     def inflow(self, flow: Array | None) -> Array | None:
@@ -308,6 +311,35 @@ class Plant:
             own_inflow = _inflow_of(law, inflow, indices)
             power[..., indices] = law.power(command[..., indices, :], own_inflow)
         return power
+
+    def figures(self, command: Array) -> CommandFigures | None:
+        """Returns all that is judged of one command, in a tenth of the time of its parts.
+
+        Args:
+            command: (n, 3); a row of NaN is a lost actuator.
+
+        Returns:
+            Its figures, which are those of the laws to rounding; None where a law is no formula,
+            actuators act on each other, or the command is none of this robot.
+        """
+        formulas = self._formulas
+        return None if formulas is None else formulas.figures(command)
+
+    @cached_property
+    def _formulas(self) -> Formulas | None:
+        """The laws of all actuators as the core evaluates them; None where one is no formula there,
+        feels the flow, or actuators act on each other."""
+        if self.feels_flow:
+            return None
+        laws = np.zeros(self.n, struct("fl_formula"))
+        for indices, law in self._laws:
+            formula = law.formula()
+            if formula is None:
+                return None
+            laws["kind"][indices] = constant(formula.kind)
+            for name, values in formula.numbers.items():
+                laws[name][indices] = values
+        return Formulas(laws, self.effectiveness, self.layout.frames)
 
     def power_gradient(self, command: Array, *, flow: Array | None = None) -> Array:
         """Returns the derivatives of the power; arguments as for `power`.

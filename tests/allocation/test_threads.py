@@ -1,6 +1,8 @@
 """Batches that several threads share: `threads=` of `Allocator.allocate_batch`, and allocators that
 threads ask at once."""
 
+import os
+import subprocess
 import sys
 import threading
 from concurrent.futures import ThreadPoolExecutor
@@ -128,3 +130,21 @@ def test_parts_of_a_long_batch_have_their_own_commands(method: str) -> None:
         assert (batch.bound is None) == (method == "analytic")
         if batch.bound is not None:
             assert (batch.bound <= batch.power).all() and (batch.bound[batch.reachable] > 0.0).all()
+
+
+FORK_SCRIPT = """
+import os
+from finlab.allocation.shared_work import in_threads
+
+assert in_threads(abs, range(4), 2) == [0, 1, 2, 3]
+child = os.fork()
+if child == 0:
+    os._exit(0 if in_threads(abs, range(4), 2) == [0, 1, 2, 3] else 1)
+assert os.waitpid(child, 0)[1] == 0
+"""
+"""A program whose child shares work, too, after its parent has."""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="processes have no children here")
+def test_a_child_has_threads_of_its_own() -> None:
+    subprocess.run([sys.executable, "-c", FORK_SCRIPT], check=True, timeout=60.0)

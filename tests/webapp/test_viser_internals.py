@@ -4,6 +4,8 @@ import asyncio
 import gzip
 import http.client
 import threading
+import time
+from collections.abc import Callable, Iterator
 from http.client import HTTPConnection
 from itertools import chain
 from typing import Any
@@ -13,15 +15,26 @@ from zipfile import ZipFile
 import numpy as np
 import pytest
 import viser
+from msgspec import msgpack
 from viser import _icons, _messages
-from viser.infra._async_message_buffer import AsyncMessageBuffer
 from viser.infra._messages import Message
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
+from websockets.typing import Subprotocol
+from zstandard import ZstdCompressor, ZstdDecompressor
 
 from webapp import viser_internals
 from webapp.guard import COOKIE, Guard, is_loopback
-from webapp.viser_internals import assign, hold_uploads, icons_at_hand, start_server, stop_server
+from webapp.viser_internals import (
+    Outbox,
+    _frame,
+    assign,
+    hold_uploads,
+    icons_at_hand,
+    run_script,
+    start_server,
+    stop_server,
+)
 
 
 def test_property_types_of_a_handle_are_those_of_its_class() -> None:
@@ -200,34 +213,49 @@ def test_real_server_refuses_before_anything_is_shown() -> None:
         stop_server(server)
 
 
-def test_updates_are_packed_as_viser_packs_them() -> None:
-    server = start_server()  # from now on
+def unpacked(frame: bytes) -> tuple[list[dict[str, Any]], list[bytes]]:
+    """Messages and arrays of a frame, as a page reads it."""
+    head = 16
+    packed = int.from_bytes(frame[8:head], "little")
+    window = msgpack.decode(ZstdDecompressor().decompress(frame[head : head + packed]))
+    at = head + packed
+    arrays = []
+    for length in window["binaryBufferLengths"]:
+        at += -at % 8
+        arrays.append(frame[at : at + length])
+        at += length
+    assert at == len(frame)
+    return window["messages"], arrays
+
+
+def test_messages_are_packed_as_viser_packs_them() -> None:
     array = np.arange(12.0, dtype=np.float32).reshape(2, 2, 3)
     updates: list[dict[str, Any]] = [
         {"content": "<b>ü</b>", "visible": True, "order": 1.5, "count": 3},
         {"points": array, "scale": 2.0},
         {"points": array.swapaxes(0, 2), "colors": np.zeros((1, 3), np.uint8)},
         {"scale": (1.0, 2.0, 3.0), "points": array},
+        {"points": np.arange(3, dtype=np.uint8)},
         {"value": np.float64(0.5)},
         {"value": None},
     ]
-    for kind in (_messages.GuiUpdateMessage, _messages.SceneNodeUpdateMessage):
-        for update in updates:
-            message = kind("/node", update)
-            message.redundancy_key()
-            buffers: list[memoryview] = []
-            expected: list[memoryview] = []
-            packed = message.as_serializable_dict(buffers)
-            assert packed == Message.as_serializable_dict(message, expected)
-            assert [buffer.tobytes() for buffer in buffers] == [e.tobytes() for e in expected]
-    stop_server(server)
+    messages: list[Message] = [_messages.RunJavascriptMessage("f();")]
+    for update in updates:
+        messages.append(_messages.GuiUpdateMessage("widget", update))
+        messages.append(_messages.SceneNodeUpdateMessage("/node", update))
+    expected: list[memoryview] = []
+    by_viser = [message.as_serializable_dict(expected) for message in messages]
+    packed, arrays = unpacked(_frame(messages, ZstdCompressor(level=1)))
+    assert packed == msgpack.decode(msgpack.encode(by_viser))
+    assert arrays == [buffer.tobytes() for buffer in expected]
 
 
 def test_properties_of_a_node_are_one_message_and_what_viser_would_keep() -> None:
     server = start_server()
     arrows = server.scene.add_arrows("/arrows", np.zeros((1, 2, 3)), np.zeros((1, 3), np.uint8))
     sent: list[Any] = []
-    arrows._impl.api._queue_scene_message = sent.append  # type: ignore[method-assign]
+    interface: Any = server._websock_server
+    interface.queue_message = sent.append
     points = np.ones((2, 2, 3), np.float32)
     colors = np.full((2, 3), 7, np.uint8)
     assign(arrows, {"points": points, "colors": colors, "scale": (1.0, 2.0, 3.0)})
@@ -240,42 +268,157 @@ def test_properties_of_a_node_are_one_message_and_what_viser_would_keep() -> Non
     stop_server(server)
 
 
-def test_messages_to_one_page_come_in_their_order_and_groups_stay_together() -> None:
-    stop_server(start_server())  # from now on
-    loop = asyncio.new_event_loop()
+class Heard:
+    """A page that notes the scripts of each frame that comes."""
 
-    async def heard() -> list[list[str]]:
-        buffer = AsyncMessageBuffer(loop, persistent_messages=False, max_window_size=3)
-        windows: list[list[str]] = []
+    def __init__(self, server: viser.ViserServer) -> None:
+        protocol = Subprotocol(f"viser-v{viser.__version__}")
+        url = f"ws://127.0.0.1:{server.get_port()}"
+        self._socket = connect(url, subprotocols=[protocol], max_size=None)
+        self._frames: list[list[str]] = []
+        camera = {"wxyz": (1.0, 0.0, 0.0, 0.0), "position": (1.0, 1.0, 1.0), "fov": 1.0}
+        size = {"near": 0.1, "far": 9.0, "image_height": 60, "image_width": 80}
+        ways = {"look_at": (0.0, 0.0, 0.0), "up_direction": (0.0, 0.0, 1.0)}
+        message = {"type": "ViewerCameraMessage", **camera, **size, **ways}
+        self._socket.send(msgpack.encode(message))
+        threading.Thread(target=self._listen, daemon=True).start()
 
-        async def listen() -> None:
-            async for window in buffer.window_generator(0):
-                windows.append([message.source for message in window])  # type: ignore[attr-defined]
+    def _listen(self) -> None:
+        for frame in self._socket:
+            assert isinstance(frame, bytes)
+            sources = [message.get("source") for message in unpacked(frame)[0]]
+            self._frames.append([source for source in sources if source is not None])
 
-        listening = loop.create_task(listen())
-        await asyncio.sleep(0.0)
-        for word in "abcd":
-            buffer.push(_messages.RunJavascriptMessage(word))
-        await asyncio.sleep(0.01)
-        buffer.atomic_start()
-        buffer.push(_messages.RunJavascriptMessage("e"))
-        await asyncio.sleep(0.01)
-        buffer.push(_messages.RunJavascriptMessage("f"))
-        buffer.atomic_end()
-        await asyncio.sleep(0.01)
-        thread = threading.Thread(
-            target=buffer.push, args=(_messages.RunJavascriptMessage("from a thread"),)
+    def frames(self, last: str) -> list[list[str]]:
+        """The scripts of each frame with some, until one came with this script."""
+        end_s = time.monotonic() + 30.0
+        while time.monotonic() < end_s:
+            frames = [frame for frame in self._frames if frame]
+            if frames and last in frames[-1]:
+                self._frames.clear()
+                return frames
+            time.sleep(0.02)
+        raise AssertionError(f"{last} did not come")
+
+    def close(self) -> None:
+        """Leave."""
+        self._socket.close()
+
+
+@pytest.fixture
+def page() -> Iterator[tuple[viser.ViserServer, viser.ClientHandle, Heard]]:
+    """A server, one of its pages, and what that hears."""
+    server = start_server()
+    came = threading.Event()
+
+    async def note(_client: viser.ClientHandle) -> None:
+        came.set()
+
+    server.on_client_connect(note)
+    heard = Heard(server)
+    assert came.wait(30.0)
+    yield server, next(iter(server.get_clients().values())), heard
+    heard.close()
+    stop_server(server)
+
+
+def on_loop(server: viser.ViserServer, act: Callable[[], None]) -> None:
+    """Call a function on the loop of a server."""
+
+    async def run() -> None:
+        act()
+
+    asyncio.run_coroutine_threadsafe(run(), server.get_event_loop()).result(30.0)
+
+
+@pytest.mark.parametrize("is_busy", [False, True])
+def test_groups_come_in_their_order_and_stay_together(
+    page: tuple[viser.ViserServer, viser.ClientHandle, Heard], is_busy: bool
+) -> None:
+    server, client, heard = page
+    outbox = Outbox(client)
+    transport = outbox._websocket.transport
+    waiting = transport.get_write_buffer_size
+    written: list[bytes] = []
+    write = transport.write
+
+    def noted(data: bytes) -> None:
+        written.append(data)
+        write(data)
+
+    def tell() -> None:
+        transport.write = noted
+        if is_busy:
+            transport.get_write_buffer_size = lambda: 1
+        run_script(client.gui, "before")
+        with outbox:
+            run_script(client.gui, "a")
+            client.gui._websock_interface.queue_message(_messages.RunJavascriptMessage("by viser"))
+            run_script(client.gui, "b")
+        with outbox:
+            run_script(client.gui, "c")
+        with outbox:
+            pass
+        assert len(written) == 0, "nothing is written before all groups are told"
+        outbox.send()
+        assert len(written) == (not is_busy)
+        transport.get_write_buffer_size = waiting
+
+    on_loop(server, tell)
+    frames = heard.frames("c")
+    told = ["before", "a", "by viser", "b"]
+    assert frames == ([[*told, "c"]] if is_busy else [told, ["c"]])
+    # What is told from another thread, or beside groups, comes as well.
+    threading.Thread(target=run_script, args=(client.gui, "thread")).start()
+    assert heard.frames("thread") == [["thread"]]
+    on_loop(server, lambda: run_script(client.gui, "alone"))
+    assert heard.frames("alone") == [["alone"]]
+
+
+def test_a_group_is_told_as_far_as_it_came_where_that_failed(
+    page: tuple[viser.ViserServer, viser.ClientHandle, Heard],
+) -> None:
+    server, client, heard = page
+    outbox = Outbox(client)
+
+    def tell() -> None:
+        with pytest.raises(ZeroDivisionError), outbox:
+            run_script(client.gui, "a")
+            raise ZeroDivisionError
+        outbox.send()
+        run_script(client.gui, "b")
+
+    on_loop(server, tell)
+    assert list(chain(*heard.frames("b"))) == ["a", "b"]
+
+
+def test_inputs_are_heard_at_once_and_a_bad_one_ends_nothing(
+    page: tuple[viser.ViserServer, viser.ClientHandle, Heard],
+) -> None:
+    server, client, heard = page
+    outbox = Outbox(client)
+    slider = client.gui.add_slider("force", 0.0, 10.0, 0.1, 1.0)
+    values: list[float] = []
+    faults: list[Any] = []
+    server.get_event_loop().set_exception_handler(lambda _loop, about: faults.append(about))
+
+    @slider.on_update
+    async def changed(event: Any) -> None:
+        values.append(event.target.value)
+
+    assert outbox._websocket.finlab_client is client
+    for value in (2.0, "no number", 3):
+        heard._socket.send(
+            msgpack.encode(
+                {"type": "GuiUpdateMessage", "uuid": slider._impl.uuid, "updates": {"value": value}}
+            )
         )
-        thread.start()
-        await asyncio.wait_for(loop.run_in_executor(None, thread.join), 30.0)
-        await asyncio.sleep(0.01)
-        buffer.set_done()
-        await asyncio.wait_for(listening, 30.0)
-        return windows
-
-    windows = loop.run_until_complete(heard())
-    loop.close()
-    assert windows == [["a", "b", "c"], ["d"], ["e", "f"], ["from a thread"]]
+    on_loop(server, lambda: run_script(client.gui, "heard"))
+    heard.frames("heard")
+    end_s = time.monotonic() + 30.0
+    while len(values) < 2 and time.monotonic() < end_s:
+        time.sleep(0.02)
+    assert values == [2.0, 3.0] and len(faults) == 1
 
 
 def test_a_loop_wakes_itself_for_other_threads_alone() -> None:

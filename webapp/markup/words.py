@@ -178,10 +178,13 @@ def in_app(text: str) -> str:
     return text
 
 
-def missing_part(allocation: Allocation) -> Array:
+def missing_part(allocation: Allocation) -> list[float]:
     """The unallocated wrench (6,) [N, N m] without what is too small to matter."""
-    unallocated = allocation.unallocated
-    return np.where(np.abs(unallocated / allocation.scale) > SMALL, unallocated, 0.0)
+    part: list[float] = allocation.unallocated.tolist()
+    for axis, scale in enumerate(allocation.scale.tolist()):
+        if abs(part[axis]) <= SMALL * scale:
+            part[axis] = 0.0
+    return part
 
 
 def unlearned_sentence(layout: Layout, fins: Sequence[str]) -> str:

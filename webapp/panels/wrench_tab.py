@@ -28,6 +28,9 @@ from webapp.session.state import MAX_SPEED, Flow, State
 from webapp.session.targets import PRESETS, axis_reach, full_thrust, slider_end
 from webapp.tasks.solver import JetComparison
 
+DIGITS = 4
+"""Digits behind the point that sliders of the wrench show."""
+
 
 class Memoized:
     """A function whose last result is kept while its arguments are the same objects: a page asks
@@ -91,8 +94,9 @@ def add_target(page: Page) -> None:
             if limit != limits[axis]:
                 limits[axis] = slider.max = limit
                 slider.min = -limit
-            rounded = round(value, 4) + 0.0
-            if slider.value != rounded:
+            rounded = round(value, DIGITS) + 0.0
+            # What the page has sent may have more digits, of which it shows no other ones.
+            if round(slider.value, DIGITS) != rounded:
                 slider.value = rounded
 
     board.act(reach)
@@ -146,7 +150,7 @@ def _add_slider(page: Page, axis: int) -> viser.GuiSliderHandle[float]:
     page.add_html(lambda layout: _switch(axis, bool(layout.commanded[axis])))
     slider = page.gui.add_slider(label, -10.0, 10.0, step, 0.0, hint=hint, marks=())
     page.board.show(slider, disabled=lambda layout: not layout.commanded[axis])
-    slider.precision = 4
+    slider.precision = DIGITS
     page.on_change(slider, partial(session.set_target, axis))
     return slider
 

@@ -4,7 +4,7 @@ A fin beats, a foil is deflected, a propeller spins, a pod turns as well; `frame
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -44,7 +44,7 @@ class Motion(NamedTuple):
     """Own axis of the propeller: 0 or 1."""
 
 
-def motion(actuator: Actuator, command: Array | None) -> Motion:
+def motion(actuator: Actuator, command: Sequence[float] | None) -> Motion:
     """How an actuator moves with a command (3,), and how it hangs where that is None."""
     along = int(actuator.KIND.drawn_as == "pod")
     if command is None:
@@ -52,11 +52,12 @@ def motion(actuator: Actuator, command: Array | None) -> Motion:
         limp = math.atan2(third[2], across[2]) if actuator.KIND.drawn_as == "fin" else 0.0
         return Motion(angle=limp, along=along)  # the blade hangs as far down as it can
     if actuator.KIND.drawn_as == "fin":
-        return Motion(*command.tolist())
-    angle = float(command[actuator.KIND.stuck_number]) if actuator.KIND.sticks_at_angle else 0.0
+        amplitude, frequency, angle = command
+        return Motion(amplitude, frequency, angle)
+    angle = command[actuator.KIND.stuck_number] if actuator.KIND.sticks_at_angle else 0.0
     if actuator.KIND.force_number is None:
         return Motion(angle=angle)
-    force = float(command[actuator.KIND.force_number])
+    force = command[actuator.KIND.force_number]
     most = (
         actuator.upper[actuator.KIND.force_number]
         if force >= 0.0

@@ -6,6 +6,7 @@ Both are one node for the whole robot, so a page is sent a few numbers for each 
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import viser
@@ -17,6 +18,7 @@ from finlab.swim.hull.mesh_file import Mesh
 from webapp.handles import set_properties
 from webapp.scene.actuator_shapes import CHORD, ROOT, SHORTEST, SPAN
 from webapp.theme import Rgb, fin_color
+from webapp.viser_internals import assign
 
 HEAD_RADIUS = 2.5
 """Radius of an arrow's head, in radii of its shaft."""
@@ -47,6 +49,12 @@ class Arrows:
             visible=False,
         )
         self._is_visible = False
+        self._size = 0.0
+        self._colors: NDArray[np.uint8] | None = None
+        """Of all arrows of which some are drawn, as they were given last."""
+        self._drawn = b""
+        """Which of them are."""
+        self._points: NDArray[np.float32] | None = None
 
     def show(self, starts: Array, vectors: Array, colors: NDArray[np.uint8], size: float) -> None:
         """Show arrows; those of no length are left out.
@@ -54,12 +62,12 @@ class Arrows:
         Args:
             starts: where they begin (n, 3) [m].
             vectors: from there to their tips (n, 3) [m].
-            colors: of each (n, 3), in linear light.
+            colors: of each (n, 3), in linear light; nobody changes them.
             size: factor of the thickness of their shafts.
         """
         is_drawn = (vectors * vectors).sum(axis=1) > (SHORTEST * size) ** 2
-        n_drawn = int(is_drawn.sum())
-        is_visible = n_drawn > 0
+        n_drawn = np.count_nonzero(is_drawn)
+        is_visible = bool(n_drawn)
         if is_visible != self._is_visible:
             self.node.visible = self._is_visible = is_visible
         if not is_visible:
@@ -70,10 +78,29 @@ class Arrows:
         points /= size
         if n_drawn < len(points):
             points = points[is_drawn]
-            colors = colors[is_drawn]
-        set_properties(
-            self.node, scale=size, colors=colors, points=points.round(DIGITS).astype(np.float32)
-        )
+        self._send(points.round(DIGITS).astype(np.float32), colors, is_drawn, size)
+
+    def _send(
+        self,
+        points: NDArray[np.float32],
+        colors: NDArray[np.uint8],
+        is_drawn: NDArray[np.bool_],
+        size: float,
+    ) -> None:
+        """Sends what has changed: ends of the arrows (m, 2, 3) that are drawn of n, and their
+        looks."""
+        changed: dict[str, Any] = {}
+        if size != self._size:
+            changed["scale"] = self._size = size
+        drawn = is_drawn.tobytes()
+        if colors is not self._colors or drawn != self._drawn:
+            self._colors = colors
+            self._drawn = drawn
+            changed["colors"] = colors[is_drawn]
+        if self._points is None or points.tobytes() != self._points.tobytes():
+            changed["points"] = self._points = points
+        if changed:
+            assign(self.node, changed)
 
 
 class ForceNodes:
@@ -102,8 +129,8 @@ class ForceNodes:
         """Of each actuator (n, 3), in linear light."""
         self._middles = self._turns = self._starts = np.zeros((0, 3))
         self._sizes = (1.0, 1.0)
-        self._swept = np.zeros((2, 0))
-        """Half angles and angles [rad] of the fans that are shown (2, n)."""
+        self._swept: tuple[list[float], list[float]] = ([], [])
+        """Half angles and angles [rad] of the fans that are shown (n,)."""
 
     def place(self, layout: Layout, sizes: tuple[float, float]) -> None:
         """Where actuators stand; `sizes` are of them and of arrows."""
@@ -112,17 +139,17 @@ class ForceNodes:
         shafts = layout.frames[:, 0] * layout.is_fin[:, None]
         self._starts = layout.position + size * (ROOT + SPAN / 2) * shafts
         self._turns = np.array([quaternion(frame.T) for frame in layout.frames])
-        self._swept = np.zeros((2, 0))  # the fans are elsewhere
+        self._swept = ([], [])  # the fans are elsewhere
 
-    def command(self, forces: Array, amplitudes: Array, angles: Array) -> None:
+    def command(self, forces: Array, half_angles: list[float], middles: list[float]) -> None:
         """Show forces (n, 3) as arrows [m], and fans of half angles (n,) about angles (n,)
         [rad]."""
         self._arrows.show(self._starts, forces, self._colors, self._sizes[1])
-        swept = np.array([amplitudes, angles]).round(DIGITS)
-        if np.array_equal(swept, self._swept):
+        swept = ([round(x, DIGITS) for x in half_angles], [round(x, DIGITS) for x in middles])
+        if swept == self._swept:
             return
         self._swept = swept
-        amplitudes, angles = swept
+        amplitudes, angles = np.array(swept)
         beats = amplitudes > 0.0
         fans = self._fans
         fans.visible = bool(beats.any())

@@ -1,6 +1,7 @@
 """The whole 3D view of one browser."""
 
 import math
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -41,6 +42,7 @@ CAMERAS = {
 """Where the camera stands in each view [m]."""
 SPEED = 0.5
 FORCES_ONLY = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+NO_WRENCH = [0.0] * 6
 
 
 class RobotScene:
@@ -212,21 +214,23 @@ class RobotScene:
             commands = np.full((visible_layout.n, 3), np.nan)
             forces = np.zeros((visible_layout.n, 3))
         scaled = LENGTH / scale.newtons
-        works = [
-            actuator.name not in idle and math.isfinite(commands[i, 0])
-            for i, actuator in enumerate(visible_layout.actuators)
-        ]
-        self._moves = [
-            motion(actuator, commands[i] if works[i] else None)
-            for i, actuator in enumerate(visible_layout.actuators)
-        ]
+        # Lists: a robot has few actuators, and an operation on an array takes as long as on ten.
+        works: list[bool] = []
+        moves: list[Motion] = []
+        for actuator, row in zip(visible_layout.actuators, commands.tolist(), strict=True):
+            alive = actuator.name not in idle and math.isfinite(row[0])
+            works.append(alive)
+            moves.append(motion(actuator, row if alive else None))
+        self._moves = moves
         if works != self._works:
             self._works = works
             for node, alive in zip(self._fins, works, strict=False):
                 node.command(alive)
-        arrows = np.where(np.array(works)[:, None], forces, 0.0) * (scaled * self._arrow_size)
-        moves = np.array(self._moves)
-        self._forces.command(arrows, moves[:, 0] * works, moves[:, 2])
+        arrows = forces * (scaled * self._arrow_size)
+        if False in works:
+            arrows[~np.array(works)] = 0.0
+        swept = [move.amplitude if alive else 0.0 for move, alive in zip(moves, works, strict=True)]
+        self._forces.command(arrows, swept, [move.angle for move in moves])
         if visible_layout.interaction is not None or self._jets.drawn:
             robot = (
                 shown_allocation.layout
@@ -263,14 +267,13 @@ class RobotScene:
         scale: Scale,
         moment: Moment | None,
     ) -> None:
-        demanded = np.array(target)
-        delivered = np.zeros(6)
-        missing = np.zeros(6)
+        demanded: Sequence[float] = target
+        delivered = missing = NO_WRENCH
         if moment is not None:
-            demanded = moment.asked * FORCES_ONLY
-            delivered = moment.delivered * FORCES_ONLY
+            demanded = (moment.asked * FORCES_ONLY).tolist()
+            delivered = (moment.delivered * FORCES_ONLY).tolist()
         elif shown_allocation is not None:
-            delivered = shown_allocation.wrench
+            delivered = shown_allocation.wrench.tolist()
             missing = missing_part(shown_allocation)
         lengths = LENGTH / scale.newtons, LENGTH / scale.torque
         self._wrench.refresh(demanded, delivered, missing, self._top, *lengths, self._arrow_size)

@@ -20,6 +20,7 @@ from webapp.scene.stage import Shape
 from webapp.tasks.analysing import Analysis
 from webapp.tasks.swimmer import Swimmer
 from webapp.theme import ASKED, DEAD, DELIVERED, LIGHT, MISSING, REACH, Rgb
+from webapp.viser_internals import assign
 
 NEWTONS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 """Forces [N] that an arrow of 0.1 m may stand for."""
@@ -37,6 +38,10 @@ HEIGHT = 0.16
 """How far above the hull the arrows begin [m]; inside it they could not be seen."""
 FORCE_COLORS = linear([DELIVERED, MISSING])
 """Of the arrows of the delivered and of the missing force (2, 3), in linear light."""
+NO_LENGTH = (0.0, 0.0, 0.0)
+"""A vector of no length [m]."""
+LEAST_TURN = 1e-4
+"""Change of a component of a direction up to which a mesh is not turned [1]."""
 LARGEST = 0.42
 """How far the drawn set may reach from the centre of gravity [m]."""
 
@@ -59,7 +64,7 @@ def fitting_scale(
     if shown_allocation is not None:
         wrench = shown_allocation.wrench.tolist()
         forces += [wrench[:3], *shown_allocation.forces.tolist()]
-        torques += [missing_part(shown_allocation)[3:].tolist(), wrench[3:]]
+        torques += [missing_part(shown_allocation)[3:], wrench[3:]]
     force = max([math.hypot(*vector) for vector in forces])
     torque = max([math.hypot(*vector) for vector in torques])
     newtons = fitting(NEWTONS, force, now.newtons, LENGTH, ARROWS)
@@ -120,9 +125,9 @@ class WrenchNodes:
 
     def refresh(
         self,
-        target: Array,
-        got: Array,
-        missing: Array,
+        target: Sequence[float],
+        got: Sequence[float],
+        missing: Sequence[float],
         top: float,
         scale: float,
         turn: float,
@@ -136,19 +141,23 @@ class WrenchNodes:
             self._root.position = np.array([0.0, 0.0, top + HEIGHT * size])
             for node in self._nodes:
                 set_properties(node, scale=size)
-        asked_force = size * scale * target[:3]
-        delivered = size * scale * got[:3]
-        starts = np.zeros((2, 3))  # the missing force begins where the delivered one ends
-        starts[1] = delivered
-        vectors = np.empty((2, 3))
-        vectors[0] = delivered
-        vectors[1] = size * scale * missing[:3]
-        self._forces.show(starts, vectors, FORCE_COLORS, size)
-        length = math.hypot(*asked_force.tolist())
+        length_scale = size * scale
+        # Component by component: operations on arrays of three take longer.
+        Fx, Fy, Fz = got[:3]
+        delivered = length_scale * Fx, length_scale * Fy, length_scale * Fz
+        Fx, Fy, Fz = missing[:3]
+        left = length_scale * Fx, length_scale * Fy, length_scale * Fz
+        # The missing force begins where the delivered one ends.
+        self._forces.show(
+            np.array([NO_LENGTH, delivered]), np.array([delivered, left]), FORCE_COLORS, size
+        )
+        Fx, Fy, Fz = target[:3]
+        asked_force = length_scale * Fx, length_scale * Fy, length_scale * Fz
+        length = math.hypot(*asked_force)
         self._asked_force.show(asked_force, length, (round(length, DIGITS), size, size))
         for ring, wrench in zip(self._torques, (target, got, missing), strict=True):
             torque = wrench[3:]
-            length = math.hypot(*torque.tolist())
+            length = math.hypot(*torque)
             radius = round(size * turn * length, DIGITS)
             ring.show(torque, length, (radius, radius, radius))
 
@@ -160,11 +169,13 @@ class UnitMesh:
         """`turn` gives the rotation (3, 3) for a direction (3,)."""
         self.node = node
         self._turn = turn
-        self._direction = np.zeros(3)
+        self._direction: Sequence[float] = NO_LENGTH
         self._scale = (0.0, 0.0, 0.0)
         self._is_visible = True
 
-    def show(self, vector: Array, length: float, scale: tuple[float, float, float]) -> None:
+    def show(
+        self, vector: Sequence[float], length: float, scale: tuple[float, float, float]
+    ) -> None:
         """Turn the mesh to a vector and scale it; one of no length is hidden.
 
         Args:
@@ -179,11 +190,15 @@ class UnitMesh:
             return
         if scale != self._scale:
             self._scale = scale
-            set_properties(self.node, scale=scale)
-        direction = vector / length
-        if abs(direction - self._direction).max() > 1e-4:
-            self._direction = direction
-            self.node.wxyz = quaternion(self._turn(direction))
+            assign(self.node, {"scale": scale})
+        x, y, z = vector
+        x /= length
+        y /= length
+        z /= length
+        old_x, old_y, old_z = self._direction
+        if max(abs(x - old_x), abs(y - old_y), abs(z - old_z)) > LEAST_TURN:
+            direction = self._direction = x, y, z
+            self.node.wxyz = quaternion(self._turn(np.array(direction)))
 
 
 def along_x(direction: Array) -> Array:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.actuators.fin.fin_model import FinModelSpec
-from finlab.actuators.law import Blade, FinLaw, PlanarLaw
+from finlab.actuators.law import Blade, FinLaw, Formula, PlanarLaw
 from finlab.arrays import ROUNDING, Array, Values, library_of
 
 
@@ -42,6 +42,9 @@ class Drag(PlanarLaw):
         # Mostly asked of arrays, many times for one answer.
         sin = np.sin if isinstance(amplitude, np.ndarray) else library_of(amplitude).sin
         return self.coefficient * (frequency * sin(amplitude)) ** 2
+
+    def formula(self) -> Formula:
+        return Formula("FL_DRAG", {"coefficient": self.coefficient, **self.blade_numbers()})
 
     def thrust_gradient(
         self, amplitude: Array, frequency: Array, zero_direction: Array
@@ -123,6 +126,9 @@ class Lighthill(PlanarLaw):
         """See `PlanarLaw`; it does not depend on the zero direction."""
         return self.coefficient * frequency**2 * amplitude * bessel_j1(amplitude)
 
+    def formula(self) -> Formula:
+        return Formula("FL_LIGHTHILL", {"coefficient": self.coefficient, **self.blade_numbers()})
+
     def thrust_gradient(
         self, amplitude: Array, frequency: Array, zero_direction: Array
     ) -> tuple[Array, Array, Array | float]:
@@ -162,6 +168,18 @@ class Soft(PlanarLaw):
         cos = library_of(zero_direction).cos
         uneven = 1.0 + self._e * cos(zero_direction - self._phi_e)
         return self._k * x**self._p / (1.0 + (x / self._x0) ** self._q) * uneven
+
+    def formula(self) -> Formula:
+        numbers = {
+            "coefficient": self._k,
+            "rise_exponent": self._p,
+            "fall_begin": self._x0,
+            "fall_exponent": self._q,
+            "unevenness": self._e,
+            "unevenness_angle": self._phi_e,
+            "lean_angle": self.offset,
+        }
+        return Formula("FL_SOFT", numbers | self.blade_numbers())
 
     def thrust_gradient(
         self, amplitude: Array, frequency: Array, zero_direction: Array

@@ -23,6 +23,12 @@ static const constant CONSTANTS[] = {
     CONSTANT(FL_FIN),
     CONSTANT(FL_FOIL),
     CONSTANT(FL_KINDS),
+    CONSTANT(FL_DRAG),
+    CONSTANT(FL_LIGHTHILL),
+    CONSTANT(FL_SOFT),
+    CONSTANT(FL_FIXED_PROPELLER),
+    CONSTANT(FL_TURNING_PROPELLER),
+    CONSTANT(FL_FORMULAS),
     CONSTANT(FL_CLOSEST),
     CONSTANT(FL_DIRECTION),
     CONSTANT(FL_PRIORITY),
@@ -211,6 +217,43 @@ static real margin_at(const real *margin, real v) {
   return v * (beyond[cell] + t * (beyond[cell + 1] - beyond[cell]));
 }
 
+/* Power of a force F by a power law c |F|^e, as `margins` of fl_conjugates have it [W]. */
+static real power_by_law(const real *law, real force) {
+  real c = law[1];
+  if (force < 0) c = law[2];
+  const real e = law[3];
+  return c * POW(FABS(force), e);
+}
+
+/* Conjugate max v F - P(F) of that law over the forces between two, at a price v (Eq. 4). */
+static real conjugate_by_law(const real *law, real v, real low, real high) {
+  real c = law[1];
+  if (v < 0) c = law[2];
+  const real e = law[3];
+  real force = POW(FABS(v) / (e * c), 1 / (e - 1)); /* where e c F^(e - 1) = |v| */
+  if (v < 0) force = -force;
+  force = clipped(force, low, high);
+  return v * force - power_by_law(law, force);
+}
+
+/* The same of a propeller at its prices, within the limits of its set. */
+static real conjugate_of_propeller(const fl_actuator *a, const real *law,
+                                   const fl_actuator_conjugate *prices) {
+  const real low = prices->force_min;
+  const real high = prices->force_max;
+  if (!is_plane(a)) {
+    const real v = a->command_sign * prices->price_ahead;
+    if (a->command_sign > 0) return conjugate_by_law(law, v, low, high);
+    return conjugate_by_law(law, v, -high, -low);
+  }
+  const real ahead = conjugate_by_law(law, prices->price_ahead, larger(low, 0), larger(high, 0));
+  if (low >= 0) return ahead;
+  const real astern =
+      conjugate_by_law(law, -prices->price_reverse, smaller(low, 0), smaller(high, 0));
+  if (high < 0) return astern;
+  return larger(ahead, astern);
+}
+
 /* The conjugate of one actuator's cost at its prices s (Eq. 4), over all that it may give now; with
    a margin an upper bound of that of its law, over all that its limits ever allow. */
 static fl_actuator_conjugate conjugate_at(const real *block, int i, const fl_set *set,
@@ -237,6 +280,10 @@ static fl_actuator_conjugate conjugate_at(const real *block, int i, const fl_set
     return result;
   }
   const fl_actuator *a = ACTUATOR(block, i);
+  if (margin[0] < 0) {
+    result.conjugate = conjugate_of_propeller(a, margin, &result);
+    return result;
+  }
   const line_response y = fl_unlimited_response(block, a, along_force);
   const real v = along_force * a->force_scale / a->power_scale; /* price of the table */
   result.conjugate = y.conjugate + a->power_scale * margin_at(margin, v);

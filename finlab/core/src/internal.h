@@ -18,6 +18,7 @@ typedef fl_wide wide;
 #define COS cosf
 #define ATAN2 atan2f
 #define EXP expf
+#define POW powf
 #define TANH tanhf
 #define FLOOR floorf
 #define RINT rintf
@@ -36,6 +37,7 @@ typedef fl_wide wide;
 #define COS cos
 #define ATAN2 atan2
 #define EXP exp
+#define POW pow
 #define TANH tanh
 #define FLOOR floor
 #define RINT rint
