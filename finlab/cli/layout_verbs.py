@@ -69,7 +69,7 @@ def show(
 def convert_layout(
     file: Annotated[Positional[str], arg(metavar="FILE")],
     output: Annotated[Positional[Path], arg(metavar="OUT")],
-    to: Literal["layout", "urdf", "sdf", "px4", "ardusub", "matrix"] | None = None,
+    to: Literal["layout", "urdf", "sdf", "mjcf", "px4", "ardusub", "matrix"] | None = None,
     fins: Annotated[tuple[str, ...], arg(metavar="LINK...")] = (),
     thrusters: Annotated[tuple[str, ...], arg(metavar="LINK...")] = (),
     origin: Literal["gravity", "base"] = "gravity",
@@ -78,14 +78,15 @@ def convert_layout(
     rows: Literal["axes", "thrusters"] | None = None,
     model: Annotated[str | None, arg(metavar="NAME")] = None,
 ) -> None:
-    """Make a layout of a file of others, or the other way round: URDF, SDF, PX4, ArduSub, a matrix.
+    """Make a layout of a file of others, or the other way round: URDF, SDF, MuJoCo, PX4, ArduSub, a
+    matrix.
 
     Args:
-        file: robot description (URDF, SDF), parameters of PX4 or ArduSub, factors, matrix, or
-            layout.
+        file: robot description (URDF, SDF, MJCF), parameters of PX4 or ArduSub, factors, matrix,
+            places and directions, or layout.
         output: file to write; its end says the form.
         to: form of the output, where its end is not enough.
-        fins: links of a robot description that are fins.
+        fins: links or bodies of a robot description that are fins.
         thrusters: links that are thrusters although no plugin drives them.
         origin: where the layout's origin goes: the centre of gravity of all links, or the root
             link's frame.

@@ -16,8 +16,11 @@ from finlab.exchange.description_layout import read_description
 from finlab.exchange.description_text import SDF, URDF, description_text
 from finlab.exchange.exchange import Exchange
 from finlab.exchange.matrix_table import plain_of, table_of
+from finlab.exchange.mjcf_read import read_mjcf
+from finlab.exchange.mjcf_write import write_mjcf
 from finlab.exchange.parameters import read_parameters, read_px4, write_px4
 from finlab.exchange.plain_robot import read_plain, write_matrix
+from finlab.exchange.xml_models import root_of
 from finlab.files import parse_json, parse_yaml
 from finlab.files.guarded import is_regular, read_text
 from finlab.layout import Layout, load_layout, save_layout
@@ -29,6 +32,7 @@ MAX_BYTES = 5_000_000
 WRITERS: dict[str, Callable[[Layout, Exchange, str], str]] = {
     "urdf": lambda layout, exchange, _: description_text(layout, exchange, URDF),
     "sdf": lambda layout, exchange, _: description_text(layout, exchange, SDF),
+    "mjcf": write_mjcf,
     "px4": write_px4,
     "ardusub": motor_factors.write_ardusub,
     "matrix": write_matrix,
@@ -38,6 +42,8 @@ the exchange that gets the notes, and the suffix of the file; returns its text."
 FORMAT_OF_SUFFIX = {
     ".urdf": "urdf",
     ".sdf": "sdf",
+    ".xml": "mjcf",
+    ".mjcf": "mjcf",
     ".params": "px4",
     ".cpp": "ardusub",
     ".csv": "matrix",
@@ -52,12 +58,24 @@ PROGRAMS = (".cpp", ".h", ".hpp", ".lua")
 """Suffixes of sources with calls that add motors to ArduSub."""
 PARAMETERS = (".params", ".parm", ".param")
 """Suffixes of parameter files of PX4 and ArduPilot."""
-FOREIGN = (".urdf", ".sdf", ".world", ".xacro", ".scn", *PARAMETERS, *PROGRAMS)
+FOREIGN = (
+    ".urdf",
+    ".sdf",
+    ".world",
+    ".xacro",
+    ".xml",
+    ".mjcf",
+    ".scn",
+    ".toml",
+    *PARAMETERS,
+    *PROGRAMS,
+)
 """Suffixes of robot descriptions, and of what autopilots read; their content says what they
 hold."""
 UNKNOWN_FORMAT = (
-    "holds none of the forms that are read: a layout, a robot description (URDF, SDF), parameters "
-    "of PX4 or ArduSub, motors of ArduSub, thrusters or a matrix in YAML, JSON or CSV"
+    "holds none of the forms that are read: a layout, a robot description (URDF, SDF, MJCF), "
+    "parameters of PX4 or ArduSub, motors of ArduSub, thrusters or a matrix in YAML, JSON, TOML or "
+    "CSV"
 )
 
 
@@ -133,7 +151,7 @@ def read_robot(text: str, file: str, exchange: Exchange) -> Layout:
     name = path.stem.strip()[:64].strip() or "robot"
     suffix = path.suffix.lower()
     if text.lstrip().startswith("<"):
-        return read_description(text, name, exchange)
+        return _read_xml(text, name, exchange)
     if FORMAT_OF_SUFFIX.get(suffix) != "layout":
         layout = _read_lines(text, name, suffix, exchange)
         if layout is not None:
@@ -147,6 +165,14 @@ def read_robot(text: str, file: str, exchange: Exchange) -> Layout:
         raise LayoutError(UNKNOWN_FORMAT)
     comments = [line for line in text.splitlines() if line.lstrip().startswith("#")]
     return read_plain(data, name, exchange, comments)
+
+
+def _read_xml(text: str, name: str, exchange: Exchange) -> Layout:
+    """The layout in a text of XML; its outermost element says what it is."""
+    root = root_of(text)
+    if root.tag in ("mujoco", "mujocoinclude"):
+        return read_mjcf(root, name, exchange)
+    return read_description(root, name, exchange)
 
 
 def _is_layout_file(data: dict[str, Any]) -> bool:

@@ -322,7 +322,7 @@ def _masses(
 ) -> _Masses:
     """The masses of all links together.
 
-    A link that says no mass counts as none. In SDF it has 1 kg and 1 kg m^2, which is no propeller's
+    A link that says no mass has none. SDF would give it 1 kg and 1 kg m^2, which is no propeller's
     and moves the centre of gravity: a note says so.
     """
     links = []

@@ -24,22 +24,20 @@ from finlab.exchange.thruster_plugins import (
     force_limits,
     is_gz_plugin,
 )
-from finlab.exchange.xml_models import root_of
 from finlab.layout import MAX_ACTUATORS, Actuator, Layout
 
 
-def read_description(text: str, name: str, exchange: Exchange) -> Layout:
-    """Returns the layout in a text of URDF or SDF.
+def read_description(root: Element, name: str, exchange: Exchange) -> Layout:
+    """Returns the layout in a description in URDF or SDF.
 
     Args:
-        text: the description.
+        root: its outermost element.
         name: the layout's name where the description has none.
         exchange: which links are actuators, and what to take for the origin; gets the notes.
 
     Raises:
         LayoutError: the description cannot be read, lacks a link or joint, or has no actuator.
     """
-    root = root_of(text)
     at_gravity = exchange.origin == "gravity"
     if root.tag == "scenario":
         hint = "give thrusters by place and direction, in YAML"
