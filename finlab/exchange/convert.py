@@ -20,6 +20,7 @@ from finlab.exchange.mjcf_read import read_mjcf
 from finlab.exchange.mjcf_write import write_mjcf
 from finlab.exchange.parameters import read_parameters, read_px4, write_px4
 from finlab.exchange.plain_robot import read_plain, write_matrix
+from finlab.exchange.stonefish import is_stonefish, read_stonefish
 from finlab.exchange.xml_models import root_of
 from finlab.files import parse_json, parse_yaml
 from finlab.files.guarded import is_regular, read_text
@@ -172,6 +173,8 @@ def _read_xml(text: str, name: str, exchange: Exchange) -> Layout:
     root = root_of(text)
     if root.tag in ("mujoco", "mujocoinclude"):
         return read_mjcf(root, name, exchange)
+    if is_stonefish(root):
+        return read_stonefish(root, name, exchange)
     return read_description(root, name, exchange)
 
 

@@ -39,9 +39,6 @@ def read_description(root: Element, name: str, exchange: Exchange) -> Layout:
         LayoutError: the description cannot be read, lacks a link or joint, or has no actuator.
     """
     at_gravity = exchange.origin == "gravity"
-    if root.tag == "scenario":
-        hint = "give thrusters by place and direction, in YAML"
-        raise LayoutError(f"is a scenario of Stonefish, which is not read; {hint}")
     description = parse_description(root, name, drives_thruster, exchange)
     if at_gravity and description.mass <= 0:
         raise _no_mass(description)

@@ -110,7 +110,7 @@ def test_matrices_of_every_shape(file: str, text: str, read_as: str) -> None:
         ("a.sdf", sdf('<include merge="true"><uri>model://wamv</uri></include>' + THRUSTER), "in <include> wamv, which is not"),
         ("a.xacro", '<robot xmlns:xacro="x"><link name="${a}"/></robot>', "is a xacro file, .* expands it"),
         ("a.xml", "<launch/>", "got <launch>"),
-        ("a.scn", '<scenario><include file="b.scn"/></scenario>', "is a scenario of Stonefish, which is not read"),
+        ("a.scn", '<scenario><include file="b.scn"/></scenario>', "Stonefish without a <robot>; it includes b.scn, which are not opened"),
     ],
 )  # fmt: skip
 def test_what_stands_in_the_way_is_named(file: str, text: str, message: str) -> None:
