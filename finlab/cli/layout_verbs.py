@@ -76,6 +76,7 @@ def convert_layout(
     force: Annotated[tuple[float, float] | None, arg(metavar="LEAST MOST")] = None,
     frame: Literal["FLU", "FRD"] | None = None,
     rows: Literal["axes", "thrusters"] | None = None,
+    length: Literal["m", "cm", "mm"] | None = None,
     model: Annotated[str | None, arg(metavar="NAME")] = None,
 ) -> None:
     """Make a layout of a file of others, or the other way round: URDF, SDF, MuJoCo, PX4, ArduSub, a
@@ -94,12 +95,13 @@ def convert_layout(
         frame: frame of a matrix or of places: x forward, and y left, z up (FLU) or y right, z down
             (FRD); what the file says, else FLU, by default.
         rows: what the rows of a matrix without labels are, where they may be both.
+        length: unit of positions whose key names none.
         model: which model of a description of several; the first with thrusters by default.
     """
     from finlab.exchange import Exchange, convert
     from finlab.files.worker import in_worker
 
-    exchange = Exchange(fins, thrusters, origin, force, frame, rows, model)
+    exchange = Exchange(fins, thrusters, origin, force, frame, rows, length, model=model)
     layout, notes = in_worker(convert, file, output, to, exchange)
     lines = [
         f"{output}: {layout.name} with {layout.counts_in_words}",

@@ -5,6 +5,7 @@ that format; `WRITERS` has the writers. The app reads dropped files by `read_rob
 """
 
 import os
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,7 @@ from finlab.exchange.parameters import read_parameters, read_px4, write_px4
 from finlab.exchange.plain_robot import read_plain, write_matrix
 from finlab.exchange.stonefish import is_stonefish, read_stonefish
 from finlab.exchange.xml_models import root_of
-from finlab.files import parse_json, parse_yaml
+from finlab.files import parse_json, parse_toml, parse_yaml, without_comments
 from finlab.files.guarded import is_regular, read_text
 from finlab.layout import Layout, load_layout, save_layout
 from finlab.layout.load import parse_layout
@@ -73,6 +74,10 @@ FOREIGN = (
 )
 """Suffixes of robot descriptions, and of what autopilots read; their content says what they
 hold."""
+_TOML_TABLE = re.compile(r"\[\[?[\w.\"' -]{1,100}\]\]?[ \t]*(?:\n|$)")
+"""The head of a table of TOML."""
+_TOML_KEY = re.compile(r"[\w.-]{1,100}[ \t]*=[ \t]*\S")
+"""The key of a value of TOML."""
 UNKNOWN_FORMAT = (
     "holds none of the forms that are read: a layout, a robot description (URDF, SDF, MJCF), "
     "parameters of PX4 or ArduSub, motors of ArduSub, thrusters or a matrix in YAML, JSON, TOML or "
@@ -157,15 +162,38 @@ def read_robot(text: str, file: str, exchange: Exchange) -> Layout:
         layout = _read_lines(text, name, suffix, exchange)
         if layout is not None:
             return layout
-    parse = parse_json if suffix == ".json" else parse_yaml
-    data = parse(text, "", LayoutError)
+    data = _plain_values(text, suffix)
     if isinstance(data, dict) and _is_layout_file(data):
         folder = exchange.path.parent if exchange.path else None
         return parse_layout(data, "", folder, may_open=folder is not None)
     if not isinstance(data, dict | list):
         raise LayoutError(UNKNOWN_FORMAT)
-    comments = [line for line in text.splitlines() if line.lstrip().startswith("#")]
+    comments = [line for line in text.splitlines() if line.lstrip().startswith(("#", "//"))]
     return read_plain(data, name, exchange, comments)
+
+
+def _plain_values(text: str, suffix: str) -> Any:
+    """The values in a text of JSON, perhaps with comments, TOML or YAML."""
+    if suffix == ".json":
+        try:
+            return parse_json(text, "", LayoutError)
+        except LayoutError:
+            bare = without_comments(text)
+            if bare == text:
+                raise
+            return parse_json(bare, "", LayoutError)
+    if suffix == ".toml":
+        return parse_toml(text, "", LayoutError)
+    if FORMAT_OF_SUFFIX.get(suffix) != "layout":
+        bare = without_comments(text)
+        if bare.lstrip()[:1] in ("{", "["):
+            # A TOML file may begin with the bracket of a table.
+            if not _TOML_TABLE.match(bare.lstrip()):
+                return parse_json(bare, "", LayoutError)
+            return parse_toml(text, "", LayoutError)
+        if _TOML_KEY.match(bare.lstrip()):
+            return parse_toml(text, "", LayoutError)
+    return parse_yaml(text, "", LayoutError)
 
 
 def _read_xml(text: str, name: str, exchange: Exchange) -> Layout:
@@ -215,6 +243,7 @@ def _read_lines(text: str, name: str, suffix: str, exchange: Exchange) -> Layout
             raise LayoutError(f"holds {n_parameters} parameters of an autopilot, but {names}")
     if suffix in PROGRAMS:
         raise LayoutError(
-            "is a program without a call of add_motor_raw_6dof, by which ArduSub adds motors"
+            "is a program without a call of add_motor_raw_6dof, by which ArduSub adds motors, or "
+            "of Motors_6DoF:add_motor"
         )
     return None

@@ -43,6 +43,10 @@ class Exchange:
     """Frame of a matrix or of places; the file's, else FLU, when None."""
     rows: Literal["axes", "thrusters"] | None = None
     """What the rows of a matrix without labels are, where it may be both."""
+    length: Literal["m", "cm", "mm"] | None = None
+    """Unit of positions whose key names none; metres, if they may be, when None."""
+    angle_unit: float | None = None
+    """What an angle of 1 stands for where its key names no unit [rad]; set by the reader."""
     model: str | None = None
     """Name of the model to take from a robot description of several; the first with thrusters when
     None."""
