@@ -5,6 +5,7 @@ azimuth. A fin's joint sits where its force acts, and its axis is the shaft. Thr
 joints that plugins drive, and the links that the user names; fins are named by the user alone.
 """
 
+import re
 from dataclasses import replace
 from xml.etree.ElementTree import Element
 
@@ -25,6 +26,9 @@ from finlab.exchange.thruster_plugins import (
     is_gz_plugin,
 )
 from finlab.layout import MAX_ACTUATORS, Actuator, Layout
+
+_THRUSTER_NAME = re.compile(r"thruster|propell|(?:^|[_\W])prop(?:[_\W\d]|$)|rotor", re.IGNORECASE)
+"""A name by which people call a thruster or its propeller."""
 
 
 def read_description(root: Element, name: str, exchange: Exchange) -> Layout:
@@ -53,6 +57,12 @@ def read_description(root: Element, name: str, exchange: Exchange) -> Layout:
         )
     if unread:
         exchange.note(f"Plugins that are not read: {listed(unread)}.")
+    idle = _idle_thrusters(description, {actuator.name for actuator in actuators})
+    if idle:
+        exchange.note(
+            f"Left out, since no plugin drives them: {listed(idle)}; --thrusters names the links "
+            "among them that push."
+        )
     exchange.note(f"Model {description.name} was read, x forward, y left, z up, in m, kg and N.")
     body = body_of(description, exchange) if at_gravity else None
     origin_name = "centre of gravity" if at_gravity else "base frame"
@@ -86,6 +96,23 @@ def _actuators(description: Description, origin: Array, exchange: Exchange) -> l
     for link in exchange.fins:
         actuators.append(fin_on(_joint_of_link(description, link), origin, exchange))
     return actuators
+
+
+def _idle_thrusters(description: Description, names: set[str]) -> list[str]:
+    """Links that are called thrusters or propellers and are none of the layout's actuators, nor
+    what these are mounted on, or mounted on them."""
+    joint_of_link = description.joint_of_link
+    touching = set(names)
+    for link, joint in joint_of_link.items():
+        if link in names:
+            touching.add(joint.parent)
+        if joint.parent in names:
+            touching.add(link)
+    return [
+        link
+        for link, joint in joint_of_link.items()
+        if link not in touching and _THRUSTER_NAME.search(f"{link} {joint.name}")
+    ]
 
 
 def _unread_plugins(description: Description) -> list[str]:

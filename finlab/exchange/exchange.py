@@ -21,6 +21,8 @@ T200_FORCE = (-39.91, 51.44)
 """Least and most force of a Blue Robotics T200 at 16 V [N], by the maker's table."""
 T200_POWER = PowerLaw(0.997, 1.449)
 """A fit of that table's electric power over force: 0.997 F^1.5 ahead, 1.449 |F|^1.5 astern [W]."""
+NO_TORQUE = 1e-12
+"""Reaction torque over the force up to which it is a rounding error [m]."""
 TO_FRD = np.array([[1.0], [-1.0], [-1.0], [1.0], [-1.0], [-1.0]])
 """Signs (6, 1) that turn wrenches (6, n) from FLU (x forward, y left, z up) to FRD (x forward,
 y right, z down), and back."""
@@ -91,7 +93,7 @@ class Exchange:
             vector(axis),
             self.force or force or T200_FORCE,
             T200_POWER,
-            torque_per_newton=torque_per_newton,
+            torque_per_newton=torque_per_newton if abs(torque_per_newton) > NO_TORQUE else 0.0,
         )
 
     def thruster_of_column(

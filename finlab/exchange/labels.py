@@ -189,7 +189,7 @@ def unknown_in(rows: Iterable[Mapping[str, Any]]) -> str:
     unknown: dict[str, None] = {}  # a set that keeps the order
     for row in rows:
         for key in map(str, row):
-            is_known = is_key_of(key.removesuffix(" (sign)"), THRUSTER_KEYS, units)
+            is_known = is_key_of(key.removeprefix("sign of "), THRUSTER_KEYS, units)
             if not axis_of(key) and not is_known:
                 unknown[key] = None
     return ", ".join(unknown)[:300]

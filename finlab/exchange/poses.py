@@ -33,7 +33,9 @@ _DIRECTION_WORDS = (
     "{0}vector"
 )
 """Keys of a component of a direction."""
-_POSE = "pose poses transform xyzrpy placeandangles"
+SIGN_OF = "sign of "
+"""What goes before a key of a direction that holds a sign or a sense of turning."""
+POSE = "pose poses transform xyzrpy placeandangles"
 """Keys of a position with angles."""
 _HEADING = "heading azimuth azimuthangle headingangle"
 _ELEVATION = "pitch elevation elevationangle pitchangle"
@@ -51,7 +53,7 @@ def split(record: Mapping[str, Any]) -> Record:
     joined = _without_pose({**record})
     key, value, *_ = lookup(joined, labels.DIRECTION)
     if key and (np.ndim(value) == 0 and (_is_sign(value) or plain(value) in _SPINS)):
-        joined[f"{key} (sign)"] = joined.pop(key)
+        joined[SIGN_OF + key] = joined.pop(key)
     _join(joined, "direction", _DIRECTION_WORDS)
     has_direction = bool(lookup(joined, labels.DIRECTION).key)
     has_heading = bool(lookup(joined, _HEADING, TURNS).key)
@@ -66,11 +68,13 @@ def split(record: Mapping[str, Any]) -> Record:
 
 def _without_pose(record: Record) -> Record:
     """A record whose pose of six numbers, or of a mapping, stands in keys of its own."""
-    key, value, *_ = lookup(record, _POSE)
+    key, value, *_ = lookup(record, POSE)
     if not key:
         return record
     if isinstance(value, Mapping):
-        inner = {f"{name}": entry for name, entry in value.items()}
+        inner = {str(name): entry for name, entry in value.items()}
+        _join(inner, "position", _PLACE_WORDS)
+        _join_angles(inner)
         return {**{k: v for k, v in record.items() if k != key}, **inner}
     pose = numbers_in(value)
     if pose is None or pose.shape != (6,):
@@ -314,11 +318,11 @@ def note_reversed(records: Mapping[str, Record], exchange: Exchange) -> None:
     names: dict[str, None] = {}
     for name, record in records.items():
         for key, value in record.items():
-            is_word = labels.is_key_of(key.removesuffix(" (sign)"), labels.REVERSED)
-            is_signed = key.endswith(" (sign)") and plain(value) not in _SPINS
+            is_word = labels.is_key_of(key, labels.REVERSED)
+            is_signed = key.startswith(SIGN_OF) and plain(value) not in _SPINS
             is_thrust = plain(key) == "thrust" and _is_sign(value)
             if (is_word or is_signed or is_thrust) and _is_negative(value, is_word):
-                keys[key.removesuffix(" (sign)")] = None
+                keys[key.removeprefix(SIGN_OF)] = None
                 names[name] = None
     if names:
         exchange.note(

@@ -123,7 +123,7 @@ def _by_position(node: Node, exchange: Exchange) -> ThrusterRecords | None:
         return None
     records = {}
     for key, record in _records_below(node.value).items():
-        if not labels.names_other_device((key,)):
+        if not labels.names_other_device((key,)) and not labels.is_key_of(key, poses.POSE):
             with layout_errors_at(f"{node.words}.{key}"):
                 records[key] = poses.split(record)
     poses.name_unit_orientations(records.values(), exchange)
