@@ -150,7 +150,11 @@ def _note_model(
         exchange.note(f"Body {robot.name} has no free joint, and is taken as the robot.")
     if robot.not_made:
         exchange.note(f"What it makes is not read, with its mass: {listed(robot.not_made)}.")
-    fluid = [key for option in file.root.findall("option") for key in FLUID if option.get(key)]
+    fluid = []
+    for option in file.root.findall("option"):
+        for key in FLUID:
+            if option.get(key, "0").strip() not in ("0", "0.0"):
+                fluid.append(key)
     if fluid:
         exchange.note(
             f"The water of MuJoCo ({', '.join(fluid)}) is not read: added mass and damping are "

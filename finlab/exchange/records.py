@@ -15,7 +15,7 @@ from finlab.axes import AXES, Axis
 from finlab.errors import LayoutError, layout_errors_at
 from finlab.exchange import labels, poses
 from finlab.exchange.exchange import Exchange
-from finlab.exchange.labels import Node, axis_of, lookup, nodes, numbers_in, plain
+from finlab.exchange.labels import Node, axis_of, listed, lookup, nodes, numbers_in, plain
 from finlab.exchange.poses import UNIT_TOLERANCE, Record
 from finlab.files.csv_table import LENGTHS
 
@@ -36,6 +36,8 @@ MATRIX_WORDS = {
     *("configuration", "config", "control", "motor", "motors"),
 }
 """A key that holds `matrix` and no other words than these names an allocation matrix, too."""
+THRUSTER_WORDS = {"thruster", "thrusters", "motor", "motors", "propeller", "propellers"}
+"""Words of a key that names thrusters, where other devices have places and directions, too."""
 OTHER_MATRIX_WORDS = {
     *("mass", "inertia", "damping", "drag", "added", "coriolis", "covariance", "weight"),
     *("weights", "gain", "gains", "rotation", "inverse", "inv", "pinv", "pseudo", "pseudoinverse"),
@@ -75,6 +77,13 @@ def find_thrusters(data: Any, exchange: Exchange, is_table: bool) -> ThrusterRec
     """
     by_position = _candidates(data, lambda node: _by_position(node, exchange))
     candidates = by_position or _candidates(data, lambda node: _by_wrench(node, exchange, is_table))
+    named = [candidate for candidate in candidates if names_thrusters(candidate.node)]
+    if len(candidates) > 1 and len(named) == 1:
+        others = [candidate.node.words for candidate in candidates if candidate is not named[0]]
+        exchange.note(
+            f"Places beside those of {named[0].node.words} are left out: {listed(others)}."
+        )
+        candidates = named
     if len(candidates) == 1:
         return candidates[0]
     if len(candidates) > 1:
@@ -90,6 +99,11 @@ def find_thrusters(data: Any, exchange: Exchange, is_table: bool) -> ThrusterRec
         "has no matrix, expected six rows of numbers (Fx, Fy, Fz, Tx, Ty, Tz) under a key such as "
         f"`tam` or `allocation_matrix`, or a position and a direction of each thruster{hint}"
     )
+
+
+def names_thrusters(node: Node) -> bool:
+    """Whether a node's own key says that thrusters stand there."""
+    return bool({plain(word) for word in re.split(r"[^A-Za-z]+", node.key[:100])} & THRUSTER_WORDS)
 
 
 def _candidates(data: Any, read: Callable[[Node], ThrusterRecords | None]) -> list[ThrusterRecords]:
@@ -139,7 +153,23 @@ def _by_position(node: Node, exchange: Exchange) -> ThrusterRecords | None:
                 f"has no {lacks}, and others beside it have one", f"{node.words}.{key}"
             )
     thrusters = {key: record for key, record in records.items() if has_position[key]}
+    if len(thrusters) == 1:
+        _check_symmetry(node, *thrusters)
     return ThrusterRecords(node, thrusters)
+
+
+def _check_symmetry(node: Node, only: str) -> None:
+    """Raises a LayoutError where one thruster has a place, and several beside it have a name
+    alone: they follow from it by a symmetry that the program knows."""
+    siblings = node.value.items() if isinstance(node.value, Mapping) else ()
+    for key, value in siblings:
+        is_list = isinstance(value, Mapping | list) and len(value) > 1 and not _records_below(value)
+        if key != only and is_list and names_thrusters(Node((str(key),), value, ())):
+            raise LayoutError(
+                f"has a place and a direction of {only} alone, and {len(value)} {key} beside it, "
+                "which follow from it by a symmetry; write the place and direction of each",
+                node.words,
+            )
 
 
 def _from_lists(node: Node, exchange: Exchange) -> dict[str, Record]:

@@ -153,8 +153,7 @@ class _Values:
             value = self._arguments.get(match[1])
             if value is None or "$" in value:
                 raise LayoutError(
-                    f"{what} has {match[0]}, whose value this file of Stonefish does not say; "
-                    "write it"
+                    f"{what} has {match[0]}, whose value this file of Stonefish does not say"
                 )
             return value
 
@@ -283,7 +282,11 @@ def _thruster(
     if link not in links.poses:
         raise LayoutError(f"thruster {name!r:.60} is on link {link!r:.60}, which is not there")
     pose = links.poses[link] @ values.pose(element.find("origin"))
-    limits = _limits(element, density, values)
+    try:
+        limits = _limits(element, density, values)
+    except LayoutError as error:
+        exchange.note(f"Limits of {name} are not read: {error.problem}.")
+        limits = _Limits(None, 0.0, None)
     thruster = exchange.thruster(
         name,
         pose[:3, 3] * TO_FLU - origin,

@@ -149,6 +149,12 @@ def test_arguments_and_names() -> None:
     assert layout.actuators[0].position[1] == pytest.approx(0.2)
 
 
+def test_limits_that_the_file_does_not_say_are_named() -> None:
+    _, notes = read(robot(thruster()).replace("${2*pi*15}", "$(param max_rpm)"))
+    assert "Limits of port are not read: specs@max_setpoint of actuator 'port' has $(param" in notes
+    assert "those of a T200 at 16 V are taken" in notes
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -158,8 +164,8 @@ def test_arguments_and_names() -> None:
             robot(thruster()).replace("-0.4 -0.2", "$(arg x) -0.2"),
             r"<origin> has \$\(arg x\), whose value this file of Stonefish does not say",
         ),
-        (robot(thruster()).replace("${2*pi*15}", "${open('x')}"), "calls open, which opens files"),
-        (robot(thruster()).replace("${2*pi*15}", "${9**9**9}"), "9"),
+        (robot(thruster()).replace("-0.4 -0.2", "${open('x')} 0"), "calls open, which opens files"),
+        (robot(thruster()).replace("-0.4 -0.2", "${9**9**9} 0"), "9"),
         (robot(thruster()).replace("-0.4 -0.2", "nan -0.2"), "xyz of <origin> is not 3 numbers"),
         (
             robot(

@@ -225,6 +225,17 @@ def test_cameras_are_no_thrusters() -> None:
     assert read("a.yaml", f"{thrusters}\n{cameras}")[0].names == ("a",)
 
 
+def test_devices_beside_the_thrusters_and_symmetries() -> None:
+    pose = "pose: [0, 0, 0, 0, 0, 0]"
+    text = f"thrusters: [{{name: a, {pose}}}]\npoker: {{tip: {{{pose}}}}}\nfog: {{{pose}}}"
+    layout, notes = read("a.yaml", text)
+    assert layout.names == ("a",)
+    assert "Places beside those of thrusters are left out: the file, poker" in notes
+    text = "seed: {position: [0.2, 0.2, 0], axis: [1, 0, 0]}\nmotors: {front: 0, back: 1}"
+    with pytest.raises(LayoutError, match="of seed alone, and 2 motors beside it, which follow"):
+        read("a.yaml", text)
+
+
 @pytest.mark.parametrize(
     ("file", "text", "said"),
     [
