@@ -31,10 +31,19 @@ STIFFNESS = 4.0
 """Torque of a servo per angle [N m/rad]: with `ARMATURE` it swings at 20 rad/s."""
 DAMPING = 0.4
 """Torque of a servo per angular velocity [N m s/rad], which lets it swing no more."""
-THRUSTER_SIZE = (0.03, 0.05)
+THRUSTER_SIZE = (0.04, 0.02)
 """Radius of the disc that stands for a thruster, and half its length [m]."""
-HULL_COLOR = "0.9 0.75 0.2 0.5"
+HULL_COLOR = "0.9 0.75 0.2 0.3"
 """Red, green, blue and opacity of the hull."""
+WATER = {
+    "type": "skybox",
+    "builtin": "gradient",
+    "rgb1": "0.35 0.55 0.7",
+    "rgb2": "0.02 0.1 0.2",
+    "width": "64",
+    "height": "64",
+}
+"""What stands behind the robot."""
 GEOMS = {"box": "box", "ucat": "box", "ellipsoid": "ellipsoid", "torpedo": "ellipsoid"}
 """Types of geoms by the shape of a hull."""
 
@@ -121,6 +130,8 @@ def write_mjcf(layout: Layout, exchange: Exchange, _suffix: str) -> str:
         compiler.set("balanceinertia", "true")
         exchange.note("No solid has its moments of inertia: MuJoCo balances them.")
     SubElement(root, "option", integrator="implicitfast")
+    assets = SubElement(root, "asset")
+    SubElement(assets, "texture", **WATER)
     world = SubElement(root, "worldbody")
     SubElement(world, "light", pos="0 0 5", dir="0 0 -1", directional="true")
     base = SubElement(world, "body", name=_base_name(layout), gravcomp="1")
