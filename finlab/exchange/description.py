@@ -155,7 +155,8 @@ def numbers(text: str, count: int, what: str) -> Array:
     except ValueError:
         values = np.empty(0)
     if values.shape != (count,) or not (np.abs(values) < 1e9).all():
-        raise LayoutError(f"{what} is not {count} numbers of ordinary size")
+        expected = "a number" if count == 1 else f"{count} numbers"
+        raise LayoutError(f"{what} is not {expected} of ordinary size")
     return values
 
 

@@ -81,6 +81,9 @@ class MjcfFile:
         self._classes: dict[str, dict[str, Attributes]] = {MAIN_CLASS: {}}
         for default in root.findall("default"):
             self._read_class(default)
+            # Before MuJoCo 3 the outermost class could have another name.
+            name = default.get("class", MAIN_CLASS)
+            self._classes[name] = self._classes[MAIN_CLASS]
 
     def attributes(self, element: Element, child_class: str = "") -> Attributes:
         """Returns the attributes of an element, with those of its class of defaults.

@@ -25,6 +25,8 @@ SERVO = "_angle"
 """What follows the name of an actuator in that of the servo that turns it."""
 DEFAULT_MASS = 10.0
 """Mass of a body whose layout has none [kg]."""
+LEAST_MASS = 1e-12
+"""Least mass of a body that turns [kg]; MuJoCo wants 1e-15."""
 ARMATURE = 0.01
 """Inertia of a servo about its hinge [kg m^2]: the servo turns that, and not the hull."""
 STIFFNESS = 4.0
@@ -131,13 +133,13 @@ def write_mjcf(layout: Layout, exchange: Exchange, _suffix: str) -> str:
         exchange.note("No solid has its moments of inertia: MuJoCo balances them.")
     SubElement(root, "option", integrator="implicitfast")
     assets = SubElement(root, "asset")
-    SubElement(assets, "texture", **WATER)
+    SubElement(assets, "texture", WATER)
     world = SubElement(root, "worldbody")
     SubElement(world, "light", pos="0 0 5", dir="0 0 -1", directional="true")
     base = SubElement(world, "body", name=_base_name(layout), gravcomp="1")
     SubElement(base, "freejoint", name=f"{_base_name(layout)}_joint")
     link_moment = INERTIA_SHARE * min(moments) / max(1, len(turning))
-    link_mass = MASS_SHARE * mass / max(1, len(turning))
+    link_mass = max(MASS_SHARE * mass / max(1, len(turning)), LEAST_MASS)
     base_moments = [moment - link_moment * len(turning) for moment in moments]
     _add_inertial(base, mass - link_mass * len(turning), base_moments)
     if body.hull is not None:

@@ -68,7 +68,7 @@ def split(record: Mapping[str, Any]) -> Record:
 
 def _without_pose(record: Record) -> Record:
     """A record whose pose of six numbers, or of a mapping, stands in keys of its own."""
-    key, value, *_ = lookup(record, POSE)
+    key, value, unit, names_unit = lookup(record, POSE, TURNS)
     if not key:
         return record
     if isinstance(value, Mapping):
@@ -85,7 +85,8 @@ def _without_pose(record: Record) -> Record:
             key,
         )
     rest = {k: v for k, v in record.items() if k != key}
-    return {**rest, "position": pose[:3].tolist(), "rpy": pose[3:].tolist()}
+    angles = {"rpy_rad" if names_unit else "rpy": (pose[3:] * unit).tolist()}
+    return {**rest, "position": pose[:3].tolist(), **angles}
 
 
 def _join(record: Record, vector: str, words: str) -> None:
@@ -259,7 +260,8 @@ def direction_of(key: str, record: Record, is_frd: bool, exchange: Exchange) -> 
         angles = vector_in(value, f"{key}.{angle_key}") * unit
         if np.abs(angles).max() > 2 * np.pi:
             raise LayoutError(
-                "is more than a turn; are these degrees? call it rpy_deg", f"{key}.{angle_key}"
+                "is more than a turn; are these degrees? call it rpy_deg, or a pose pose_deg",
+                f"{key}.{angle_key}",
             )
         rotation = Rotation.from_euler("xyz", angles)
     exchange.note(f"{angle_key} turns the axis x of a thruster, along which it pushes.")

@@ -23,7 +23,7 @@ _NUMBER = re.compile(r"-?(?:0|[1-9][0-9]*)(\.[0-9]+)?([eE][-+]?[0-9]+)?\Z")
 """A number of JSON."""
 _CONSTANTS = {"": None, "null": None, "true": True, "false": False}
 """Plain scalars of YAML that are no text."""
-MAX_TOML = 300_000
+MAX_TOML = 100_000
 """Longest TOML [characters]; its parser is not linear in all that it may hold."""
 MAX_COMMENTED = 1_000_000
 """Longest JSON that may have comments [characters]."""

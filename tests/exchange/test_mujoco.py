@@ -204,6 +204,19 @@ def test_random_models_give_the_wrench_and_the_mass_of_mujoco(seed: int) -> None
         np.testing.assert_allclose(ours, wrench_of_mujoco(model, ctrl), rtol=0, atol=TIGHT)
 
 
+@pytest.mark.parametrize("seed", range(20, 28))
+def test_models_that_mujoco_saved_are_the_same(seed: int) -> None:
+    model_text, names = random_model(seed)
+    spec = mujoco.MjSpec.from_string(model_text)
+    spec.compile()
+    saved = read(spec.to_xml())[0]
+    layout = read(model_text)[0]
+    assert list(saved.names) == names
+    np.testing.assert_allclose(own_effectiveness(saved), own_effectiveness(layout), atol=1e-4)
+    assert saved.body is not None and layout.body is not None
+    assert saved.body.mass_kg == pytest.approx(layout.body.mass_kg, rel=1e-4)
+
+
 @pytest.mark.parametrize("name", shipped_layouts())
 def test_shipped_robots_push_in_mujoco_as_here(name: str, tmp_path: Path) -> None:
     file = tmp_path / "robot.xml"
@@ -345,6 +358,23 @@ ROBOTS = {
         '<inertial pos="0.1 0 -0.02" mass="12" diaginertia="0.2 0.3 0.3"/>',
         '<geom type="capsule" fromto="-0.4 0 0 0.5 0 0.1" size="0.12"/><geom size="0.1" mass="2"/>',
     ),
+    "class of another name": hull(
+        SITES,
+        '<default class="main"><motor gear="0 0 1"/><default class="a"><motor ctrlrange="-3 4"/>'
+        "</default></default>",
+        '<motor name="port" site="port" class="a"/><motor name="bow" site="bow" class="main"/>',
+    ),
+    "masses of geoms": hull(
+        SITES + '<geom type="box" size="0.2 0.1 0.1" pos="0.3 0 0"/><geom size="0.1" group="3"/>',
+        '<compiler inertiafromgeom="true" inertiagrouprange="0 2"/>',
+        MOTORS,
+    ),
+    "joint of class free": hull(SITES, "", MOTORS)
+    .replace("<freejoint/>", '<joint class="root"/>')
+    .replace(
+        "<worldbody>",
+        '<default><default class="root"><joint type="free"/></default></default><worldbody>',
+    ),
     "propeller that spins": hull(
         '<body name="screw" pos="-0.5 0 0"><joint name="spin" axis="1 0 0"/><inertial pos="0 0 0" '
         'mass="0.1" diaginertia="1e-4 1e-4 1e-4"/><site name="port" zaxis="1 0 0"/></body>',
@@ -437,6 +467,35 @@ def test_fins_and_thrusters_may_be_named() -> None:
         read(text_of_model)
     with pytest.raises(LayoutError, match="has no body 'wing' that a joint moves; .* flipper"):
         read(text_of_model, fins=["wing"])
+
+
+def test_masses_of_meshes_are_asked_for() -> None:
+    mesh = '<geom name="shell" type="mesh" mesh="hull"/>'
+    without = (
+        hull(SITES + mesh, "", MOTORS).replace("<inertial", "<a").replace("/><site", "/><site", 1)
+    )
+    with pytest.raises(
+        LayoutError, match=r"that of a mesh is not computed \(shell of hull\); give"
+    ):
+        read(without)
+    layout, _ = read(without, origin="base")
+    assert layout.actuators[0].position == (-0.5, 0.3, 0.0) and layout.body is None
+    weightless = without.replace('mesh="hull"', 'mesh="hull" mass="0"')
+    with pytest.raises(LayoutError, match="has no mass of body 'hull'; give it an <inertial>"):
+        read(weightless)
+
+
+def test_a_world_that_is_no_robot() -> None:
+    fixed = hull(SITES, "", MOTORS).replace("<freejoint/>", '<joint name="x" type="slide"/>')
+    assert "Body hull has no free joint, and is taken as the robot" in read(fixed)[1]
+    cart = (
+        '<mujoco><worldbody><body name="cart"><joint name="x" type="slide"/><geom size="1"/></body>'
+        '</worldbody><actuator><motor joint="x"/></actuator></mujoco>'
+    )
+    with pytest.raises(LayoutError, match="no motor or general that pushes at a site .* joint x"):
+        read(cart)
+    with pytest.raises(LayoutError, match="is a part of a model of MuJoCo, <mujocoinclude>"):
+        read("<mujocoinclude/>")
 
 
 def test_of_two_robots_one_is_read() -> None:
