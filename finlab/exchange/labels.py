@@ -288,8 +288,11 @@ def nodes(data: Any) -> Iterator[Node]:
 
 def names_other_device(path: Path) -> bool:
     """Whether the keys that lead to a value name a camera or a sensor, and no thruster."""
-    words = {plain(word) for key in path for word in re.split(r"[^A-Za-z]+", key[:100])}
-    return bool(words & OTHER_DEVICES)
+    for key in path:
+        words = {plain(word) for word in re.split(r"[^A-Za-z]+", key[:100])}
+        if words & OTHER_DEVICES:
+            return True
+    return False
 
 
 def unread(data: Any, used: set[Path]) -> str:

@@ -169,12 +169,9 @@ def _actuators(file: MjcfFile) -> tuple[list[_Push], dict[str, str]]:
     """The actuators that push at a site, and why each of the others does not."""
     pushes: list[_Push] = []
     others: dict[str, str] = {}
-    elements = [
-        element
-        for section in file.root.findall("actuator")
-        for element in section
-        if element.tag in ACTUATOR_TAGS
-    ]
+    elements: list[Element] = []
+    for section in file.root.findall("actuator"):
+        elements += [element for element in section if element.tag in ACTUATOR_TAGS]
     for k, element in enumerate(elements):
         attributes = file.attributes(element)
         site = attributes.get("site", "")

@@ -293,9 +293,10 @@ def _note_what_is_left_out(layout: Layout, exchange: Exchange) -> None:
         f"MJCF has no place for power, dead bands, rates and lags{water}; the weight is "
         "compensated (gravcomp)."
     )
-    kinds = {kind for kind in (_words_of(actuator) for actuator in layout.actuators) if kind}
-    for words in sorted(kinds):
-        exchange.note(words)
+    for actuator in layout.actuators:
+        words = _words_of(actuator)
+        if words:
+            exchange.note(words)
 
 
 def _words_of(actuator: Actuator) -> str:

@@ -28,8 +28,18 @@ from finlab.exchange.links import TURNING, Joint, LinkMass, combined
 from finlab.exchange.mounts import on_mount
 from finlab.layout import MAX_ACTUATORS, Actuator, Body, Layout
 
-THRUSTERS = ("thruster", "simple_thruster")
+SIMPLE = "simple_thruster"
+"""A thruster whose setpoint is its force, whichever way its propeller turns."""
+THRUSTERS = ("thruster", SIMPLE)
 """Types of actuators that are read."""
+FLUID = "fluid_dynamics"
+"""The model of thrust that is taken where the file names none."""
+TABLE = "linear_interpolation"
+"""The model of thrust by a table."""
+SPEED_DRIVES = ("zero_order", "first_order", "mechanical_pi")
+"""Dynamics of a rotor whose setpoint is an angular velocity [rad/s]."""
+FALSE = ("false", "0")
+"""What an attribute says that is false."""
 DENSITY = 1000.0
 """Density of the water where the scenario does not say [kg/m^3]."""
 MAX_LINKS = 1000
@@ -91,21 +101,17 @@ def read_stonefish(root: Element, name: str, exchange: Exchange) -> Layout:
         )
     if len(elements) > MAX_ACTUATORS:
         raise LayoutError(f"expected up to {MAX_ACTUATORS} thrusters, got {len(elements)}")
-    density = float(values.number(root, "environment/ocean/water@density", DENSITY))
     links = _links(robot, values)
     mass = _mass(robot, links, values) if exchange.origin == "gravity" else None
     origin = np.zeros(3) if mass is None else mass.center * TO_FLU
+    density = values.number(root, "environment/ocean/water@density", DENSITY)
     actuators: list[Actuator] = []
     turned_round = []
-    for element in elements:
-        thruster_name = element.get("name", "").strip()[:64] or f"thruster{len(actuators) + 1}"
-        thruster_name = _ARGUMENT.sub("", thruster_name).strip("/_ ") or thruster_name
-        actuators.append(
-            _thruster(element, thruster_name, links, origin, density, values, exchange)
-        )
-        is_left = text_at(element, "propeller@right", "true").lower() in ("false", "0")
-        inverted = text_at(element, "specs@inverted_setpoint specs@inverted", "false").lower()
-        if is_left != (inverted in ("true", "1")):
+    for i, element in enumerate(elements):
+        thruster_name = _name(element, f"thruster{i + 1}")
+        limits = _limits_or_none(element, thruster_name, density, values, exchange)
+        actuators.append(_thruster(element, thruster_name, limits, links, origin, values, exchange))
+        if _is_turned_round(element):
             turned_round.append(thruster_name)
     if turned_round:
         exchange.note(
@@ -115,23 +121,36 @@ def read_stonefish(root: Element, name: str, exchange: Exchange) -> Layout:
     others = [element for element in robot.findall("actuator") if element not in elements]
     if others:
         exchange.note(f"Other actuators are left out: {listed(_shown(robot, others))}.")
-    robot_name = _ARGUMENT.sub("", robot.get("name", "")).strip("/_ ")[:64] or name
+    robot_name = _name(robot, name)
     exchange.note(
         f"Robot {robot_name} of Stonefish was read, x forward, y right, z down, in m, kg and N."
     )
-    body = None
-    where = "centre of gravity"
-    if mass is None:
-        where = "frame of its base link"
-        if exchange.origin == "gravity":
-            exchange.note(
-                "Masses are those of materials and meshes, which are not computed: the origin is "
-                "that of the base link; where the centre of gravity lies elsewhere, correct "
-                "`position_m`."
-            )
-    else:
+    if mass is not None:
         body = Body(mass_kg=mass.mass)
-    return Layout(robot_name, tuple(actuators), f"Origin at the {where}.", body)
+        return Layout(robot_name, tuple(actuators), "Origin at the centre of gravity.", body)
+    if exchange.origin == "gravity":
+        exchange.note(
+            "Masses are those of materials and meshes, which are not computed: the origin is that "
+            "of the base link; where the centre of gravity lies elsewhere, correct `position_m`."
+        )
+    return Layout(robot_name, tuple(actuators), "Origin at the frame of its base link.")
+
+
+def _name(element: Element, default: str) -> str:
+    """The name of a robot or an actuator, without the arguments in it."""
+    return _ARGUMENT.sub("", element.get("name", "")).strip("/_ \t\n")[:64].strip() or default
+
+
+def _is_turned_round(element: Element) -> bool:
+    """Whether a positive setpoint of a thruster pushes backwards."""
+    is_left = text_at(element, "propeller@right", "true").lower() in FALSE
+    return (is_left and element.get("type") != SIMPLE) != _is_inverted(element)
+
+
+def _is_inverted(element: Element) -> bool:
+    """Whether the setpoint of a thruster has the other sign."""
+    inverted = text_at(element, "specs@inverted_setpoint specs@inverted", "false").lower()
+    return inverted not in FALSE
 
 
 class _Values:
@@ -268,12 +287,23 @@ def _joint(element: Element, parent: str, child: str, pose: Array, values: _Valu
     )
 
 
+def _limits_or_none(
+    element: Element, name: str, density: float, values: _Values, exchange: Exchange
+) -> _Limits:
+    """The thrust of a thruster, without limits where the file leaves them open."""
+    try:
+        return _limits(element, density, values)
+    except LayoutError as error:
+        exchange.note(f"Limits of {name} are not read: {error.problem}.")
+        return _Limits(None, 0.0, None)
+
+
 def _thruster(
     element: Element,
     name: str,
+    limits: _Limits,
     links: _Robot,
     origin: Array,
-    density: float,
     values: _Values,
     exchange: Exchange,
 ) -> Actuator:
@@ -282,11 +312,6 @@ def _thruster(
     if link not in links.poses:
         raise LayoutError(f"thruster {name!r:.60} is on link {link!r:.60}, which is not there")
     pose = links.poses[link] @ values.pose(element.find("origin"))
-    try:
-        limits = _limits(element, density, values)
-    except LayoutError as error:
-        exchange.note(f"Limits of {name} are not read: {error.problem}.")
-        limits = _Limits(None, 0.0, None)
     thruster = exchange.thruster(
         name,
         pose[:3, 3] * TO_FLU - origin,
@@ -305,51 +330,92 @@ def _thruster(
 
 
 def _limits(element: Element, density: float, values: _Values) -> _Limits:
-    """Least and most force of a thruster by its model of thrust."""
-    low = values.number(element, "specs@lower_thrust_limit")
-    high = values.number(element, "specs@upper_thrust_limit")
-    if math.isfinite(low) and math.isfinite(high):
-        return _Limits((low, high), 0.0, None)
-    diameter = values.number(element, "propeller@diameter")
-    per_square = density * diameter**4  # of revolutions per second
-    paths = "thrust_model/thrust_coeff"
-    ahead = values.number(element, f"{paths}@forward {paths}@value specs@thrust_coeff")
-    astern = values.number(element, f"{paths}@reverse specs@thrust_coeff_backward", ahead)
-    torque = values.number(element, "thrust_model/torque_coeff@value specs@torque_coeff", 0.0)
-    speed = values.number(element, "specs@max_setpoint") / (2.0 * math.pi)  # [1/s]
-    if text_at(element, "specs@max_rpm"):
-        speed = values.number(element, "specs@max_rpm") / 60.0
-    kind = text_at(element, "thrust_model@type", "fluid_dynamics")
-    rotor = text_at(element, "rotor_dynamics@type", "zero_order")
-    time_constant = None
-    if rotor == "first_order":
-        time_constant = values.number(element, "rotor_dynamics/time_constant@value")
-    if rotor not in ("zero_order", "first_order", "mechanical_pi"):
-        speed = math.nan  # the setpoint is a torque or a voltage
-    square = speed * speed
-    if kind == "linear_interpolation":
-        what = "the table of a thruster of Stonefish"
-        outputs = text_at(element, "thrust_model/output@value")
-        forces = numbers(outputs, len(outputs.split()), what) if outputs else np.zeros(1)
-        table = (min(0.0, float(forces.min())), max(0.0, float(forces.max())))
-        return _Limits(table if forces.any() else None, 0.0, time_constant)
-    if kind in ("quadratic", "deadband"):
-        per_square = (2.0 * math.pi) ** 2  # by the square of the angular velocity
-    most = ahead * per_square * square
-    least = -astern * per_square * square
-    if kind == "deadband":
-        lower = abs(values.number(element, "thrust_model/deadband@lower", 0.0))
-        upper = abs(values.number(element, "thrust_model/deadband@upper", 0.0))
-        most -= ahead * upper
-        least += astern * lower
+    """The thrust of a thruster by its model."""
+    lower = values.number(element, "specs@lower_thrust_limit")
+    upper = values.number(element, "specs@upper_thrust_limit")
+    kind = text_at(element, "thrust_model@type", FLUID)
+    is_right = text_at(element, "propeller@right", "true").lower() not in FALSE
+    torque_per_newton = 0.0
+    if element.get("type") == SIMPLE or math.isfinite(upper):
+        least, most = (-upper, -lower) if _is_inverted(element) else (lower, upper)
+    elif kind == TABLE:
+        least, most = _forces_of_table(element, values)
+    elif kind == FLUID:
+        least, most = _forces_of_propeller(element, density, values)
+        torque_per_newton = _torque_per_newton(element, values) * (-1.0 if is_right else 1.0)
+    else:
+        least, most = _forces_of_square(element, values)
+    if kind != FLUID and not is_right and element.get("type") != SIMPLE:
+        least, most = -most, -least  # there a left-handed propeller turns the force itself round
     force = None
     if math.isfinite(least) and math.isfinite(most) and least <= 0.0 <= most and least < most:
         force = (least, most)
-    is_right = text_at(element, "propeller@right", "true").lower() not in ("false", "0")
-    torque_per_newton = 0.0
-    if kind == "fluid_dynamics" and torque and ahead and math.isfinite(diameter):
-        torque_per_newton = (-1.0 if is_right else 1.0) * diameter * torque / ahead
+    time_constant = None
+    if text_at(element, "rotor_dynamics@type") == "first_order":
+        time_constant = values.number(element, "rotor_dynamics/time_constant@value")
     return _Limits(force, torque_per_newton, time_constant)
+
+
+def _fastest(element: Element, values: _Values) -> float:
+    """The largest angular velocity of a thruster [rad/s]; NaN where its setpoint is a torque or a
+    voltage, or nothing is said."""
+    if text_at(element, "specs@max_rpm"):
+        return values.number(element, "specs@max_rpm") / 60.0 * 2.0 * math.pi
+    if text_at(element, "rotor_dynamics@type", SPEED_DRIVES[0]) not in SPEED_DRIVES:
+        return math.nan
+    return values.number(element, "specs@max_setpoint")
+
+
+def _coefficients(element: Element, values: _Values) -> tuple[float, float]:
+    """The thrust coefficients ahead and astern."""
+    path = "thrust_model/thrust_coeff"
+    ahead = values.number(element, f"{path}@forward {path}@value specs@thrust_coeff")
+    astern = values.number(element, f"{path}@reverse specs@thrust_coeff_backward", ahead)
+    return ahead, astern
+
+
+def _forces_of_propeller(element: Element, density: float, values: _Values) -> tuple[float, float]:
+    """Least and most force F = C rho D^4 n |n| at the largest n in revolutions per second [N]."""
+    n = _fastest(element, values) / (2.0 * math.pi)
+    diameter = values.number(element, "propeller@diameter")
+    ahead, astern = _coefficients(element, values)
+    per_coefficient = density * diameter**4 * n * n
+    return -astern * per_coefficient, ahead * per_coefficient
+
+
+def _torque_per_newton(element: Element, values: _Values) -> float:
+    """The size of the reaction torque Q = C_Q rho D^5 n |n| over the force ahead [m]."""
+    torque = values.number(element, "thrust_model/torque_coeff@value specs@torque_coeff", 0.0)
+    ahead, _ = _coefficients(element, values)
+    diameter = values.number(element, "propeller@diameter")
+    ratio = diameter * torque / ahead if ahead else 0.0
+    return ratio if math.isfinite(ratio) else 0.0
+
+
+def _forces_of_square(element: Element, values: _Values) -> tuple[float, float]:
+    """Least and most force by the square of the angular velocity, less a dead band [N]."""
+    square = _fastest(element, values) ** 2
+    ahead, astern = _coefficients(element, values)
+    below = abs(values.number(element, "thrust_model/deadband@lower", 0.0))
+    above = abs(values.number(element, "thrust_model/deadband@upper", 0.0))
+    return -astern * (square - below), ahead * (square - above)
+
+
+def _forces_of_table(element: Element, values: _Values) -> tuple[float, float]:
+    """Least and most force of a table at the largest angular velocity either way [N]; NaN where
+    there is none."""
+    columns = []
+    for column in ("input", "output"):
+        text = text_at(element, f"thrust_model/{column}@value")
+        columns.append(numbers(text, max(1, len(text.split())), f"{column} of a table of thrust"))
+    speeds, forces = columns
+    if len(speeds) != len(forces) or (np.diff(speeds) <= 0.0).any():
+        raise LayoutError("the table of thrust has other inputs than outputs, or none that rise")
+    fastest = _fastest(element, values)
+    if not math.isfinite(fastest):
+        return float(forces.min()), float(forces.max())
+    least, most = np.interp([-fastest, fastest], speeds, forces)
+    return float(least), float(most)
 
 
 def _mass(robot: Element, links: _Robot, values: _Values) -> LinkMass | None:

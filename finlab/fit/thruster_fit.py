@@ -5,6 +5,7 @@ force comes from the table's rows (`finlab.physics.table_error`).
 """
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -115,20 +116,7 @@ def _fit(bench: BenchData) -> ThrusterFit:
         )
     )
     idle_commands = [row_command for row_command, row_force, _ in rows if row_force == 0.0]
-    dead_band = 0.0
-    if len(idle_commands) > 1:
-        pushing = [row for row in rows if row[1] != 0.0]
-        command_beside, force_beside, _ = min(pushing, key=lambda row: abs(row[1]))
-        dead_band = abs(force_beside)
-        if dead_band > COARSE_STEP * float(np.abs(thrust).max()):
-            dead_band = 0.0
-            notes.append(
-                f"the first force beside rest is {force_beside:.4g} N at {command_beside:g} "
-                f"{bench.unit}".rstrip()
-                + ", a coarse step: whether forces between 0 and that can "
-                "be held is not measured, so no dead band is written, and they are interpolated; "
-                "measure there in finer steps"
-            )
+    dead_band = _dead_band(rows, bench.unit, notes) if len(idle_commands) > 1 else 0.0
     torque_per_newton = 0.0
     if bench.torque is not None:
         # The least-squares slope of torque over force, through the origin.
@@ -168,6 +156,29 @@ def _one_way(command: Array, rising: Array, direction: Array, unit: str, notes: 
         "noise of the load cell at rest, and their rows as without force"
     )
     return np.where(is_rest, 0.0, direction)
+
+
+def _dead_band(rows: Sequence[tuple[float, float, float]], unit: str, notes: list[str]) -> float:
+    """The least force beside a dead band [N]; 0, with a note, where it is no more than a step of
+    the bench.
+
+    Args:
+        rows: commands, forces [N] and powers of the table.
+        unit: the unit of the commands.
+        notes: gets the step.
+    """
+    pushing = [row for row in rows if row[1] != 0.0]
+    command, force, _ = min(pushing, key=lambda row: abs(row[1]))
+    largest = max(abs(row[1]) for row in pushing)
+    if abs(force) <= COARSE_STEP * largest:
+        return abs(force)
+    where = f"{command:g} {unit}".rstrip()
+    notes.append(
+        f"the first force beside rest is {force:.4g} N at {where}, a coarse step: whether forces "
+        "between 0 and that can be held is not measured, so no dead band is written, and they are "
+        "interpolated; measure there in finer steps"
+    )
+    return 0.0
 
 
 def _note_missed_power(

@@ -86,6 +86,10 @@ def test_what_is_sent_may_have_the_other_sign() -> None:
         ),
         ('<specs lower_thrust_limit="-10" upper_thrust_limit="12"/>', (-10.0, 12.0)),
         (
+            '<specs lower_thrust_limit="-10" upper_thrust_limit="12" inverted="true"/>',
+            (-12.0, 10.0),
+        ),
+        (
             '<specs max_setpoint="100"/><thrust_model type="quadratic"><thrust_coeff '
             'value="0.002"/></thrust_model>',
             (-20.0, 20.0),
@@ -99,6 +103,12 @@ def test_what_is_sent_may_have_the_other_sign() -> None:
             '<specs max_setpoint="100"/><thrust_model type="linear_interpolation"><input '
             'value="-100 0 100"/><output value="-7 0 9"/></thrust_model>',
             (-7.0, 9.0),
+        ),
+        (
+            '<specs max_setpoint="50"/><propeller right="false"/><thrust_model '
+            'type="linear_interpolation"><input value="-100 0 100"/><output value="-7 0 9"/>'
+            "</thrust_model>",
+            (-4.5, 3.5),
         ),
         ("", (-39.91, 51.44)),
         (MODEL.replace("first_order", "bessa"), (-39.91, 51.44)),
