@@ -15,7 +15,7 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.axes import is_full_turn
-from finlab.exchange.description_text import DEFAULT_INERTIA, INERTIA_SHARE, MASS_SHARE
+from finlab.exchange.description_text import DEFAULT_INERTIA
 from finlab.exchange.exchange import Exchange
 from finlab.layout import Actuator, Body, Hull, Layout
 
@@ -25,8 +25,10 @@ SERVO = "_angle"
 """What follows the name of an actuator in that of the servo that turns it."""
 DEFAULT_MASS = 10.0
 """Mass of a body whose layout has none [kg]."""
-LEAST_MASS = 1e-12
-"""Least mass of a body that turns [kg]; MuJoCo wants 1e-15."""
+LINK_SHARE = 1e-12
+"""Mass and moment of inertia of a body that turns, as shares of the robot's."""
+LEAST_LINK = 1e-14
+"""Least of either [kg, kg m^2]; MuJoCo wants 1e-15."""
 ARMATURE = 0.01
 """Inertia of a servo about its hinge [kg m^2]: the servo turns that, and not the hull."""
 STIFFNESS = 4.0
@@ -138,10 +140,7 @@ def write_mjcf(layout: Layout, exchange: Exchange, _suffix: str) -> str:
     SubElement(world, "light", pos="0 0 5", dir="0 0 -1", directional="true")
     base = SubElement(world, "body", name=_base_name(layout), gravcomp="1")
     SubElement(base, "freejoint", name=f"{_base_name(layout)}_joint")
-    link_moment = INERTIA_SHARE * min(moments) / max(1, len(turning))
-    link_mass = max(MASS_SHARE * mass / max(1, len(turning)), LEAST_MASS)
-    base_moments = [moment - link_moment * len(turning) for moment in moments]
-    _add_inertial(base, mass - link_mass * len(turning), base_moments)
+    _add_inertial(base, mass, moments)
     if body.hull is not None:
         _add_hull(base, body.hull, exchange)
     drives = Element("actuator")
@@ -152,6 +151,8 @@ def write_mjcf(layout: Layout, exchange: Exchange, _suffix: str) -> str:
                 base, "body", name=actuator.name, pos=_text(actuator.position), gravcomp="1"
             )
             _add_hinge(place, actuator)
+            link_mass = max(LINK_SHARE * mass, LEAST_LINK)
+            link_moment = max(LINK_SHARE * min(moments), LEAST_LINK)
             _add_inertial(place, link_mass, [link_moment] * 3)
         _add_drive(place, drives, actuator, layout.names)
     root.append(drives)

@@ -1,5 +1,6 @@
 """Models of MuJoCo (MJCF), read and written: MuJoCo itself judges wrenches and masses."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -232,6 +233,32 @@ def test_any_robot_pushes_in_mujoco_as_here(kind: str, tmp_path: Path) -> None:
     finlab.save_layout(layout, before)
     convert(str(before), tmp_path / "robot.xml", None, Exchange())
     check_written(layout, tmp_path / "robot.xml")
+
+
+@pytest.mark.parametrize("name", ["catamaran", "ucat"])
+def test_servos_turn_what_turns_and_leave_the_hull_in_peace(name: str, tmp_path: Path) -> None:
+    convert(name, tmp_path / "robot.xml", None, Exchange())
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "robot.xml"))
+    data = mujoco.MjData(model)
+    servos = np.flatnonzero(model.actuator_biastype == mujoco.mjtBias.mjBIAS_AFFINE)
+    data.ctrl[servos] = np.linspace(-0.8, 1.0, len(servos))
+    for _ in range(500):
+        mujoco.mj_step(model, data)
+    joints = model.actuator_trnid[servos, 0]
+    np.testing.assert_allclose(data.qpos[model.jnt_qposadr[joints]], data.ctrl[servos], atol=1e-4)
+    np.testing.assert_allclose(data.qpos[:7], [0, 0, 0, 1, 0, 0, 0], atol=1e-6)
+
+
+def test_a_plate_has_its_moments_and_no_solid_is_said(tmp_path: Path) -> None:
+    layout = finlab.load_layout("ucat")
+    for moments, said in (((0.1, 0.1, 0.2), False), ((0.1, 0.1, 0.5), True)):
+        body = finlab.Body(mass_kg=10.0, inertia_kgm2=moments)
+        finlab.save_layout(replace(layout, body=body), tmp_path / "plate.yaml")
+        file = tmp_path / "plate.xml"
+        _, notes = convert(str(tmp_path / "plate.yaml"), file, None, Exchange())
+        model = mujoco.MjModel.from_xml_path(str(file))
+        assert any("No solid has its moments" in note for note in notes) == said
+        assert said or sorted(model.body_inertia[1]) == pytest.approx(sorted(moments))
 
 
 def check_written(layout: Layout, file: Path) -> None:
