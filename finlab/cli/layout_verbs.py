@@ -69,23 +69,25 @@ def show(
 def convert_layout(
     file: Annotated[Positional[str], arg(metavar="FILE")],
     output: Annotated[Positional[Path], arg(metavar="OUT")],
-    to: Literal["layout", "urdf", "sdf", "px4", "ardusub", "matrix"] | None = None,
+    to: Literal["layout", "urdf", "sdf", "mjcf", "px4", "ardusub", "matrix"] | None = None,
     fins: Annotated[tuple[str, ...], arg(metavar="LINK...")] = (),
     thrusters: Annotated[tuple[str, ...], arg(metavar="LINK...")] = (),
     origin: Literal["gravity", "base"] = "gravity",
     force: Annotated[tuple[float, float] | None, arg(metavar="LEAST MOST")] = None,
     frame: Literal["FLU", "FRD"] | None = None,
     rows: Literal["axes", "thrusters"] | None = None,
+    length: Literal["m", "cm", "mm"] | None = None,
     model: Annotated[str | None, arg(metavar="NAME")] = None,
 ) -> None:
-    """Make a layout of a file of others, or the other way round: URDF, SDF, PX4, ArduSub, a matrix.
+    """Make a layout of a file of others, or the other way round: URDF, SDF, MuJoCo, PX4, ArduSub, a
+    matrix.
 
     Args:
-        file: robot description (URDF, SDF), parameters of PX4 or ArduSub, factors, matrix, or
-            layout.
+        file: robot description (URDF, SDF, MJCF), parameters of PX4 or ArduSub, factors, matrix,
+            places and directions, or layout.
         output: file to write; its end says the form.
         to: form of the output, where its end is not enough.
-        fins: links of a robot description that are fins.
+        fins: links or bodies of a robot description that are fins.
         thrusters: links that are thrusters although no plugin drives them.
         origin: where the layout's origin goes: the centre of gravity of all links, or the root
             link's frame.
@@ -93,12 +95,13 @@ def convert_layout(
         frame: frame of a matrix or of places: x forward, and y left, z up (FLU) or y right, z down
             (FRD); what the file says, else FLU, by default.
         rows: what the rows of a matrix without labels are, where they may be both.
+        length: unit of positions whose key names none.
         model: which model of a description of several; the first with thrusters by default.
     """
     from finlab.exchange import Exchange, convert
     from finlab.files.worker import in_worker
 
-    exchange = Exchange(fins, thrusters, origin, force, frame, rows, model)
+    exchange = Exchange(fins, thrusters, origin, force, frame, rows, length, model=model)
     layout, notes = in_worker(convert, file, output, to, exchange)
     lines = [
         f"{output}: {layout.name} with {layout.counts_in_words}",

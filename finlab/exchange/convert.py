@@ -5,6 +5,7 @@ that format; `WRITERS` has the writers. The app reads dropped files by `read_rob
 """
 
 import os
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -16,9 +17,13 @@ from finlab.exchange.description_layout import read_description
 from finlab.exchange.description_text import SDF, URDF, description_text
 from finlab.exchange.exchange import Exchange
 from finlab.exchange.matrix_table import plain_of, table_of
+from finlab.exchange.mjcf_read import read_mjcf
+from finlab.exchange.mjcf_write import write_mjcf
 from finlab.exchange.parameters import read_parameters, read_px4, write_px4
 from finlab.exchange.plain_robot import read_plain, write_matrix
-from finlab.files import parse_json, parse_yaml
+from finlab.exchange.stonefish import is_stonefish, read_stonefish
+from finlab.exchange.xml_models import root_of
+from finlab.files import parse_json, parse_toml, parse_yaml, without_comments
 from finlab.files.guarded import is_regular, read_text
 from finlab.layout import Layout, load_layout, save_layout
 from finlab.layout.load import parse_layout
@@ -29,6 +34,7 @@ MAX_BYTES = 5_000_000
 WRITERS: dict[str, Callable[[Layout, Exchange, str], str]] = {
     "urdf": lambda layout, exchange, _: description_text(layout, exchange, URDF),
     "sdf": lambda layout, exchange, _: description_text(layout, exchange, SDF),
+    "mjcf": write_mjcf,
     "px4": write_px4,
     "ardusub": motor_factors.write_ardusub,
     "matrix": write_matrix,
@@ -38,6 +44,8 @@ the exchange that gets the notes, and the suffix of the file; returns its text."
 FORMAT_OF_SUFFIX = {
     ".urdf": "urdf",
     ".sdf": "sdf",
+    ".xml": "mjcf",
+    ".mjcf": "mjcf",
     ".params": "px4",
     ".cpp": "ardusub",
     ".csv": "matrix",
@@ -52,12 +60,28 @@ PROGRAMS = (".cpp", ".h", ".hpp", ".lua")
 """Suffixes of sources with calls that add motors to ArduSub."""
 PARAMETERS = (".params", ".parm", ".param")
 """Suffixes of parameter files of PX4 and ArduPilot."""
-FOREIGN = (".urdf", ".sdf", ".world", ".xacro", ".scn", *PARAMETERS, *PROGRAMS)
+FOREIGN = (
+    ".urdf",
+    ".sdf",
+    ".world",
+    ".xacro",
+    ".xml",
+    ".mjcf",
+    ".scn",
+    ".toml",
+    *PARAMETERS,
+    *PROGRAMS,
+)
 """Suffixes of robot descriptions, and of what autopilots read; their content says what they
 hold."""
+_TOML_TABLE = re.compile(r"\[\[?[\w.\"' -]{1,100}\]\]?[ \t]*(?:\n|$)")
+"""The head of a table of TOML."""
+_TOML_KEY = re.compile(r"[\w.-]{1,100}[ \t]*=[ \t]*\S")
+"""The key of a value of TOML."""
 UNKNOWN_FORMAT = (
-    "holds none of the forms that are read: a layout, a robot description (URDF, SDF), parameters "
-    "of PX4 or ArduSub, motors of ArduSub, thrusters or a matrix in YAML, JSON or CSV"
+    "holds none of the forms that are read: a layout, a robot description (URDF, SDF, MJCF), "
+    "parameters of PX4 or ArduSub, motors of ArduSub, thrusters or a matrix in YAML, JSON, TOML or "
+    "CSV"
 )
 
 
@@ -133,20 +157,53 @@ def read_robot(text: str, file: str, exchange: Exchange) -> Layout:
     name = path.stem.strip()[:64].strip() or "robot"
     suffix = path.suffix.lower()
     if text.lstrip().startswith("<"):
-        return read_description(text, name, exchange)
+        return _read_xml(text, name, exchange)
     if FORMAT_OF_SUFFIX.get(suffix) != "layout":
         layout = _read_lines(text, name, suffix, exchange)
         if layout is not None:
             return layout
-    parse = parse_json if suffix == ".json" else parse_yaml
-    data = parse(text, "", LayoutError)
+    data = _plain_values(text, suffix)
     if isinstance(data, dict) and _is_layout_file(data):
         folder = exchange.path.parent if exchange.path else None
         return parse_layout(data, "", folder, may_open=folder is not None)
     if not isinstance(data, dict | list):
         raise LayoutError(UNKNOWN_FORMAT)
-    comments = [line for line in text.splitlines() if line.lstrip().startswith("#")]
+    comments = [line for line in text.splitlines() if line.lstrip().startswith(("#", "//"))]
     return read_plain(data, name, exchange, comments)
+
+
+def _plain_values(text: str, suffix: str) -> Any:
+    """The values in a text of JSON, perhaps with comments, TOML or YAML."""
+    if suffix == ".json":
+        try:
+            return parse_json(text, "", LayoutError)
+        except LayoutError:
+            bare = without_comments(text)
+            if bare == text:
+                raise
+            return parse_json(bare, "", LayoutError)
+    if suffix == ".toml":
+        return parse_toml(text, "", LayoutError)
+    if FORMAT_OF_SUFFIX.get(suffix) != "layout":
+        bare = without_comments(text)
+        if bare.lstrip()[:1] in ("{", "["):
+            # A TOML file may begin with the bracket of a table.
+            if not _TOML_TABLE.match(bare.lstrip()):
+                return parse_json(bare, "", LayoutError)
+            return parse_toml(text, "", LayoutError)
+        if _TOML_KEY.match(bare.lstrip()):
+            return parse_toml(text, "", LayoutError)
+    return parse_yaml(text, "", LayoutError)
+
+
+def _read_xml(text: str, name: str, exchange: Exchange) -> Layout:
+    """The layout in a text of XML; its outermost element says what it is."""
+    root = root_of(text)
+    if root.tag in ("mujoco", "mujocoinclude"):
+        return read_mjcf(root, name, exchange)
+    if is_stonefish(root):
+        return read_stonefish(root, name, exchange)
+    return read_description(root, name, exchange)
 
 
 def _is_layout_file(data: dict[str, Any]) -> bool:
@@ -186,6 +243,7 @@ def _read_lines(text: str, name: str, suffix: str, exchange: Exchange) -> Layout
             raise LayoutError(f"holds {n_parameters} parameters of an autopilot, but {names}")
     if suffix in PROGRAMS:
         raise LayoutError(
-            "is a program without a call of add_motor_raw_6dof, by which ArduSub adds motors"
+            "is a program without a call of add_motor_raw_6dof, by which ArduSub adds motors, or "
+            "of Motors_6DoF:add_motor"
         )
     return None

@@ -20,6 +20,8 @@ from scipy.spatial.transform import Rotation
 from finlab.arrays import Array
 from finlab.errors import LayoutError
 from finlab.exchange.exchange import Exchange
+from finlab.exchange.labels import listed
+from finlab.exchange.links import TURNING, Joint, LinkMass, combined
 from finlab.exchange.xacro_files import expand
 from finlab.exchange.xml_models import (
     DrivesThruster,
@@ -35,30 +37,10 @@ ADDED_MASS_TAGS = ("xx", "yy", "zz", "pp", "qq", "rr")
 """Tags of the diagonal of SDF's <fluid_added_mass>."""
 INERTIA_ENTRIES = ("xx", "xy", "xz", "yy", "yz", "zz")
 """Entries of the upper triangle of an inertia, row by row."""
-TURNING = ("revolute", "continuous")
-"""Kinds of joints that turn."""
 OLD_SDF = ("1.0", "1.1", "1.2", "1.3", "1.4")
 """Versions of SDF in which the axis of a joint is expressed in the frame of its model."""
 MAX_ATTACHMENTS = 20
 """Most frames that are attached to one another in a row."""
-
-
-class Joint(NamedTuple):
-    """A joint, in the frame of its description."""
-
-    name: str
-    kind: str
-    """The type of the joint in URDF and SDF, such as `revolute`."""
-    parent: str
-    """The link that it is mounted on."""
-    child: str
-    """The link that it moves."""
-    position: Array
-    """(3,) [m]."""
-    axis: Array
-    """The axis (3,) that it turns about or slides along; of length 1 unless the joint is fixed."""
-    limits: tuple[float, float]
-    """Least and greatest angle [rad], infinite where nothing limits it."""
 
 
 @dataclass(frozen=True)
@@ -133,14 +115,15 @@ def parse_description(
                 joints[joint.name] = joint
     if included:
         exchange.note(f"What it includes is left out, with its mass: {', '.join(included)[:300]}.")
-    masses = _masses(elements, poses)
+    is_sdf = root.tag in ("sdf", "model")
+    masses = _masses(elements, poses, is_sdf, exchange)
     return Description(
         name=model.get("name") or name,
         joints=joints,
         joint_of_link={joint.child: joint for joint in joints.values()},
-        mass=masses.mass,
-        center=masses.center,
-        inertia=masses.inertia,
+        mass=masses.total.mass,
+        center=masses.total.center,
+        inertia=masses.total.inertia if masses.is_inertia_known else None,
         added_mass=masses.added_mass,
         plugins=plugins,
         included=included,
@@ -172,7 +155,8 @@ def numbers(text: str, count: int, what: str) -> Array:
     except ValueError:
         values = np.empty(0)
     if values.shape != (count,) or not (np.abs(values) < 1e9).all():
-        raise LayoutError(f"{what} is not {count} numbers of ordinary size")
+        expected = "a number" if count == 1 else f"{count} numbers"
+        raise LayoutError(f"{what} is not {expected} of ordinary size")
     return values
 
 
@@ -325,32 +309,34 @@ def _link_name(scope: str, name: str, elements: Elements) -> str:
 
 
 class _Masses(NamedTuple):
-    """Masses of all links together; the fields are those of `Description`."""
+    """Masses of all links together."""
 
-    mass: float
-    center: Array
-    inertia: Array | None
+    total: LinkMass
+    is_inertia_known: bool
+    """Whether every link with a mass has an inertia."""
     added_mass: dict[str, float]
+    """As in `Description`."""
 
 
-class _LinkMass(NamedTuple):
-    """The mass of one link, in the axes of the description."""
+def _masses(
+    elements: Elements, poses: dict[str, Array], is_sdf: bool, exchange: Exchange
+) -> _Masses:
+    """The masses of all links together.
 
-    mass: float
-    """[kg]."""
-    center: Array
-    """Its centre of gravity, (3,) [m]."""
-    inertia: Array
-    """(3, 3) about that centre [kg m^2]."""
-
-
-def _masses(elements: Elements, poses: dict[str, Array]) -> _Masses:
-    """The masses of all links together; inertias by the theorem of Huygens and Steiner."""
+    A link that says no mass has none. SDF would give it 1 kg and 1 kg m^2, which is no propeller's
+    and moves the centre of gravity: a note says so.
+    """
     links = []
     added_mass: dict[str, float] = {}
     is_inertia_known = True
+    without_mass = []
     for key, (_, element) in elements.items():
-        inertial = element.find("inertial") if key in poses else None
+        if key not in poses or element.tag != "link":
+            continue
+        inertial = element.find("inertial")
+        has_mass = inertial is not None and bool(text_at(inertial, "mass@value mass"))
+        if is_sdf and not has_mass:
+            without_mass.append(key.removeprefix("link "))
         if inertial is None:
             continue
         pose = poses[key] @ _pose(inertial)
@@ -361,18 +347,15 @@ def _masses(elements: Elements, poses: dict[str, Array]) -> _Masses:
         has_inertia = all(text_at(inertial, paths[entry]) for entry in ("xx", "yy", "zz"))
         is_inertia_known &= mass == 0.0 or has_inertia
         rotation = pose[:3, :3]
-        links.append(_LinkMass(mass, pose[:3, 3], rotation @ inertia @ rotation.T))
+        links.append(LinkMass(mass, pose[:3, 3], rotation @ inertia @ rotation.T))
         for tag in ADDED_MASS_TAGS:
             path = f"fluid_added_mass/{tag}"
             if text_at(inertial, path):
                 added_mass[tag] = added_mass.get(tag, 0.0) + number(inertial, path)
-    total = sum(link.mass for link in links)
-    center = np.zeros(3)
-    total_inertia = np.zeros((3, 3))
-    if total > 0.0:
-        center = sum((link.mass * link.center for link in links), center) / total
-        for link in links:
-            arm = link.center - center
-            shift = arm @ arm * np.eye(3) - np.outer(arm, arm)
-            total_inertia += link.inertia + link.mass * shift
-    return _Masses(total, center, total_inertia if is_inertia_known else None, added_mass)
+    total = combined(links)
+    if without_mass and total.mass > 0.0:
+        exchange.note(
+            f"No mass stands at link {listed(without_mass)}: 0 is taken, where SDF takes 1 kg and "
+            "1 kg m^2, which moves the centre of gravity; give it an <inertial>."
+        )
+    return _Masses(total, is_inertia_known, added_mass)

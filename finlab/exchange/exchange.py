@@ -21,6 +21,8 @@ T200_FORCE = (-39.91, 51.44)
 """Least and most force of a Blue Robotics T200 at 16 V [N], by the maker's table."""
 T200_POWER = PowerLaw(0.997, 1.449)
 """A fit of that table's electric power over force: 0.997 F^1.5 ahead, 1.449 |F|^1.5 astern [W]."""
+NO_TORQUE = 1e-12
+"""Reaction torque over the force up to which it is a rounding error [m]."""
 TO_FRD = np.array([[1.0], [-1.0], [-1.0], [1.0], [-1.0], [-1.0]])
 """Signs (6, 1) that turn wrenches (6, n) from FLU (x forward, y left, z up) to FRD (x forward,
 y right, z down), and back."""
@@ -43,6 +45,10 @@ class Exchange:
     """Frame of a matrix or of places; the file's, else FLU, when None."""
     rows: Literal["axes", "thrusters"] | None = None
     """What the rows of a matrix without labels are, where it may be both."""
+    length: Literal["m", "cm", "mm"] | None = None
+    """Unit of positions whose key names none; metres, if they may be, when None."""
+    angle_unit: float | None = None
+    """What an angle of 1 stands for where its key names no unit [rad]; set by the reader."""
     model: str | None = None
     """Name of the model to take from a robot description of several; the first with thrusters when
     None."""
@@ -87,7 +93,7 @@ class Exchange:
             vector(axis),
             self.force or force or T200_FORCE,
             T200_POWER,
-            torque_per_newton=torque_per_newton,
+            torque_per_newton=torque_per_newton if abs(torque_per_newton) > NO_TORQUE else 0.0,
         )
 
     def thruster_of_column(

@@ -62,11 +62,42 @@ DIRECTION = (
 """Keys of a thruster's direction, or of all directions."""
 ANGLES = "rpy euler eulerangles rollpitchyaw"
 """Keys of roll, pitch and yaw of a thruster, which pushes along its x."""
+HEADING_PITCH = "headingpitch headingandpitch azimuthelevation azel"
+"""Keys of heading and pitch of a thruster's force."""
+QUATERNION = "quaternion quat quatxyzw quaternionxyzw"
+"""Keys of a quaternion x, y, z, w of a thruster, which pushes along its x."""
+REVERSED = (
+    "reversed reverse isreversed flipped flip isflipped inverted invert inverse isinverted "
+    "polarity sign"
+)
+"""Keys that say that something of a thruster has the other sign."""
+UNIT = "unit units lengthunit lengthunits positionunit positionunits distanceunit distanceunits"
+"""Keys of the unit of lengths around the thrusters."""
+LENGTH_WORDS = {
+    **LENGTHS,
+    **dict.fromkeys(("meter", "meters", "metre", "metres", "si"), 1.0),
+    **dict.fromkeys(("centimeter", "centimeters", "centimetre", "centimetres"), 0.01),
+    **dict.fromkeys(("millimeter", "millimeters", "millimetre", "millimetres"), 1e-3),
+}
+"""Units of length by the words that files have for them [m]."""
+OTHER_DEVICES = {
+    *("camera", "cameras", "sensor", "sensors", "imu", "imus", "dvl", "lidar", "sonar", "gps"),
+    *("light", "lights", "beacon", "beacons", "hydrophone", "hydrophones", "marker", "markers"),
+}
+"""Words of keys below which no thruster is."""
 AMBIGUOUS = "orientation orientations attitude rotation"
 """Keys that may hold a direction or angles; a file with one is refused."""
+_FRAME_IN_COMMENT = re.compile(
+    r"\b(?:FLU|FRD|NED|ENU|SNAME|frame)\b"
+    r"|\b[yY] ?(?:is|=|:|to the|->)? ?(?:left|right|port|starboard)"
+)
+"""A comment that names a frame, by a word or by where y points."""
 ROW_LABELS = "axes dof dofs rows rownames axisnames degreesoffreedom controlledaxes"
 """Keys of the labels of a matrix's rows."""
-CENTER = "centerofmass centreofmass centerofgravity centreofgravity cog com cg"
+CENTER = (
+    "centerofmass centreofmass centerofgravity centreofgravity centergravity centregravity "
+    "gravitycenter gravitycentre masscenter masscentre cog com cg"
+)
 """Keys of the centre of gravity."""
 LIMITS = (
     "bounds limits range forcelimits thrustlimits forcebounds thrustbounds thrustrange forcerange"
@@ -83,8 +114,7 @@ UPPER_LIMIT = (
 LIMIT_KEYS = f"{LIMITS} {LOWER_LIMIT} {UPPER_LIMIT} {COUNT} {ROW_LABELS}"
 """Keys that are read of a mapping around the thrusters."""
 THRUSTER_KEYS = (
-    f"{NAME} {POSITION} {DIRECTION} {ANGLES} {LIMIT_KEYS} x y z px py pz posx posy posz dx dy dz "
-    "ax ay az nx ny nz ux uy uz dirx diry dirz"
+    f"{NAME} {POSITION} {DIRECTION} {ANGLES} {HEADING_PITCH} {QUATERNION} {REVERSED} {LIMIT_KEYS}"
 )
 """Keys that are read of the mapping of one thruster."""
 MAX_LIST_LENGTH = 300
@@ -113,6 +143,8 @@ class Entry(NamedTuple):
     value: Any
     unit: float
     """What a value of 1 stands for, in SI: 0.001 of `position_mm`; 1 where no unit is named."""
+    names_unit: bool = False
+    """Whether the key names that unit."""
 
 
 def lookup(
@@ -133,14 +165,16 @@ def lookup(
     for key, value in values.items():
         label = str(key)[:100]
         size = 1.0
+        names_unit = False
         if units:
             unit = re.search(r"[_ (\[]+([a-z]+)[)\]]?$", label, re.IGNORECASE)
             if unit and unit[1].lower() in units:
                 label = label[: unit.start()]
                 size = units[unit[1].lower()]
+                names_unit = True
         word = plain(label)
         if word in accepted or word.removeprefix("thruster").removeprefix("s") in accepted:
-            return Entry(str(key), value, size)
+            return Entry(str(key), value, size, names_unit)
     return Entry("", None, 1.0)
 
 
@@ -155,7 +189,8 @@ def unknown_in(rows: Iterable[Mapping[str, Any]]) -> str:
     unknown: dict[str, None] = {}  # a set that keeps the order
     for row in rows:
         for key in map(str, row):
-            if not axis_of(key) and not is_key_of(key, THRUSTER_KEYS, units):
+            is_known = is_key_of(key.removeprefix("sign of "), THRUSTER_KEYS, units)
+            if not axis_of(key) and not is_known:
                 unknown[key] = None
     return ", ".join(unknown)[:300]
 
@@ -184,7 +219,7 @@ def stated_frame(
         LayoutError: a frame is named by a word that is not known.
     """
     for scope in scopes:
-        key, value, _ = lookup(scope, FRAME_KEYS)
+        key, value, *_ = lookup(scope, FRAME_KEYS)
         text = " ".join(map(str, value.values())) if isinstance(value, Mapping) else str(value)
         frame = frame_in(text)
         if frame:
@@ -195,7 +230,7 @@ def stated_frame(
                 f"is {text!r:.60}, expected {words}; or leave it out, and say --frame", key
             )
     for comment in comments:
-        if re.search(r"\b(?:FLU|FRD|NED|ENU|SNAME|frame)\b", comment):
+        if _FRAME_IN_COMMENT.search(comment):
             frame = frame_in(comment)
             if frame:
                 return frame, "its comment"
@@ -249,6 +284,15 @@ def nodes(data: Any) -> Iterator[Node]:
         yield node
         for key, child in reversed(children):
             stack.append(Node((*path, key), child, scopes))
+
+
+def names_other_device(path: Path) -> bool:
+    """Whether the keys that lead to a value name a camera or a sensor, and no thruster."""
+    for key in path:
+        words = {plain(word) for word in re.split(r"[^A-Za-z]+", key[:100])}
+        if words & OTHER_DEVICES:
+            return True
+    return False
 
 
 def unread(data: Any, used: set[Path]) -> str:

@@ -3,7 +3,8 @@
 Each motor has six factors, in the order roll, pitch, yaw, throttle, forward, lateral. They hold
 directions of forces and signs of torques, no lengths and no newtons. Forward, right and up are
 positive, and so are roll to the right, pitch up and yaw clockwise seen from above (ArduSub,
-`AP_Motors6DOF::setup_motors`, commit of 2026). Calls are in C++ and Lua, with simple arithmetic.
+`AP_Motors6DOF::setup_motors`, commit of 2026), as in scripts of ArduCopter (`Motors_6DoF`), which
+also say whether a motor pushes both ways. Calls are in C++ and Lua, with simple arithmetic.
 """
 
 import ast
@@ -11,6 +12,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from itertools import islice
 from typing import NamedTuple
 
@@ -137,6 +139,8 @@ class Motor(NamedTuple):
     name: str
     factors: Sequence[float]
     """Roll, pitch, yaw, throttle, forward, lateral."""
+    is_reversible: bool = True
+    """Whether it pushes both ways."""
 
 
 def layout_of_motors(name: str, motors: Sequence[Motor], exchange: Exchange) -> Layout:
@@ -166,6 +170,13 @@ def layout_of_motors(name: str, motors: Sequence[Motor], exchange: Exchange) -> 
     thrusters = [
         exchange.thruster_of_column(motor_name, column, None)
         for motor_name, column in zip(names, columns, strict=True)
+    ]
+    one_way = [motor.name for motor in motors if not motor.is_reversible]
+    if one_way:
+        exchange.note(f"Not reversible, and so pushing one way, are {', '.join(one_way)}.")
+    thrusters = [
+        thruster if motor.is_reversible else replace(thruster, force=(0.0, thruster.force[1]))
+        for thruster, motor in zip(thrusters, motors, strict=True)
     ]
     return Layout(name, tuple(thrusters))
 
@@ -265,12 +276,17 @@ def write_ardusub(layout: Layout, exchange: Exchange, suffix: str) -> str:
 
 
 def motors_in_source(text: str) -> list[Motor]:
-    """Returns the motors that calls of `add_motor_raw_6dof` in C++ or Lua add.
+    """Returns the motors that calls of `add_motor_raw_6dof` in C++ or Lua add, or of
+    `Motors_6DoF:add_motor` in Lua.
 
     Raises:
         LayoutError: a call cannot be parsed; its line is named.
     """
-    is_lua = "motors:" in text or re.search(r"^\s{0,20}local ", text, re.MULTILINE) is not None
+    is_lua = (
+        "motors:" in text
+        or "Motors_6DoF" in text
+        or re.search(r"^\s{0,20}local ", text, re.MULTILINE) is not None
+    )
     code = _without_comments(text, is_lua)
     constants = constants_in(code)
     motors: list[Motor] = []
@@ -283,8 +299,18 @@ def motors_in_source(text: str) -> list[Motor]:
         same_line = code[max(0, call.start() - 40) : call.start()].rpartition("\n")[2]
         if re.search(r"\b(?:void|function)\b", same_line) or any(map(_DECLARATION.match, cells)):
             continue  # the function itself, not a call
-        if len(cells) not in (7, 8):
-            raise LayoutError(f"line {line}: expected a motor and its six factors in brackets")
+        if len(cells) not in (7, 8, 9):
+            raise LayoutError(
+                f"line {line}: a motor with {max(0, len(cells) - 1)} arguments behind it, expected "
+                "its six factors in brackets, as add_motor_raw_6dof of ArduSub and "
+                "Motors_6DoF:add_motor of ArduCopter have them"
+            )
+        reversible = cells[7].strip() if len(cells) == 9 else "true"
+        if reversible not in ("true", "false"):
+            raise LayoutError(
+                f"line {line}: {reversible!r:.40} says whether it is reversible; "
+                "expected true or false"
+            )
         if len(motors) == MAX_ACTUATORS:
             raise LayoutError(f"line {line}: adds more than {MAX_ACTUATORS} motors")
         if not is_lua:
@@ -297,7 +323,8 @@ def motors_in_source(text: str) -> list[Motor]:
             factors = [value_of(cell, constants) for cell in cells[1:7]]
         except ValueError as error:
             raise LayoutError(f"line {line}: {error}; write its number") from None
-        motors.append(Motor(_motor_name(cells[0].strip()), factors))
+        motor_name = _motor_name(cells[0].strip())
+        motors.append(Motor(motor_name, factors, reversible == "true"))
     return motors
 
 

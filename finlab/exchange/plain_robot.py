@@ -7,12 +7,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from finlab.arrays import Array
 from finlab.axes import AXES
 from finlab.errors import LayoutError
-from finlab.exchange import labels
+from finlab.exchange import labels, poses
 from finlab.exchange.exchange import TO_FRD, Exchange
 from finlab.exchange.labels import (
     FRAMES,
@@ -24,7 +23,8 @@ from finlab.exchange.labels import (
     stated_frame,
     unread,
 )
-from finlab.exchange.records import UNIT_TOLERANCE, Record, ThrusterRecords, find_thrusters, is_unit
+from finlab.exchange.poses import Record
+from finlab.exchange.records import ThrusterRecords, find_thrusters, is_unit
 from finlab.files import yaml_text
 from finlab.files.csv_table import FORCES, LENGTHS, TURNS
 from finlab.layout import MAX_ACTUATORS, Layout, Thruster, own_effectiveness
@@ -63,6 +63,8 @@ def read_plain(
         limit_keys = labels.LIMIT_KEYS if depth < 2 else ""
         words = f"{labels.FRAME_KEYS} {labels.NAMES} {limit_keys}"
         used |= {(*path, key) for key in scope if is_key_of(key, words, FORCES)}
+    records = {_thruster_name(key, record): record for key, record in thrusters.records.items()}
+    poses.note_reversed(records, exchange)
     unknown_keys = labels.unknown_in(thrusters.records.values())
     if unknown_keys:
         exchange.note(f"Not read of each thruster: {unknown_keys}.")
@@ -92,26 +94,75 @@ def _of_positions(
     thrusters: ThrusterRecords, data: Any, is_frd: bool, used: set[Path], exchange: Exchange
 ) -> tuple[Thruster, ...]:
     """Thrusters by position and direction; adds the paths of what it reads to `used`."""
+    meters = _length_unit(thrusters, used, exchange)
+    places = [poses.position_of(key, record, meters) for key, record in thrusters.records.items()]
     center = np.zeros(3)
     if exchange.origin == "gravity":
-        for node in nodes(data):
-            point = numbers_in(node.value) if is_key_of(node.key, labels.CENTER) else None
-            if point is not None and point.shape == (3,):
-                center = point
-                used.add(node.path)
-                x, y, z = point
-                exchange.note(f"The origin is at {node.words}, {x:g} {y:g} {z:g} m.")
+        center = _center(thrusters, data, meters, used, exchange)
     exchange.note(f"{thrusters.node.words} was read: places in m, directions, limits in N.")
     sign = TO_FRD[:3, 0] if is_frd else np.ones(3)
     limits = _limits(thrusters, data, used, exchange)
+    _settle_angles(thrusters, exchange)
     actuators = []
-    for (key, record), force in zip(thrusters.records.items(), limits, strict=True):
-        position_key, value, meters = lookup(record, labels.POSITION, LENGTHS)
-        position = _vector(value, f"{key}.{position_key}") * meters - center
-        axis = _direction(key, record, exchange)
+    for (key, record), place, force in zip(thrusters.records.items(), places, limits, strict=True):
+        position = place - center
+        axis = poses.direction_of(key, record, is_frd, exchange)
         name = _thruster_name(key, record)
         actuators.append(exchange.thruster(name, position * sign, axis * sign, force))
     return tuple(actuators)
+
+
+def _length_unit(thrusters: ThrusterRecords, used: set[Path], exchange: Exchange) -> float | None:
+    """What a length of 1 stands for where its own key does not say [m]; None where nobody has
+    said."""
+    if exchange.length is not None:
+        return LENGTHS[exchange.length]
+    for path, scope in thrusters.node.scopes:
+        key, value, *_ = lookup(scope, labels.UNIT)
+        word = str(value).lower().strip()
+        if key and labels.LENGTH_WORDS.get(word):
+            used.add((*path, key))
+            exchange.note(f"Lengths are in {word} ({key}).")
+            return labels.LENGTH_WORDS[word]
+    return None
+
+
+def _center(
+    thrusters: ThrusterRecords, data: Any, meters: float | None, used: set[Path], exchange: Exchange
+) -> Array:
+    """The centre of gravity (3,) in the file's frame [m], in the unit of the positions where its
+    own key names none; 0 where the file has none."""
+    position_units = {
+        lookup(record, labels.POSITION, LENGTHS).unit for record in thrusters.records.values()
+    }
+    center = np.zeros(3)
+    for node in nodes(data):
+        if not is_key_of(node.key, labels.CENTER, LENGTHS):
+            continue
+        value = node.value
+        components = [value.get(axis) for axis in "xyz"] if isinstance(value, Mapping) else value
+        point = numbers_in(components)
+        if point is None or point.shape != (3,):
+            continue
+        entry = lookup({node.key: None}, labels.CENTER, LENGTHS)
+        unit = meters or (min(position_units) if len(position_units) == 1 else 1.0)
+        center = point * (entry.unit if entry.names_unit else unit)
+        used.add(node.path)
+        x, y, z = center
+        exchange.note(f"The origin is at {node.words}, {x:g} {y:g} {z:g} m.")
+    return center
+
+
+def _settle_angles(thrusters: ThrusterRecords, exchange: Exchange) -> None:
+    """Takes headings for degrees where one of them is more than a turn in radians."""
+    largest = 0.0
+    for record in thrusters.records.values():
+        angles = numbers_in(lookup(record, labels.HEADING_PITCH).value)
+        if angles is not None:
+            largest = max(largest, float(np.abs(angles).max()))
+    if largest > 2.0 * np.pi:
+        exchange.angle_unit = TURNS["deg"]
+        exchange.note(f"Headings reach {largest:g}, and are read in degrees.")
 
 
 def _thruster_name(key: str, record: Record) -> str:
@@ -120,37 +171,6 @@ def _thruster_name(key: str, record: Record) -> str:
     if name and not name.isdecimal():
         return name
     return f"thruster{int(key[1:-1]) + 1}" if key.startswith("[") else key
-
-
-def _direction(key: str, record: Record, exchange: Exchange) -> Array:
-    """The direction (3,) of a thruster's force, of length 1, by a vector or by angles."""
-    direction_key, value, _ = lookup(record, labels.DIRECTION)
-    if direction_key:
-        axis = _vector(value, f"{key}.{direction_key}")
-    else:
-        direction_key, value, radians = lookup(record, labels.ANGLES, TURNS)
-        angles = _vector(value, f"{key}.{direction_key}") * radians
-        if np.abs(angles).max() > 2 * np.pi:
-            raise LayoutError(
-                "is more than a turn; are these degrees? call it rpy_deg", f"{key}.{direction_key}"
-            )
-        exchange.note(f"{direction_key} turns the axis x of a thruster, along which it pushes.")
-        axis = Rotation.from_euler("xyz", angles).apply([1.0, 0.0, 0.0])
-    length = float(np.linalg.norm(axis))
-    if length < 1e-9:
-        raise LayoutError("has no length", f"{key}.{direction_key}")
-    if abs(length - 1.0) > UNIT_TOLERANCE:
-        exchange.note(f"{key}.{direction_key} has length {length:g}; its direction alone is read.")
-    return axis / length
-
-
-def _vector(value: Any, key: str) -> Array:
-    """The vector (3,) in a list, a text or a mapping of x, y and z; `key` goes into the error."""
-    components = [value.get(axis) for axis in "xyz"] if isinstance(value, Mapping) else value
-    array = numbers_in(components)
-    if array is None or array.shape != (3,):
-        raise LayoutError(f"is {value!r:.60}, expected three numbers", key)
-    return array
 
 
 def _of_columns(
@@ -196,7 +216,7 @@ def _limits(
     for node in nodes(data):
         if not isinstance(node.value, Mapping):
             continue
-        name_key, name, _ = lookup(node.value, labels.NAME)
+        name_key, name, *_ = lookup(node.value, labels.NAME)
         if not name_key:
             name = node.key
         if isinstance(name, str) and name in names:
@@ -215,7 +235,7 @@ def _limits_in(values: Mapping[str, Any], n: int, exchange: Exchange) -> list[Li
 
     One pair, or one number of each, is for all. A most alone is for both ways.
     """
-    key, value, newtons = lookup(values, labels.LIMITS, FORCES)
+    key, value, newtons, _ = lookup(values, labels.LIMITS, FORCES)
     if key and value is not None:
         pairs = numbers_in(value)
         if pairs is None or pairs.shape not in ((2,), (n, 2), (2, n)):
@@ -224,8 +244,8 @@ def _limits_in(values: Mapping[str, Any], n: int, exchange: Exchange) -> list[Li
             pairs = pairs.T
         pairs = np.broadcast_to(pairs, (n, 2)) * newtons
         return [(low, high) for low, high in pairs.tolist()]
-    low_key, low_value, low_newtons = lookup(values, labels.LOWER_LIMIT, FORCES)
-    high_key, high_value, high_newtons = lookup(values, labels.UPPER_LIMIT, FORCES)
+    low_key, low_value, low_newtons, _ = lookup(values, labels.LOWER_LIMIT, FORCES)
+    high_key, high_value, high_newtons, _ = lookup(values, labels.UPPER_LIMIT, FORCES)
     if high_value is None:
         return [None] * n
     high = numbers_in(high_value)

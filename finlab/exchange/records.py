@@ -12,14 +12,13 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.axes import AXES, Axis
-from finlab.errors import LayoutError
-from finlab.exchange import labels
+from finlab.errors import LayoutError, layout_errors_at
+from finlab.exchange import labels, poses
 from finlab.exchange.exchange import Exchange
-from finlab.exchange.labels import Node, axis_of, lookup, nodes, numbers_in, plain
-from finlab.files.csv_table import LENGTHS, TURNS
+from finlab.exchange.labels import Node, axis_of, listed, lookup, nodes, numbers_in, plain
+from finlab.exchange.poses import UNIT_TOLERANCE, Record
+from finlab.files.csv_table import LENGTHS
 
-UNIT_TOLERANCE = 0.05
-"""A vector whose length is this close to 1 is a direction, or a force per newton."""
 ALLOCATION_WORDS = {
     "tam",
     "tcm",
@@ -37,6 +36,8 @@ MATRIX_WORDS = {
     *("configuration", "config", "control", "motor", "motors"),
 }
 """A key that holds `matrix` and no other words than these names an allocation matrix, too."""
+THRUSTER_WORDS = {"thruster", "thrusters", "motor", "motors", "propeller", "propellers"}
+"""Words of a key that names thrusters, where other devices have places and directions, too."""
 OTHER_MATRIX_WORDS = {
     *("mass", "inertia", "damping", "drag", "added", "coriolis", "covariance", "weight"),
     *("weights", "gain", "gains", "rotation", "inverse", "inv", "pinv", "pseudo", "pseudoinverse"),
@@ -44,8 +45,6 @@ OTHER_MATRIX_WORDS = {
 """Words of a key, or of one around it, that holds another matrix."""
 WRENCH_LABELS = {"fx", "fy", "fz", "tx", "ty", "tz", "mx", "my", "mz"}
 """Labels that are those of a wrench under any key; `x` or `roll` are so in a matrix alone."""
-Record = dict[str, Any]
-"""What a file says of one thruster, by its own keys."""
 
 
 class ThrusterRecords(NamedTuple):
@@ -78,6 +77,13 @@ def find_thrusters(data: Any, exchange: Exchange, is_table: bool) -> ThrusterRec
     """
     by_position = _candidates(data, lambda node: _by_position(node, exchange))
     candidates = by_position or _candidates(data, lambda node: _by_wrench(node, exchange, is_table))
+    named = [candidate for candidate in candidates if names_thrusters(candidate.node)]
+    if len(candidates) > 1 and len(named) == 1:
+        others = [candidate.node.words for candidate in candidates if candidate is not named[0]]
+        exchange.note(
+            f"Places beside those of {named[0].node.words} are left out: {listed(others)}."
+        )
+        candidates = named
     if len(candidates) == 1:
         return candidates[0]
     if len(candidates) > 1:
@@ -93,6 +99,11 @@ def find_thrusters(data: Any, exchange: Exchange, is_table: bool) -> ThrusterRec
         "has no matrix, expected six rows of numbers (Fx, Fy, Fz, Tx, Ty, Tz) under a key such as "
         f"`tam` or `allocation_matrix`, or a position and a direction of each thruster{hint}"
     )
+
+
+def names_thrusters(node: Node) -> bool:
+    """Whether a node's own key says that thrusters stand there."""
+    return bool({plain(word) for word in re.split(r"[^A-Za-z]+", node.key[:100])} & THRUSTER_WORDS)
 
 
 def _candidates(data: Any, read: Callable[[Node], ThrusterRecords | None]) -> list[ThrusterRecords]:
@@ -122,12 +133,16 @@ def _records_below(value: Any) -> dict[str, Mapping[str, Any]]:
 
 def _by_position(node: Node, exchange: Exchange) -> ThrusterRecords | None:
     """Thrusters by position and direction: mappings below a node, or lists of all in one."""
-    records = {key: _join_components(record) for key, record in _records_below(node.value).items()}
-    has_position = {
-        key: _may_be_vector(lookup(record, labels.POSITION, LENGTHS).value)
-        for key, record in records.items()
-    }
-    has_direction = {key: _has_direction(record) for key, record in records.items()}
+    if labels.names_other_device(node.path):
+        return None
+    records = {}
+    for key, record in _records_below(node.value).items():
+        if not labels.names_other_device((key,)) and not labels.is_key_of(key, poses.POSE):
+            with layout_errors_at(f"{node.words}.{key}"):
+                records[key] = poses.split(record)
+    poses.name_unit_orientations(records.values(), exchange)
+    has_position = {key: poses.has_position(record) for key, record in records.items()}
+    has_direction = {key: poses.has_direction(record) for key, record in records.items()}
     if not any(has_position[key] and has_direction[key] for key in records):
         in_lists = _from_lists(node, exchange)
         return ThrusterRecords(node, in_lists) if in_lists else None
@@ -138,56 +153,31 @@ def _by_position(node: Node, exchange: Exchange) -> ThrusterRecords | None:
                 f"has no {lacks}, and others beside it have one", f"{node.words}.{key}"
             )
     thrusters = {key: record for key, record in records.items() if has_position[key]}
+    if len(thrusters) == 1:
+        _check_symmetry(node, *thrusters)
     return ThrusterRecords(node, thrusters)
 
 
-def _join_components(record: Mapping[str, Any]) -> Record:
-    """A record in which `x`, `y`, `z` became one position, and `dx`, `dy`, `dz` or the like one
-    direction, unless it has torques or angles: then its entries are those of a wrench."""
-    joined = {**record}
-    by_label = {str(key).lower().strip().replace("_", ""): value for key, value in record.items()}
-    if any(axis_of(label) in ("Tx", "Ty", "Tz") for label in by_label):
-        return joined
-    prefixes_of = {"position": ("", "p", "pos"), "direction": ("d", "a", "n", "u", "dir", "f")}
-    for vector, prefixes in prefixes_of.items():
-        for prefix in prefixes:
-            if {f"{prefix}x", f"{prefix}y"} <= set(by_label):
-                components = [by_label.get(f"{prefix}{axis}", 0.0) for axis in "xyz"]
-                joined.setdefault(vector, components)
-    return joined
-
-
-def _may_be_vector(value: Any) -> bool:
-    """Whether a value may be a vector of one thruster: a mapping, a text or a short list."""
-    if isinstance(value, Mapping | str):
-        return True
-    if not isinstance(value, list) or len(value) >= 6:
-        return False
-    return not any(isinstance(item, list) for item in value)
-
-
-def _has_direction(record: Record) -> bool:
-    """Whether a record says where its thruster points; an error where that may be angles, too."""
-    has_direction = any(
-        _may_be_vector(lookup(record, words, TURNS).value)
-        for words in (labels.DIRECTION, labels.ANGLES)
-    )
-    key, value, _ = lookup(record, labels.AMBIGUOUS)
-    has_position = bool(lookup(record, labels.POSITION, LENGTHS).key)
-    if key and not has_direction and _may_be_vector(value) and has_position:
-        raise LayoutError(
-            "may be a direction, or roll, pitch and yaw; call it `direction`, or `rpy` in radians",
-            key,
-        )
-    return has_direction
+def _check_symmetry(node: Node, only: str) -> None:
+    """Raises a LayoutError where one thruster has a place, and several beside it have a name
+    alone: they follow from it by a symmetry that the program knows."""
+    siblings = node.value.items() if isinstance(node.value, Mapping) else ()
+    for key, value in siblings:
+        is_list = isinstance(value, Mapping | list) and len(value) > 1 and not _records_below(value)
+        if key != only and is_list and names_thrusters(Node((str(key),), value, ())):
+            raise LayoutError(
+                f"has a place and a direction of {only} alone, and {len(value)} {key} beside it, "
+                "which follow from it by a symmetry; write the place and direction of each",
+                node.words,
+            )
 
 
 def _from_lists(node: Node, exchange: Exchange) -> dict[str, Record]:
     """The thrusters of a mapping that holds all positions in one list and all directions in
     another; empty where it does not."""
     value = node.value if isinstance(node.value, Mapping) else {}
-    position_key, position_value, meters = lookup(value, labels.POSITION, LENGTHS)
-    direction_key, direction_value, _ = lookup(value, labels.DIRECTION)
+    position_key, position_value, meters, names_unit = lookup(value, labels.POSITION, LENGTHS)
+    direction_key, direction_value, *_ = lookup(value, labels.DIRECTION)
     positions = numbers_in(position_value)
     axes = numbers_in(direction_value)
     if axes is None or positions is None:
@@ -229,8 +219,9 @@ def _from_lists(node: Node, exchange: Exchange) -> dict[str, Record]:
     else:
         positions = positions.reshape(3, n).T
         axes = axes.reshape(3, n).T
+    key_of_position = "position_m" if names_unit else "position"
     return {
-        name: {"position": position, "direction": axis}
+        name: {key_of_position: position, "direction": axis}
         for name, position, axis in zip(
             _names(node, n), positions.tolist(), axes.tolist(), strict=True
         )
@@ -301,6 +292,8 @@ def _of_wrench_records(
     node: Node, records: Mapping[str, Mapping[str, Any]]
 ) -> ThrusterRecords | None:
     """Thrusters with a mapping of each wrench by axes; None where the mappings are no wrenches."""
+    if labels.names_other_device(node.path):
+        return None
     keys_by_axis = [_axis_keys(record) for record in records.values()]
     axes = tuple(keys_by_axis[0])
     if len(axes) < 2 or not set(axes) & {"Fx", "Fy", "Fz"}:
@@ -336,7 +329,7 @@ def _axis_keys(record: Mapping[str, Any]) -> dict[Axis, str]:
 def _names(node: Node, n: int) -> list[str]:
     """Names of a matrix's thrusters from the nearest mapping around it that has some."""
     for _, scope in node.scopes:
-        key, names, _ = lookup(scope, labels.NAMES)
+        key, names, *_ = lookup(scope, labels.NAMES)
         if isinstance(names, list) and all(isinstance(name, str | int) for name in names):
             if len({*map(str, names)}) != n or len(names) != n:
                 raise LayoutError(f"holds {len(names)} names, expected {n}, each another one", key)

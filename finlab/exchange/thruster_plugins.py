@@ -9,8 +9,9 @@ import math
 from xml.etree.ElementTree import Element
 
 from finlab.errors import LayoutError
-from finlab.exchange.description import Description, Joint, number, text_at
+from finlab.exchange.description import Description, number, text_at
 from finlab.exchange.exchange import Exchange
+from finlab.exchange.links import Joint
 
 DEFAULT_LIMIT = 1000.0
 """What gz-sim takes for a limit of a thruster that is left out [N]."""

@@ -1,4 +1,4 @@
-"""Parses YAML and JSON into plain values: mappings, lists, text, true, false, null and numbers.
+"""Parses YAML, JSON and TOML into plain values: mappings, lists, text, true, false, null, numbers.
 
 The text may come from a stranger. Nothing in it runs code, expands, drops a key, or takes more than
 linear time. Numbers are those of JSON: whatever else YAML calls a number (0o17, 1_000, 1:30, .inf),
@@ -23,6 +23,20 @@ _NUMBER = re.compile(r"-?(?:0|[1-9][0-9]*)(\.[0-9]+)?([eE][-+]?[0-9]+)?\Z")
 """A number of JSON."""
 _CONSTANTS = {"": None, "null": None, "true": True, "false": False}
 """Plain scalars of YAML that are no text."""
+MAX_TOML = 100_000
+"""Longest TOML [characters]; its parser is not linear in all that it may hold."""
+MAX_COMMENTED = 1_000_000
+"""Longest JSON that may have comments [characters]."""
+_JSON_PIECE = re.compile(
+    r'(?P<text>"(?:[^"\\\n]|\\.)*"?)'
+    r"|(?P<comment>//[^\n]*|\#[^\n]*|/\*(?:[^*]|\*(?!/))*(?:\*/)?)"
+    r"|(?P<comma>,(?=\s*[}\]]))"
+    r"|(?P<other>[^\"/#,]+|.)",
+    re.DOTALL,
+)
+"""A text in quotes, a comment, a comma before a closing bracket, or anything else of JSON."""
+_LAST_COMMA = re.compile(r'"(?:[^"\\\n]|\\.)*"?|,(?=\s*[}\]])', re.DOTALL)
+"""A text in quotes, or a comma before a closing bracket."""
 _ESCAPED_SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
 """Half of a surrogate pair as an escape of JSON."""
 
@@ -59,6 +73,73 @@ def parse_json(content: str, source: str, error: type[FinlabError] = DataError) 
         raise error.in_file(source, "is nested too deeply") from None
     except ValueError as problem:
         raise error.in_file(source, str(problem)[:160]) from None
+
+
+def without_comments(content: str) -> str:
+    """Returns JSON without its comments (`//`, `#`, `/* */`) and commas before a closing bracket.
+
+    Lines keep their numbers, and what stands in quotes stays as it is; so does a text that is too
+    long for a robot.
+    """
+    if len(content) > MAX_COMMENTED:
+        return content
+    pieces = []
+    for match in _JSON_PIECE.finditer(content):
+        piece = match[0]
+        if match.lastgroup == "comment":
+            piece = "\n" * piece.count("\n")
+        elif match.lastgroup == "comma":
+            piece = ""
+        pieces.append(piece)
+    # A comment may stand between a comma and the bracket.
+    return _LAST_COMMA.sub(_kept_quotes, "".join(pieces))
+
+
+def _kept_quotes(match: re.Match[str]) -> str:
+    """A text in quotes as it is; nothing for a comma before a bracket."""
+    return match[0] if match[0].startswith('"') else ""
+
+
+def parse_toml(content: str, source: str, error: type[FinlabError] = DataError) -> Any:
+    """Returns the values of a TOML document.
+
+    Args:
+        content: the text of the document.
+        source: its name in the sentence of an error.
+        error: the class of the error.
+
+    Raises:
+        FinlabError: of the class `error`: it is no TOML, is too large or too deep, holds a number
+            that is not finite, or this Python cannot read it.
+    """
+    try:
+        import tomllib
+    except ModuleNotFoundError:  # Python 3.10
+        reason = "is TOML, which Python reads from 3.11 on; write it as YAML or JSON"
+        raise error.in_file(source, reason) from None
+    if len(content) > MAX_TOML:
+        raise error.in_file(source, f"is TOML of more than {MAX_TOML:,} characters, too large")
+    try:
+        return _plain(tomllib.loads(content), 0)
+    except tomllib.TOMLDecodeError as problem:
+        raise error.in_file(source, f"is not valid TOML: {problem!s:.160}") from None
+    except RecursionError:
+        raise error.in_file(source, "is nested too deeply") from None
+    except ValueError as problem:
+        raise error.in_file(source, str(problem)[:160]) from None
+
+
+def _plain(value: Any, depth: int) -> Any:
+    """A value of TOML as one of JSON: dates are text, and numbers are finite."""
+    if depth > MAX_DEPTH:
+        raise ValueError(f"is nested deeper than {MAX_DEPTH} levels, too deep to be read")
+    if isinstance(value, dict):
+        return {key: _plain(entry, depth + 1) for key, entry in value.items()}
+    if isinstance(value, list):
+        return [_plain(entry, depth + 1) for entry in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        raise ValueError(f"holds {value}, expected a finite number")
+    return value if isinstance(value, str | bool | int | float) else str(value)
 
 
 def parse_yaml(content: str, source: str, error: type[FinlabError] = DataError) -> Any:

@@ -5,8 +5,9 @@ An error names the line and the column. Force tables, measurements of `finlab fi
 """
 
 import csv
+import io
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from math import pi
 
@@ -70,6 +71,23 @@ class CsvTable:
         """Names of the columns."""
         self._rows = lines[n_notes + 1 :]
         self._first_line = n_notes + 2
+
+    def columns(self, names: Mapping[int, str]) -> "CsvTable":
+        """Returns the table of some columns under other names, without rows in which all of them
+        are empty; lines keep their numbers.
+
+        Args:
+            names: the new names by the indices of the columns.
+        """
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerows([["#"]] * (self._first_line - 2))
+        writer.writerow(names.values())
+        for line, row in enumerate(self._rows, self._first_line):
+            cells = [] if row.startswith("#") else self._cells(row, f"{self.source}: line {line}")
+            chosen = [cells[i].strip() if i < len(cells) else "" for i in names]
+            writer.writerow(chosen if any(chosen) else ["#"])
+        return CsvTable(text.getvalue().encode(), self.source, self._gaps)
 
     def numbers(self, indices: Sequence[int]) -> tuple[Array, NDArray[np.intp]]:
         """Returns columns of numbers.

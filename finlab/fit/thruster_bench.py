@@ -15,7 +15,15 @@ from numpy.typing import NDArray
 
 from finlab.arrays import Array
 from finlab.errors import DataError
-from finlab.fit.columns import Columns, concatenate, named_column, read_columns, read_sheets
+from finlab.files.csv_table import CsvTable, read_table
+from finlab.fit.columns import (
+    MAX_BYTES,
+    Columns,
+    concatenate,
+    named_column,
+    read_columns,
+    read_sheets,
+)
 
 _WORDS = {
     "PWM": "pwm pulse pulse_width pulsewidth pwm_signal pwm_value pwm_input pwm_width signal "
@@ -62,6 +70,8 @@ NEGATIVE = 0.02
 """Share of the largest power by which a power may lie below 0, as noise."""
 Rows = Mapping[str, Array]
 """Columns of a bench by name (n,), with `command`, `force` and `power`."""
+_VOLTAGE = re.compile(r"(?:\bat |@ ?)?\b(\d+(?:[.,]\d+)?) ?v(?:olts?)?\b", re.IGNORECASE)
+"""A voltage in the title of a sheet, or in a header."""
 SAME_VOLTAGE = 0.05
 """Share by which voltages of one supply may differ."""
 OVERLAP = 0.3
@@ -232,7 +242,8 @@ def read_bench(paths: Sequence[str | os.PathLike[str]], voltage: float | None = 
 def _read_tables(path: Path) -> tuple[list[Columns], tuple[str, ...]]:
     """The tables of a file, and notes on sheets without one."""
     if path.suffix.lower() not in (".xlsx", ".xlsm"):
-        return [_with_pulse_column(read_columns(path, NAMES, NEEDED_COLUMNS, EXPECTED_COLUMNS))], ()
+        table = read_table(path, MAX_BYTES, "a CSV file of measurements")
+        return [_with_pulse_column(columns) for columns in _columns_of(table)], ()
     tables_by_sheet, empty_sheets = read_sheets(path, _is_header)
     if not tables_by_sheet:
         raise DataError(
@@ -241,14 +252,42 @@ def _read_tables(path: Path) -> tuple[list[Columns], tuple[str, ...]]:
         )
     tables = []
     for title, table in tables_by_sheet.items():
-        columns = _with_pulse_column(read_columns(table, NAMES, NEEDED_COLUMNS, EXPECTED_COLUMNS))
-        volts = re.search(r"(\d+(?:[.,]\d+)?) ?v(?:olts?)?\b", title, flags=re.IGNORECASE)
-        if volts and "voltage" not in columns.values:
-            columns.values["voltage"] = np.full(
-                len(columns.sources), float(volts[1].replace(",", "."))
-            )
-        tables.append(columns)
+        volts = _VOLTAGE.search(title)
+        for columns in map(_with_pulse_column, _columns_of(table)):
+            if volts and "voltage" not in columns.values:
+                _add_voltage(columns, volts)
+            tables.append(columns)
     return tables, (f"no table in sheet {', '.join(empty_sheets):.200}",) if empty_sheets else ()
+
+
+def _columns_of(table: CsvTable) -> list[Columns]:
+    """The columns of a table; those of each voltage, where the headers name several side by side
+    (`pwm 12V, force 12V, pwm 16V, force 16V`). Columns without a voltage belong to all."""
+    by_voltage: dict[str, dict[int, str]] = {}
+    found = [_VOLTAGE.search(cell) for cell in table.header]
+    for volts in {match[0]: match for match in found if match}.values():
+        names = {}
+        for i, (cell, match) in enumerate(zip(table.header, found, strict=True)):
+            if match is None or match[1] == volts[1]:
+                names[i] = _VOLTAGE.sub("", cell).strip()
+        if _is_header([*names.values()]):
+            by_voltage[volts[1]] = names
+    if not by_voltage:
+        return [read_columns(table, NAMES, NEEDED_COLUMNS, EXPECTED_COLUMNS)]
+    tables = []
+    for voltage, names in by_voltage.items():
+        own = table.columns(names)
+        columns = read_columns(own, NAMES, NEEDED_COLUMNS, EXPECTED_COLUMNS)
+        if "voltage" not in columns.values:
+            _add_voltage(columns, voltage)
+        tables.append(columns)
+    return tables
+
+
+def _add_voltage(columns: Columns, volts: str | re.Match[str]) -> None:
+    """Adds a column with the voltage that a title or a header names."""
+    number = volts if isinstance(volts, str) else volts[1]
+    columns.values["voltage"] = np.full(len(columns.sources), float(number.replace(",", ".")))
 
 
 def _is_header(cells: Sequence[str]) -> bool:

@@ -5,6 +5,7 @@ force comes from the table's rows (`finlab.physics.table_error`).
 """
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,6 +24,15 @@ SMALL_FORCE = 0.05
 """Share of the largest force below which forces show their noise."""
 MIN_SMALL_FORCES = 8
 """Fewest such forces by which the noise is estimated."""
+REST_NOISE = 0.06
+"""Share of the largest force up to which the forces of one side are noise at rest."""
+COARSE_STEP = 0.02
+"""Share of the largest force above which the first force beside rest is one of the bench's steps,
+and tells of no dead band."""
+MISSED_POWER = 0.3
+"""Share of a measured power by which the table may miss it without a note."""
+MISSED_SHARE = 0.03
+"""As `MISSED_POWER`, of the largest power."""
 WEIGHT_FLOOR = 0.05
 """Share of the largest power that is added to each power, whose inverse is its weight."""
 MAX_CONVEX_ERROR = 0.1
@@ -82,19 +92,21 @@ def _fit(bench: BenchData) -> ThrusterFit:
     power = np.bincount(cell, bench.power) / count
     rising = isotonic_regression(force, weights=count).x
     direction = _directions(command, force, rising, bench.unit)
+    notes = list(bench.notes)
+    direction = _one_way(command, rising, direction, bench.unit, notes)
     is_idle = direction == 0
     idle_power = float(power[is_idle].min()) if is_idle.any() else 0.0
     smallest_force = NO_FORCE * float(np.abs(force).max())
     magnitude = np.maximum(direction * rising, smallest_force)
     thrust = np.where(is_idle, 0.0, direction * magnitude)
     convex_power = np.full(len(thrust), idle_power)
-    notes = list(bench.notes)
     for sign, name in ((-1.0, "negative"), (1.0, "positive")):
         is_side = direction == sign
         if is_side.any():
             convex_power[is_side] = _convex(np.abs(thrust[is_side]), power[is_side], idle_power)
         else:
             notes.append(f"no {name} forces were measured: the thruster pushes one way")
+    _note_missed_power(command, power, convex_power, bench.unit, notes)
     rows = tuple(
         zip(
             _rounded(command, COMMAND_DIGITS),
@@ -104,9 +116,7 @@ def _fit(bench: BenchData) -> ThrusterFit:
         )
     )
     idle_commands = [row_command for row_command, row_force, _ in rows if row_force == 0.0]
-    dead_band = 0.0
-    if len(idle_commands) > 1:
-        dead_band = min(abs(row_force) for _, row_force, _ in rows if row_force != 0.0)
+    dead_band = _dead_band(rows, bench.unit, notes) if len(idle_commands) > 1 else 0.0
     torque_per_newton = 0.0
     if bench.torque is not None:
         # The least-squares slope of torque over force, through the origin.
@@ -118,6 +128,73 @@ def _fit(bench: BenchData) -> ThrusterFit:
         torque_per_newton=torque_per_newton,
         notes=tuple(notes),
     )
+
+
+def _one_way(command: Array, rising: Array, direction: Array, unit: str, notes: list[str]) -> Array:
+    """The directions (k,), without a side that is no more than the noise of a load cell at rest.
+
+    Args:
+        command: commands (k,) in the bench's unit.
+        rising: their forces, which never fall (k,) [N].
+        direction: their directions (k,) by `_directions`.
+        unit: the unit of the commands.
+        notes: gets the rows that are left out.
+    """
+    size = np.abs(rising)
+    largest = {sign: float(size[direction == sign].max(initial=0.0)) for sign in (-1.0, 1.0)}
+    weak, strong = sorted(largest, key=lambda sign: largest[sign])
+    noise = largest[weak]
+    if not 0.0 < noise <= REST_NOISE * largest[strong]:
+        return direction
+    is_rest = size <= noise
+    first = float(command[is_rest].min())
+    last = float(command[is_rest].max())
+    span = f"{first:g} to {last:g} {unit}".rstrip()
+    share = 100.0 * noise / largest[strong]
+    notes.append(
+        f"forces of up to {noise:.3g} N at {span} are {share:.2g} % of the largest: they count as "
+        "noise of the load cell at rest, and their rows as without force"
+    )
+    return np.where(is_rest, 0.0, direction)
+
+
+def _dead_band(rows: Sequence[tuple[float, float, float]], unit: str, notes: list[str]) -> float:
+    """The least force beside a dead band [N]; 0, with a note, where it is no more than a step of
+    the bench.
+
+    Args:
+        rows: commands, forces [N] and powers of the table.
+        unit: the unit of the commands.
+        notes: gets the step.
+    """
+    pushing = [row for row in rows if row[1] != 0.0]
+    command, force, _ = min(pushing, key=lambda row: abs(row[1]))
+    largest = max(abs(row[1]) for row in pushing)
+    if abs(force) <= COARSE_STEP * largest:
+        return abs(force)
+    where = f"{command:g} {unit}".rstrip()
+    notes.append(
+        f"the first force beside rest is {force:.4g} N at {where}, a coarse step: whether forces "
+        "between 0 and that can be held is not measured, so no dead band is written, and they are "
+        "interpolated; measure there in finer steps"
+    )
+    return 0.0
+
+
+def _note_missed_power(
+    command: Array, measured: Array, taken: Array, unit: str, notes: list[str]
+) -> None:
+    """Says where the table's power (k,) is far from the one that was measured (k,) [W]."""
+    missed = np.abs(taken - measured)
+    far = (missed > MISSED_POWER * measured) & (missed > MISSED_SHARE * measured.max())
+    if far.any():
+        k = int(np.argmax(np.where(far, missed, 0.0)))
+        notes.append(
+            f"{int(far.sum())} rows have another power in the table than was measured, as at "
+            f"{command[k]:g} {unit}".rstrip()
+            + f" {taken[k]:.3g} W for {measured[k]:.3g} W: the "
+            "power over the force is the nearest convex curve"
+        )
 
 
 def _rounded(values: Array, digits: int) -> list[float]:

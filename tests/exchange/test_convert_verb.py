@@ -42,7 +42,7 @@ def test_from_a_description_to_the_robot(
 
 def test_the_form_of_the_output_must_be_clear(tmp_path: Path) -> None:
     error = refused(["layout", "convert", HEAVY_URDF, str(tmp_path / "60999_rov")])
-    assert "its end says no form; say --to layout, urdf, sdf, px4, ardusub, matrix" in error
+    assert "its end says no form; say --to layout, urdf, sdf, mjcf, px4, ardusub, matrix" in error
     assert main(["layout", "convert", HEAVY_URDF, str(tmp_path / "60999_rov"), "--to", "px4"]) == 0
     error = refused(["layout", "convert", "nowhere.urdf", str(tmp_path / "x.yaml")])
     assert "'nowhere.urdf' is neither a file nor a shipped layout" in error

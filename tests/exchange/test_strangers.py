@@ -110,7 +110,7 @@ def test_matrices_of_every_shape(file: str, text: str, read_as: str) -> None:
         ("a.sdf", sdf('<include merge="true"><uri>model://wamv</uri></include>' + THRUSTER), "in <include> wamv, which is not"),
         ("a.xacro", '<robot xmlns:xacro="x"><link name="${a}"/></robot>', "is a xacro file, .* expands it"),
         ("a.xml", "<launch/>", "got <launch>"),
-        ("a.scn", '<scenario><include file="b.scn"/></scenario>', "is a scenario of Stonefish, which is not read"),
+        ("a.scn", '<scenario><include file="b.scn"/></scenario>', "Stonefish without a <robot>; it includes b.scn, which are not opened"),
     ],
 )  # fmt: skip
 def test_what_stands_in_the_way_is_named(file: str, text: str, message: str) -> None:
@@ -150,6 +150,19 @@ def test_a_boat_commands_the_axes_of_its_rows() -> None:
         ("a.csv", "thruster,x (mm),y (mm),z,dx,dy,dz,min,max\na,100,200,0,0,0,1,-9.80665,9.80665".replace(" (mm)", "")
                   .replace("100,200", "0.1,0.2")),
         ("a.csv", "name,px,py,pz,ax,ay,az,min,max\na,0.1,0.2,0,0,0,1,-9.80665,9.80665"),
+        ("a.yaml", "t: [{name: a, pose: [0.1, 0.2, 0, 0, -1.5707963268, 0], bounds: [-9.80665, 9.80665]}]"),
+        ("a.yaml", "t: [{name: a, pose_deg: [0.1, 0.2, 0, 0, -90, 0], bounds: [-9.80665, 9.80665]}]"),
+        ("a.yaml", "t: [{name: a, pose: {x: 0.1, y: 0.2, z: 0, roll: 0, pitch: -1.5707963268, yaw: 0}, bounds: [-9.80665, 9.80665]}]"),
+        ("a.yaml", "t: [{name: a, pose: {position: {x: 0.1, y: 0.2, z: 0}, orientation: {x: 0, y: -0.70710678118, z: 0, w: 0.70710678118}},\n"
+                   "     bounds: [-9.80665, 9.80665]}]"),
+        ("a.yaml", "# body frame, y to the right\nt: [{name: a, pos: [0.1, -0.2, 0], heading_pitch: [0, 90], bounds: [-9.80665, 9.80665]}]"),
+        ("a.yaml", "t: [{name: a, pos: [0.1, 0.2, 0], heading_deg: 0, pitch_deg: 90, bounds: [-9.80665, 9.80665]}]"),
+        ("a.yaml", "unit: mm\ncom: {x: 50, y: 0, z: 0}\nt: [{name: a, x: 150, y: 200, x-dir: 0, y-dir: 0, z-dir: 1, bounds: [-9.80665, 9.80665]}]"),
+        ("a.yaml", "t: [{name: a, x_mm: 100, y_mm: 200, z_mm: 0, dx: 0, dy: 0, dz: 1, bounds: [-9.80665, 9.80665]}]"),
+        ("a.toml", '[[thrusters]]\nname = "a"\npos = [0.1, 0.2, 0]\naxis = [0, 0, 1]\nbounds = [-9.80665, 9.80665]'),
+        ("a.conf", '// FLU\n{"thrusters": [ # all\n {"name": "a", "pos": [0.1, 0.2, 0], /* up */ "axis": [0, 0, 1,], "bounds": [-9.80665, 9.80665]}, // one\n]}'),
+        ("a.json", '{"url": "http://a", "t": [{"name": "a", "xyz": [0.1, 0.2, 0], "axis": [0, 0, 1], "bounds": [-9.80665, 9.80665],},]}'),
+        ("a.cfg", '[[thrusters]]\nname = "a"\npos = [0.1, 0.2, 0]\naxis = [0, 0, 1]\nbounds = [-9.80665, 9.80665]'),
         ("a.json", '{"thrusters": {"names": ["a", "b"], "thruster_positions": [[0.1, 0.2, 0], [0, 1, 0]], "max_force": 9.80665, '
                    '"directions": [[0, 0, 1], [1, 0, 0]]}}'),
     ],
@@ -162,6 +175,116 @@ def test_thrusters_by_place_and_direction(file: str, text: str) -> None:
         [first.position, first.frame[0]], [[0.1, 0.2, 0], [0, 0, 1]], atol=1e-9
     )
     np.testing.assert_allclose([first.lower[0], first.upper[0]], [-9.80665, 9.80665])
+
+
+def test_what_a_pose_does_not_say_is_asked() -> None:
+    for text, said in {
+        "t: [{pose: [0, 0, 0, 0, 0, 0, 1], name: a}]": "is 7 numbers, expected six: x, y, z, roll",
+        "t: [{pos: [260, 0, 0], axis: [1, 0, 0]}]": "reaches 260: which unit is that.*--length mm",
+        "t: [{pos: [0, 0, 0], heading_pitch: [1.5, 0]}]": "in degrees or radians. name the unit",
+        "t: [{pos: [0, 0, 0], rpy: [0, 90, 0]}]": "are these degrees",
+        "t: [{pos: [0, 0, 0], orientation: [1, 0, 0]}]": "may be a direction, or roll, pitch",
+        "t: [{pos: [0, 0, 0], heading_pitch: [1, 2, 3]}]": "expected heading and pitch",
+        "t: [{pos: [0, 0, 0], quaternion: [0, 0, 0, 0]}]": "expected x, y, z, w of a quaternion",
+    }.items():
+        with pytest.raises(LayoutError, match=said):
+            read("a.yaml", text)
+    layout, _ = read("a.yaml", "t: [{pos: [260, 0, 0], axis: [1, 0, 0]}]", length="mm")
+    assert layout.actuators[0].position == pytest.approx((0.26, 0.0, 0.0))
+
+
+def test_orientations_that_lean_and_have_length_1_are_directions() -> None:
+    text = (
+        "[motors.a]\nposition = [0.1, 0.2, 0]\norientation = [0.6, 0.8, 0.0]\n"
+        'direction = "Clockwise"\n[motors.b]\nposition = [0.1, 0.2, 0]\n'
+        'orientation = [0.0, 0.0, 1.0]\ndirection = "CounterClockwise"'
+    )
+    layout, notes = read("a.toml", text)
+    np.testing.assert_allclose(
+        [part.frame[0] for part in layout.actuators], [[0.6, 0.8, 0], [0, 0, 1]]
+    )
+    assert "orientation has length 1 throughout" in notes and "not applied" not in notes
+
+
+@pytest.mark.parametrize(
+    "key", ["reversed: true", "flipped: yes", "direction: -1, axis: [1, 0, 0]", "thrust: -1"]
+)
+def test_reversed_thrusters_are_named(key: str) -> None:
+    axis = "" if "axis" in key else "axis: [1, 0, 0], "
+    plain = "{name: b, pos: [0, 0, 0], axis: [1, 0, 0], reversed: false, thrust: 1}"
+    layout, notes = read("a.yaml", f"t: [{{name: a, pos: [0, 0, 0], {axis}{key}}}, {plain}]")
+    assert layout.actuators[0].frame[0] == (1.0, 0.0, 0.0)
+    assert f"{key.split(':')[0]} of a is not applied: the direction is as drawn" in notes
+
+
+def test_cameras_are_no_thrusters() -> None:
+    camera = '{"Cameras": {"front": {"X": 1, "Y": 0, "Z": 0, "Pitch": 0, "Roll": 0, "Yaw": 0}}}'
+    with pytest.raises(LayoutError, match="has no matrix, expected six rows"):
+        read("settings.json", f'{{"Vehicles": {{"rov": {camera}}}}}')
+    thrusters = "t: [{name: a, pos: [0, 0, 0], axis: [1, 0, 0]}]"
+    cameras = "cameras: {front: {pos: [0, 0, 0], direction: [1, 0, 0]}}"
+    assert read("a.yaml", f"{thrusters}\n{cameras}")[0].names == ("a",)
+
+
+def test_devices_beside_the_thrusters_and_symmetries() -> None:
+    pose = "pose: [0, 0, 0, 0, 0, 0]"
+    text = f"thrusters: [{{name: a, {pose}}}]\npoker: {{tip: {{{pose}}}}}\nfog: {{{pose}}}"
+    layout, notes = read("a.yaml", text)
+    assert layout.names == ("a",)
+    assert "Places beside those of thrusters are left out: the file, poker" in notes
+    text = "seed: {position: [0.2, 0.2, 0], axis: [1, 0, 0]}\nmotors: {front: 0, back: 1}"
+    with pytest.raises(LayoutError, match="of seed alone, and 2 motors beside it, which follow"):
+        read("a.yaml", text)
+
+
+@pytest.mark.parametrize(
+    ("file", "text", "said"),
+    [
+        ("a.toml", "a = [1", "is not valid TOML: "),
+        ("a.toml", "a = nan", "holds nan, expected a finite number"),
+        ("a.toml", "a = " + "[" * 500 + "]" * 500, "nested"),
+        ("a.toml", "a = 1\n" + "#" * 400_000, "is TOML of more than 100,000 characters"),
+        ("a.toml", "day = 2020-01-01\n", "has no matrix"),
+        ("a.conf", '{"a": 1 // one\n "b": 2}', "is not valid JSON: line 2"),
+        ("a.json", '{"a": "x // y" "b": 2}', "is not valid JSON: line 1"),
+    ],
+)  # fmt: skip
+def test_a_file_is_blamed_for_what_it_is(file: str, text: str, said: str) -> None:
+    with pytest.raises(LayoutError, match=said):
+        read(file, text)
+
+
+def test_mixers_of_arducopter_push_as_they_say() -> None:
+    calls = (
+        "Motors_6DoF:add_motor(0, 0.0, 0.5, -0.1, 0.8, 0.5, 0.0, true, 1)\n"
+        "Motors_6DoF:add_motor(1, -0.4, -0.2, 0.1, 0.8, -0.3, 0.5, false, 2) -- aft\n"
+    )
+    layout, notes = read("a.lua", calls)
+    size = np.hypot(0.5, 0.8)
+    np.testing.assert_allclose(layout.actuators[0].frame[0], [0.5 / size, 0, 0.8 / size])
+    right = np.array([-0.3, -0.5, 0.8])  # to the left is -0.5
+    np.testing.assert_allclose(layout.actuators[1].frame[0], right / np.linalg.norm(right))
+    # Pitch up is -Ty, yaw to the right is -Tz, with arms of 0.2 m; roll to the right is Tx.
+    np.testing.assert_allclose(effectiveness_of(layout)[0, 3:], [0, -0.1, 0.02], atol=1e-12)
+    np.testing.assert_allclose(effectiveness_of(layout)[1, 3:], [-0.08, 0.04, -0.02], atol=1e-12)
+    assert layout.actuators[1].lower[0] == 0.0 and "pushing one way, are motor2" in notes
+    with pytest.raises(LayoutError, match="line 1: 'maybe' says whether it is reversible"):
+        read("a.lua", calls.replace("true", "maybe"))
+    with pytest.raises(LayoutError, match="line 1: a motor with 4 arguments behind it"):
+        read("a.lua", "MotorsMatrix:add_motor_raw(0, -1, 0.5, 0.7, 2)")
+
+
+def test_thrusters_without_a_plugin_are_named() -> None:
+    more = (
+        SCREW[SCREW.index('<link name="screw"') :]
+        .replace("screw", "thruster_2")
+        .replace("sj", "j2")
+    )
+    _, notes = read("a.sdf", sdf(SCREW + more + THRUSTER))
+    assert "Left out, since no plugin drives them: thruster_2; --thrusters" in notes
+    assert "No mass stands at link screw, thruster_2: 0 is taken, where SDF takes 1 kg" in notes
+    layout, notes = read("a.sdf", sdf(SCREW + more + THRUSTER), thrusters=["thruster_2"])
+    assert layout.names == ("screw", "thruster_2") and "Left out" not in notes
 
 
 def test_motors_of_programs_and_lists_are_the_same() -> None:
@@ -337,6 +460,18 @@ def test_xacro_is_expanded_where_it_is_installed(tmp_path: Path) -> None:
         ("a.params", "CA_ROTOR_COUNT x " + "A_B " * 200_000),
         ("a.parm", "MOT_" * 200_000 + "\n" + " " * 500_000 + "FRAME_CONFIG x"),
         ("a.json", '{"a":' + "[" * 900 + "1" + "]" * 900 + "," + ",".join(f'"k{i}": [1,2,3]' for i in range(50_000)) + "}"),
+        ("a.conf", "{" + '"' * 900_000),
+        ("a.conf", "{" + "/*" * 450_000),
+        ("a.conf", "{" + ",  " * 300_000),
+        ("a.conf", '{"a": "' + "\\\\" * 400_000),
+        ("a.conf", '{"a": [' + "1, /* */ " * 100_000 + "]}"),
+        ("a.toml", "a = " + "[" * 100_000),
+        ("a.toml", "".join(f"a.b{i}.c = 1\n" for i in range(20_000))),
+        ("a.toml", "".join(f"[[t.x{i}]]\nposition = [1]\n" for i in range(10_000))),
+        ("a.json", '{"thrusters": [' + ",".join(['{"pose": [1,2,3,4,5,6,7]}'] * 4_000) + "]}"),
+        ("a.lua", "Motors_6DoF:add_motor(0, " * 60_000),
+        ("a.scn", "<robot><base_link name='a'/>" + "<joint><parent name='a'/><child name='a'/></joint>" * 30_000 + "</robot>"),
+        ("a.scn", "<robot><base_link name='a'/>" + "<actuator type='thruster'/>" * 60_000 + "</robot>"),
         ("a.scn", "<scenario>" + '<robot name="r"><actuator type="thruster"><origin xyz="' + "${" * 100_000 + '"/></actuator></robot></scenario>'),
     ],
 )  # fmt: skip

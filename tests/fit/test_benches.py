@@ -196,3 +196,54 @@ def test_blanks_take_no_time(tmp_path: Path) -> None:
     with pytest.raises(DataError, match="power or voltage is missing"):
         read_bench([path])
     assert time.thread_time() - before < 1.0
+
+
+def test_voltages_may_stand_in_the_header(tmp_path: Path) -> None:
+    columns = {}
+    for volts in (12.0, 16.0):
+        columns |= {
+            f"pwm {volts:g}V": PWM,
+            f"thrust (kgf) {volts:g}V": true_force(volts) / N_PER_KGF,
+            f"power at {volts:g} V": true_power(volts),
+        }
+    path = write_csv(tmp_path / "both.csv", columns)
+    for volts in (12.0, 16.0):
+        np.testing.assert_allclose(
+            fitted(path, volts=volts).force, np.array(ENDS) * volts / 16.0, rtol=1e-3
+        )
+    with pytest.raises(DataError, match="measured at 12, 16 V; say which counts"):
+        fitted(path)
+    shared = {"PWM": PWM} | {key: value for key, value in columns.items() if "pwm" not in key}
+    path = write_csv(tmp_path / "shared.csv", shared)
+    np.testing.assert_allclose(fitted(path, volts=16.0).force, ENDS, rtol=1e-3)
+    text = (tmp_path / "both.csv").read_text().splitlines()
+    ragged = [text[0], *(row + "," for row in text[1:])]
+    ragged[0] += ",remarks"
+    ragged[3] = ",".join(["", "", "", *ragged[3].split(",")[3:]])
+    (tmp_path / "ragged.csv").write_text("\n".join(ragged))
+    np.testing.assert_allclose(fitted(tmp_path / "ragged.csv", volts=16.0).force, ENDS, rtol=1e-3)
+    np.testing.assert_allclose(
+        fitted(tmp_path / "ragged.csv", volts=12.0).force, np.array(ENDS) * 0.75, rtol=1e-3
+    )
+
+
+def test_noise_at_rest_is_no_reverse_thrust(tmp_path: Path) -> None:
+    command = np.array([1000.0, 1050, 1100, 1200, 1300, 1400, 1500, 1600, 1700, 1800, 1900, 2000])
+    grams = np.array([-1.1, -0.6, 0.4, 3, 6, 9, 12, 15, 18, 20, 22, 24])
+    watts = np.array([0.57, 1.0, 1.3, 2.6, 3.7, 4.9, 6.1, 7.1, 8.1, 9.1, 10.0, 11.2])
+    columns = {"ESC signal (us)": command, "Thrust (gf)": grams, "Power (W)": watts}
+    fit = fitted(write_csv(tmp_path / "stand.csv", columns))
+    assert fit.force == pytest.approx((0.0, 24 * 0.00980665), rel=1e-5)
+    assert fit.idle_commands == (1000.0, 1100.0) and fit.dead_band == 0.0
+    notes = " ".join(fit.notes)
+    assert "1000 to 1100 us are 4.6 % of the largest: they count as noise" in notes
+    assert "as at 1100 us 0.57 W for 1.3 W" in notes and "pushes one way" in notes
+
+
+def test_a_coarse_step_is_no_dead_band(tmp_path: Path) -> None:
+    force = true_force()
+    force[np.abs(PWM - 1500.0) < 60.0] = 0.0
+    columns = {"PWM": PWM, "force": force, "power": true_power()}
+    fit = fitted(write_csv(tmp_path / "coarse.csv", columns))
+    assert fit.dead_band == 0.0 and fit.idle_commands == (1450.0, 1550.0)
+    assert "-4.462 N at 1400 us, a coarse step" in " ".join(fit.notes)

@@ -223,6 +223,12 @@ def test_descriptions_of_others_are_opened_and_what_they_lack_is_said() -> None:
     assert np.allclose(opened.layout.position[:4], known.position[:4], atol=1e-9)
     rotors = WRITERS["px4"](known, Exchange(), ".params").encode()
     assert files.read_layout("rov.params", rotors).layout.n == 8
+    model = WRITERS["mjcf"](known, Exchange(), ".xml").encode()
+    assert files.read_layout("rov.xml", model).layout.names == known.names
+    team = b'[[thrusters]]\nname = "bow"\npos_mm = [100, 0, 0]\nheading_pitch_deg = [0, 0]'
+    assert files.read_layout("rov.toml", team).layout.position[0, 0] == 0.1
+    with pytest.raises(FinlabError, match=r"rov\.xml: includes '/etc/passwd', which did not come"):
+        files.read_layout("rov.xml", b'<mujoco><include file="/etc/passwd"/></mujoco>')
     for bad in (
         text.replace(b"<robot", b"<!DOCTYPE a []><robot", 1),
         b"<a/>",

@@ -101,7 +101,7 @@ CONTROLS = {
     "--voltage": "finlab fit thruster --voltage",
     **{
         f"--{word}": f"{CONVERT} --{word}"
-        for word in ("origin", "frame", "fins", "thrusters", "rows", "model")
+        for word in ("origin", "frame", "fins", "thrusters", "rows", "length", "model")
     },
 }
 """Words of the command line that reach the page, and what is said there."""

@@ -27,8 +27,9 @@ from webapp.tasks.swimming import Swimming
 from webapp.viser_internals import run_script
 
 KINDS = (
-    "a design (YAML, JSON, ZIP), a robot of others (URDF, SDF, PX4, ArduSub, a matrix), "
-    "measurements of a fin (CSV), a hull (STL, OBJ, GLB, PLY), or a log (ULG, BIN, MCAP, DB3, BAG)"
+    "a design (YAML, JSON, ZIP), a robot of others (URDF, SDF, MuJoCo, Stonefish, PX4, ArduSub, a "
+    "matrix), measurements of a fin (CSV), a hull (STL, OBJ, GLB, PLY), or a log (ULG, BIN, MCAP, "
+    "DB3, BAG)"
 )
 """The kinds of files that the page opens, for hints and errors."""
 SHARED = (
