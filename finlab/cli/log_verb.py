@@ -21,6 +21,7 @@ def log(
     demand: Annotated[str | None, arg(metavar="TOPIC")] = None,
     outputs: Annotated[str | None, arg(metavar="TOPIC")] = None,
     priority: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="AXES")] = (),
+    whole: bool = False,
     improve: bool = True,
     output: Annotated[Path | None, arg(metavar="FILE.yaml", aliases=["-o"])] = None,
     plot: Annotated[Path | None, arg(metavar="FILE")] = None,
@@ -39,6 +40,7 @@ def log(
         outputs: topic of a bag with what actuators were sent, where there are several.
         priority: for policy priority: a group of axes with commas between, most important first;
             the axis that lost most by default.
+        whole: judge time disarmed, landed or on deck, too.
         improve: search for a better layout and replay on it.
         output: layout file to write that layout to.
         plot: file for a picture of the timeline, .png, .svg or .pdf (needs matplotlib, extra plot).
@@ -54,7 +56,7 @@ def log(
     shared_options.check_json_file(output, "output")
     check_figure_file(plot)
     layout = None if robot is None else shared_options.open_robot(robot)[0]
-    read = partial(read_log, scale=scale, demand=demand, outputs=outputs)
+    read = partial(read_log, scale=scale, demand=demand, outputs=outputs, whole=whole)
     groups = cast(
         "list[list[Axis]]", [group.split(",") for group in priority]
     )  # `judge` checks them

@@ -78,6 +78,13 @@ class LogRecord:
     """Whether outputs are shares."""
     unmet: Series | None = None
     """The part of a demand that the autopilot logged as unallocated (M, 6), in its unit."""
+    armed: Series | None = None
+    """Whether motors were armed (K, 1), 1 or 0; None where the log does not say it."""
+    in_water: Series | None = None
+    """Whether the robot was in the water, or in flight (K, 1), 1 or 0; None likewise."""
+    unlogged: Series | None = None
+    """Along which axes the log lacks the demand of a time (N, 6), 1 or 0: what outputs gave counts
+    as asked there. None where it lacks none, or lacks an axis throughout."""
     turns: Series | None = None
     """Speeds of the motors (M, n) by their ESCs, in any unit; NaN where none says it."""
     layout: Layout | None = None

@@ -1,8 +1,10 @@
 """A dive of an eight-thruster robot whose yaw is out of reach for a while, as autopilots would log
 it."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -92,8 +94,9 @@ def px4_dive(
     dt: float = 0.02,
     outputs: str = "shares",
     speed: np.ndarray | None = None,
+    extra: Mapping[str, Any] | None = None,
 ) -> Dive:
-    """A log of PX4. Outputs are its own method's, judged by hand: wrench = sum of forces and
+    """A log of PX4, with extra topics. Outputs are its own method's, judged by hand: wrench = sum of forces and
     levers. ESCs say the speed (n, 8) of motors, if it is given."""
     robot = even_robot()
     time, demand = asked(n, dt, 90.0, 18.0)
@@ -133,12 +136,19 @@ def px4_dive(
     topics["esc_status"] = (time, escs if speed is None else escs | {"esc.esc_rpm": speed})
     status = {"unallocated_torque": left[:, 3:], "unallocated_thrust": left[:, :3]}
     topics["control_allocator_status"] = (time + 0.001, status)
+    topics |= extra or {}
     return Dive(robot, write_ulog(path, topics, parameters), time, demand, given)
 
 
-def sub_dive(path: Path, n: int = 3000, dt: float = 0.02, speed: np.ndarray | None = None) -> Dive:
-    """A log of ArduSub: more of forward and yaw is asked for than goes together, and outputs are
-    the sum of factors, cut at full. ESCs say the speed (n, 8) of motors, if it is given."""
+def sub_dive(
+    path: Path,
+    n: int = 3000,
+    dt: float = 0.02,
+    speed: np.ndarray | None = None,
+    extra: Mapping[str, Any] | None = None,
+) -> Dive:
+    """A log of ArduSub, with extra messages: more of forward and yaw is asked for than goes together, and outputs are
+    the sum of factors, cut at full; pulses up to 25 us from rest turn no motor. ESCs say the speed (n, 8) of motors, if it is given."""
     robot = even_robot()
     time, _ = asked(n, dt, 0.0, 0.0)
     hard = slice(n // 2, n // 2 + n // 6)
@@ -151,6 +161,7 @@ def sub_dive(path: Path, n: int = 3000, dt: float = 0.02, speed: np.ndarray | No
     signs = np.array([1, -1, 1, 1, -1, 1, 1, 1.0])
     pulse = np.round(1500.0 + 400.0 * output * signs)
     force = FULL * (pulse - 1500.0) / 400.0 * signs
+    force[np.abs(pulse - 1500.0) <= 25.0] = 0.0
     given = force @ columns(robot)
     demand = stick[:, [4, 5, 3, 0, 1, 2]] * [1.0, -1.0, 1.0, 1.0, -1.0, -1.0] * SUB_UNIT
     us = np.round(time * 1e6)
@@ -170,6 +181,7 @@ def sub_dive(path: Path, n: int = 3000, dt: float = 0.02, speed: np.ndarray | No
             "RPM": speed.ravel(),
         }
         messages["ESC"] = ("QBe", motors)
+    messages |= extra or {}
     parameters = {
         "FRAME_CONFIG": 2.0,
         **{f"MOT_{i}_DIRECTION": sign for i, sign in enumerate(signs, 1)},
