@@ -20,6 +20,7 @@ from finlab.log.ardusub_signals import (
     ARMED,
     DISARMED,
     PILOT_STEERS_SIDEWAYS,
+    REPORTED,
     describe_frame,
     motor_outputs,
     stick_channel,
@@ -34,8 +35,6 @@ HEAD_BYTES = 3
 """Bytes before the values of a message: MAGIC and its kind."""
 CHANNELS = 14
 """Channels of one message of outputs, or of sticks."""
-REPORTED = re.compile(r"fail|leak|lost|error|crash|bad |low", re.IGNORECASE)
-"""Words of messages that become events."""
 OTHER_VEHICLE = re.compile(r"(Ardu(?!Sub)|Blimp|AntennaTracker)\w*(?= V\d)")
 """The beginning of a message by which another vehicle of ArduPilot names itself."""
 MESSAGES = ("PARM", "RATE", "CTUN", "RCOU", "RCIN", "ESC", "MSG", "ERR", "ARM", "EV", "MODE")

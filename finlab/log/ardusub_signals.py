@@ -6,6 +6,7 @@ trim asks for nothing, at either end for full thrust (`RC_Channel::norm_input`).
 depends on the mode (`mode_manual.cpp`, `mode_stabilize.cpp`, `mode_althold.cpp`).
 """
 
+import re
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -46,6 +47,8 @@ PILOT_STEERS_SIDEWAYS = (STABILIZE, ACRO, ALT_HOLD, SURFACE, MANUAL, SURFTRAK)
 """Modes in which the pilot's sticks are the demands forward and lateral."""
 PILOT_HEAVES = (STABILIZE, ACRO, MANUAL)
 """Modes in which the pilot's stick is the demand of throttle."""
+REPORTED = re.compile(r"fail|leak|lost|error|crash|bad |low", re.IGNORECASE)
+"""Words of messages that become events."""
 ARMED = 10
 DISARMED = 11
 """Numbers of the events of arming (ArduPilot, `LogEvent`)."""

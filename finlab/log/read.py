@@ -22,7 +22,7 @@ from finlab.axes import AXES
 from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.files.guarded import read_file
 from finlab.layout import Layout, load_layout
-from finlab.log import ardusub_log, px4_log, ros_bag
+from finlab.log import ardusub_log, px4_log, ros_bag, telemetry_log
 from finlab.log.ardusub_signals import ESC_DEAD_BAND_US, FULL_US, REST_US, in_dead_band
 from finlab.log.recorded import Event, Form, LogRecord, Series
 from finlab.log.working_time import working_time
@@ -87,7 +87,7 @@ def read_log(
     outputs: str | None = None,
     whole: bool = False,
 ) -> Log:
-    """Reads a log of PX4 (`.ulg`), of ArduSub (`.bin`) or a bag of ROS.
+    """Reads a log of PX4 (`.ulg`), of ArduSub (`.bin`, `.tlog`) or a bag of ROS.
 
     It runs in this process: files of strangers belong in `finlab.files.worker.in_worker`.
 
@@ -138,9 +138,14 @@ def _read_record(path: Path, demand: str | None, outputs: str | None) -> LogReco
         return ardusub_log.read_dataflash(path)
     if is_folder and sum(entry.stat().st_size for entry in path.iterdir()) > MAX_BYTES:
         raise DataError(f"{path}: is larger than {MAX_BYTES:,} bytes; cut it")
-    if is_folder or path.suffix.lower() in ros_bag.SUFFIXES:
+    suffix = path.suffix.lower()
+    if is_folder or suffix in ros_bag.SUFFIXES:
         return ros_bag.read_bag(path, demand, outputs)
-    raise DataError(f"{path}: expected a log of PX4 (.ulg), of ArduSub (.bin), or a bag of ROS 2")
+    if suffix == telemetry_log.SUFFIX or telemetry_log.looks_like(head):
+        return telemetry_log.read_telemetry(path)
+    raise DataError(
+        f"{path}: expected a log of PX4 (.ulg), of ArduSub (.bin, .tlog), or a bag of ROS"
+    )
 
 
 def _motor_signs(log_robot: Layout | None, robot: Layout) -> Array:

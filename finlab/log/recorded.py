@@ -59,7 +59,10 @@ class Series:
         )
 
     def at(self, time: Array) -> Array:
-        """Values (M, K) that hold at times (M,) [s]; NaN before the first."""
+        """Values (M, K) that hold at times (M,) [s]; NaN before the first, and where there is
+        none."""
+        if not len(self.time):
+            return np.full((len(time), self.values.shape[1]), np.nan)
         index = np.searchsorted(self.time, time, side="right") - 1
         return np.where(index[:, None] >= 0, self.values[np.maximum(index, 0)], np.nan)
 

@@ -140,19 +140,28 @@ def px4_dive(
     return Dive(robot, write_ulog(path, topics, parameters), time, demand, given)
 
 
-def sub_dive(
-    path: Path,
-    n: int = 3000,
-    dt: float = 0.02,
-    speed: np.ndarray | None = None,
-    extra: Mapping[str, Any] | None = None,
-) -> Dive:
-    """A log of ArduSub, with extra messages: more of forward and yaw is asked for than goes together, and outputs are
-    the sum of factors, cut at full; pulses up to 25 us from rest turn no motor. ESCs say the speed (n, 8) of motors, if it is given."""
+@dataclass(frozen=True)
+class SubMotion:
+    """What ArduSub is asked for and does: more of forward and yaw is asked for than goes together,
+    and outputs are the sum of factors, cut at full; pulses up to 25 us from rest turn no motor."""
+
+    robot: Layout
+    time: np.ndarray
+    stick: np.ndarray
+    """Roll, pitch, yaw, throttle, forward, lateral (n, 6)."""
+    pulse: np.ndarray
+    """(n, 8) [us]."""
+    demand: np.ndarray
+    given: np.ndarray
+    parameters: dict[str, float]
+
+
+def sub_motion(n: int, dt: float) -> SubMotion:
+    """The motion of n samples."""
     robot = even_robot()
     time, _ = asked(n, dt, 0.0, 0.0)
     hard = slice(n // 2, n // 2 + n // 6)
-    stick = np.zeros((n, 6))  # roll, pitch, yaw, throttle, forward, lateral
+    stick = np.zeros((n, 6))
     stick[:, 2] = 0.1 * np.sin(time)
     stick[:, 3] = 0.2 * np.cos(time / 3)
     stick[:, 4] = 0.3
@@ -164,14 +173,34 @@ def sub_dive(
     force[np.abs(pulse - 1500.0) <= 25.0] = 0.0
     given = force @ columns(robot)
     demand = stick[:, [4, 5, 3, 0, 1, 2]] * [1.0, -1.0, 1.0, 1.0, -1.0, -1.0] * SUB_UNIT
-    us = np.round(time * 1e6)
+    parameters = {
+        "FRAME_CONFIG": 2.0,
+        **{f"MOT_{i}_DIRECTION": sign for i, sign in enumerate(signs, 1)},
+    }
+    parameters |= {f"SERVO{i}_FUNCTION": 32.0 + i for i in range(1, 9)}
+    return SubMotion(robot, time, stick, pulse, demand, given, parameters)
+
+
+def sub_dive(
+    path: Path,
+    n: int = 3000,
+    dt: float = 0.02,
+    speed: np.ndarray | None = None,
+    extra: Mapping[str, Any] | None = None,
+) -> Dive:
+    """A log of ArduSub, with extra messages. ESCs say the speed (n, 8) of motors, if it is
+    given."""
+    motion = sub_motion(n, dt)
+    stick = motion.stick
+    us = np.round(motion.time * 1e6)
     rate = {"TimeUS": us, "ROut": stick[:, 0], "POut": stick[:, 1], "YOut": stick[:, 2]}
     rate["AOut"] = 0.5 + 0.5 * stick[:, 3]
     sticks = {f"C{i}": np.round(1500 + 400 * stick[:, i - 1]) for i in (5, 6)}
+    pulses = {f"C{i}": motion.pulse[:, i - 1] for i in range(1, 9)}
     messages = {
         "RATE": ("Qffff", rate),
         "RCIN": ("QHH", {"TimeUS": us, **sticks}),
-        "RCOU": ("Q" + "H" * 8, {"TimeUS": us, **{f"C{i}": pulse[:, i - 1] for i in range(1, 9)}}),
+        "RCOU": ("Q" + "H" * 8, {"TimeUS": us, **pulses}),
         "MSG": ("QZ", {"TimeUS": us[n // 2 :][:1], "Message": np.array([b"Leak Detected"])}),
     }
     if speed is not None:
@@ -182,12 +211,8 @@ def sub_dive(
         }
         messages["ESC"] = ("QBe", motors)
     messages |= extra or {}
-    parameters = {
-        "FRAME_CONFIG": 2.0,
-        **{f"MOT_{i}_DIRECTION": sign for i, sign in enumerate(signs, 1)},
-    }
-    parameters |= {f"SERVO{i}_FUNCTION": 32.0 + i for i in range(1, 9)}
-    return Dive(robot, write_dataflash(path, messages, parameters), time, demand, given)
+    written = write_dataflash(path, messages, motion.parameters)
+    return Dive(motion.robot, written, motion.time, motion.demand, motion.given)
 
 
 @pytest.fixture(scope="session")
