@@ -19,7 +19,8 @@ NAMES = {
     "finlab.allocation": "Allocation Allocator BatchAllocation Candidates METHODS MethodName "
     "Policy PolicyName Solution",
     "finlab.analysis": "AXES AttainableSet Authority Bounds GOALS Improvement Loss Progress "
-    "ScoreCard attainable_set authority least_power losses mirror_pairs optimize_layout score_card",
+    "ScoreCard SecondLoss attainable_set authority least_power losses mirror_pairs "
+    "optimize_layout score_card second_losses",
     "finlab.swim.control": "CONTROLLERS Completion Controller Diagnosis FaultMonitor Foresighted "
     "Learner Measurement MonitorSettings MotionObserver Setpoint TrackingController "
     "VelocityController WaypointController gains_for make_controller steerable_loss steers",
