@@ -65,7 +65,7 @@ def test_every_name_of_the_front_door_is_listed_and_found() -> None:
 def test_names_in_arguments_have_types_that_list_them() -> None:
     """Editors complete them, and type checkers refuse others."""
     assert get_args(MethodName) == tuple(METHODS)
-    assert get_args(PolicyName) == ("closest", "direction", "priority")
+    assert get_args(PolicyName) == ("closest", "direction", "priority", "falling")
     assert get_args(Axis) == AXES
     assert get_type_hints(Policy)["kind"] == PolicyName
     assert get_type_hints(Policy)["order"] == tuple[tuple[Axis, ...], ...]
