@@ -21,7 +21,8 @@ CORE = Path(__file__).with_name("finlab") / "core"
 # No fast math, no contraction, no instructions of this machine alone: results do not depend on the
 # builder.
 FLAGS = shlex.split(
-    "-std=c99 -O3 -ffp-contract=off -fno-math-errno -fno-trapping-math -fPIC -shared -Wall"
+    "-std=c99 -O3 -ffp-contract=off -fno-math-errno -fno-trapping-math -fPIC -shared -Wall "
+    "-DFL_WITH_FALLING"
 )
 ZIG = [sys.executable, "-m", "ziglang", "cc", "-s", "-mcpu=baseline", "-target"]
 # Target as zig names it: platform in the name of the wheel, ending of a library.

@@ -4,12 +4,19 @@ bring optional packages.
 The shipped folders stand at the top of a source tree, and inside the package in a wheel.
 """
 
+import os
+import sys
+from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 
 from finlab.errors import CheckpointError
 
 DISTRIBUTION = "finlab-marine"
 """Name of the distribution; the package that is imported is called `finlab`."""
+OTHER_DISTRIBUTION = "finlab"
+"""Name of a distribution of others, for the analysis of stocks, whose package and script are called
+`finlab`, too."""
 EXTRA_OF_PACKAGE = {
     "torch": "train",
     "matplotlib": "plot",
@@ -28,6 +35,48 @@ _PACKAGE = Path(__file__).resolve().parent
 def install_command(extra: str) -> str:
     """Returns the command that installs an extra, for error messages."""
     return f"pip install '{DISTRIBUTION}[{extra}]'"
+
+
+def other_distribution(folders: Iterable[str] | None = None) -> str | None:
+    """Returns the folder of metadata of the other distribution that owns the name `finlab`.
+
+    A look into the folders of packages takes a millisecond; `importlib.metadata`, which reads the
+    metadata of all packages, many.
+
+    Args:
+        folders: where packages are; those of `sys.path` when None.
+
+    Returns:
+        Its path; None where it is not installed.
+    """
+    for folder in sys.path if folders is None else folders:
+        with suppress(OSError):  # not every entry is a folder
+            for name in os.listdir(folder or "."):
+                is_metadata = name.endswith((".dist-info", ".egg-info"))
+                if is_metadata and name.startswith(f"{OTHER_DISTRIBUTION}-"):
+                    return os.path.join(folder, name)
+    return None
+
+
+def warning_of_other_distribution() -> str | None:
+    """Returns a sentence where the other distribution is installed beside this one, at the first
+    start alone; None otherwise. A file in the user's cache says that it was said."""
+    found = other_distribution()
+    if found is None:
+        return None
+    cache = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
+    mark = Path(cache) / DISTRIBUTION / f"told-of-{os.path.basename(found)}"
+    if mark.exists():
+        return None
+    with suppress(OSError):  # then it is said again
+        mark.parent.mkdir(parents=True, exist_ok=True)
+        mark.touch()
+    return (
+        f"{found}: another distribution, {OTHER_DISTRIBUTION!r}, is installed beside "
+        f"{DISTRIBUTION!r}; both bring a package and a script of the name finlab, and the later "
+        "one has overwritten files of the other. Give each an environment of its own; the script "
+        f"{DISTRIBUTION} is this one's."
+    )
 
 
 def shipped_folder(name: str) -> Path:

@@ -1,7 +1,9 @@
 """The command on a terminal: what a person sees first, and the sentence of a refusal."""
 
+import fcntl
 import os
 import pty
+import struct
 import subprocess
 import sys
 import termios
@@ -18,7 +20,7 @@ def first_shown(*words: str) -> tuple[str, float]:
     """What `finlab WORDS` shows first on a terminal, and the processor's time until then [s]; it is
     ended there."""
     leader, follower = pty.openpty()
-    termios.tcsetwinsize(follower, (24, 80))
+    fcntl.ioctl(follower, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
     program = [sys.executable, "-m", "finlab", *words]
     process = subprocess.Popen(program, cwd=ROOT, stderr=follower, stdout=subprocess.DEVNULL)
     os.close(follower)

@@ -19,7 +19,8 @@ NAMES = {
     "finlab.allocation": "Allocation Allocator BatchAllocation Candidates METHODS MethodName "
     "Policy PolicyName Solution",
     "finlab.analysis": "AXES AttainableSet Authority Bounds GOALS Improvement Loss Progress "
-    "ScoreCard attainable_set authority least_power losses mirror_pairs optimize_layout score_card",
+    "ScoreCard SecondLoss attainable_set authority least_power losses mirror_pairs "
+    "optimize_layout score_card second_losses",
     "finlab.swim.control": "CONTROLLERS Completion Controller Diagnosis FaultMonitor Foresighted "
     "Learner Measurement MonitorSettings MotionObserver Setpoint TrackingController "
     "VelocityController WaypointController gains_for make_controller steerable_loss steers",
@@ -64,7 +65,7 @@ def test_every_name_of_the_front_door_is_listed_and_found() -> None:
 def test_names_in_arguments_have_types_that_list_them() -> None:
     """Editors complete them, and type checkers refuse others."""
     assert get_args(MethodName) == tuple(METHODS)
-    assert get_args(PolicyName) == ("closest", "direction", "priority")
+    assert get_args(PolicyName) == ("closest", "direction", "priority", "falling")
     assert get_args(Axis) == AXES
     assert get_type_hints(Policy)["kind"] == PolicyName
     assert get_type_hints(Policy)["order"] == tuple[tuple[Axis, ...], ...]

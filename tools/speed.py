@@ -11,7 +11,7 @@ docs/measured/speed.md.
 import os
 import sys
 from collections.abc import Callable, Iterator
-from datetime import UTC, datetime
+from datetime import datetime, timezone
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
@@ -75,7 +75,7 @@ def run(
 def origin() -> str:
     """Returns where and when the figures were measured."""
     packages = dict.fromkeys(["numpy", "scipy", *(peer.package for peer in PEERS if peer.package)])
-    day = datetime.now(UTC).date().isoformat()
+    day = datetime.now(timezone.utc).date().isoformat()
     versions = version_words(packages)
     return f"Measured on {day} at {commit_words()}, on {machine_words()}, with {versions}."
 

@@ -17,7 +17,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import MISSING, dataclass, fields, is_dataclass, replace
 from functools import cached_property
-from typing import Annotated, Any, ClassVar, NamedTuple, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 from msgspec import Meta, Struct
@@ -29,6 +29,9 @@ from finlab.arrays import Array
 from finlab.axes import Vector3
 from finlab.errors import FinlabError, LayoutError
 from finlab.files.schema import Checked, Name, Part
+
+if TYPE_CHECKING:
+    from typing_extensions import Self  # Python 3.10 has none of its own
 
 Indices = NDArray[np.intp]
 """Indices (m,) of actuators in a layout, or in a sequence of some."""
@@ -281,7 +284,7 @@ class Actuator(Checked, ABC):
 
     @classmethod
     @abstractmethod
-    def sample(cls) -> Self:
+    def sample(cls) -> "Self":
         """Returns one as the app adds it, at the origin, named after its kind."""
 
     @property
@@ -350,7 +353,7 @@ class Actuator(Checked, ABC):
 
         return file_stamp(self.reads)
 
-    def reading(self, path: str) -> Self:
+    def reading(self, path: str) -> "Self":
         """Returns it with another file that its law reads."""
         return self
 
@@ -373,7 +376,7 @@ class Actuator(Checked, ABC):
                 return getattr(holder, key)
         return None
 
-    def with_value(self, key: str, value: Any) -> Self:
+    def with_value(self, key: str, value: Any) -> "Self":
         """Returns it with another value of a field.
 
         Args:
@@ -387,7 +390,7 @@ class Actuator(Checked, ABC):
             return self
         return replace(self, **{key: value})
 
-    def with_model(self, model_type: str) -> Self:
+    def with_model(self, model_type: str) -> "Self":
         """Returns it with a model of another type of `KIND.models`; parameters that both models
         have keep their values."""
         return self
@@ -452,11 +455,11 @@ class Actuator(Checked, ABC):
         return row
 
     @abstractmethod
-    def damaged(self, faults: Faults) -> Self:
+    def damaged(self, faults: Faults) -> "Self":
         """Returns it with the law and the limits that faults, those of `KIND.faults`, leave."""
 
     @abstractmethod
-    def scaled(self, share: float) -> Self:
+    def scaled(self, share: float) -> "Self":
         """Returns one whose force is `share` of its own at every command; one that reads a file
         stays as it is."""
 
@@ -485,7 +488,7 @@ class Actuator(Checked, ABC):
         axis in the body frame, and limits of the angle [rad]."""
         yield "", self.frame[0], None
 
-    def turned(self, frame: ArrayLike, position: ArrayLike | None = None, **changes: Any) -> Self:
+    def turned(self, frame: ArrayLike, position: ArrayLike | None = None, **changes: Any) -> "Self":
         """Returns it with other own axes, at another point.
 
         Args:
@@ -498,7 +501,7 @@ class Actuator(Checked, ABC):
             changes["position"] = tuple(_rounded(position))
         return replace(self, **changes)
 
-    def image(self) -> Self:
+    def image(self) -> "Self":
         """Returns its mirror image in the plane y = 0, under the same name. Rotations change their
         sense in a mirror: arcs and the reaction torque change sign."""
         changes: dict[str, Any] = {}
@@ -511,7 +514,7 @@ class Actuator(Checked, ABC):
         position = np.array(self.position) * axes.MIRROR_SIGNS
         return self.turned(frame, position, **changes)
 
-    def facing(self, towards: Vector3) -> Self:
+    def facing(self, towards: Vector3) -> "Self":
         """Returns it with its `direction` along a vector of any length, body frame; the other axis
         turns along by the least rotation, or as its kind has it. Raises FinlabError: the vector has
         no length."""
@@ -535,7 +538,7 @@ class Actuator(Checked, ABC):
         others as the kind prefers them."""
         return frame
 
-    def turned_about(self, towards: Vector3) -> Self:
+    def turned_about(self, towards: Vector3) -> "Self":
         """Returns it turned about its `direction`, with its other axis as near as a right angle
         allows to a vector of any length, body frame. Raises FinlabError: the vector is parallel to
         the direction."""

@@ -9,7 +9,7 @@ from __future__ import annotations  # help() then prints `Newtons`, not the boun
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 from msgspec import Meta
@@ -51,6 +51,9 @@ from finlab.arrays import Array, Values
 from finlab.axes import FILE_TURN_TOLERANCE, TURN, Direction3, Vector3, is_full_turn
 from finlab.errors import LayoutError
 from finlab.files.schema import Name
+
+if TYPE_CHECKING:
+    from typing_extensions import Self  # Python 3.10 has none of its own
 
 Angle = Annotated[float, Meta(ge=-TURN - 1e-9, le=TURN + 1e-9)]
 """End of an arc [rad]; a turn in degrees, converted, may exceed `TURN` by rounding."""

@@ -4,7 +4,7 @@ jet, and its input for a force."""
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from msgspec import Meta
@@ -17,6 +17,9 @@ from finlab.actuators.thrust_model import MAX_FORCE, PowerLaw, PowerTable, Thrus
 from finlab.actuators.thrust_power import ThrustPower
 from finlab.arrays import NEARLY, NOTHING, AnyArray, Array, Values
 from finlab.errors import AllocationError
+
+if TYPE_CHECKING:
+    from typing_extensions import Self  # Python 3.10 has none of its own
 
 ForceRate = Annotated[float, Meta(ge=1e-6, le=1e9)]
 """A rate of change of a force [N/s]."""
@@ -68,7 +71,7 @@ class Propeller(Actuator):
     open_water: tuple[float, float] | None
     hangs: bool
 
-    def hung(self, force: float) -> Self:
+    def hung(self, force: float) -> "Self":
         """Returns it with a single force, which it keeps whatever is commanded.
 
         The propeller is the same: a jet that was estimated from the largest force stays as it is.
@@ -110,19 +113,19 @@ class Propeller(Actuator):
         Kt0, J0 = self.open_water
         return math.sqrt(8.0 * Kt0 / math.pi) / J0
 
-    def with_value(self, key: str, value: Any) -> Self:
+    def with_value(self, key: str, value: Any) -> "Self":
         if key not in LAW_FIELDS:
             return super().with_value(key, value)
         if not isinstance(self.model, PowerLaw):
             return self
         return replace(self, model=replace(self.model, **{key: value}))
 
-    def with_model(self, model_type: str) -> Self:
+    def with_model(self, model_type: str) -> "Self":
         if not isinstance(self.model, PowerTable):
             return self
         return replace(self, model=_law_of(self.model))
 
-    def scaled(self, share: float) -> Self:
+    def scaled(self, share: float) -> "Self":
         """See `Actuator`. The command is the force itself: of 0.8 of the force the limits are 0.8
         as large, and a force takes the power that force / 0.8 took."""
         return replace(

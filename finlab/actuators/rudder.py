@@ -15,7 +15,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, ClassVar, NamedTuple, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 from msgspec import Meta
@@ -42,6 +42,9 @@ from finlab.arrays import NOTHING, Array, Values
 from finlab.axes import FORWARD, MIN_LENGTH, Direction3, Vector3, arc_words, perpendicular
 from finlab.errors import LayoutError
 from finlab.files.schema import Name
+
+if TYPE_CHECKING:
+    from typing_extensions import Self  # Python 3.10 has none of its own
 
 SHARPNESS = 50.0
 """How fast the flow separates around the angle of stall [1/rad]."""

@@ -4,7 +4,7 @@ measurements. `thrust_power` evaluates them.
 
 import os
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 from msgspec import Meta, Struct
@@ -13,6 +13,9 @@ from finlab.arrays import Array
 from finlab.errors import DataError, LayoutError
 from finlab.files.csv_table import read_table
 from finlab.files.schema import Checked, Part
+
+if TYPE_CHECKING:
+    from typing_extensions import Self  # Python 3.10 has none of its own
 
 MAX_FORCE = 1e6
 """Largest force of one actuator [N]."""
@@ -100,7 +103,7 @@ class PowerTable(Checked, Part):
         return TableForm
 
     @classmethod
-    def from_file(cls, tag: str, values: dict[str, Any], may_open: bool) -> Self:
+    def from_file(cls, tag: str, values: dict[str, Any], may_open: bool) -> "Self":
         if ("rows" in values) == ("path" in values):
             raise LayoutError(
                 "give either rows, or the path of a CSV file, not both or neither", "rows"
@@ -112,7 +115,7 @@ class PowerTable(Checked, Part):
         return cls.read(values["path"], values.get("unit", ""))
 
     @classmethod
-    def read(cls, path: str | os.PathLike[str], unit: str = "") -> Self:
+    def read(cls, path: str | os.PathLike[str], unit: str = "") -> "Self":
         """Returns the table in a CSV file with the columns `COLUMNS`.
 
         Args:

@@ -8,7 +8,7 @@ from __future__ import annotations  # help() then prints `Newtons`, not the boun
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar, Self
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -45,6 +45,9 @@ from finlab.arrays import Array, Values
 from finlab.axes import Direction3, unit_vector
 from finlab.errors import LayoutError
 from finlab.files.schema import Name
+
+if TYPE_CHECKING:
+    from typing_extensions import Self  # Python 3.10 has none of its own
 
 
 class ThrusterLaw(PropellerLaw):

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, NamedTuple, Self, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,8 @@ from finlab.physics.objective import REACHED, effort_of_one, judged_effort, judg
 from finlab.physics.plant import Plant, plant_of
 
 if TYPE_CHECKING:
+    from typing_extensions import Self  # Python 3.10 has none of its own
+
     from finlab.allocation.robot_state import RobotState
 
 Number = TypeVar("Number", float, Array)
@@ -203,7 +205,7 @@ class Answer(PlainData, Generic[Number]):
                 object.__setattr__(self, name, read_only(value.copy()))
 
     @classmethod
-    def of(cls, **values: Any) -> Self:
+    def of(cls, **values: Any) -> "Self":
         """Makes an answer, see `PlainData`; its arrays, which nobody else may write to, are made
         read-only."""
         for name in cls.ARRAYS:
@@ -423,7 +425,7 @@ class Allocation(Answer[float]):
     @classmethod
     def to_read(
         cls, command: Array, previous: Array | None, solve_ms: float, answered: LazyFigures
-    ) -> Self:
+    ) -> "Self":
         """Makes an answer whose other fields are set when the first of them is read: a control loop
         reads the command alone.
 
@@ -569,7 +571,7 @@ class Allocation(Answer[float]):
         missing = self.unallocated / self.scale
         return what_binds(self.layout, self.command, missing, self.previous, period_s)
 
-    def with_command(self, command: Array) -> Self:
+    def with_command(self, command: Array) -> "Self":
         """Returns the same question with another command (n, 3) in place of the answer, judged by
         the plant."""
         answered = self.answered
@@ -582,7 +584,7 @@ class Allocation(Answer[float]):
             other.__dict__.update({name: getattr(self, name) for name in of_question})
         return other
 
-    def with_candidates(self, candidates: Candidates | None, samples: Candidates | None) -> Self:
+    def with_candidates(self, candidates: Candidates | None, samples: Candidates | None) -> "Self":
         """Puts other candidates in place of those of the answer.
 
         Args:

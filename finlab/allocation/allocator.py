@@ -7,7 +7,7 @@ import os
 import time
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -37,6 +37,9 @@ from finlab.layout.damage import NO_DAMAGE, Damage
 from finlab.layout.layout import Layout
 from finlab.physics.objective import wrench_scale_of
 from finlab.physics.plant import plant_of
+
+if TYPE_CHECKING:
+    from typing_extensions import Self  # Python 3.10 has none of its own
 
 _NAME_LISTS = (tuple, list)
 """Types of lists of names by which states are found."""

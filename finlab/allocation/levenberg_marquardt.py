@@ -7,7 +7,7 @@ it removes the error that the core's tables leave (`exact_commands`). The baseli
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple, Self
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,8 @@ from finlab.core.calls import CoreAnswer
 from finlab.physics.plant import Plant
 
 if TYPE_CHECKING:
+    from typing_extensions import Self  # Python 3.10 has none of its own
+
     from finlab.allocation.rates import CommandBox
 
 RIDGE = (1e-9, 1e-14)
@@ -55,7 +57,7 @@ class CommandProblem:
     """Which axes (6,) of the wrench count; None where all do."""
 
     @classmethod
-    def of(cls, plant: Plant, error_scale: Array) -> Self:
+    def of(cls, plant: Plant, error_scale: Array) -> "Self":
         """Poses the problem by the actuators' own laws.
 
         Args:
@@ -76,7 +78,9 @@ class CommandProblem:
             error_scale=error_scale,
         )
 
-    def restricted(self, works: NDArray[np.bool_] | None, counts: NDArray[np.bool_] | None) -> Self:
+    def restricted(
+        self, works: NDArray[np.bool_] | None, counts: NDArray[np.bool_] | None
+    ) -> "Self":
         """Returns the problem of some actuators and some axes.
 
         Args:
@@ -93,7 +97,7 @@ class CommandProblem:
             effectiveness = np.where(counts, effectiveness, 0.0)
         return replace(self, effectiveness=effectiveness, works=works, counts=counts)
 
-    def in_tick(self, box: "CommandBox") -> Self:
+    def in_tick(self, box: "CommandBox") -> "Self":
         """Returns the problem within what may follow the command of the tick before."""
         no_limits = box.any_angle & self.no_limits
         return replace(self, lower=box.lower, upper=box.upper, no_limits=no_limits, box=box)

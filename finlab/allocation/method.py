@@ -14,7 +14,7 @@ from copy import copy
 from dataclasses import Field, dataclass, field, fields
 from functools import cached_property
 from numbers import Integral, Real
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Protocol, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Protocol
 
 import numpy as np
 
@@ -27,6 +27,8 @@ from finlab.layout.layout import Layout
 from finlab.physics.plant import plant_of
 
 if TYPE_CHECKING:
+    from typing_extensions import Self  # Python 3.10 has none of its own
+
     from finlab.allocation.rates import Rates
 
 Takes = Literal["any actuator", "fins", "horizontal fins", "thrusters"]
@@ -322,7 +324,7 @@ class Method(ABC):
                 "use method 'dual', or policy 'closest' without axis weights"
             )
 
-    def at(self, flow: Array | None) -> Self:
+    def at(self, flow: Array | None) -> "Self":
         """Returns the method for a robot that moves through the water.
 
         Args:

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from finlab.axes import AXES, Axis, mask_of
 from finlab.errors import CommandError
 
-PolicyName = Literal["closest", "direction", "priority"]
+PolicyName = Literal["closest", "direction", "priority", "falling"]
 """`closest`: least weighted error. `direction`: the same direction, scaled down. `priority`: groups
-of axes, each served as far as those before it allow."""
+of axes, each served as far as those before it allow. `falling`: least error with no axis given more
+than was asked for, nor anything the other way."""
 POLICY_NAMES: tuple[PolicyName, ...] = get_args(PolicyName)
 """Names of all policies."""
 
@@ -53,6 +54,9 @@ class Policy:
     """For `closest`: weight of each axis of the normalized error."""
     order: tuple[tuple[Axis, ...], ...] = (("Fz",), ("Tx", "Ty", "Tz"), ("Fx", "Fy"))
     """For `priority`: groups of axes, most important first; axes that are not named come last."""
+    falling: tuple[Axis, ...] = AXES
+    """For `falling`: axes along which less may be given than was asked for, down to nothing, and
+    never more; the others may go either way."""
 
     def __post_init__(self) -> None:
         if self.kind not in POLICY_NAMES:
@@ -70,6 +74,7 @@ class Policy:
                 f"axis_weights: expected six numbers from 0, not all 0, got {self.axis_weights}"
             )
         check_order(self.order, "order")
+        check_order((self.falling,), "falling")
 
     @property
     def is_plain(self) -> bool:
@@ -79,7 +84,9 @@ class Policy:
     @property
     def groups(self) -> list[NDArray[np.bool_]]:
         """For `priority`: masks (6,) of the groups of axes in order; those that are not named come
-        last."""
+        last. For `falling`: the mask of the axes that fall."""
+        if self.kind == "falling":
+            return [mask_of(self.falling)]
         unnamed = set(AXES)
         for group in self.order:
             unnamed -= set(group)
@@ -97,7 +104,10 @@ def as_policy(policy: Policy | PolicyName) -> Policy:
 
 
 def policy_from(
-    kind: str, axis_weights: Any = None, priority: Sequence[str] | None = None
+    kind: str,
+    axis_weights: Any = None,
+    priority: Sequence[str] | None = None,
+    falling: str | None = None,
 ) -> Policy:
     """Makes a policy as the command line names it.
 
@@ -105,6 +115,7 @@ def policy_from(
         kind: one of `POLICY_NAMES`.
         axis_weights: for `closest`: six weights; all 1 when None.
         priority: for `priority`: groups of axes joined by commas, such as `["Fz", "Tx,Ty"]`.
+        falling: for `falling`: axes joined by commas; all when None.
 
     Returns:
         The policy.
@@ -118,4 +129,6 @@ def policy_from(
     if priority:
         options["order"] = tuple(tuple(group.split(",")) for group in priority)
         check_order(options["order"], "priority")
+    if falling:
+        options["falling"] = tuple(falling.split(","))
     return Policy(cast("PolicyName", kind), **options)  # which checks it

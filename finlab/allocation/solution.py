@@ -5,12 +5,15 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
-from typing import Any, NamedTuple, Protocol, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finlab.arrays import Array
+
+if TYPE_CHECKING:
+    from typing_extensions import Self  # Python 3.10 has none of its own
 
 CANDIDATE_ARRAYS = ("command", "wrench", "err_norm", "effort", "power")
 """Fields of `Candidates` that are arrays with a row of each."""
@@ -32,7 +35,7 @@ class PlainData:
     __hash__ = None  # type: ignore[assignment]
 
     @classmethod
-    def of(cls, **values: Any) -> Self:
+    def of(cls, **values: Any) -> "Self":
         """Makes one of the values of all its fields, by name, in a fifth of the constructor's time;
         nothing is checked."""
         made = object.__new__(cls)
@@ -173,7 +176,7 @@ class Solution(NamedTuple):
     notes: Callable[[], tuple[str, ...]] | None = None
 
     @classmethod
-    def with_command(cls, solved: Solved, command: Array) -> Self:
+    def with_command(cls, solved: Solved, command: Array) -> "Self":
         """Returns a solution with another command (N, n, 3) for the same wrenches."""
         return cls(
             command,

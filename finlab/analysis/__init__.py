@@ -18,6 +18,8 @@ from finlab.analysis.optimize import optimize_layout as optimize_layout
 from finlab.analysis.score_card import ScoreCard as ScoreCard
 from finlab.analysis.score_card import least_power as least_power
 from finlab.analysis.score_card import score_card as score_card
+from finlab.analysis.second_losses import SecondLoss as SecondLoss
+from finlab.analysis.second_losses import second_losses as second_losses
 from finlab.forces.attainable import AttainableSet as AttainableSet
 from finlab.forces.attainable import attainable_set as attainable_set
 
@@ -31,6 +33,7 @@ __all__ = [
     "Loss",
     "Progress",
     "ScoreCard",
+    "SecondLoss",
     "attainable_set",
     "authority",
     "least_power",
@@ -38,4 +41,5 @@ __all__ = [
     "mirror_pairs",
     "optimize_layout",
     "score_card",
+    "second_losses",
 ]

@@ -70,8 +70,8 @@ class Authority(HeldAxes):
     @property
     def reachable(self) -> tuple[MotionAxis, ...]:
         """Axes along which something can be had both ways with the other five at zero."""
-        ranges = zip(AXES, self.largest, self.most_negative, SCALE, strict=True)
-        return tuple(name for name, a, b, unit in ranges if min(a, b) > NEGLIGIBLE_SIZE * unit)
+        sizes = np.array([self.largest, self.most_negative]) / SCALE
+        return _reached(sizes.ravel())
 
 
 @dataclass(frozen=True)
@@ -139,16 +139,7 @@ def _authorities(
     counting = sets.along(counted_rows)
     values, vectors = singular_values(counting)
     held_of = [_held(commanded_axes(layout), *pair) for pair in zip(values, vectors, strict=True)]
-    axes = np.concatenate([np.eye(6), -np.eye(6)])
-    size, _ = max_wrench_along_exactly(sets, axes)
-    if flow is not None and layout.flow_driven:
-        # The hull of a rudder's lift and drag has drag without lift, which pushes alone what
-        # nothing does.
-        pushed_alone = np.array(
-            [[axis in held_axes_of.alone for axis in AXES] for held_axes_of in held_of]
-        )
-        size = np.where(np.tile(pushed_alone, 2), size, 0.0)
-    size = np.where(size > NEGLIGIBLE_SIZE, size, 0.0)
+    size = _largest_sizes(sets, held_of, layout, flow)
     least = weakest(counting)
     direction = np.zeros((len(failures), 6))
     direction[:, counted_rows] = least.direction
@@ -163,6 +154,49 @@ def _authorities(
         )
         for k in range(len(failures))
     ]
+
+
+def reachable_axes(
+    layout: Layout, failures: Sequence[Collection[str]], flow: ArrayLike | None = None
+) -> list[tuple[MotionAxis, ...]]:
+    """Returns the axes that are reachable alone, as those of `Authority`, after each of several
+    losses.
+
+    Args:
+        layout: the layout.
+        failures: for each case the names of the actuators that are lost.
+        flow: as for `losses`.
+
+    Raises:
+        LayoutError: there is no actuator of a name in `failures`.
+    """
+    sets = force_sets(layout, flow=flow).tile(len(failures))
+    for row, lost in enumerate(failures):
+        sets.lose(row, list(layout.indices(tuple(lost), "lost")))
+    sizes = _largest_sizes(sets, held_axes(layout, sets), layout, flow)
+    return [_reached(size) for size in sizes]
+
+
+def _largest_sizes(
+    sets: ForceSets, held_of: Sequence[HeldAxes], layout: Layout, flow: ArrayLike | None
+) -> Array:
+    """Largest scaled wrenches (P, 12) [N] of P variants of a layout along the axes, and against
+    them, with the other five at zero; 0 where negligible."""
+    axes = np.concatenate([np.eye(6), -np.eye(6)])
+    size, _ = max_wrench_along_exactly(sets, axes)
+    if flow is not None and layout.flow_driven:
+        # The hull of a rudder's lift and drag has drag without lift, which pushes alone what
+        # nothing does.
+        pushed_alone = np.array([[axis in held.alone for axis in AXES] for held in held_of])
+        size = np.where(np.tile(pushed_alone, 2), size, 0.0)
+    return np.where(size > NEGLIGIBLE_SIZE, size, 0.0)
+
+
+def _reached(sizes: Array) -> tuple[MotionAxis, ...]:
+    """The axes along which something can be had both ways, by scaled sizes (12,) [N]: along the
+    axes, and against them."""
+    is_reached = np.minimum(sizes[:6], sizes[6:]) > NEGLIGIBLE_SIZE
+    return tuple(axis for axis, reached in zip(AXES, is_reached, strict=True) if reached)
 
 
 def commanded_axes(layout: Layout) -> tuple[MotionAxis, ...]:

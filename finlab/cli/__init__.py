@@ -18,7 +18,7 @@ import tyro
 from tyro.extras import SubcommandApp
 
 from finlab import __version__
-from finlab.assets import EXTRA_OF_PACKAGE, install_command
+from finlab.assets import EXTRA_OF_PACKAGE, install_command, warning_of_other_distribution
 from finlab.cli.shared_options import with_json_file
 from finlab.errors import EXIT_ERROR, FinlabError, exit_code
 
@@ -90,6 +90,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     Args:
         argv: the arguments after the program's name; those of this process when None.
     """
+    if argv is None and (warning := warning_of_other_distribution()) is not None:
+        print(f"finlab: {warning}", file=sys.stderr)
     return exit_code("finlab", lambda: _run(list(sys.argv[1:] if argv is None else argv)))
 
 

@@ -53,17 +53,25 @@ def show(
     flow: shared_options.Flow = None,
     json: shared_options.JsonFile = None,
 ) -> None:
-    """Print the actuators of a layout and its score card: what it can do, what it can lose.
+    """Print the actuators of a layout and its score card: what it can do, what it can lose, and
+    which pairs of losses are fatal.
 
     Args:
         lost: name of an actuator that does not work.
     """
-    from finlab.analysis import score_card
+    from dataclasses import asdict
+
+    from finlab.analysis import score_card, second_losses
+    from finlab.analysis.second_losses import pair_blocks
+    from finlab.display import text
 
     shared_options.check_json_file(json)
     robot, lost_names = shared_options.open_robot(layout, lost)
     card = score_card(robot, lost_names, flow)
-    shared_options.put_json(card.to_dict(), json, f"{robot}\n\n{card}")
+    pairs = second_losses(robot, lost_names, flow)
+    values = card.to_dict() | {"second_losses": [asdict(pair) for pair in pairs]}
+    pair_text = text(pair_blocks(pairs, card.n_actuators))
+    shared_options.put_json(values, json, f"{robot}\n\n{card}\n\n{pair_text}")
 
 
 def convert_layout(

@@ -26,6 +26,7 @@ def allocate(
     policy: Annotated[str, arg(metavar="NAME")] = "closest",
     axis_weights: Annotated[shared_options.Wrench | None, arg(metavar="W1 ... W6")] = None,
     priority: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="AXES")] = (),
+    falling: Annotated[str | None, arg(metavar="AXES")] = None,
     weak: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=SHARE")] = (),
     torn: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=SHARE")] = (),
     stuck: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=DEG|N")] = (),
@@ -45,11 +46,13 @@ def allocate(
             ipopt.
         robust: for method dual: watts that an expected error of 1 % of the wrench scale is worth.
         checkpoint: trained checkpoint; the shipped one of the method by default.
-        policy: for a wrench out of reach: closest, direction (same direction, scaled down) or
-            priority.
+        policy: for a wrench out of reach: closest, direction (same direction, scaled down),
+            priority, or falling (no axis is given more than was asked for).
         axis_weights: for `closest`: weight of each axis of the error.
         priority: for `priority`: a group of axes with commas between, most important first, such as
             Fz,Tz.
+        falling: for `falling`: the axes that may be given less and not more, with commas between;
+            all by default.
         weak: an actuator of less strength: share that is left of its limits, such as bow=0.5.
         torn: a fin or rudder that gives a share of its force at every command.
         stuck: where one stays: the angle at which a fin or azimuth no longer turns [deg], or the
@@ -71,7 +74,7 @@ def allocate(
     name = cast("MethodName", method)
     axes = cast("tuple[Axis, ...]", free)
     allocator = Allocator(robot, name, checkpoint=checkpoint, **options)
-    answer = policy_from(policy, axis_weights, priority)
+    answer = policy_from(policy, axis_weights, priority, falling)
     damage = Damage.parse(robot, gone, weak, torn, stuck, running)
     result = allocator.allocate(
         wrench, damage=damage, free=axes, policy=answer, flow=flow, seed=seed

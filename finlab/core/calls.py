@@ -244,7 +244,8 @@ def policy_record(
     Args:
         kind: name of the policy: "closest" is FL_CLOSEST in C, and so on.
         axis_weights: weights (6,) of the axes, for `closest`.
-        groups: masks (6,) of the groups of axes in order, for `priority`.
+        groups: masks (6,) of the groups of axes in order, for `priority`; of the axes that fall,
+            for `falling`.
     """
     weights = np.array(axis_weights)
     record = np.zeros(1, struct("fl_policy"))

@@ -124,6 +124,7 @@ enum {
   FL_CLOSEST,   /* the nearest wrench by the weights of the axes */
   FL_DIRECTION, /* the largest share of the wrench */
   FL_PRIORITY,  /* groups of axes, one after the other */
+  FL_FALLING,   /* the nearest wrench that gives along some axes no more; by FL_WITH_FALLING */
   FL_POLICIES   /* how many policies there are */
 };
 

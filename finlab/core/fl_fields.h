@@ -64,9 +64,9 @@ FL_END(fl_actuator)
 
 FL_BEGIN(fl_policy)
 FL_FIELD(int, kind, , "1", "FL_CLOSEST ...")
-FL_FIELD(int, group_count, , "1", "groups of axes, for FL_PRIORITY")
+FL_FIELD(int, group_count, , "1", "of axes, for FL_PRIORITY; 1 for FL_FALLING")
 FL_FIELD(fl_real, axis_weight, [6], "1", "of the axes, largest 1, for FL_CLOSEST")
-FL_FIELD(fl_byte, group, [6][6], "1", "1 of the axes of each group, for FL_PRIORITY")
+FL_FIELD(fl_byte, group, [6][6], "1", "1 of the axes of each group; of those that fall")
 FL_END(fl_policy)
 
 FL_BEGIN(fl_question)

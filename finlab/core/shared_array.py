@@ -1,11 +1,14 @@
 """Arrays that Python and the core both read and write."""
 
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from finlab.arrays import Array
+
+if TYPE_CHECKING:
+    from typing_extensions import Self  # Python 3.10 has none of its own
 
 
 class SharedArray:
@@ -23,10 +26,10 @@ class SharedArray:
         self.address: int = self.array.ctypes.data
         """Where they stand."""
 
-    def __copy__(self) -> Self:
+    def __copy__(self) -> "Self":
         return type(self)(self.array)
 
-    def __deepcopy__(self, memo: object) -> Self:
+    def __deepcopy__(self, memo: object) -> "Self":
         return type(self)(self.array)
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -61,6 +61,7 @@ QUESTIONS: tuple[tuple[PolicyName, float], ...] = (
     ("closest", 3.0),
     ("direction", 3.0),
     ("priority", 3.0),
+    ("falling", 3.0),
     ("closest", 0.6),
 )
 """Questions of a self-test in turn: policy, and factor of a wrench within reach; below 0.9 it is a

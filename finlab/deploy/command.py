@@ -15,7 +15,7 @@ from finlab.errors import EXIT_ERROR, FinlabError, exit_code
 if TYPE_CHECKING:
     from finlab.deploy.deployed_robot import DeployedRobot
 
-POLICIES = ("closest", "direction", "priority")
+POLICIES = ("closest", "direction", "priority", "falling")
 """As `POLICY_NAMES` of `finlab.allocation.policy`, which cannot be imported here: it loads numpy,
 before the number of its threads is set."""
 

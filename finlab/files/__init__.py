@@ -162,6 +162,9 @@ def parse_yaml(content: str, source: str, error: type[FinlabError] = DataError) 
         mark = getattr(problem, "problem_mark", None)
         message = getattr(problem, "problem", None) or str(problem).splitlines()[0]
         line = f"line {mark.line + 1}: " if mark else ""
+        if "nesting depth" in message:  # of libyaml, before the first of our events
+            deep = f"{line}is nested deeper than {MAX_DEPTH} levels, too deep to be read"
+            raise error.in_file(source, deep) from None
         raise error.in_file(source, f"is not valid YAML: {line}{message}"[:200]) from None
     except ValueError as problem:
         raise error.in_file(source, str(problem)[:200]) from None

@@ -11,14 +11,15 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import MISSING, fields
 from functools import cache
 from typing import (
+    TYPE_CHECKING,
     Annotated,
     Any,
     ClassVar,
     NamedTuple,
-    Self,
     TypeVar,
     cast,
     get_args,
+    get_origin,
     get_type_hints,
 )
 
@@ -26,6 +27,9 @@ import msgspec
 from msgspec import Meta, inspect
 
 from finlab.errors import FinlabError, LayoutError
+
+if TYPE_CHECKING:
+    from typing_extensions import Self  # Python 3.10 has none of its own
 
 Checkable = TypeVar("Checkable")
 """A type that plain values are checked against."""
@@ -283,7 +287,7 @@ class Part(ABC):
 
     @classmethod
     @abstractmethod
-    def from_file(cls, tag: str, values: dict[str, Any], may_open: bool) -> Self:
+    def from_file(cls, tag: str, values: dict[str, Any], may_open: bool) -> "Self":
         """Returns the value that a part stands for.
 
         Args:
@@ -313,7 +317,12 @@ def _holds_checked(kind: Any) -> bool:
     members = get_args(kind)
     if members:
         return any(map(_holds_checked, members))
-    return isinstance(kind, type) and issubclass(kind, Checked)
+    return is_class(kind) and issubclass(kind, Checked)
+
+
+def is_class(kind: Any) -> bool:
+    """Returns whether an annotation is a class; Python 3.10 takes `tuple[float, ...]` for one."""
+    return isinstance(kind, type) and get_origin(kind) is None
 
 
 def form(

@@ -11,13 +11,16 @@ derivatives are by the forces, not by the commands.
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import NamedTuple, Self
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from finlab.arrays import AnyArray, Array
 from finlab.core import library
 from finlab.files.schema import Checked
+
+if TYPE_CHECKING:
+    from typing_extensions import Self  # Python 3.10 has none of its own
 
 DENSITY = 1000.0
 """Density of the water [kg/m^3]."""
@@ -226,6 +229,6 @@ class InteractionModel(Checked, ABC):
 
         return file_stamp(self.reads)
 
-    def reading(self, path: str) -> Self:
+    def reading(self, path: str) -> "Self":
         """Returns the model with another path of its file; itself where it reads none."""
         return self

@@ -36,7 +36,7 @@ from finlab.axes import AXES
 from finlab.errors import LayoutError, layout_errors_at
 from finlab.files import parse_json, parse_yaml
 from finlab.files.guarded import read_text
-from finlab.files.schema import Checked, Part, checked, form, shown
+from finlab.files.schema import Checked, Part, checked, form, is_class, shown
 from finlab.layout.layout import MAX_ACTUATORS, Layout
 
 FORMAT = "finlab-layout"
@@ -280,7 +280,7 @@ def _form_of_field(hint: Any) -> Any:
     """The form of what a field holds, by its type, where that is a part of its own in a file, or
     one of several; None of plain values."""
     classes = [cls for cls in get_args(hint) or (hint,) if cls is not NoneType]
-    if not all(isinstance(cls, type) and issubclass(cls, Part | Checked) for cls in classes):
+    if not all(is_class(cls) and issubclass(cls, Part | Checked) for cls in classes):
         return None
     forms = []
     for cls in classes:

@@ -3,8 +3,7 @@
 pymavlink indexes the messages, and numpy reads them as columns.
 
 Demands of roll, pitch, yaw and throttle are those of RATE, forward and lateral those of the pilot
-(RCIN, channels RCMAP_*), which no other message holds. An output of 1500 us is rest, 400 us more or
-less full (ArduSub, `AP_Motors6DOF`).
+(RCIN, channels RCMAP_*), which no other message holds. `ardusub_signals` says what pulses mean.
 """
 
 import re
@@ -17,30 +16,30 @@ from numpy.typing import NDArray
 
 from finlab.arrays import Array
 from finlab.errors import DataError
-from finlab.exchange.motor_factors import read_parameters_of_ardusub
+from finlab.log.ardusub_signals import (
+    ARMED,
+    DISARMED,
+    PILOT_STEERS_SIDEWAYS,
+    REPORTED,
+    describe_frame,
+    motor_outputs,
+    stick_channel,
+    stick_share,
+)
 from finlab.log.recorded import TRUNCATED, Event, LogRecord, Series, silenced
+from finlab.log.working_time import by_changes, by_depth
 
 MAGIC = b"\xa3\x95"
 """The first bytes of each message, and so of a file."""
 HEAD_BYTES = 3
 """Bytes before the values of a message: MAGIC and its kind."""
-REST_US = 1500.0
-"""Pulse of a motor at rest [us]."""
-FULL_US = 400.0
-"""Pulse of a motor at full thrust, above or below the one at rest [us]."""
-FIRST_MOTOR = 33
-"""SERVOn_FUNCTION of the output of motor 1; the next motors have the next numbers."""
-MOTORS = 8
-"""Most motors."""
 CHANNELS = 14
-"""Channels of one message of outputs."""
-REPORTED = re.compile(r"fail|leak|lost|error|crash|bad |low", re.IGNORECASE)
-"""Words of messages that become events."""
+"""Channels of one message of outputs, or of sticks."""
 OTHER_VEHICLE = re.compile(r"(Ardu(?!Sub)|Blimp|AntennaTracker)\w*(?= V\d)")
 """The beginning of a message by which another vehicle of ArduPilot names itself."""
-MESSAGES = ("PARM", "RATE", "CTUN", "RCOU", "RCIN", "ESC", "MSG", "ERR")
-STICK_CHANNELS = {"FORWARD": 5, "LATERAL": 6}
-"""Demands of the pilot, and their default channels."""
+MESSAGES = ("PARM", "RATE", "CTUN", "RCOU", "RCIN", "ESC", "MSG", "ERR", "ARM", "EV", "MODE")
+PILOTED = ("FORWARD", "LATERAL")
+"""Demands that no message holds but the pilot's sticks."""
 Columns = dict[str, Any]
 """Columns of one kind of message by name, and the times [s] under `time`."""
 
@@ -66,12 +65,8 @@ def read_dataflash(path: Path) -> LogRecord:
         record.notes.append(TRUNCATED)
     _note_sticks(record, tables, parameters)
     _read_outputs(record, tables, parameters)
-    frame = {
-        name: value for name, value in parameters.items() if name.startswith(("FRAME_", "MOT_"))
-    }
-    if record.describe(read_parameters_of_ardusub, frame, path.stem):
-        guesses = "guesses are taken; name the robot by --robot LAYOUT"
-        record.lacking.append(f"A frame of ArduSub has no arms and no newtons: {guesses}.")
+    _read_state(record, tables)
+    describe_frame(record, parameters, path.stem)
     for time, words in messages:
         if REPORTED.search(words):
             record.events.append(Event(time, words))
@@ -97,14 +92,6 @@ def _checked_rates(path: Path, tables: dict[str, Columns], messages: list[str]) 
     return tables["RATE"]
 
 
-def _stick_channels(parameters: dict[str, float]) -> dict[str, int]:
-    """The channel of each demand of the pilot."""
-    return {
-        name: int(parameters.get(f"RCMAP_{name}", default))
-        for name, default in STICK_CHANNELS.items()
-    }
-
-
 def _demands(tables: dict[str, Columns], rates: Columns, parameters: dict[str, float]) -> Series:
     """Demands (N, 6), FLU, -1 to 1, at the times of RATE; ArduSub's roll is FLU's, its pitch and
     yaw have the other sign, and its throttle goes from 0 to 1."""
@@ -115,10 +102,10 @@ def _demands(tables: dict[str, Columns], rates: Columns, parameters: dict[str, f
     heave = np.zeros(len(time))
     if throttle is not None:
         heave = 2.0 * np.asarray(throttle, np.float64) - 1.0
-    channels = _stick_channels(parameters)
     sticks = tables.get("RCIN", {})
-    forward = _stick(sticks, parameters, channels["FORWARD"], time)
-    lateral = _stick(sticks, parameters, channels["LATERAL"], time)
+    forward, lateral = (
+        _stick(sticks, parameters, stick_channel(parameters, name), time) for name in PILOTED
+    )
     setpoints = [forward, -lateral, heave, rates["ROut"], -rates["POut"], -rates["YOut"]]
     return Series.of(time, np.stack(setpoints, axis=1))
 
@@ -127,15 +114,51 @@ def _note_sticks(
     record: LogRecord, tables: dict[str, Columns], parameters: dict[str, float]
 ) -> None:
     """Adds sentences on the demands of the pilot, and on those that the log lacks."""
-    channels = _stick_channels(parameters)
+    channels = {name: stick_channel(parameters, name) for name in PILOTED}
     sticks = tables.get("RCIN", {})
     missing = [name for name, channel in channels.items() if f"C{channel}" not in sticks]
     for name in missing:
         remedy = f"log RCIN, channel {channels[name]} (LOG_BITMASK)"
         record.asks.append(f"It holds no {name.lower()} demand: that axis is not judged; {remedy}.")
     if len(missing) < len(channels):
-        reason = "modes that steer them log none"
-        record.notes.append(f"Demands forward and lateral are the pilot's (RCIN); {reason}.")
+        record.notes.append("Demands forward and lateral are the pilot's (RCIN).")
+        _leave_to_modes(record, tables)
+
+
+def _leave_to_modes(record: LogRecord, tables: dict[str, Columns]) -> None:
+    """Marks forward and lateral demands as not logged in modes that steer them themselves."""
+    modes = tables.get("MODE", {})
+    column = "ModeNum" if "ModeNum" in modes else "Mode"
+    if column not in modes:
+        return
+    time = record.demand.time
+    mode = _values_at(modes, column, time)[:, 0]
+    is_steered = np.isfinite(mode) & ~np.isin(mode, PILOT_STEERS_SIDEWAYS)
+    if not is_steered.any():
+        return
+    unlogged = np.zeros((len(time), 6))
+    unlogged[is_steered, :2] = 1.0
+    record.unlogged = Series(time, unlogged)
+    record.notes.append(
+        "In modes that steer forward and lateral themselves no message holds these demands: what "
+        "outputs gave counts as asked there."
+    )
+
+
+def _read_state(record: LogRecord, tables: dict[str, Columns]) -> None:
+    """Adds when the robot was armed (ARM, or else events), and under water (CTUN)."""
+    arming = tables.get("ARM", {})
+    if "ArmState" in arming:
+        record.armed = by_changes(arming["time"], arming["ArmState"] > 0)
+    elif "Id" in tables.get("EV", {}):
+        events = tables["EV"]
+        is_of_arming = np.isin(events["Id"], (ARMED, DISARMED))
+        state = events["Id"] == ARMED
+        record.armed = by_changes(events["time"][is_of_arming], state[is_of_arming])
+    control = tables.get("CTUN", {})
+    height = control.get("Alt", control.get("BAlt"))
+    if height is not None:
+        record.in_water = by_depth(control["time"], -height)
 
 
 def _message_rows(
@@ -209,13 +232,8 @@ def _stick(sticks: Columns, parameters: dict[str, float], channel: int, time: Ar
     pulses = sticks.get(f"C{channel}")
     if pulses is None:
         return np.full(len(time), np.nan)
-    minimum = parameters.get(f"RC{channel}_MIN", 1100)
-    trim = parameters.get(f"RC{channel}_TRIM", 1500)
-    maximum = parameters.get(f"RC{channel}_MAX", 1900)
-    pulse_points = np.maximum.accumulate([minimum, trim, maximum])
-    share = np.interp(np.where(pulses > 0, pulses, trim), pulse_points, [-1.0, 0.0, 1.0])
-    sign = -1.0 if parameters.get(f"RC{channel}_REVERSED", 0) else 1.0
-    return np.nan_to_num(Series.of(sticks["time"], sign * share[:, None]).at(time)[:, 0])
+    share = stick_share(pulses, parameters, channel)
+    return np.nan_to_num(Series.of(sticks["time"], share[:, None]).at(time)[:, 0])
 
 
 def _read_outputs(
@@ -226,28 +244,19 @@ def _read_outputs(
     pulses = tables.get("RCOU")
     if pulses is None:
         return
-    functions = {int(parameters.get(f"SERVO{i}_FUNCTION", 0)): i for i in range(CHANNELS, 0, -1)}
-    if not any(FIRST_MOTOR <= function < FIRST_MOTOR + MOTORS for function in functions):
-        functions = {FIRST_MOTOR + i: i + 1 for i in range(MOTORS)}
-        rule = "channel n is motor n"
-        record.notes.append(f"It says of no output that it is a motor's (SERVOn_FUNCTION): {rule}.")
+    by_channel = {i: pulses[f"C{i}"] for i in range(1, CHANNELS + 1) if f"C{i}" in pulses}
+    outputs = motor_outputs(by_channel, parameters, record.notes)
+    if outputs is None:
+        return
     time = pulses["time"]
+    record.outputs = Series.of(time, outputs.shares)
     escs = tables.get("ESC", {})
-    shares = []
     speeds = []
-    for motor in range(MOTORS):
-        channel = functions.get(FIRST_MOTOR + motor, 0)
-        pulse = pulses.get(f"C{channel}")
-        if pulse is None:
-            break
-        sign = parameters.get(f"MOT_{motor + 1}_DIRECTION", 1.0)
-        shares.append(np.where(pulse > 0, sign * (pulse - REST_US) / FULL_US, np.nan))
+    for channel in outputs.channels:
         rows = escs.get("Instance", np.empty(0)) == channel - 1
         speed = np.full((len(time), 1), np.nan)
         speeds.append(_values_at(escs, "RPM", time, rows) if rows.any() else speed)
-    if shares:
-        record.outputs = Series.of(time, np.stack(shares, axis=1))
-        record.turns = Series.of(time, np.hstack(speeds))
+    record.turns = Series.of(time, np.hstack(speeds))
 
 
 def _values_at(table: Columns, column: str, time: Array, rows: Any = slice(None)) -> Array:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from msgspec import to_builtins
 
+from finlab.analysis.second_losses import SecondLoss
 from finlab.arrays import Array
 from finlab.axes import AXES, MOTIONS, UNITS
 from finlab.display import three_digits
@@ -91,6 +92,9 @@ class Judgement:
     n_spells: int
     """How many there were."""
     replays: tuple[Replay, ...]
+    second_losses: tuple[SecondLoss, ...]
+    """Pairs of losses that take an axis away which either alone leaves; where one actuator was
+    stopped, those with it."""
     improved: Layout | None
     """Layout on which the hardest demands cost least; None where none was found, or asked for."""
     timeline: Timeline

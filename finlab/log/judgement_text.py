@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from finlab.analysis.second_losses import PAIR_COLUMNS, pair_blocks
 from finlab.axes import AXES, MOTIONS, UNITS
 from finlab.display import Block, Column, table_of, text
 from finlab.log.judgement import DEMANDED_SHARE, Judgement, Spell
@@ -128,7 +129,8 @@ def judged_axis(judgement: Judgement) -> int:
 
 
 def judgement_text(judgement: Judgement) -> str:
-    """Returns the sentence, then the loss of each axis, the longest spells, and the replays."""
+    """Returns the sentence, then the loss of each axis, the longest spells, the replays, and the
+    fatal pairs of losses."""
     longest = sorted(judgement.spells, key=lambda spell: spell.start - spell.end)[:MAX_SPELLS]
     spells = sorted(longest, key=lambda spell: spell.start)
     blocks: list[Block] = [textwrap.fill(judgement.sentence, TEXT_WIDTH)]
@@ -140,6 +142,7 @@ def judgement_text(judgement: Judgement) -> str:
     columns = (*REPLAY_NAMES, *missing, *REPLAY_COSTS)
     title = "What each method misses along the axes, on the same demands:"
     blocks.append(table_of(columns, _replays_in_text(judgement), title))
+    blocks += _pair_blocks(judgement)
     blocks += [f"{time:.1f} s: {words}" for time, words in judgement.events[:MAX_EVENTS]]
     sentences = [*judgement.asks, *judgement.notes]
     if judgement.watts is not None:
@@ -147,6 +150,21 @@ def judgement_text(judgement: Judgement) -> str:
         sentences.insert(0, f"The outputs took {power} on average, by the actuators' own models.")
     blocks += [textwrap.fill(sentence, TEXT_WIDTH) for sentence in sentences]
     return text(blocks)
+
+
+def _pair_blocks(judgement: Judgement) -> list[Block]:
+    """The fatal pairs of losses; where an actuator was stopped, which loss would be the next."""
+    pairs = judgement.second_losses
+    without = judgement.without
+    if without is None:
+        return pair_blocks(pairs, judgement.robot.n)
+    if not pairs:
+        return [f"Without {without} no loss of one more takes an axis away that it alone leaves."]
+    title = f"Without {without}, the loss of one of these takes away:"
+    other = Column(
+        "next", lambda pair: pair.second if pair.first == without else pair.first, is_text=True
+    )
+    return [table_of((other, PAIR_COLUMNS[-1]), pairs, title)]
 
 
 def _replays_in_text(judgement: Judgement) -> list[Replay]:

@@ -10,6 +10,7 @@ from finlab.allocation import Allocator
 from finlab.allocation.binding import at_limits, limit_words
 from finlab.allocation.policy import CLOSEST, Policy, check_order
 from finlab.analysis.optimize import optimize_layout
+from finlab.analysis.second_losses import SecondLoss, second_losses
 from finlab.arrays import Array
 from finlab.axes import AXES, Axis, axes_in
 from finlab.errors import FinlabError
@@ -84,6 +85,7 @@ def judge(log: Log, *, priority: Sequence[Sequence[Axis]] = (), improve: bool = 
     if improved is not None:
         replays += replay(improved, log.demand, span, policies, improved=True)
     spells = account.spells()
+    stopped = account.names(account.dead | account.gone[-1])
     worst = sorted(spells, key=lambda spell: -float((spell.missing / scale).sum()))[:MAX_SPELLS]
     return Judgement(
         source=log.source,
@@ -96,10 +98,11 @@ def judge(log: Log, *, priority: Sequence[Sequence[Axis]] = (), improve: bool = 
         saturated_s=float(span @ account.lost.any(axis=1)),
         watts=account.watts,
         axis=axis,
-        stopped=account.names(account.dead | account.gone[-1]),
+        stopped=stopped,
         spells=tuple(sorted(worst, key=lambda spell: spell.start)),
         n_spells=len(spells),
         replays=tuple(replays),
+        second_losses=_second_losses(log.robot, stopped),
         improved=improved,
         timeline=account.timeline(),
         events=tuple((event.time, _event_words(log, event)) for event in log.events),
@@ -285,6 +288,14 @@ def _improved(log: Log, scale: Array, notes: list[str]) -> Layout | None:
     if not search.improved:
         notes.append("The search found no layout that meets the hardest demands better.")
     return search.layout if search.improved else None
+
+
+def _second_losses(robot: Layout, stopped: Sequence[str]) -> tuple[SecondLoss, ...]:
+    """Fatal pairs of losses; where one actuator was stopped, those with it."""
+    pairs = second_losses(robot)
+    if len(stopped) != 1:
+        return pairs
+    return tuple(pair for pair in pairs if stopped[0] in (pair.first, pair.second))
 
 
 def _event_words(log: Log, event: Event) -> str:

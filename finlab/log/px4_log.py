@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from finlab.errors import DataError
 from finlab.exchange.parameters import read_px4
 from finlab.log.recorded import FLU, TRUNCATED, Event, LogRecord, Series, changes, silenced
+from finlab.log.working_time import by_samples
 
 MAGIC = b"ULog\x01\x125"
 """The first bytes of a file."""
@@ -49,9 +50,14 @@ TOPICS = {
         *_indexed("unallocated_torque#", 3),
     ),
     "failure_detector_status": ("motor_failure_mask",),
+    "actuator_armed": ("armed", "lockdown", "manual_lockdown", "kill", "termination"),
+    "vehicle_status": ("arming_state",),
+    "vehicle_land_detected": ("landed",),
     "esc_status": ("esc_online_flags", "esc_count", *_indexed("esc#.esc_rpm", 8)),
 }
 """Columns that are read, by topic."""
+ARMING_STATE_ARMED = 2
+"""Value of `arming_state` of `vehicle_status` while motors are armed."""
 
 
 def read_ulog(path: Path) -> LogRecord:
@@ -77,6 +83,7 @@ def read_ulog(path: Path) -> LogRecord:
     if outputs is None and "actuator_outputs" in topics:
         outputs = _by_pulses(topics["actuator_outputs"], parameters)
     record = LogRecord("px4", _setpoints(path, topics), outputs)
+    _read_state(record, topics)
     unallocated = topics.get("control_allocator_status")
     if unallocated:
         record.unmet = Series(unallocated.time, unallocated.values * FLU)
@@ -107,6 +114,22 @@ def _setpoints(path: Path, topics: dict[str, Series]) -> Series:
         )
     setpoints = np.hstack([thrust.at(torque.time), torque.values]) * FLU
     return Series(torque.time, setpoints, torque.max_jump_back)
+
+
+def _read_state(record: LogRecord, topics: dict[str, Series]) -> None:
+    """Adds when motors were armed and not locked, and when the robot had not landed."""
+    arming = topics.get("actuator_armed")
+    status = topics.get("vehicle_status")
+    if arming:
+        flags = np.nan_to_num(arming.values) > 0.0
+        is_locked = flags[:, 1:].any(axis=1)
+        record.armed = by_samples(arming.time, flags[:, 0] & ~is_locked)
+    elif status:
+        is_armed = status.values[:, 0] == ARMING_STATE_ARMED
+        record.armed = by_samples(status.time, is_armed)
+    landing = topics.get("vehicle_land_detected")
+    if landing:
+        record.in_water = by_samples(landing.time, ~(np.nan_to_num(landing.values[:, 0]) > 0.0))
 
 
 def _read_health(record: LogRecord, topics: dict[str, Series]) -> None:

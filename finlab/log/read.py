@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from finlab.actuators.actuator import Actuator
 from finlab.actuators.thrust_model import PowerTable
 from finlab.allocation.baselines.autopilots import ArduSub, Px4
 from finlab.allocation.solution import PlainData
@@ -21,10 +22,12 @@ from finlab.axes import AXES
 from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.files.guarded import read_file
 from finlab.layout import Layout, load_layout
-from finlab.log import ardusub_log, px4_log, ros_bag
-from finlab.log.ardusub_log import FULL_US, REST_US
+from finlab.log import ardusub_log, px4_log, ros_bag, telemetry_log
+from finlab.log.ardusub_signals import ESC_DEAD_BAND_US, FULL_US, REST_US, in_dead_band
 from finlab.log.recorded import Event, Form, LogRecord, Series
+from finlab.log.working_time import working_time
 from finlab.physics.objective import wrench_scale_of
+from finlab.physics.plant import plant_of
 
 MAX_BYTES = 1_000_000_000
 """Largest log."""
@@ -82,8 +85,9 @@ def read_log(
     scale: ArrayLike | None = None,
     demand: str | None = None,
     outputs: str | None = None,
+    whole: bool = False,
 ) -> Log:
-    """Reads a log of PX4 (`.ulg`), of ArduSub (`.bin`) or a bag of ROS.
+    """Reads a log of PX4 (`.ulg`), of ArduSub (`.bin`, `.tlog`) or a bag of ROS.
 
     It runs in this process: files of strangers belong in `finlab.files.worker.in_worker`.
 
@@ -94,6 +98,7 @@ def read_log(
             multiplied by. By the autopilot's own rule and the robot's forces when None.
         demand: topic of a bag that holds the wrench; the only one there when None.
         outputs: topic of a bag that holds what actuators were sent; the only one there when None.
+        whole: whether time counts at which the robot was disarmed, or not in the water.
 
     Raises:
         DataError: the file is damaged, of another kind or too large, or lacks what no option gives;
@@ -118,6 +123,8 @@ def read_log(
         raise DataError(f"{file}: {record.lacking[0]}")
     if layout is record.layout:
         record.notes, record.asks = record.notes + record.taken, record.lacking + record.asks
+    if whole:
+        record.armed = record.in_water = None
     return _log_of_record(file.name, record, layout, scale)
 
 
@@ -131,9 +138,14 @@ def _read_record(path: Path, demand: str | None, outputs: str | None) -> LogReco
         return ardusub_log.read_dataflash(path)
     if is_folder and sum(entry.stat().st_size for entry in path.iterdir()) > MAX_BYTES:
         raise DataError(f"{path}: is larger than {MAX_BYTES:,} bytes; cut it")
-    if is_folder or path.suffix.lower() in ros_bag.SUFFIXES:
+    suffix = path.suffix.lower()
+    if is_folder or suffix in ros_bag.SUFFIXES:
         return ros_bag.read_bag(path, demand, outputs)
-    raise DataError(f"{path}: expected a log of PX4 (.ulg), of ArduSub (.bin), or a bag of ROS 2")
+    if suffix == telemetry_log.SUFFIX or telemetry_log.looks_like(head):
+        return telemetry_log.read_telemetry(path)
+    raise DataError(
+        f"{path}: expected a log of PX4 (.ulg), of ArduSub (.bin, .tlog), or a bag of ROS"
+    )
 
 
 def _motor_signs(log_robot: Layout | None, robot: Layout) -> Array:
@@ -218,11 +230,9 @@ def _log_of_record(source: str, record: LogRecord, robot: Layout, scale: ArrayLi
     unmet = None
     if record.outputs is not None:
         command = commands_of(record, record.outputs.values, robot, signs)
+        notes += _notes_on_dead_band(record, robot)
         record.events += _stop_thrusters(command, record.turns, time, robot)
-        is_idle = (np.nan_to_num(command) == rest_command(robot)).all(axis=(1, 2))
-        is_kept &= ~is_idle
-        if is_idle.any():
-            notes.append("Times at which no output moved, such as before arming, are left out.")
+        demand = _with_given(demand, record, time, command, robot)
     else:
         asks.append(
             "It holds no outputs: what the autopilot gave is what its method gives, not what it "
@@ -230,6 +240,14 @@ def _log_of_record(source: str, record: LogRecord, robot: Layout, scale: ArrayLi
         )
         if record.unmet is not None:
             unmet = np.nan_to_num(record.unmet.values * unit, posinf=0.0, neginf=0.0)
+    counts = working_time(source, record, time, notes)
+    if counts is not None:
+        is_kept &= counts
+    elif command is not None:
+        is_idle = (np.nan_to_num(command) == rest_command(robot)).all(axis=(1, 2))
+        is_kept &= ~is_idle
+        if is_idle.any():
+            notes.append("Times at which no output moved, such as before arming, are left out.")
     if is_kept.sum() < 2:
         raise DataError(
             f"{source}: holds no demands while outputs moved; there is nothing to judge"
@@ -259,6 +277,38 @@ def _log_of_record(source: str, record: LogRecord, robot: Layout, scale: ArrayLi
         notes=tuple(dict.fromkeys(notes)),
         asks=tuple(asks),
     )
+
+
+def _with_given(
+    demand: Array, record: LogRecord, time: Array, command: Array, robot: Layout
+) -> Array:
+    """Demands (N, 6), with the wrench of the outputs along axes whose demand the log lacks at a
+    time."""
+    if record.unlogged is None:
+        return demand
+    is_unlogged = (record.unlogged.at(time) > 0.0) & robot.commanded
+    return np.where(is_unlogged, plant_of(robot).wrench(command), demand)
+
+
+def _notes_on_dead_band(record: LogRecord, robot: Layout) -> list[str]:
+    """A sentence on outputs that ESCs take for rest."""
+    if record.form != "ardusub" or record.outputs is None:
+        return []
+    shares = record.outputs.values[:, : robot.n]
+    is_plain = np.array([_pulse_table(actuator) is None for actuator in robot.actuators])
+    is_dead = in_dead_band(shares) & (shares != 0.0) & is_plain[: shares.shape[1]]
+    if not is_dead.any():
+        return []
+    return [
+        f"Pulses within {ESC_DEAD_BAND_US:.0f} us of rest, the dead band of ESCs, count as 0 N: "
+        f"{is_dead.mean():.0%} of all."
+    ]
+
+
+def _pulse_table(actuator: Actuator) -> PowerTable | None:
+    """The actuator's table of force over the width of its pulse; None where it has none."""
+    model = getattr(actuator, "model", None)
+    return model if isinstance(model, PowerTable) and model.unit == "us" else None
 
 
 def _notes_on_time(step: Array, jump_s: float) -> list[str]:
@@ -347,10 +397,12 @@ def commands_of(record: LogRecord, outputs: Array, robot: Layout, signs: Array) 
     low = robot.lower[:, 0]
     high = robot.upper[:, 0]
     force = np.where(values < 0.0, -values * low, values * high) if record.of_shares else values
-    for i, actuator in enumerate(robot.actuators):
-        model = getattr(actuator, "model", None)
-        if record.form == "ardusub" and isinstance(model, PowerTable) and model.unit == "us":
-            force[:, i] = np.interp(REST_US + FULL_US * values[:, i], *model.columns[:2])
+    if record.form == "ardusub":
+        force = np.where(in_dead_band(values), 0.0, force)
+        for i, actuator in enumerate(robot.actuators):
+            table = _pulse_table(actuator)
+            if table is not None:
+                force[:, i] = np.interp(REST_US + FULL_US * values[:, i], *table.columns[:2])
     command[..., 0] = np.clip(force, low, high)
     command[np.isnan(values)] = np.nan
     return command

@@ -59,7 +59,10 @@ class Series:
         )
 
     def at(self, time: Array) -> Array:
-        """Values (M, K) that hold at times (M,) [s]; NaN before the first."""
+        """Values (M, K) that hold at times (M,) [s]; NaN before the first, and where there is
+        none."""
+        if not len(self.time):
+            return np.full((len(time), self.values.shape[1]), np.nan)
         index = np.searchsorted(self.time, time, side="right") - 1
         return np.where(index[:, None] >= 0, self.values[np.maximum(index, 0)], np.nan)
 
@@ -78,6 +81,13 @@ class LogRecord:
     """Whether outputs are shares."""
     unmet: Series | None = None
     """The part of a demand that the autopilot logged as unallocated (M, 6), in its unit."""
+    armed: Series | None = None
+    """Whether motors were armed (K, 1), 1 or 0; None where the log does not say it."""
+    in_water: Series | None = None
+    """Whether the robot was in the water, or in flight (K, 1), 1 or 0; None likewise."""
+    unlogged: Series | None = None
+    """Along which axes the log lacks the demand of a time (N, 6), 1 or 0: what outputs gave counts
+    as asked there. None where it lacks none, or lacks an axis throughout."""
     turns: Series | None = None
     """Speeds of the motors (M, n) by their ESCs, in any unit; NaN where none says it."""
     layout: Layout | None = None

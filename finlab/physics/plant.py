@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from copy import copy
 from dataclasses import astuple
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,6 +28,8 @@ from finlab.layout.effectiveness import body_force, own_effectiveness, wrench_of
 from finlab.layout.layout import Layout
 
 if TYPE_CHECKING:
+    from typing_extensions import Self  # Python 3.10 has none of its own
+
     from finlab.interaction.interaction import PointInteraction
 
 
@@ -75,7 +77,7 @@ class Plant:
         """The flow (..., 6) [m/s, rad/s] of calls that are given none."""
         self._inflow: Array | None = None
 
-    def at(self, flow: ArrayLike | None) -> Self:
+    def at(self, flow: ArrayLike | None) -> "Self":
         """Returns the plant with a flow (..., 6) [m/s, rad/s], body frame, for calls that are given
         none; itself where the flow has no effect."""
         if flow is None or not self.feels_flow:
@@ -85,7 +87,7 @@ class Plant:
         plant._inflow = plant.inflow(plant.flow)
         return plant
 
-    def counting(self, axes: NDArray[np.bool_]) -> Self:
+    def counting(self, axes: NDArray[np.bool_]) -> "Self":
         """Returns the plant with the axes (6,) of the wrench that count, the others being 0; itself
         where all count."""
         if axes.all():

@@ -165,7 +165,7 @@ def test_direction_within_arcs(search: AllocatorCache) -> None:
     assert least_error(layout, more, 1.0 / result.scale, 2) > 0.01
 
 
-@pytest.mark.parametrize("policy", ["closest", "direction", "priority"])
+@pytest.mark.parametrize("policy", POLICY_NAMES)
 def test_what_is_reachable_is_delivered_whole_by_all(policy: str, search: AllocatorCache) -> None:
     layout = shipped("A")
     target = [1.0, 0.5, 2.0, 0.0, 0.1, 0.1]
@@ -233,7 +233,7 @@ def test_methods_without_weights_say_so() -> None:
     [
         (
             {"kind": "nearest"},
-            "policy: expected one of closest, direction, priority, got 'nearest'",
+            "policy: expected one of closest, direction, priority, falling, got 'nearest'",
         ),
         ({"axis_weights": (1.0,) * 5}, "axis_weights: expected six numbers from 0"),
         ({"axis_weights": (0.0,) * 6}, "axis_weights: expected six numbers from 0, not all 0"),

@@ -261,4 +261,8 @@ def test_extremes_name_the_one_that_has_no_answer(monkeypatch: pytest.MonkeyPatc
     found = extremes(robot)
     assert found.value == 1.0 and not found.good
     assert found.question.endswith(f"first priority -Tz, {second} lost: IndexError: of a group")
-    assert len(set(asked)) == len(asked) == 2 * layout.commanded.sum() * 3 * (1 + layout.n)
+    assert (
+        len(set(asked))
+        == len(asked)
+        == 2 * layout.commanded.sum() * len(POLICY_NAMES) * (1 + layout.n)
+    )

@@ -1,8 +1,10 @@
 """A dive of an eight-thruster robot whose yaw is out of reach for a while, as autopilots would log
 it."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -92,8 +94,9 @@ def px4_dive(
     dt: float = 0.02,
     outputs: str = "shares",
     speed: np.ndarray | None = None,
+    extra: Mapping[str, Any] | None = None,
 ) -> Dive:
-    """A log of PX4. Outputs are its own method's, judged by hand: wrench = sum of forces and
+    """A log of PX4, with extra topics. Outputs are its own method's, judged by hand: wrench = sum of forces and
     levers. ESCs say the speed (n, 8) of motors, if it is given."""
     robot = even_robot()
     time, demand = asked(n, dt, 90.0, 18.0)
@@ -133,16 +136,32 @@ def px4_dive(
     topics["esc_status"] = (time, escs if speed is None else escs | {"esc.esc_rpm": speed})
     status = {"unallocated_torque": left[:, 3:], "unallocated_thrust": left[:, :3]}
     topics["control_allocator_status"] = (time + 0.001, status)
+    topics |= extra or {}
     return Dive(robot, write_ulog(path, topics, parameters), time, demand, given)
 
 
-def sub_dive(path: Path, n: int = 3000, dt: float = 0.02, speed: np.ndarray | None = None) -> Dive:
-    """A log of ArduSub: more of forward and yaw is asked for than goes together, and outputs are
-    the sum of factors, cut at full. ESCs say the speed (n, 8) of motors, if it is given."""
+@dataclass(frozen=True)
+class SubMotion:
+    """What ArduSub is asked for and does: more of forward and yaw is asked for than goes together,
+    and outputs are the sum of factors, cut at full; pulses up to 25 us from rest turn no motor."""
+
+    robot: Layout
+    time: np.ndarray
+    stick: np.ndarray
+    """Roll, pitch, yaw, throttle, forward, lateral (n, 6)."""
+    pulse: np.ndarray
+    """(n, 8) [us]."""
+    demand: np.ndarray
+    given: np.ndarray
+    parameters: dict[str, float]
+
+
+def sub_motion(n: int, dt: float) -> SubMotion:
+    """The motion of n samples."""
     robot = even_robot()
     time, _ = asked(n, dt, 0.0, 0.0)
     hard = slice(n // 2, n // 2 + n // 6)
-    stick = np.zeros((n, 6))  # roll, pitch, yaw, throttle, forward, lateral
+    stick = np.zeros((n, 6))
     stick[:, 2] = 0.1 * np.sin(time)
     stick[:, 3] = 0.2 * np.cos(time / 3)
     stick[:, 4] = 0.3
@@ -151,16 +170,37 @@ def sub_dive(path: Path, n: int = 3000, dt: float = 0.02, speed: np.ndarray | No
     signs = np.array([1, -1, 1, 1, -1, 1, 1, 1.0])
     pulse = np.round(1500.0 + 400.0 * output * signs)
     force = FULL * (pulse - 1500.0) / 400.0 * signs
+    force[np.abs(pulse - 1500.0) <= 25.0] = 0.0
     given = force @ columns(robot)
     demand = stick[:, [4, 5, 3, 0, 1, 2]] * [1.0, -1.0, 1.0, 1.0, -1.0, -1.0] * SUB_UNIT
-    us = np.round(time * 1e6)
+    parameters = {
+        "FRAME_CONFIG": 2.0,
+        **{f"MOT_{i}_DIRECTION": sign for i, sign in enumerate(signs, 1)},
+    }
+    parameters |= {f"SERVO{i}_FUNCTION": 32.0 + i for i in range(1, 9)}
+    return SubMotion(robot, time, stick, pulse, demand, given, parameters)
+
+
+def sub_dive(
+    path: Path,
+    n: int = 3000,
+    dt: float = 0.02,
+    speed: np.ndarray | None = None,
+    extra: Mapping[str, Any] | None = None,
+) -> Dive:
+    """A log of ArduSub, with extra messages. ESCs say the speed (n, 8) of motors, if it is
+    given."""
+    motion = sub_motion(n, dt)
+    stick = motion.stick
+    us = np.round(motion.time * 1e6)
     rate = {"TimeUS": us, "ROut": stick[:, 0], "POut": stick[:, 1], "YOut": stick[:, 2]}
     rate["AOut"] = 0.5 + 0.5 * stick[:, 3]
     sticks = {f"C{i}": np.round(1500 + 400 * stick[:, i - 1]) for i in (5, 6)}
+    pulses = {f"C{i}": motion.pulse[:, i - 1] for i in range(1, 9)}
     messages = {
         "RATE": ("Qffff", rate),
         "RCIN": ("QHH", {"TimeUS": us, **sticks}),
-        "RCOU": ("Q" + "H" * 8, {"TimeUS": us, **{f"C{i}": pulse[:, i - 1] for i in range(1, 9)}}),
+        "RCOU": ("Q" + "H" * 8, {"TimeUS": us, **pulses}),
         "MSG": ("QZ", {"TimeUS": us[n // 2 :][:1], "Message": np.array([b"Leak Detected"])}),
     }
     if speed is not None:
@@ -170,12 +210,9 @@ def sub_dive(path: Path, n: int = 3000, dt: float = 0.02, speed: np.ndarray | No
             "RPM": speed.ravel(),
         }
         messages["ESC"] = ("QBe", motors)
-    parameters = {
-        "FRAME_CONFIG": 2.0,
-        **{f"MOT_{i}_DIRECTION": sign for i, sign in enumerate(signs, 1)},
-    }
-    parameters |= {f"SERVO{i}_FUNCTION": 32.0 + i for i in range(1, 9)}
-    return Dive(robot, write_dataflash(path, messages, parameters), time, demand, given)
+    messages |= extra or {}
+    written = write_dataflash(path, messages, motion.parameters)
+    return Dive(motion.robot, written, motion.time, motion.demand, motion.given)
 
 
 @pytest.fixture(scope="session")

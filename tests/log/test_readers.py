@@ -16,7 +16,6 @@ from rosbags.typesys import Stores, get_typestore
 import finlab
 from finlab.cli import main
 from finlab.errors import FinlabError
-from finlab.files.worker import in_worker
 from finlab.log import judge, read_log
 from tests.log.conftest import Dive
 from tests.log.test_judge import check
@@ -72,25 +71,6 @@ def test_a_bag_of_two_wrenches_asks_which(px4: Dive, tmp_path: Path) -> None:
     assert len(read_log(bag, px4.robot, demand="/b")) > 40
     with pytest.raises(FinlabError, match="no topic '/c'"):
         read_log(bag, px4.robot, demand="/c")
-
-
-@pytest.mark.parametrize("kind", ["px4", "sub"])
-def test_damaged_logs_end_in_a_sentence(
-    kind: str, request: pytest.FixtureRequest, tmp_path: Path
-) -> None:
-    dive: Dive = request.getfixturevalue(kind)
-    content = dive.path.read_bytes()[:60_000]
-    rng = np.random.default_rng(0)
-    for seed in range(20):
-        damaged = bytearray(content[: rng.integers(8, len(content))])
-        for place in rng.integers(8, len(damaged), 1 + seed):
-            damaged[place] = rng.integers(256)
-        path = tmp_path / "log"
-        path.write_bytes(damaged)
-        try:
-            judge(in_worker(read_log, path, dive.robot), improve=False)
-        except FinlabError as error:
-            assert len(str(error)) < 1000
 
 
 def test_a_log_of_ardusub_that_ends_in_zeros_is_read_in_silence(

@@ -7,7 +7,6 @@ import os
 import re
 import subprocess
 import sys
-import tomllib
 import zipfile
 from collections.abc import Iterator
 from importlib import metadata
@@ -17,6 +16,11 @@ import pytest
 from packaging.requirements import Requirement
 
 from finlab.assets import DISTRIBUTION, EXTRA_OF_PACKAGE
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
 
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]

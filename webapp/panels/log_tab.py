@@ -36,8 +36,8 @@ if TYPE_CHECKING:
 PLOTS_A_ROW = 4
 """Plots that stand beside each other in a window of usual width."""
 INVITATION = (
-    "Drop a log on the page: PX4 (.ulg), ArduSub (.bin), or a bag of ROS (.mcap, .db3, .bag). It "
-    "is told when and on which axis the robot could not, and what would have held it."
+    "Drop a log on the page: PX4 (.ulg), ArduSub (.bin, .tlog), or a bag of ROS (.mcap, .db3, "
+    ".bag). It is told when and on which axis the robot could not, and what would have held it."
 )
 """What the tab says while there is no log."""
 

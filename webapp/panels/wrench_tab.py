@@ -129,7 +129,10 @@ def add_target(page: Page) -> None:
     page.add_html(mark)
     board.act(hint)
     page.add_html(_ranges_error)
-    policies = "Come closest, keep the direction, or serve axes by priority, heave first."
+    policies = (
+        "Come closest, keep the direction, serve axes by priority, heave first, or give no axis "
+        "more than was asked for."
+    )
     box = gui.add_dropdown("Out of reach", POLICY_NAMES, hint=policies)
     page.bind(box, partial(session.set_setting, "policy"), lambda policy: policy)
 

@@ -16,7 +16,7 @@ from webapp.tasks.slot import Slot, Work
 if TYPE_CHECKING:  # who opens no log needs none of it
     from finlab.log import Judgement
 
-SUFFIXES = ".ulg,.bin,.mcap,.db3,.bag"
+SUFFIXES = ".ulg,.bin,.tlog,.mcap,.db3,.bag"
 """Suffixes of logs, as a browser expects them."""
 
 

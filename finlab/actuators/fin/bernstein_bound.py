@@ -87,8 +87,8 @@ class TableBound:
         indices: list[NDArray[np.intp]] = list(np.nonzero(left))
         row, *index = indices
         bound = bound[left]
-        ends = self._ends[*index]
-        pair = np.stack([cells[row, *index], cells[-1, *index]], axis=1)
+        ends = self._ends[tuple(index)]
+        pair = np.stack([cells[(row, *index)], cells[(-1, *index)]], axis=1)
         for _ in range(ROUNDS):
             if not 0 < 8 * len(row) <= MOST_CELLS:
                 break

@@ -9,7 +9,7 @@ from __future__ import annotations  # help() then prints `Rate`, not the bounds 
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 from msgspec import Meta
@@ -37,6 +37,9 @@ from finlab.actuators.law import ActuatorLaw, FinLaw
 from finlab.arrays import Array
 from finlab.errors import LayoutError
 from finlab.files.schema import Checked, Name
+
+if TYPE_CHECKING:
+    from typing_extensions import Self  # Python 3.10 has none of its own
 
 Coordinate = Annotated[float, Meta(ge=-10.0, le=10.0)]
 """A coordinate of a point on the hull [m]."""

@@ -6,13 +6,16 @@
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, Self, Union
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Union
 
 from msgspec import Meta, Struct, defstruct
 
 from finlab.axes import FULL_TURN_TOLERANCE, TURN
 from finlab.errors import LayoutError
 from finlab.files.schema import Checked, Part, checked, given
+
+if TYPE_CHECKING:
+    from typing_extensions import Self  # Python 3.10 has none of its own
 
 MAX_AMPLITUDE = math.pi / 2
 """Largest half amplitude a layout may allow [rad]; beyond it the fin would beat through the
@@ -176,7 +179,7 @@ class FinModelSpec(Part):
         return Model
 
     @classmethod
-    def from_file(cls, tag: str, values: dict[str, Any], may_open: bool) -> Self:
+    def from_file(cls, tag: str, values: dict[str, Any], may_open: bool) -> "Self":
         return cls(tag, tuple(values.items()))
 
     @classmethod

@@ -2,7 +2,9 @@
 
 `px4` is the pseudo-inverse of the effectiveness with PX4's normalisation of its columns, then
 sequential desaturation (PX4, `ControlAllocationPseudoInverse.cpp` and
-`ControlAllocationSequentialDesaturation.cpp`, 1bbd116).
+`ControlAllocationSequentialDesaturation.cpp`, 00202eb, with its parameters MC_AIRMODE_LIM and
+MC_AIRMODE_YAW): outputs beyond limits are moved back along one axis after the other. Thrust may
+fall for the sake of roll and pitch; it may rise only as far as the airmode's limit allows.
 
 `ardusub` has a sum of six factors times six demands for each thruster, whatever the geometry. Roll,
 pitch and throttle are one group and yaw, forward and lateral the other; each is scaled down until
@@ -18,10 +20,11 @@ out, as are those that hang at a force, which the others make up for.
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from finlab.allocation.baselines.fixed_actuators import fixed_actuators_of
-from finlab.allocation.method import LeastErrorMethod, Settings, choice
+from finlab.allocation.method import LeastErrorMethod, Settings, choice, number, switch
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
 from finlab.axes import AXES as WRENCH_AXES
@@ -44,6 +47,8 @@ LEAST_ENTRY = 0.2
 """Entries of a column from which on a thruster takes part in desaturation."""
 YAW_MARGIN = 0.15
 """Share of a thruster's range by which yaw may exceed it."""
+LEAST_FOLD_GAIN = 1e-3
+"""How much less thrust outputs must need with yaw than without it for yaw to be mixed in first."""
 PX4_ORDER: tuple[tuple[Axis, ...], ...] = (("Tx", "Ty"), ("Fz",), ("Tz",), ("Fx", "Fy"))
 """Groups of axes in the order in which PX4 means to keep them where not all can be had; surge and
 sway are never reduced by plan, but cut off with the thrusters' limits."""
@@ -54,10 +59,20 @@ class Px4Settings(Settings):
     """Settings of method `px4`."""
 
     desaturation: str = choice(
-        "airmode 0",
-        ("none", "airmode 0", "axes"),
-        "what gives way at limits: nothing (plain pseudo-inverse), what PX4 does with MC_AIRMODE "
-        "0, or each axis in turn, least important first, as in older versions",
+        "sequential",
+        ("none", "sequential", "axes"),
+        "what gives way at limits: nothing (plain pseudo-inverse), what PX4 does today, or each "
+        "axis in turn, least important first, as in older versions",
+    )
+    airmode_limit: float = number(
+        0.0,
+        0.0,
+        1.0,
+        "thrust that `sequential` may add to keep roll and pitch, as a share of full thrust "
+        "(PX4's MC_AIRMODE_LIM): 0 for none, 1 for any",
+    )
+    airmode_yaw: bool = switch(
+        False, "whether yaw may spend that thrust, too (PX4's MC_AIRMODE_YAW)"
     )
 
 
@@ -95,33 +110,84 @@ class Px4(LeastErrorMethod):
         if desaturation == "axes":
             for axis in (SWAY, SURGE, YAW, HEAVE, PITCH, ROLL):
                 u = self._desaturated(u, axis)
-        elif desaturation != "none":
-            yaw = output_by_axis[..., YAW]
-            u = u - yaw
-            u = self._desaturated(u, HEAVE, reduce_only=True)
-            u = self._desaturated(u, ROLL)
-            u = self._desaturated(u, PITCH)
-            u = self._desaturated(u + yaw, YAW, margin=YAW_MARGIN)
-            u = self._desaturated(u, HEAVE, reduce_only=True)
+        elif desaturation == "sequential":
+            u = self._sequential(u, output_by_axis[..., YAW], setpoint[:, YAW])
         command = np.zeros((*u.shape, 3))
         command[..., 0] = np.clip(u, self._low, self._high) * self._largest
         return Solution(self.plant.feasible(command))
 
-    def _desaturated(
-        self, u: Array, axis: int, reduce_only: bool = False, margin: float = 0.0
-    ) -> Array:
+    def _sequential(self, u: Array, yaw: Array, yaw_setpoint: Array) -> Array:
+        """Outputs (N, n) that PX4 finds: thrust gives way first, then roll and pitch; yaw is added
+        last to what is left, or mixed in from the start, where it gives way before roll and pitch.
+
+        Args:
+            u: outputs of the mix (N, n).
+            yaw: the part of yaw in them (N, n).
+            yaw_setpoint: the setpoint of yaw (N,).
+        """
+        limit = self.settings.airmode_limit
+        without_yaw = u - yaw
+        is_mixed_in = self._yaw_is_mixed_in(u, without_yaw)
+        moved = np.where(is_mixed_in[:, None], u, without_yaw)
+        moved = self._desaturated(moved, HEAVE, rise=limit)
+        with_less_yaw = self._with_less_yaw(moved, yaw_setpoint)
+        moved = np.where(is_mixed_in[:, None], with_less_yaw, moved)
+        if limit < 1.0:
+            moved = self._desaturated(moved, ROLL)
+            moved = self._desaturated(moved, PITCH)
+        added = self._desaturated(moved + yaw, YAW, margin=YAW_MARGIN)
+        added = self._desaturated(added, HEAVE, rise=0.0)
+        return np.where(is_mixed_in[:, None], moved, added)
+
+    def _yaw_is_mixed_in(self, u: Array, without_yaw: Array) -> NDArray[np.bool_]:
+        """Whether yaw is part of the outputs (N,) from the start: where it may spend thrust, or
+        where outputs with it need less thrust than without it."""
+        if self.settings.airmode_limit == 0.0:
+            return np.zeros(len(u), bool)
+        if self.settings.airmode_yaw:
+            return np.ones(len(u), bool)
+        column = self.mix[:, HEAVE]
+        needed = _shift_needed(u, column, self._low, self._high)
+        needed_without = _shift_needed(without_yaw, column, self._low, self._high)
+        return np.asarray(needed < needed_without - LEAST_FOLD_GAIN)
+
+    def _with_less_yaw(self, u: Array, yaw_setpoint: Array) -> Array:
+        """Outputs (N, n) moved along yaw towards their limits, as far as that takes from the
+        setpoint (N,) of yaw, and never beyond 0."""
+        column = self.mix[:, YAW]
+        least = np.minimum(-yaw_setpoint, 0.0)
+        most = np.maximum(-yaw_setpoint, 0.0)
+        first_gain = np.clip(_gain(u, column, self._low, self._high), least, most)
+        moved = u + first_gain[:, None] * column
+        second_gain = 0.5 * _gain(moved, column, self._low, self._high)
+        second_gain = np.clip(second_gain, least - first_gain, most - first_gain)
+        return np.asarray(moved + second_gain[:, None] * column)
+
+    def _desaturated(self, u: Array, axis: int, rise: float = 1.0, margin: float = 0.0) -> Array:
         """Outputs (N, n) moved along a column of the mix towards their limits: a whole step, then
-        half of the next. With `reduce_only` they are moved down alone, in the direction of the
-        axis."""
+        half of the next.
+
+        Args:
+            u: outputs (N, n).
+            axis: the column.
+            rise: how far both steps together may go against the axis, which for thrust, positive
+                downwards, is up; 1 for any.
+            margin: share of the outputs' range by which they may exceed it.
+        """
         column = self.mix[:, axis]
         high = self._high + margin * (self._high - self._low)
-        first_gain = _gain(u, column, self._low, high)
+        gain = _gain(u, column, self._low, high)
+        first_gain = gain if rise >= 1.0 else np.maximum(gain, -rise)
         moved = u + first_gain[:, None] * column
-        second_gain = _gain(moved, column, self._low, high)
-        moved = moved + 0.5 * second_gain[:, None] * column
-        if not reduce_only:
-            return moved
-        return np.where((first_gain < 0.0)[:, None], u, moved)
+        second_gain = 0.5 * _gain(moved, column, self._low, high)
+        if 0.0 < rise < 1.0:
+            rise_left = rise - np.maximum(-first_gain, 0.0)
+            second_gain = np.maximum(second_gain, -rise_left)
+        moved = moved + second_gain[:, None] * column
+        if rise == 0.0:
+            # PX4 leaves these outputs to the axes that come after.
+            return np.where((gain < 0.0)[:, None], u, moved)
+        return moved
 
 
 def normalised(mix: Array) -> tuple[Array, Array]:
@@ -151,13 +217,24 @@ def normalised(mix: Array) -> tuple[Array, Array]:
     return result, scale
 
 
+def _shifts(u: Array, column: Array, low: Array, high: Array) -> Array:
+    """How far (N, k) each output of (N, n) has to move along a column (n,) to its limit, of those k
+    that the column moves well."""
+    takes_part = np.abs(column) >= LEAST_ENTRY
+    excess = np.clip(u, low, high) - u
+    return np.asarray(excess[:, takes_part] / column[takes_part])
+
+
 def _gain(u: Array, column: Array, low: Array, high: Array) -> Array:
     """How far (N,) outputs (N, n) move along a column (n,) until their excesses on both sides are
     alike."""
-    takes_part = np.abs(column) >= LEAST_ENTRY
-    excess = np.clip(u, low, high) - u
-    gain = excess[:, takes_part] / column[takes_part]
-    return np.asarray(gain.min(axis=1, initial=0.0) + gain.max(axis=1, initial=0.0))
+    shift = _shifts(u, column, low, high)
+    return np.asarray(shift.min(axis=1, initial=0.0) + shift.max(axis=1, initial=0.0))
+
+
+def _shift_needed(u: Array, column: Array, low: Array, high: Array) -> Array:
+    """Largest way (N,) along a column (n,) that one of the outputs (N, n) has to its limit."""
+    return np.asarray(np.abs(_shifts(u, column, low, high)).max(axis=1, initial=0.0))
 
 
 COLUMNS = np.array([WRENCH_AXES.index(axis) for axis in AXES])

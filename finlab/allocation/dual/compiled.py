@@ -7,7 +7,7 @@ for the commands that give forces.
 
 from copy import copy
 from functools import cached_property, lru_cache
-from typing import Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,9 @@ from finlab.core.fields import Record
 from finlab.layout.layout import Layout
 from finlab.physics.objective import wrench_scale_of
 from finlab.physics.plant import Plant, plant_of
+
+if TYPE_CHECKING:
+    from typing_extensions import Self  # Python 3.10 has none of its own
 
 _NO_FORCE = 1e-12
 """Added to largest forces [N], so that nothing is divided by 0."""
@@ -87,7 +90,7 @@ class Compiled:
         self._compile()
 
     @classmethod
-    def of(cls, layout: Layout) -> Self:
+    def of(cls, layout: Layout) -> "Self":
         """Compiles a layout at rest in the water, with its own wrench scale and axes.
 
         Args:

@@ -9,7 +9,7 @@ commands, within the same limits.
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,8 @@ from finlab.layout.effectiveness import wrench_of_forces
 from finlab.physics.objective import judged_power
 
 if TYPE_CHECKING:
+    from typing_extensions import Self  # Python 3.10 has none of its own
+
     from finlab.allocation.levenberg_marquardt import CommandProblem
     from finlab.core.coupled_core import CoupledCore
 
@@ -180,7 +182,7 @@ class Dual(Method):
 
         return coupled_core(self.plant, self.compiled)
 
-    def at(self, flow: Array | None) -> Self:
+    def at(self, flow: Array | None) -> "Self":
         """Returns the method in a flow; see `Method.at`. The last flow's is kept."""
         if flow is None:
             return self

@@ -212,6 +212,11 @@ static void answer_question(const real *block, fl_work *work, const fl_question 
 static int is_valid_policy(const fl_policy *p) {
   if (p->kind < FL_CLOSEST || p->kind >= FL_POLICIES) return 0;
   if (p->kind == FL_PRIORITY && (p->group_count < 0 || p->group_count > 6)) return 0;
+#ifdef FL_WITH_FALLING
+  if (p->kind == FL_FALLING && p->group_count != 1) return 0;
+#else
+  if (p->kind == FL_FALLING) return 0;
+#endif
   if (p->kind == FL_CLOSEST && !fl_are_within(p->axis_weight, 6, 1)) return 0;
   return 1;
 }

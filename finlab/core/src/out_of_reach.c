@@ -4,7 +4,8 @@
    Each is the point of a convex set nearest to another, in axes in which what counts more is
    longer. `closest` takes the axes by their weights, `direction` the farthest share of the
    target, `priority` the axes of one group after the other, what those before it have got
-   held. Sets with gaps are cut until the best answer of all lies in none. */
+   held, `falling` the nearest wrench that gives no more along some axes than was asked for,
+   and nothing the other way. Sets with gaps are cut until the best answer of all lies in none. */
 #include "internal.h"
 
 #define REACH_PARTS 96     /* parts that a policy may look at, of any robot */
@@ -12,7 +13,9 @@
 
 /* Distance, over the wrench scale, up to which the point of a part is the nearest one. */
 #define ROUGHLY (NEARLY / 10)
-#define HELD 1e3  /* weight of an axis that is held over one of the group that is served */
+#define HELD 1e3 /* weight of an axis that is held over one of the group that is served */
+#define HOLDS 16 /* rounds that look for the axes at an end of what they may get */
+#define TURNED (CLOSE / 10) /* pull at a held axis from which on it is let go */
 #define PULL 2e-3 /* miss of a group for which held axes give way by a millionth at a curved rim */
 /* Scaled wrench by which an answer at the rim may be off: what it gives is then what is served. */
 #define AT_RIM (R(0.1) * NEARLY)
@@ -76,19 +79,36 @@ static wide nearest_point(const real *block, fl_work *work, const wide *target_w
   return fl_nearest_point(block, work, target_weighted, work->distance_enough, 0, m);
 }
 
-static void serve_closest(const real *block, fl_work *work, const real *wrench,
+/* Points of a mixture anew, in the axes that hold now. */
+static void remake_points(const real *block, const fl_work *work, fl_mixture *m) {
+  m->basis_count = 0;
+  for (int p = 0; p < m->count; p++) fl_point_of_forces(block, work, m->force[p], m->point[p]);
+}
+
+/* Comes as near to a wrench over the wrench scale as weighted axes allow; `missing` becomes what
+   the axes of a weight lack of it. Returns the miss in weighted axes. */
+static wide serve_weighted(const real *block, fl_work *work, const wide *weight, const wide *wanted,
+                           wide *missing) {
+  fl_mixture *m = &work->mixture;
+  wide target_weighted[6];
+  for (int k = 0; k < 6; k++) target_weighted[k] = weight[k] * wanted[k];
+  fl_weigh_axes(block, work, weight);
+  remake_points(block, work, m);
+  const wide miss = nearest_point(block, work, target_weighted);
+  for (int k = 0; k < 6; k++) {
+    missing[k] = 0;
+    if (weight[k] > 0) missing[k] = m->miss[k] / weight[k];
+  }
+  return miss;
+}
+
+static void serve_closest(const real *block, fl_work *work, const wide *wanted,
                           const fl_policy *policy, real *score) {
   wide weight[6];
-  wide target_weighted[6];
-  for (int k = 0; k < 6; k++) {
-    weight[k] = larger(policy->axis_weight[k], CLOSE);
-    target_weighted[k] = weight[k] * over_wrench_scale(block, wrench, k);
-  }
-  fl_weigh_axes(block, work, weight);
-  work->mixture.count = 0;
-  const wide miss = nearest_point(block, work, target_weighted);
+  wide missing[6];
+  for (int k = 0; k < 6; k++) weight[k] = larger(policy->axis_weight[k], CLOSE);
+  score[0] = rounded((real)serve_weighted(block, work, weight, wanted, missing));
   keep_normal(block, work, weight, work->mixture.miss);
-  score[0] = rounded((real)miss);
 }
 
 /* The ray of a wrench, over the wrench scale, within the range of the effectiveness. */
@@ -151,12 +171,6 @@ static void serve_direction(const real *block, fl_work *work, const real *wrench
   score[MISSING_RAY_SHARE] = (real)(1 - ray_share);
 }
 
-/* Points of a mixture anew, in the axes that hold now. */
-static void remake_points(const real *block, const fl_work *work, fl_mixture *m) {
-  m->basis_count = 0;
-  for (int p = 0; p < m->count; p++) fl_point_of_forces(block, work, m->force[p], m->point[p]);
-}
-
 /* Serves one group of axes, for a wrench over the wrench scale, while those before it are held;
    `missing` becomes what it lacks. Its length. A group that wants more than there is pulls
    at the held axes: then it weighs so much less that these give way by as little as they do
@@ -164,43 +178,31 @@ static void remake_points(const real *block, const fl_work *work, fl_mixture *m)
 static wide serve_group(const real *block, fl_work *work, const wide *wanted,
                         const unsigned char *held, const unsigned char *group, int is_first,
                         wide *missing) {
-  fl_mixture *m = &work->mixture;
   wide missed = PULL;
   int rounds = 2;
   if (is_first) rounds = 1;
   for (int round = 0; round < rounds && missed >= PULL; round++) {
     wide weight[6];
-    wide target_weighted[6];
-    for (int k = 0; k < 6; k++) {
-      weight[k] = HELD * held[k] + sqrt(PULL / missed) * group[k];
-      target_weighted[k] = weight[k] * wanted[k];
-    }
-    fl_weigh_axes(block, work, weight);
-    remake_points(block, work, m);
-    nearest_point(block, work, target_weighted);
-    for (int k = 0; k < 6; k++) {
-      if (group[k]) missing[k] = m->miss[k] / weight[k];
-    }
+    for (int k = 0; k < 6; k++) weight[k] = HELD * held[k] + sqrt(PULL / missed) * group[k];
+    serve_weighted(block, work, weight, wanted, missing);
+    for (int k = 0; k < 6; k++) missing[k] *= group[k];
     missed = norm_wide(missing);
     /* What a group misses by rounding has no direction: the rim is that of the one before. */
-    if (is_first || missed > NEARLY) keep_normal(block, work, weight, m->miss);
+    if (is_first || missed > NEARLY) keep_normal(block, work, weight, work->mixture.miss);
   }
   return missed;
 }
 
-static void serve_priority(const real *block, fl_work *work, const real *wrench,
-                           const fl_policy *policy, real *score) {
+static void serve_priority(const real *block, fl_work *work, wide *wanted, const fl_policy *policy,
+                           real *score) {
   unsigned char held[6] = {0};
-  wide wanted[6]; /* over the wrench scale; of held axes what they have got */
-  for (int k = 0; k < 6; k++) wanted[k] = over_wrench_scale(block, wrench, k);
-  work->mixture.count = 0;
   for (int g = 0; g < policy->group_count; g++) {
     const unsigned char *group = policy->group[g];
     wide missing[6] = {0};
     const wide missed = serve_group(block, work, wanted, held, group, g == 0, missing);
     for (int k = 0; k < 6; k++) {
       held[k] |= group[k];
-      if (group[k]) wanted[k] -= missing[k];
+      wanted[k] -= missing[k]; /* of held axes what they have got */
     }
     score[g] = rounded((real)missed);
   }
@@ -208,24 +210,95 @@ static void serve_priority(const real *block, fl_work *work, const real *wrench,
   if (fl_has_lines_alone(block)) work->is_rim_exact = 0;
 }
 
+#ifdef FL_WITH_FALLING
+/* Holds the falling axis that is farthest beyond its range, from nothing to what was asked for, at
+   that end of it, or lets go the one that is pulled most back into it. Returns whether there was
+   one. */
+static int change_hold(const wide *asked, const unsigned char *falls, const wide *missing,
+                       unsigned char *held, wide *wanted) {
+  int changed = -1;
+  wide most = NEARLY;
+  wide end = 0;
+  for (int k = 0; k < 6; k++) {
+    if (!falls[k]) continue;
+    const wide given = wanted[k] - missing[k];
+    const wide far_end = wanted[k] == asked[k] ? 0 : asked[k];
+    wide into = given * asked[k] > 0 ? asked[k] : 0; /* the end that it is beyond */
+    wide size = fabs(given) - fabs(into);
+    if (held[k]) {
+      /* the others' pull on it, and its own to what was asked for */
+      const wide pull = asked[k] - wanted[k] - HELD * HELD * missing[k];
+      size = -1;
+      if (pull * (far_end - wanted[k]) > 0) size = fabs(pull) - TURNED;
+      into = asked[k];
+    }
+    if (!(size > most)) continue;
+    most = size;
+    changed = k;
+    end = into;
+  }
+  if (changed < 0) return 0;
+  held[changed] ^= 1;
+  wanted[changed] = end;
+  return 1;
+}
+
+/* The nearest wrench that gives along the axes of the first group between nothing and what was
+   asked for, Eq. 12 under bounds: an axis that is beyond is held at that end, by the weight HELD,
+   and let go again where it is pulled back (an active set). At last the others weigh so much less
+   that held axes give way no more than they do for a miss of PULL. */
+static void serve_falling(const real *block, fl_work *work, const wide *asked,
+                          const fl_policy *policy, real *score) {
+  unsigned char held[6] = {0};
+  wide wanted[6];
+  wide missing[6];
+  wide weight[6];
+  wide loose_weight = 1;
+  memcpy(wanted, asked, sizeof wanted);
+  for (int round = 0;; round++) {
+    for (int k = 0; k < 6; k++) weight[k] = held[k] ? HELD : loose_weight;
+    serve_weighted(block, work, weight, wanted, missing);
+    keep_normal(block, work, weight, work->mixture.miss);
+    if (round < HOLDS && change_hold(asked, policy->group[0], missing, held, wanted)) continue;
+    wide all_missing[6];
+    for (int k = 0; k < 6; k++) all_missing[k] = asked[k] - wanted[k] + missing[k];
+    const wide missed = norm_wide(all_missing);
+    score[0] = rounded((real)missed);
+    if (round == 0 || !(missed > PULL) || loose_weight < 1) break;
+    loose_weight = sqrt(PULL / missed);
+    round = HOLDS;
+  }
+  /* The normal is that of axes of very different weights, by which rounding counts as a price. */
+  if (loose_weight < 1 && fl_has_lines_alone(block)) work->is_rim_exact = 0;
+}
+#endif
+
 /* Serves a policy within the sets of a part; how badly, the first number counting most, the
    numbers that a policy does not use 0:
 
    - closest: score[0] is the distance from the wrench, by the weights of the axes;
    - direction: score[0] is what misses across the ray, score[MISSING_RAY_SHARE] the share of the
      wrench that is not given, Eqs. 14 and 15;
-   - priority: score[g] is what group g lacks.
+   - priority: score[g] is what group g lacks;
+   - falling: score[0] is the distance from the wrench.
 
    All but the share are distances over the wrench scale, rounded. */
 static void serve(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,
                   real force[][2], real *score) {
   memset(score, 0, FL_SCORES * sizeof *score);
+  wide wanted[6]; /* over the wrench scale */
+  for (int k = 0; k < 6; k++) wanted[k] = over_wrench_scale(block, wrench, k);
+  work->mixture.count = 0;
   if (policy->kind == FL_DIRECTION)
     serve_direction(block, work, wrench, score);
   else if (policy->kind == FL_PRIORITY)
-    serve_priority(block, work, wrench, policy, score);
+    serve_priority(block, work, wanted, policy, score);
+#ifdef FL_WITH_FALLING
+  else if (policy->kind == FL_FALLING)
+    serve_falling(block, work, wanted, policy, score);
+#endif
   else
-    serve_closest(block, work, wrench, policy, score);
+    serve_closest(block, work, wanted, policy, score);
   fl_mixed_forces(block, &work->mixture, force);
 }
 

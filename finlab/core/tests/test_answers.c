@@ -122,6 +122,25 @@ static void test_groups(const golden_robot *robot, int k) {
   CHECK(second >= second_closest - by_polygons, robot->name, k);
 }
 
+/* No axis is given more than was asked for, nor anything the other way, and no answer that does so
+   is nearer than the closest one. */
+static void test_falling(const golden_robot *robot, int k) {
+  const double nearly = 1e-6; /* up to which an axis is not beyond its range */
+  const golden_question *golden = &robot->questions[k];
+  fl_answer answer;
+  ask_beyond(robot, k, FL_FALLING, &answer);
+  const double miss = distance(robot->block, answer.wrench_served, golden->beyond);
+  CHECK(miss >= golden->miss - optimal * golden->miss - by_polygons, robot->name, k);
+  for (int c = 0; c < 6; c++) {
+    const double asked = (double)golden->beyond[c] / (double)head_of(robot->block)->wrench_scale[c];
+    const double given = (double)answer.wrench_served[c] /
+                         (double)head_of(robot->block)->wrench_scale[c];
+    const double sign = asked < 0 ? -1 : 1;
+    CHECK(sign * given >= -nearly - 10 * met, robot->name, k);
+    CHECK(sign * (given - asked) <= nearly + 10 * met, robot->name, k);
+  }
+}
+
 /* One group of all axes is the same question as the closest wrench. */
 static void test_priority(const golden_robot *robot, int k) {
   const golden_question *golden = &robot->questions[k];
@@ -142,6 +161,7 @@ int main(void) {
       test_direction(robot, k);
       test_closest(robot, k);
       test_priority(robot, k);
+      test_falling(robot, k);
       test_groups(robot, k);
     }
   }

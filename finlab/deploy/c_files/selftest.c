@@ -77,6 +77,19 @@ static int is_other(const sample *s) {
   return 0;
 }
 
+/* How much farther a wrench is than the library's, or how far it goes beyond what was asked for
+   along an axis. */
+static double falls_short(const sample *s) {
+  const fl_head *head = (const fl_head *)robot;
+  double most = apart(out.wrench_served, s->wrench, all) - apart(s->aim, s->wrench, all);
+  for (int k = 0; k < 6; k++) {
+    const double sign = s->wrench[k] < 0 ? -1 : 1;
+    const double beyond = sign * ((double)out.wrench_served[k] - (double)s->wrench[k]);
+    most = fmax(most, beyond / (double)head->wrench_scale[k]);
+  }
+  return most;
+}
+
 /* How much farther a wrench is than the library's: `direction` gives one point, the others
    distances. Less counts of `direction` where foils drag, whose share is the last one that a search
    meets. */
@@ -88,6 +101,7 @@ static double farther(const sample *s) {
   if (s->policy == FL_CLOSEST) {
     return apart(out.wrench_served, s->wrench, all) - apart(s->aim, s->wrench, all);
   }
+  if (s->policy == FL_FALLING) return falls_short(s);
   double most = 0;
   for (int g = 0; g < GROUPS; g++) {
     const double own = apart(out.wrench_served, s->wrench, group[g]);
@@ -103,7 +117,16 @@ static int differs(const sample *s) {
   fl_question question = {.policy = &policy, .calm = CALM};
   if (s->previous) question.previous = s->previous[0];
   memcpy(policy.group, group, sizeof group);
+  if (s->policy == FL_FALLING) {
+    policy.group_count = 1;
+    memcpy(policy.group[0], all, sizeof all);
+  }
   memcpy(question.wrench, s->wrench, sizeof question.wrench);
+#ifndef FL_WITH_FALLING
+  if (s->policy == FL_FALLING) {
+    return fl_answer_one(robot, &work, &question, &out) != FL_BAD_ARGUMENT;
+  }
+#endif
   if (fl_answer_one(robot, &work, &question, &out) || outside()) return 1;
   if (out.newton_steps > most_steps) most_steps = out.newton_steps;
 

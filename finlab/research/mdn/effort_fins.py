@@ -11,7 +11,7 @@ A planar force is a complex number: its horizontal part, and 1j times its vertic
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import NamedTuple, Self
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,9 @@ from finlab.arrays import AnyArray, Array
 from finlab.axes import TURN
 from finlab.layout import Fin, Layout
 from finlab.physics.objective import effort_of_shares, effort_scale
+
+if TYPE_CHECKING:
+    from typing_extensions import Self  # Python 3.10 has none of its own
 
 LEVELS = 49
 """Sizes of force in a table."""
@@ -92,7 +95,7 @@ class EffortFins:
     """Half of that arc (n,) [rad]; pi for a full circle."""
 
     @classmethod
-    def of(cls, layout: Layout) -> Self:
+    def of(cls, layout: Layout) -> "Self":
         """The fins of a layout. Raises DataError: a fin's force table cannot be read, or gives no
         thrust within the limits."""
         compiled = [fin_table(fin).directions for fin in layout.fins]

@@ -16,18 +16,18 @@ Numbers may be plain floats, or arrays that broadcast; vectors are sequences of 
 
 from dataclasses import replace
 from functools import cache
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 from finlab.errors import LayoutError
 from finlab.layout import Body, Layout, load_layout
 
-Vector = TypeVar("Vector")
+Vector = Any
 """A sequence of numbers: a tuple of floats, or an array whose first axis it is."""
-Number = TypeVar("Number")
+Number = Any
 """A float, or an array of floats."""
 
 
-class Dynamics(NamedTuple, Generic[Vector, Number]):
+class Dynamics(NamedTuple):
     """The numbers of a body, or of many, in the equations of motion."""
 
     inertia: Vector
@@ -44,7 +44,7 @@ class Dynamics(NamedTuple, Generic[Vector, Number]):
     """(3) as seen from the centre of gravity [m]."""
 
 
-def accelerations(body: Dynamics[Any, Any], nu_r: Any, up: Any, tau: Any) -> Any:
+def accelerations(body: Dynamics, nu_r: Any, up: Any, tau: Any) -> Any:
     """Returns nu_r' = M^-1 (tau - C(nu_r) nu_r - D(nu_r) nu_r - g(eta)), six numbers.
 
     Args:
@@ -89,7 +89,7 @@ def accelerations(body: Dynamics[Any, Any], nu_r: Any, up: Any, tau: Any) -> Any
     return (force_x / mx, force_y / my, force_z / mz, torque_x / ix, torque_y / iy, torque_z / iz)
 
 
-def jacobian(body: Dynamics[Any, Any], nu_r: Any) -> list[list[Any]]:
+def jacobian(body: Dynamics, nu_r: Any) -> list[list[Any]]:
     """Returns the derivatives (6, 6) of `accelerations` by nu_r.
 
     Args:
@@ -117,7 +117,7 @@ def jacobian(body: Dynamics[Any, Any], nu_r: Any) -> list[list[Any]]:
     ]
 
 
-def damping_rates(body: Dynamics[Any, Any], nu_r: Any) -> list[Any]:
+def damping_rates(body: Dynamics, nu_r: Any) -> list[Any]:
     """Returns the decelerations (6) by damping at nu_r (6), over nu_r: M^-1 D(nu_r) [1/s]."""
     rates = []
     for d_1, d_2, speed, m in zip(
@@ -127,7 +127,7 @@ def damping_rates(body: Dynamics[Any, Any], nu_r: Any) -> list[Any]:
     return rates
 
 
-def damping_jacobian(body: Dynamics[Any, Any], nu_r: Any) -> list[Any]:
+def damping_jacobian(body: Dynamics, nu_r: Any) -> list[Any]:
     """Returns the derivatives (6) of those decelerations, each by its own speed [1/s]: minus the
     diagonal of the Jacobian. The quadratic part counts twice, as at twice the speed."""
     return damping_rates(body, [2.0 * speed for speed in nu_r])
@@ -154,7 +154,7 @@ def complete_body(layout: Layout) -> Body:
     return replace(ucat_body(), **{"buoyancy_n": None, **given})
 
 
-def dynamics_of(body: Body) -> Dynamics[tuple[float, ...], float]:
+def dynamics_of(body: Body) -> Dynamics:
     """Returns the numbers of a body in the equations of motion.
 
     Args:

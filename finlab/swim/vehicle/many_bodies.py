@@ -15,7 +15,7 @@ from finlab.swim.vehicle.attitude import rotation_of_angles, to_body, to_world
 from finlab.swim.vehicle.fossen import Dynamics, accelerations
 from finlab.swim.vehicle.integration import runge_kutta_step
 
-Bodies = Dynamics[Array, Array]
+Bodies = Dynamics
 """Numbers of many bodies; what follows the first axis must broadcast with the states'."""
 
 

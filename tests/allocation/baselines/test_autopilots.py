@@ -35,7 +35,7 @@ GOLDEN = {
 """Wrench [N, N m] -> forces of the pseudo-inverse [N]."""
 
 
-def px4(layout: Layout, desaturation: str = "airmode 0") -> Px4:
+def px4(layout: Layout, desaturation: str = "sequential") -> Px4:
     """PX4's method of a robot, with the way in which it gives up axes."""
     return Px4(layout, Px4Settings(desaturation), wrench_scale_of(layout))
 
@@ -47,7 +47,7 @@ def forces(layout: Layout, method: str, target: Array, **settings: str) -> Array
 
 
 @pytest.mark.parametrize("wrench", GOLDEN)
-@pytest.mark.parametrize("form", ["none", "airmode 0", "axes"])
+@pytest.mark.parametrize("form", ["none", "sequential", "axes"])
 def test_within_its_limits_px4_is_the_pseudo_inverse(wrench: tuple[float, ...], form: str) -> None:
     np.testing.assert_allclose(
         forces(HEAVY, "px4", np.array(wrench, float), desaturation=form), GOLDEN[wrench], atol=6e-5
