@@ -370,8 +370,8 @@ static void finish_search(outer_search *search, fl_answer *out) {
   fl_box_of_question(search->block, search->work, q, &search->box);
   fl_commands_for_forces(search->block, &search->box, search->force, q->previous, out->command);
   real unused[6];
-  search->error =
-      fl_linearize_coupled(search->robot, search->block, search->work, q->wrench, out->command, 1, unused);
+  search->error = fl_linearize_coupled(search->robot, search->block, search->work, q->wrench,
+                                       out->command, 1, unused);
   if (search->error > EXACT) {
     search->error = step_to_wrench(search->robot, search->block, search->work, &search->box,
                                    q->wrench, EXACT, 0, out->command);

@@ -323,9 +323,8 @@ static int answer_by_laws(start_search *search, const fl_question *q, real *lamb
 static int find_first_answer(start_search *search) {
   copy_forces(search->block, search->force_by_laws, search->force);
   if (fl_has_lines_alone(search->robot->block_uncoupled)) {
-    const int status =
-        fl_newton_from(search->robot, search->block, search->work, &search->question, 0,
-                       search->force, search->answer, &search->best);
+    const int status = fl_newton_from(search->robot, search->block, search->work, &search->question,
+                                      0, search->force, search->answer, &search->best);
     search->steps_left -= search->best.steps;
     if (status == NEWTON_MET) return FL_OK;
     copy_forces(search->block, search->force_by_laws, search->force);
