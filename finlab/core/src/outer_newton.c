@@ -233,10 +233,7 @@ static int run_rounds(newton_search *search, const known_end *known) {
   memcpy(residual_begin, search->residual, sizeof residual_begin);
   real moved_before = LARGEST_NUMBER;
   for (int k = 0; k < NEWTON_ROUNDS; k++) {
-    /* The first answer of a start has to be that of its linear model: it tells where it leads. */
-    real enough = LEFT_IN_ROUND * search->error;
-    if (known && k == 0) enough = 0;
-    if (!solve_dual(search, enough)) return NEWTON_LEFT;
+    if (!solve_dual(search, LEFT_IN_ROUND * search->error)) return NEWTON_LEFT;
     const change_of_forces change = compare_responses(search);
     const int has_held = search->held.line != NO_LINE;
     if (!has_held && !(change.largest <= SHRINKS * moved_before)) {
