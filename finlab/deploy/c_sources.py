@@ -37,6 +37,7 @@ FILES_LEFT_OUT = (
     "jets.c",
     "messages.c",
     "outer_iterations.c",
+    "outer_newton.c",
     "outer_reach.c",
     "outer_starts.c",
     "ray_reach.c",

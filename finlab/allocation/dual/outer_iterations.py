@@ -7,8 +7,9 @@ Levenberg-Marquardt steps make it exact on the whole one, and shorter steps are 
 no cheaper. Where the iterations converge, the gradient of the power lies in the range of the slope
 of the whole model: the conditions of Karush, Kuhn and Tucker hold there (sequential convex
 programming). The iterations are in finlab/core/src/outer_iterations.c, and their search for the
-best of several starts in outer_starts.c, since the whole model is not convex. Here is what the
-starts are, and what the actuators' own laws have to say of the answers.
+best of several starts in outer_starts.c, since the whole model is not convex. Robots of thrusters
+are mostly answered without them, by Newton's method in outer_newton.c. Here is what the starts are,
+and what the actuators' own laws have to say of the answers.
 """
 
 import numpy as np

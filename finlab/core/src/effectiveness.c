@@ -155,6 +155,9 @@ static int prepare_newton(const real *block, fl_work *work) {
   return span->rank == 0 || fl_factor(H);
 }
 
+/* Brings the effectiveness, which has changed, into the basis as it is. */
+void fl_reduce_effectiveness(const real *block, fl_work *work) { matrices_of(block, &work->span); }
+
 /* Prepares the state of a robot anew; 0 where its numbers are out of range. */
 int fl_prepare_span(const real *block, fl_work *work, int is_as_prepared) {
   fl_span *span = &work->span;

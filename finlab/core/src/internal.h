@@ -184,6 +184,7 @@ void fl_mark_jump(fl_set *set, real one, real other);
 /* effectiveness.c: what the actuators that work span in the axes that count */
 int fl_prepare_span(const real *block, fl_work *work, int is_as_prepared);
 void fl_offset_wrench(const real *block, fl_span *span);
+void fl_reduce_effectiveness(const real *block, fl_work *work);
 void fl_forget_span(fl_work *work);
 int fl_span_of_question(const real *block, fl_work *work, const unsigned char *lost,
                         const unsigned char *free);
@@ -389,10 +390,26 @@ typedef struct {
   real (*force)[2]; /* of lines (n, 2) [N] */
   real power;       /* [W] */
 } known_end;
+real fl_linearize_coupled(const fl_coupled_robot *robot, real *block, fl_work *work,
+                          const real *wrench, real command[][3], int is_chord, real *residual);
+real fl_exact_penalty(const real *block, const real *lambda);
+int fl_leads_to_known(const real *block, const fl_work *work, const known_end *known,
+                      real force[][2], real command[][3]);
 int fl_iterations_from(const fl_coupled_robot *robot, real *block, fl_work *work,
                        const fl_question *question, const fl_outer_limits *limits,
                        const known_end *known, real force[][2], fl_answer *answer,
                        fl_outer_result *result);
+
+/* outer_newton.c: the same of lines, where a few steps of Newton's method are enough. From forces,
+   which become those at which it ends, and multipliers of the question; returns how. */
+enum {
+  NEWTON_MET,   /* at an answer */
+  NEWTON_KNOWN, /* on its way to forces that are known */
+  NEWTON_LEFT   /* at nothing */
+};
+int fl_newton_from(const fl_coupled_robot *robot, real *block, fl_work *work,
+                   const fl_question *question, const known_end *known, real force[][2],
+                   fl_answer *answer, fl_outer_result *result);
 
 /* out_of_reach.c: what a policy gives beyond reach */
 void fl_out_of_reach(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,

@@ -124,17 +124,17 @@ static void add_hull(const water *w, const outlet *p, const jet *j, const real *
   }
 }
 
-/* Adds the force that comes of the water u that meets an actuator, and its derivatives by
-   force and water. */
+/* Adds the force that comes of the water u that meets an actuator, and, where wanted, its
+   derivatives by force and water. */
 static void add_taken(const water *w, const outlet *p, const jet *j, const real *force,
-                      const real *u, real *change, real by_force[3][3], real by_water[3][3]) {
+                      const real *u, int has_slope, real *change, real by_force[3][3],
+                      real by_water[3][3]) {
   const real *a = j->ahead;
   const real t = j->thrust;
   const real against = -dot(u, a, 3); /* speed of the water against the jet's force */
   const real share = against / j->speed;
   const real root = SQRT(share * share + FLOOR_SHARE);
   const real below = w->lag + w->most * root;
-  const real d_lost = (w->lag + w->most * FLOOR_SHARE / root) / (below * below);
   const real lost = share / below; /* share of the force */
 
   const real side_flow = w->side * j->mass_flow;
@@ -145,6 +145,8 @@ static void add_taken(const water *w, const outlet *p, const jet *j, const real 
   for (int b = 0; b < 3; b++) {
     change[b] += side_flow * across[b] + drag * speed * u[b] - lost * force[b];
   }
+  if (!has_slope) return;
+  const real d_lost = (w->lag + w->most * FLOOR_SHARE / root) / (below * below);
   const real d_lost_by_speed = d_lost / j->speed;
   const real side_per_thrust = side_flow / t;
   const real drag_per_speed = drag / speed;
@@ -238,7 +240,9 @@ static void offset_of(const water *w, const real *force, const real *inflow, rea
     real by_water[3][3] = {{0}};
     if (has_jets) count = jets_at(w, outlets, jets, i, met, u);
     if (has_hull) add_hull(w, at, jets + i, f, taken, by_force);
-    if (count > 0) add_taken(w, at, jets + i, f, u, taken, by_force, by_water);
+    if (count > 0) {
+      add_taken(w, at, jets + i, f, u, slope != 0, taken, by_force, by_water);
+    }
     if (inflow) add_lost(at, jets + i, f, inflow + 3 * i, taken, by_force);
     add_wrench(at->position, taken, wrench);
     if (!slope) continue;

@@ -49,8 +49,8 @@ static void forces_of_commands(const fl_coupled_robot *robot, const real *block,
    and the slope of what the actuators do to each other, its offset what is left. By a chord the
    slope stays that of the commands before, and the offset alone is evaluated. Their residual from
    a wrench, over the wrench scale; its size. */
-static real linearize_at(const fl_coupled_robot *robot, real *block, fl_work *work,
-                         const real *wrench, real command[][3], int is_chord, real *residual) {
+real fl_linearize_coupled(const fl_coupled_robot *robot, real *block, fl_work *work,
+                          const real *wrench, real command[][3], int is_chord, real *residual) {
   const fl_span *span = &work->span;
   const int n = COUNT(block);
   fl_head *head = (fl_head *)block;
@@ -98,7 +98,7 @@ void fl_coupled_wrench(const fl_coupled_robot *robot, real *block, fl_work *work
   const real *sigma = HEAD(block)->wrench_scale;
   const real nothing[6] = {0};
   real residual[6];
-  linearize_at(robot, block, work, nothing, command, 0, residual);
+  fl_linearize_coupled(robot, block, work, nothing, command, 0, residual);
   for (int k = 0; k < 6; k++) wrench[k] = -residual[k] * sigma[k];
 }
 
@@ -140,7 +140,7 @@ static real step_to_wrench(const fl_coupled_robot *robot, real *block, fl_work *
   const size_t size = (size_t)COUNT(block) * sizeof *command;
   real residual[6];
   real share = 1;
-  real error = linearize_at(robot, block, work, wrench, command, 0, residual);
+  real error = fl_linearize_coupled(robot, block, work, wrench, command, 0, residual);
   for (int k = 0; k < MODEL_STEPS && error > enough; k++) {
     real stepped[FL_MOST][3];
     real nearer[6]; /* than the wrench, by a share of the way */
@@ -151,7 +151,7 @@ static real step_to_wrench(const fl_coupled_robot *robot, real *block, fl_work *
     }
     fl_refine_commands(block, work, box, nearer, stepped, 1);
     const real error_stepped =
-        linearize_at(robot, block, work, wrench, stepped, is_chord, residual_stepped);
+        fl_linearize_coupled(robot, block, work, wrench, stepped, is_chord, residual_stepped);
     if (error_stepped < error) {
       memcpy(command, stepped, size);
       memcpy(residual, residual_stepped, sizeof residual);
@@ -160,7 +160,7 @@ static real step_to_wrench(const fl_coupled_robot *robot, real *block, fl_work *
       continue;
     }
     share *= SHORTEN;
-    linearize_at(robot, block, work, wrench, command, is_chord, residual);
+    fl_linearize_coupled(robot, block, work, wrench, command, is_chord, residual);
   }
   return error;
 }
@@ -170,13 +170,13 @@ real fl_refine_coupled(const fl_coupled_robot *robot, real *block, fl_work *work
   const size_t size = (size_t)COUNT(block) * sizeof *command;
   real residual[6];
   real mu = NEARLY;
-  real error = linearize_at(robot, block, work, wrench, command, 0, residual);
+  real error = fl_linearize_coupled(robot, block, work, wrench, command, 0, residual);
   for (int k = 0; k < most_steps && error > enough; k++) {
     real stepped[FL_MOST][3];
     real residual_stepped[6];
     fl_step_commands(block, work, box, residual, mu, command, stepped);
     const real error_stepped =
-        linearize_at(robot, block, work, wrench, stepped, 0, residual_stepped);
+        fl_linearize_coupled(robot, block, work, wrench, stepped, 0, residual_stepped);
     if (error_stepped <= error) {
       memcpy(command, stepped, size);
       memcpy(residual, residual_stepped, sizeof residual);
@@ -185,7 +185,7 @@ real fl_refine_coupled(const fl_coupled_robot *robot, real *block, fl_work *work
       continue;
     }
     mu = mu * MU_REFUSED + CLOSE;
-    linearize_at(robot, block, work, wrench, command, 0, residual);
+    fl_linearize_coupled(robot, block, work, wrench, command, 0, residual);
   }
   return error;
 }
@@ -216,7 +216,7 @@ static int answer_linear(real *block, fl_work *work, const fl_question *q, int i
 
 /* What an error as large as the wrench scale is worth [W] at multipliers of the wrench: twice
    that makes an exact penalty. */
-static real penalty_at(const real *block, const real *lambda) {
+real fl_exact_penalty(const real *block, const real *lambda) {
   real scaled[6];
   for (int k = 0; k < 6; k++) scaled[k] = lambda[k] * HEAD(block)->wrench_scale[k];
   return 2 * SQRT(dot(scaled, scaled, 6));
@@ -324,16 +324,15 @@ static int step_to_answer(outer_search *search, fl_answer *answer, real merit) {
   return 0;
 }
 
-/* Whether iterations would end at known forces again: an answer of the dual has each line push the
-   same way, and costs no less. */
-static int leads_to_known(const outer_search *search, fl_answer *answer) {
-  const known_end *known = search->known;
-  if (!known) return 0;
-  for (int i = 0; i < COUNT(search->block); i++) {
-    if (answer->force[i][0] * known->force[i][0] < 0) return 0;
+/* Whether iterations would end at known forces again: forces of the dual's answer, and their
+   commands, have each line push the same way, and cost no less. */
+int fl_leads_to_known(const real *block, const fl_work *work, const known_end *known,
+                      real force[][2], real command[][3]) {
+  for (int i = 0; i < COUNT(block); i++) {
+    if (force[i][0] * known->force[i][0] < 0) return 0;
   }
   real unused[FL_MOST][2];
-  const real power = fl_power_of_commands(search->block, search->work, answer->command, unused);
+  const real power = fl_power_of_commands(block, work, command, unused);
   return power >= (1 - MUCH_CHEAPER) * known->power;
 }
 
@@ -344,10 +343,11 @@ static int iterate(outer_search *search, int is_first, fl_answer *out, int *has_
   const int code = answer_linear(search->block, search->work, &search->question, is_first, &answer);
   if (code) return code;
   search->newton_steps += (real)answer.newton_steps;
-  search->is_known = leads_to_known(search, &answer);
+  search->is_known = search->known && fl_leads_to_known(search->block, search->work, search->known,
+                                                        answer.force, answer.command);
   *has_ended = 1;
   if (search->is_known) return FL_OK;
-  search->penalty = larger(search->penalty, penalty_at(search->block, answer.multipliers));
+  search->penalty = larger(search->penalty, fl_exact_penalty(search->block, answer.multipliers));
   const real merit = merit_of(search);
   if (is_first) *out = answer;
   fl_box_of_question(search->block, search->work, &search->question, &search->box);
@@ -370,8 +370,8 @@ static void finish_search(outer_search *search, fl_answer *out) {
   fl_box_of_question(search->block, search->work, q, &search->box);
   fl_commands_for_forces(search->block, &search->box, search->force, q->previous, out->command);
   real unused[6];
-  search->error =
-      linearize_at(search->robot, search->block, search->work, q->wrench, out->command, 1, unused);
+  search->error = fl_linearize_coupled(search->robot, search->block, search->work, q->wrench,
+                                       out->command, 1, unused);
   if (search->error > EXACT) {
     search->error = step_to_wrench(search->robot, search->block, search->work, &search->box,
                                    q->wrench, EXACT, 0, out->command);

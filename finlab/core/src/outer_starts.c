@@ -179,24 +179,32 @@ static int were_known_ways(start_search *search, const fl_byte *way) {
   return 0;
 }
 
-/* Whether a start is not worth a try. By the linear model at the best forces b it comes to
-   b + N (y - b), where each line pushes its way: all as the best forces do, or as others did that
-   were looked at, or some another way at more than that may gain. */
-static int is_pruned(start_search *search, real force[][2]) {
+/* Forces b + N (y - b) to which a start y of lines comes by the linear model at the best forces
+   b. */
+static void move_by_linear_model(const start_search *search, real start[][2], real moved[][2]) {
   const int n = COUNT(search->block);
-  if (!search->may_prune) return 0;
+  for (int i = 0; i < n; i++) {
+    moved[i][0] = search->force[i][0];
+    moved[i][1] = 0;
+    for (int j = 0; j < n; j++) {
+      moved[i][0] += search->null_space[i][j] * (start[j][0] - search->force[j][0]);
+    }
+  }
+}
+
+/* Whether a start is not worth a try. At the forces to which it has moved by the linear model each
+   line pushes its way: all as the best forces do, or as others did that were looked at, or some
+   another way at more than that may gain. */
+static int is_pruned(start_search *search, real moved[][2]) {
+  const int n = COUNT(search->block);
   int turned = 0;
   real cost = 0;
   real gain = 0;
   fl_byte way[FL_MOST] = {0};
   for (int i = 0; i < n; i++) {
     if (search->work->span.is_lost[i]) continue;
-    real moved = search->force[i][0];
-    for (int j = 0; j < n; j++) {
-      moved += search->null_space[i][j] * (force[j][0] - search->force[j][0]);
-    }
-    way[i] = moved > 0;
-    if (moved * search->force[i][0] > 0) continue;
+    way[i] = moved[i][0] > 0;
+    if (moved[i][0] * search->force[i][0] > 0) continue;
     turned++;
     cost += search->turn_cost[i];
     gain += search->turn_gain[i];
@@ -204,6 +212,32 @@ static int is_pruned(start_search *search, real force[][2]) {
   if (turned == 0) return 1;
   if (cost >= SURE * gain) return 1;
   return were_known_ways(search, way);
+}
+
+/* Takes an answer and its forces for the best one. */
+static void keep_best(start_search *search, const fl_outer_result *result, const fl_answer *answer,
+                      real force[][2]) {
+  search->best = *result;
+  *search->answer = *answer;
+  copy_forces(search->block, force, search->force);
+  prepare_pruning(search);
+}
+
+/* Begins Newton's method at the forces to which a start has moved by the linear model, and keeps
+   what comes out better. Returns whether the start is done with. */
+static int is_done_by_newton(start_search *search, real moved[][2]) {
+  fl_answer answer;
+  fl_outer_result result;
+  fl_question question = search->question;
+  question.multipliers = search->answer->multipliers;
+  const known_end best = {search->force, search->best.power};
+  const int status = fl_newton_from(search->robot, search->block, search->work, &question, &best,
+                                    moved, &answer, &result);
+  search->steps_left -= result.steps;
+  if (status == NEWTON_MET && is_better(&result, &search->best)) {
+    keep_best(search, &result, &answer, moved);
+  }
+  return status != NEWTON_LEFT;
 }
 
 /* Moves all starts of a kind to the nearest forces that give the wrench, and keeps the cheapest.
@@ -219,7 +253,11 @@ static int try_starts(start_search *search, int is_reversed, int count, int foll
     tried_start one;
     fl_outer_result result;
     forces_of_start(search, is_reversed, start, one.force);
-    if (is_pruned(search, one.force)) continue;
+    if (search->may_prune) {
+      real moved[FL_MOST][2];
+      move_by_linear_model(search, one.force, moved);
+      if (is_pruned(search, moved) || is_done_by_newton(search, moved)) continue;
+    }
     const int code = fl_outer_iterations(search->robot, search->block, search->work, &question,
                                          &limits, *one.force, 0, &result);
     if (code) return code;
@@ -246,10 +284,7 @@ static int follow_cheapest(start_search *search, int is_reversed, int count, int
     if (search->may_prune) known = &best;
     code = follow(search, known, cheapest[k].force, &answer, &result);
     if (code || !is_better(&result, &search->best)) continue;
-    search->best = result;
-    *search->answer = answer;
-    memcpy(search->force, cheapest[k].force, sizeof search->force);
-    prepare_pruning(search);
+    keep_best(search, &result, &answer, cheapest[k].force);
   }
   *is_cheaper = search->best.power < (1 - CHEAPER) * power_before;
   return code;
@@ -280,8 +315,21 @@ static int answer_by_laws(start_search *search, const fl_question *q, real *lamb
   memcpy(search->force_by_laws, answer->force, sizeof answer->force);
   memcpy(lambda, answer->multipliers, sizeof answer->multipliers);
   *power = fl_power_of_commands(uncoupled, work, answer->command, unused);
-  fl_forget_span(work);
   return FL_OK;
+}
+
+/* The answer from the forces by the laws alone, by Newton's method where that comes to one. Returns
+   an error code. */
+static int find_first_answer(start_search *search) {
+  copy_forces(search->block, search->force_by_laws, search->force);
+  if (fl_has_lines_alone(search->robot->block_uncoupled)) {
+    const int status = fl_newton_from(search->robot, search->block, search->work, &search->question,
+                                      0, search->force, search->answer, &search->best);
+    search->steps_left -= search->best.steps;
+    if (status == NEWTON_MET) return FL_OK;
+    copy_forces(search->block, search->force_by_laws, search->force);
+  }
+  return follow(search, 0, search->force, search->answer, &search->best);
 }
 
 /* The best answer to a question outside of ticks. Returns an error code. */
@@ -300,8 +348,7 @@ static int answer_from_all_starts(const fl_coupled_robot *robot, real *block, fl
   int code = answer_by_laws(&search, q, lambda, &power_by_laws);
   if (code) return code;
   search.question.multipliers = lambda;
-  memcpy(search.force, search.force_by_laws, sizeof search.force);
-  code = follow(&search, 0, search.force, answer, &search.best);
+  code = find_first_answer(&search);
   if (!code && search.best.power > (1 + CHEAPER) * power_by_laws) {
     search.known_count = 0;
     search.may_prune_lines = !robot->inflow && fl_has_lines_alone(robot->block_uncoupled);
