@@ -11,13 +11,16 @@
    no cost that it proves, others are taken from a lattice over the angles of all foils
    (foil_lattice.c), each kept within the branches of the lifts on which it lies. */
 #include "internal.h"
+int getenv_lattice = 0;
 
 #define APPROACH_STEPS 24         /* steps on commands from a start towards a wrench, at most */
 #define APPROACH_ROUND 6          /* the same in a row, which have to halve the error */
 #define EXACT_STEPS 24            /* steps that end them, to rounding */
 #define SURE_STEPS 12             /* the same from forces that the dual is sure of */
 #define STALL_SAMPLES 12          /* angles of a stalled foil that are looked at for its worth */
-#define CHEAPER (R(0.1) * NEARLY) /* share of the cost below which a gain ends the steps */
+#define CHEAPER R(1e-10) /* share of the cost below which a gain ends the steps */
+#define BETTER_THAN_EXPECTED R(1.2)
+#define STEP_LONGER 2
 #define STEP_SHORTER R(0.25)      /* a step that is no cheaper is shortened to this share */
 /* commands that cost more than this times the best are left alone */
 #define WITHIN_BEST R(1.5)
@@ -128,46 +131,138 @@ static void draw_tangents(const real *block, fl_work *work, const fl_box *box, c
   }
 }
 
+/* Adds to the normal equations H lambda = right that a force along a direction b (6,) in the basis
+   has a price, b' lambda = price, with a weight. */
+static void add_price(real H[6][6], real *right, const real *direction, real weight, real price) {
+  fl_add_square(H, direction, weight);
+  for (int j = 0; j < 6; j++) right[j] += weight * price * direction[j];
+}
+
+/* Adds those of a line or a plane at its force, where this may still move. */
+static void add_price_of_force(const real *block, const fl_work *work, int i, const real *force,
+                               real H[6][6], real *right) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  const fl_set *set = work->set + i;
+  const real(*B)[6] = work->span.effectiveness_reduced[i];
+  real size = force[0];
+  if (is_plane(a)) size = size_of(force);
+  if (!(size > set->force_min && size < set->force_max) || size == 0) return;
+  real price;
+  fl_power_and_price(block, i, size, &price);
+  if (size < 0) price = -price;
+  const real slope = fl_limited_response(block, a, set, !is_plane(a), price).slope;
+  if (!is_plane(a)) {
+    add_price(H, right, B[0], slope, price);
+    return;
+  }
+  const real x = force[0] / size;
+  const real y = force[1] / size;
+  real ahead[6];
+  real across[6];
+  for (int j = 0; j < 6; j++) {
+    ahead[j] = x * B[0][j] + y * B[1][j];
+    across[j] = x * B[1][j] - y * B[0][j];
+  }
+  add_price(H, right, ahead, slope, price);
+  add_price(H, right, across, size / larger(price, TINY), 0);
+}
+
+/* Makes multipliers those at which commands are cheapest for what they give, by least squares:
+   each actuator that is not at a limit has its own price there. */
+static void multipliers_at(const real *block, const fl_work *work, real force[][2], real *lambda) {
+  real H[6][6] = {{0}};
+  real right[6] = {0};
+  for (int i = 0; i < COUNT(block); i++) {
+    const fl_set *set = work->set + i;
+    if (work->span.is_lost[i]) continue;
+    if (!is_foil(ACTUATOR(block, i))) {
+      add_price_of_force(block, work, i, force[i], H, right);
+      continue;
+    }
+    const fl_tangent *tangent = work->tangent + i;
+    const real(*B)[6] = work->span.effectiveness_reduced[i];
+    real wrench_slope[6]; /* by the angle */
+    if (!(set->force_min < 0 && set->force_max > 0)) continue;
+    for (int j = 0; j < 6; j++) {
+      wrench_slope[j] = tangent->force_slope[0] * B[0][j] + tangent->force_slope[1] * B[1][j];
+    }
+    add_price(H, right, wrench_slope, 1 / tangent->curvature, tangent->cost_slope);
+  }
+  const real ridge = NOTHING * fl_trace(H) + TINY;
+  for (int j = 0; j < 6; j++) {
+    H[j][j] += ridge;
+    right[j] += ridge * lambda[j];
+  }
+  if (fl_factor(H)) fl_solve(H, right, lambda);
+}
+
+/* What commands of a cost [W] and their forces would cost if they left nothing of the target: the
+   Lagrangian at multipliers in the basis. */
+static real lagrangian(const real *block, const fl_work *work, const real *target_reduced,
+                       const real *lambda, real cost, real force[][2]) {
+  real left[6];
+  memcpy(left, target_reduced, sizeof left);
+  for (int i = 0; i < COUNT(block); i++) {
+    const real(*B)[6] = work->span.effectiveness_reduced[i];
+    for (int j = 0; j < 6; j++) left[j] -= force[i][0] * B[0][j] + force[i][1] * B[1][j];
+  }
+  return cost + dot(lambda, left, 6);
+}
+
 /* Makes commands cheaper, from their forces and cost [W] on, by steps of sequential quadratic
    programming that keep giving work->wrench_wanted; `lambda` becomes that of the last step, and
-   work->state_found the dual of its tangents. Their cost. */
+   work->state_found the dual of its tangents. Their cost, but for what they leave of the target. */
 static real cheapen(const real *block, fl_work *work, const fl_box *box, const real *target_reduced,
                     real most_error, real cost, real *lambda, real command[][3], real force[][2]) {
   real share = 1;
+  real exact_cost = cost;
+  real expected = 0;
   int has_moved = 1;
   for (int k = 0; k < FL_FOIL_STEPS; k++) {
-    if (has_moved) draw_tangents(block, work, box, lambda, command);
-    fl_prepare_sets(block, work);
-    if (has_moved &&
-        fl_dual_newton(block, work, target_reduced, lambda, FL_STEPS_AT_KINK) == FL_MET) {
-      memcpy(lambda, work->state_found->lambda_reduced, sizeof work->state_found->lambda_reduced);
+    if (has_moved) {
+      draw_tangents(block, work, box, lambda, command);
+      fl_prepare_sets(block, work);
+      if (k == 0) multipliers_at(block, work, force, lambda);
+      const int status = fl_dual_newton(block, work, target_reduced, lambda, FL_STEPS_AT_KINK);
+      const fl_state *state = work->state_found;
+      if (status == FL_MET) memcpy(lambda, state->lambda_reduced, sizeof state->lambda_reduced);
+      exact_cost = lagrangian(block, work, target_reduced, state->lambda_reduced, cost, force);
+      expected = exact_cost - state->dual_value;
+      if (status == FL_MET && expected <= CHEAPER * cost) break;
     }
     real stepped[FL_MOST][3];
     real force_stepped[FL_MOST][2];
     copy_commands(block, command, stepped);
     take_step(block, work, box, force, share, stepped);
     real gain = -INFEASIBLE_COST;
+    real cost_stepped = 0;
     if (come_to_give(block, work, box, stepped, EXACT_STEPS, most_error)) {
-      gain = cost - fl_power_of_commands(block, work, stepped, force_stepped);
+      cost_stepped = fl_power_of_commands(block, work, stepped, force_stepped);
+      gain = exact_cost - lagrangian(block, work, target_reduced, work->state_found->lambda_reduced,
+                                     cost_stepped, force_stepped);
     }
     has_moved = gain > 0;
     if (has_moved) {
       copy_commands(block, stepped, command);
       copy_forces(block, force_stepped, force);
-      cost -= gain;
+      cost = cost_stepped;
+      exact_cost -= gain;
+      if (gain > BETTER_THAN_EXPECTED * expected) share = larger(share, 1) * STEP_LONGER;
+      else share = smaller(share, 1);
     } else {
       share *= STEP_SHORTER;
     }
     if (FABS(gain) <= CHEAPER * cost) break;
   }
-  return cost;
+  return exact_cost;
 }
 
 /* Makes commands give work->wrench_wanted, in the basis `target_reduced`, to an error over the
    wrench scale, and then cheaper; `lambda` becomes that of the last step. Their forces along the
    rows, and their cost [W]; INFEASIBLE_COST where they do not come to give it. */
 static real meet_and_cheapen(const real *block, fl_work *work, const real *target_reduced,
-                             real most_error, real *lambda, real command[][3], real force[][2]) {
+                             real most_error, real *lambda, real command[][3],
+                             real force[][2]) {
   fl_box box = work->box;
   fl_set before[FL_MOST];
   copy_sets(block, work->set, before);
@@ -216,6 +311,15 @@ static int may_stall(const real *block, const fl_work *work, int i, int end, rea
   if (!is_foil(a) || work->span.is_lost[i]) return 0;
   const real stall_angle = fl_lift_end(block, a)[1];
   return FABS(*command - a->zero_lift_angle) > stall_angle;
+}
+
+/* Whether some foil may stall within its limits: it then gives more than its table. */
+static int may_any_stall(const real *block, const fl_work *work) {
+  real unused;
+  for (int i = 0; i < COUNT(block); i++) {
+    if (may_stall(block, work, i, 0, &unused) || may_stall(block, work, i, 1, &unused)) return 1;
+  }
+  return 0;
 }
 
 /* How much more than its conjugate in the dual a foil is worth, at the multipliers so far,
@@ -326,6 +430,37 @@ static void improve_from_stalls(const real *block, fl_work *work, const real *ta
   }
 }
 
+/* Improves on the best commands from the vertices of the lifts that the dual leaves between their
+   ends; returns how many there are. */
+static int improve_from_vertices(const real *block, fl_work *work, const real *target_reduced,
+                                 real *best_cost) {
+  foil_vertices vertices;
+  real lambda[6];
+  real found[FL_MOST][2];
+  fl_find_vertices(block, work, &vertices);
+  memcpy(lambda, work->state_found->lambda_reduced, sizeof lambda);
+  copy_forces(block, work->state_found->force, found);
+  int count = 1;
+  for (int vertex = 0; vertex < count; vertex++) {
+    real force[FL_MOST][2];
+    real command[FL_MOST][3];
+    unsigned char is_at_end[VERTEX_FOILS];
+    fl_box box = work->box;
+    copy_forces(block, found, force);
+    count = 1 << fl_go_to_vertex(work, &vertices, vertex, is_at_end, force);
+    fl_commands_for_forces(block, &work->box, force, work->command_previous, command);
+    for (int f = 0; f < vertices.foils; f++) {
+      const int i = vertices.foil[f];
+      if (!is_at_end[f]) continue;
+      box.command_min[i][0] = command[i][0];
+      box.command_max[i][0] = command[i][0];
+    }
+    approach(block, work, &box, command, APPROACH_ROUND);
+    improve_from(block, work, target_reduced, lambda, command, best_cost);
+  }
+  return count;
+}
+
 /* The same as fl_improve_commands of several starts, as steps from a cheap one may end
    early: each has its own valley. work->state_found is of the last steps, too. */
 void fl_improve_from_starts(const real *block, fl_work *work, const real *target_reduced,
@@ -338,7 +473,9 @@ void fl_improve_from_starts(const real *block, fl_work *work, const real *target
   memcpy(lambda, work->state_found->lambda_reduced, sizeof lambda);
   fl_commands_for_forces(block, &work->box, work->state_found->force, work->command_previous,
                          start);
-  fl_improve_commands(block, work, target_reduced, best_cost);
+  const int vertices = improve_from_vertices(block, work, target_reduced, best_cost);
+  (void)vertices;
+  if (!getenv_lattice && !may_any_stall(block,work)) return;
   if (*best_cost <= enough) return;
   improve_from_stalls(block, work, target_reduced, lambda, start, best_cost);
   if (*best_cost <= enough) return;
@@ -371,15 +508,6 @@ int fl_take_sure_forces(const real *block, fl_work *work) {
                          work->best_command);
   const real most_error = error_allowed(block, work, &work->box);
   return come_to_give(block, work, &work->box, work->best_command, SURE_STEPS, most_error);
-}
-
-/* Whether some foil may stall within its limits: it then gives more than its table. */
-static int may_any_stall(const real *block, const fl_work *work) {
-  real unused;
-  for (int i = 0; i < COUNT(block); i++) {
-    if (may_stall(block, work, i, 0, &unused) || may_stall(block, work, i, 1, &unused)) return 1;
-  }
-  return 0;
 }
 
 /* Commands that give the largest share of a wrench that steps come to, Eq. 14: between the
@@ -417,8 +545,7 @@ void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, 
         copy_commands(block, start, command);
       memcpy(lambda, out->lambda_reduced, sizeof lambda);
       real force[FL_MOST][2];
-      is_met = meet_and_cheapen(block, work, target_reduced, EXACT, lambda, command, force) <
-               INFEASIBLE_COST;
+      is_met = meet_and_cheapen(block, work, target_reduced, EXACT, lambda, command, force) < INFEASIBLE_COST;
     }
     if (!is_met) {
       most = ray_share;

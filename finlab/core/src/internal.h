@@ -327,6 +327,18 @@ void fl_commands_of_point(const real *block, const fl_work *work, const foil_lat
                           const real *target_reduced, const lattice_point *point, fl_box *box,
                           real command[][3]);
 
+/* foil_vertices.c: forces of foils that the dual leaves between their ends */
+#define VERTEX_FOILS 6 /* foils between their ends at most; others stay where they are */
+typedef struct {
+  int foils;                    /* how many there are */
+  int foil[VERTEX_FOILS];       /* which actuators these are */
+  real column[VERTEX_FOILS][6]; /* of each: wrench in the basis by its lift along its chord */
+  real size[VERTEX_FOILS];
+} foil_vertices;
+void fl_find_vertices(const real *block, const fl_work *work, foil_vertices *vertices);
+int fl_go_to_vertex(const fl_work *work, const foil_vertices *vertices, int vertex,
+                    unsigned char *is_at_end, real force[][2]);
+
 /* foil_drag.c: commands of robots whose foils drag */
 void fl_improve_commands(const real *block, fl_work *work, const real *target_reduced,
                          real *best_cost);
