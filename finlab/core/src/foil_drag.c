@@ -387,13 +387,17 @@ static const lattice_point *next_point(const lattice_point *points, int count, r
    from many points, then the cheapest of these are made cheaper, but for those that cost
    half as much again as the best so far. */
 static void improve_from_lattice(const real *block, fl_work *work, const real *target_reduced,
-                                 const real *lambda, real enough, real *best_cost) {
+                                 const real *lambda, real enough, const unsigned char *is_spread,
+                                 real *best_cost) {
   const real most_error = error_allowed(block, work, &work->box);
   foil_lattice lattice;
   lattice_point points[LATTICE_STARTS];
   real command[FL_MOST][3];
   fl_lay_lattice(block, work, &lattice);
-  const int count = fl_cheapest_points(block, work, &lattice, target_reduced, points);
+  lattice.known_branch[0] = -2;
+  if (*best_cost < INFEASIBLE_COST && !may_any_stall(block, work)) fl_leave_out_branches(&lattice, work->best_command, is_spread);
+  const int count =
+      fl_cheapest_points(block, work, &lattice, target_reduced, *best_cost * (1 - NOTHING), points);
   for (int k = 0; k < count; k++) {
     real unused[FL_MOST][2];
     begin_at(block, work, &lattice, target_reduced, points + k, command);
@@ -433,11 +437,12 @@ static void improve_from_stalls(const real *block, fl_work *work, const real *ta
 /* Improves on the best commands from the vertices of the lifts that the dual leaves between their
    ends; returns how many there are. */
 static int improve_from_vertices(const real *block, fl_work *work, const real *target_reduced,
-                                 real *best_cost) {
+                                 unsigned char *is_spread, real *best_cost) {
   foil_vertices vertices;
   real lambda[6];
   real found[FL_MOST][2];
   fl_find_vertices(block, work, &vertices);
+  memset(is_spread, 0, (size_t)COUNT(block));
   memcpy(lambda, work->state_found->lambda_reduced, sizeof lambda);
   copy_forces(block, work->state_found->force, found);
   int count = 1;
@@ -458,6 +463,7 @@ static int improve_from_vertices(const real *block, fl_work *work, const real *t
     approach(block, work, &box, command, APPROACH_ROUND);
     improve_from(block, work, target_reduced, lambda, command, best_cost);
   }
+  for (int f = 0; f < vertices.foils && count > 1; f++) is_spread[vertices.foil[f]] = 1;
   return count;
 }
 
@@ -473,18 +479,20 @@ void fl_improve_from_starts(const real *block, fl_work *work, const real *target
   memcpy(lambda, work->state_found->lambda_reduced, sizeof lambda);
   fl_commands_for_forces(block, &work->box, work->state_found->force, work->command_previous,
                          start);
-  const int vertices = improve_from_vertices(block, work, target_reduced, best_cost);
-  (void)vertices;
-  if (!getenv_lattice && !may_any_stall(block,work)) return;
+  unsigned char is_spread[FL_MOST];
+  improve_from_vertices(block, work, target_reduced, is_spread, best_cost);
   if (*best_cost <= enough) return;
+  if (may_any_stall(block, work)) {
   improve_from_stalls(block, work, target_reduced, lambda, start, best_cost);
   if (*best_cost <= enough) return;
-  real unused;
-  fl_first_lambda(block, work, target_reduced, lambda, &unused);
-  fl_dual_start(block, work, target_reduced, lambda);
+  real unused; real lambda1[6];
+  fl_first_lambda(block, work, target_reduced, lambda1, &unused);
+  fl_dual_start(block, work, target_reduced, lambda1);
   fl_improve_commands(block, work, target_reduced, best_cost);
+  }
   if (*best_cost > enough && proved <= most_cost) {
-    improve_from_lattice(block, work, target_reduced, lambda, enough, best_cost);
+    fl_dual_start(block, work, target_reduced, lambda);
+    improve_from_lattice(block, work, target_reduced, lambda, enough, is_spread, best_cost);
   }
 }
 

@@ -6,6 +6,7 @@
 
 #define LATTICE (1 << 2 * LATTICE_FOILS) /* points at most: one on each branch of all foils */
 #define EACH_MOST 6                      /* nodes on a branch */
+#define WORTH_SAMPLES 12                 /* parts of a stalled branch that are looked at */
 #define MISS_WEIGHT 12 /* cost of a miss of 1, over the largest cost of all actuators */
 
 /* Ends of the branches of a foil's lift within its limits; how many branches there are. */
@@ -26,6 +27,56 @@ static int edges_of(const real *block, const fl_work *work, int i, real *edge) {
   branches++;
   edge[branches] = high;
   return branches;
+}
+
+/* What a foil is worth most at prices s on a branch of its lift, between two angles [W]: of a stall
+   as near as so many angles tell, else at an end or where the marginal power is its price. */
+static real worth_on_branch(const real *block, const fl_work *work, int i, const real *s, real low,
+                            real high) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  const real stall_angle = fl_lift_end(block, a)[1];
+  const real middle = (low + high) / 2;
+  const int is_stalled = FABS(middle - a->zero_lift_angle) > stall_angle;
+  int samples = 1;
+  if (is_stalled || a->uncertainty_cost > 0) samples = WORTH_SAMPLES;
+  real worth = -LARGEST_NUMBER;
+  for (int k = 0; k <= samples; k++) {
+    fl_tangent tangent;
+    fl_foil_at(block, i, low + (high - low) * (real)k / (real)samples, &tangent);
+    worth = larger(worth, dot(s, tangent.force, 2) - tangent.cost);
+  }
+  if (is_stalled) return worth;
+  const real r = 1 - s[1] / a->flow_speed; /* of Eq. 19 */
+  if (!(r > 0)) return worth;
+  const line_response lift = fl_limited_response(block, a, work->set + i, 1, s[0] / r);
+  real edge[2];
+  for (int k = 0; k < 2; k++) {
+    fl_tangent tangent;
+    fl_foil_at(block, i, k ? high : low, &tangent);
+    edge[k] = tangent.force[0];
+  }
+  const int is_within = lift.force > smaller(edge[0], edge[1]) &&
+                        lift.force < larger(edge[0], edge[1]);
+  if (!is_within) return worth;
+  fl_tangent rest;
+  fl_foil_at(block, i, a->zero_lift_angle, &rest);
+  return larger(worth, r * (lift.conjugate + rest.cost) - rest.cost);
+}
+
+/* How much less than in the dual a foil is worth at most on each of its branches [W], at the
+   multipliers of work->state_found; below 0 where it is worth more, as it stalls. */
+static void find_regrets(const real *block, const fl_work *work, foil_lattice *lattice) {
+  lattice->dual_value = work->state_found->dual_value;
+  for (int f = 0; f < lattice->foils; f++) {
+    const int i = lattice->foil[f];
+    real s[2];
+    actuator_price(work, i, work->state_found->lambda_reduced, s);
+    const real known = fl_response(block, i, work->set + i, s).conjugate;
+    for (int b = 0; b < lattice->branches[f]; b++) {
+      const real *edge = lattice->edge[f] + b;
+      lattice->regret[f][b] = known - worth_on_branch(block, work, i, s, edge[0], edge[1]);
+    }
+  }
 }
 
 /* How many nodes each branch has: as many as the lattice has room for. */
@@ -186,10 +237,52 @@ static lattice_point cheapest_of_choice(const real *block, const fl_work *work,
   return best;
 }
 
+/* The branch of a foil in a choice of branches, numbered in mixed radix. */
+static int branch_in_choice(const foil_lattice *lattice, int choice, int foil) {
+  for (int f = 0; f < foil; f++) choice /= lattice->branches[f];
+  return choice % lattice->branches[foil];
+}
+
+/* The cost below which nothing on a choice of branches is, as the dual proves [W]. */
+static real least_cost_of_choice(const foil_lattice *lattice, int choice) {
+  real least = lattice->dual_value;
+  for (int f = 0; f < lattice->foils; f++) {
+    least += lattice->regret[f][branch_in_choice(lattice, choice, f)];
+  }
+  return least;
+}
+
+/* Whether a choice of branches is that of commands which are known, but for foils whose branches
+   do not count. */
+static int is_known(const foil_lattice *lattice, int choice) {
+  if (lattice->known_branch[0] == -2) return 0;
+  for (int f = 0; f < lattice->foils; f++) {
+    if (lattice->known_branch[f] < 0) continue;
+    if (lattice->known_branch[f] != branch_in_choice(lattice, choice, f)) return 0;
+  }
+  return 1;
+}
+
+/* Notes that commands (n, 3) are known: no point is on their branches; of foils that are marked
+   (n,) any branch is. */
+void fl_leave_out_branches(foil_lattice *lattice, real command[][3],
+                           const unsigned char *is_on_any) {
+  for (int f = 0; f < lattice->foils; f++) {
+    const int i = lattice->foil[f];
+    lattice->known_branch[f] = -1;
+    if (is_on_any[i]) continue;
+    int branch = 0;
+    while (branch + 1 < lattice->branches[f] && command[i][0] > lattice->edge[f][branch + 1]) {
+      branch++;
+    }
+    lattice->known_branch[f] = branch;
+  }
+}
+
 /* The cheapest point of each choice of branches, and of these the cheapest ones
-   (LATTICE_STARTS,); how many there are. */
+   (LATTICE_STARTS,), but for choices that cost more than is of use; how many there are. */
 int fl_cheapest_points(const real *block, const fl_work *work, const foil_lattice *lattice,
-                       const real *target_reduced, lattice_point *points) {
+                       const real *target_reduced, real cost_of_use, lattice_point *points) {
   int choices = 1;
   int points_of_choice = 1;
   for (int f = 0; f < lattice->foils; f++) {
@@ -198,6 +291,8 @@ int fl_cheapest_points(const real *block, const fl_work *work, const foil_lattic
   }
   int count = 0;
   for (int choice = 0; choice < choices; choice++) {
+    if (least_cost_of_choice(lattice, choice) >= cost_of_use) continue;
+    if (is_known(lattice, choice)) continue;
     const lattice_point best =
         cheapest_of_choice(block, work, lattice, target_reduced, choice, points_of_choice);
     count = put_in_order(points, count, &best);
@@ -207,6 +302,7 @@ int fl_cheapest_points(const real *block, const fl_work *work, const foil_lattic
 
 void fl_lay_lattice(const real *block, const fl_work *work, foil_lattice *lattice) {
   find_branches(block, work, lattice);
+  find_regrets(block, work, lattice);
   lay_nodes(block, work, lattice);
   lay_rows(block, work, lattice);
 }

@@ -310,6 +310,9 @@ typedef struct {
   int branches[LATTICE_FOILS];            /* of each foil */
   int first[LATTICE_FOILS];               /* its first node */
   int each;                               /* nodes on a branch */
+  real dual_value;                        /* at the multipliers of regrets [W] */
+  real regret[LATTICE_FOILS][BRANCHES];   /* of each branch: worth that it has less [W] */
+  int known_branch[LATTICE_FOILS];        /* of each foil in known commands; -1: any */
   real edge[LATTICE_FOILS][BRANCHES + 1]; /* ends of the branches [rad] */
   real angle[LATTICE_NODES];              /* of each node [rad] */
   real cost[LATTICE_NODES];               /* of each node [W] */
@@ -322,7 +325,9 @@ typedef struct {
 } lattice_point;
 void fl_lay_lattice(const real *block, const fl_work *work, foil_lattice *lattice);
 int fl_cheapest_points(const real *block, const fl_work *work, const foil_lattice *lattice,
-                       const real *target_reduced, lattice_point *points);
+                       const real *target_reduced, real cost_of_use, lattice_point *points);
+void fl_leave_out_branches(foil_lattice *lattice, real command[][3],
+                           const unsigned char *is_on_any);
 void fl_commands_of_point(const real *block, const fl_work *work, const foil_lattice *lattice,
                           const real *target_reduced, const lattice_point *point, fl_box *box,
                           real command[][3]);
