@@ -124,10 +124,10 @@ void fl_restore_sets(const real *block, fl_work *work, const fl_set *set) {
   fl_prepare_sets(block, work);
 }
 
-/* Size of a force, or of a price, along one direction or in a plane. */
+/* Size of a force, or of a price, along one direction or in a plane; of a foil that of its lift. */
 static real length(const fl_actuator *a, const real *vector) {
-  if (a->rows == 1) return FABS(vector[0]);
-  return size_of(vector);
+  if (is_plane(a)) return size_of(vector);
+  return FABS(vector[0]);
 }
 
 /* Evaluates the dual at multipliers, for a target in the basis: its value, its gradient and
@@ -151,11 +151,9 @@ void fl_dual_at(const real *block, const fl_work *work, const real *target_reduc
     state->push_angle[i] = answer.angle;
     const real size_s = length(a, s);
     const real size_y = length(a, y);
-    state->secant[i] = 0;
-    if (!work->has_drag) { /* |y| / |s| of S, Eq. 9; near rest that of quadratic costs */
-      const real price_quadratic = a->row_force_max[0] / a->secant[0];
-      state->secant[i] = size_y / larger(size_s, price_quadratic);
-    }
+    /* |y| / |s| of S, Eq. 9; near rest that of quadratic costs */
+    const real price_quadratic = a->row_force_max[0] / a->secant[0];
+    state->secant[i] = size_y / larger(size_s, price_quadratic);
     conjugate += answer.conjugate;
     const real(*B)[6] = work->span.effectiveness_reduced[i];
     for (int j = 0; j < 6; j++) wrench[j] += y[0] * B[0][j] + y[1] * B[1][j];
@@ -184,12 +182,6 @@ static void add_plane(real H[6][6], const real *bx, const real *by, real xx, rea
   }
 }
 
-/* c of Eq. 8. */
-static real share_of_metric(const fl_work *work) {
-  if (work->has_drag) return 1; /* S is left out there */
-  return SATURATED;
-}
-
 /* Solves (G_mu + mu c max(tr G_mu, tau) M) step = r with G_mu = G + mu S, Eq. 8; 0 where that is
    singular to rounding. Also max(tr G_mu, tau). */
 static int newton_step(const real *block, const fl_work *work, const fl_state *at, real mu,
@@ -200,14 +192,15 @@ static int newton_step(const real *block, const fl_work *work, const fl_state *a
     const real *dy_ds = at->dy_ds[i];
     const real xx = dy_ds[0] + mu * at->secant[i];
     const real xy = dy_ds[1];
-    const real yy = dy_ds[2] + mu * at->secant[i];
+    real yy = dy_ds[2];
+    if (is_plane(ACTUATOR(block, i))) yy += mu * at->secant[i];
     if (ACTUATOR(block, i)->rows != 1)
       add_plane(H, B[0], B[1], xx, xy, yy);
     else if (xx > 0)
       fl_add_square(H, B[0], xx);
   }
   *trace = larger(fl_trace(H), work->trace_min);
-  const real weight = share_of_metric(work) * mu * *trace; /* of M */
+  const real weight = SATURATED * mu * *trace; /* of M */
   for (int row = 0; row < 6; row++) {
     for (int col = 0; col <= row; col++) H[row][col] += weight * work->metric[row][col];
   }
@@ -232,7 +225,7 @@ static real damping_along(const real *block, const fl_work *work, const fl_state
       of_metric += 2 * work->metric[row][col] * step[row] * step[col];
     }
   }
-  return sum + share_of_metric(work) * trace * of_metric;
+  return sum + SATURATED * trace * of_metric;
 }
 
 /* How many responses jump between two states a step apart; where wanted they are marked as
@@ -309,6 +302,40 @@ static real mu_after_refused(real mu, real nu, const step_result *result, real d
   return larger(larger(mu * nu, mu + more), ROUNDING);
 }
 
+/* Where along a step (0 to 1) the dual value is largest, if that is where the lift of a foil jumps
+   from one end to the other, as its drag is welcome; 0 where it is not. A jump takes from the slope
+   along the step what the force of the foil changes. */
+static real share_to_jump(const real *block, const fl_work *work, const real *step,
+                          const step_result *result, const fl_state *from, const fl_state *to) {
+  real slope = result->slope_begin;
+  real last_share = 0;
+  for (;;) {
+    real share = 1; /* of the next jump */
+    real drop = 0;
+    for (int i = 0; i < COUNT(block); i++) {
+      if (!is_foil(ACTUATOR(block, i)) || work->span.is_lost[i] || work->set[i].tangent) continue;
+      real s[2];
+      real s_change[2];
+      const real change = to->force[i][0] - from->force[i][0];
+      const real most = work->set[i].force_max - work->set[i].force_min;
+      if (FABS(change) < most / 2) continue;
+      actuator_price(work, i, from->lambda_reduced, s);
+      actuator_price(work, i, step, s_change);
+      const real chord = (work->set[i].cost_at_max - work->set[i].cost_at_min) / most;
+      const real U = ACTUATOR(block, i)->flow_speed;
+      const real from_jump = s[0] + (s[1] / U - 1) * chord;
+      const real jump_share = -from_jump / (s_change[0] + s_change[1] / U * chord);
+      if (!(jump_share > last_share && jump_share < share)) continue;
+      share = jump_share;
+      drop = s_change[0] * change + s_change[1] * (to->force[i][1] - from->force[i][1]);
+    }
+    if (!(share < 1)) return 0;
+    slope -= drop;
+    if (slope <= 0) return share;
+    last_share = share;
+  }
+}
+
 /* Newton's method from multipliers on, or from its own first ones where there are none.
    work->state_found is the dual at the multipliers that it comes to, however it ends. Returns
    FL_MET, FL_BEYOND (also where all answers take more than work->power_of_use) or
@@ -374,6 +401,22 @@ int fl_dual_newton(const real *block, fl_work *work, const real *target_reduced,
       trial = at;
       at = work->state_found;
     } else {
+      const real share = work->has_drag ? share_to_jump(block, work, step, &result, at, trial) : 0;
+      if (share > 0) {
+        for (int j = 0; j < 6; j++) {
+          step[j] *= share;
+          lambda_next[j] = at->lambda_reduced[j] + step[j];
+        }
+        fl_dual_at(block, work, target_reduced, lambda_next, trial);
+        const step_result shorter = judged_step(step, at, trial);
+        if (is_kept(&shorter, at, trial)) {
+          nu = 2;
+          work->state_found = trial;
+          trial = at;
+          at = work->state_found;
+          continue;
+        }
+      }
       real damping = 0;
       if (!work->has_kinks) damping = damping_along(block, work, at, trace, step);
       mu = mu_after_refused(mu, nu, &result, damping);

@@ -103,6 +103,11 @@ void fl_first_lambda(const real *block, const fl_work *work, const real *target_
     if (share > NEAR_LIMIT) *mu = MU_NEAR_LIMIT;
   }
   solve_regular(H, NOTHING, target_reduced, lambda); /* regular behind the range, too */
+  for (int i = 0; i < COUNT(block) && work->has_drag; i++) {
+    real s[2];
+    actuator_price(work, i, lambda, s);
+    if (is_foil(ACTUATOR(block, i)) && s[1] > ACTUATOR(block, i)->flow_speed) *mu = MU_NEAR_LIMIT;
+  }
 }
 
 /* Price [W/N] from which on an actuator gives its largest force. */
