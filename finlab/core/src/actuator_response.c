@@ -14,7 +14,7 @@
 #include "internal.h"
 
 #define SOFT R(0.2)        /* rho of Eq. 20: r of a foil below which it is softened */
-#define SOFT_LEAST R(0.02) /* q of Eq. 20 over rho: at least, so that Newton's method sees a slope */
+#define SOFT_LEAST R(0.005) /* q of Eq. 20 over rho: at least, so that Newton's method sees a slope */
 
 /* A direction in which a plane may push. */
 typedef struct {

@@ -11,7 +11,6 @@
    no cost that it proves, others are taken from a lattice over the angles of all foils
    (foil_lattice.c), each kept within the branches of the lifts on which it lies. */
 #include "internal.h"
-int getenv_lattice = 0;
 
 #define APPROACH_STEPS 24         /* steps on commands from a start towards a wrench, at most */
 #define APPROACH_ROUND 6          /* the same in a row, which have to halve the error */
@@ -30,6 +29,13 @@ int getenv_lattice = 0;
 static int has_gap(const fl_actuator *a, const fl_set *set) {
   if (is_plane(a)) return set->is_forked || set->force_max_reverse > 0;
   return a->dead_band > 0;
+}
+
+static int any_gap(const real *block, const fl_work *work) {
+  for (int i = 0; i < COUNT(block); i++) {
+    if (has_gap(ACTUATOR(block, i), work->set + i)) return 1;
+  }
+  return 0;
 }
 
 /* Narrows sets and limits of other actuators to the side of a gap on which their forces are. */
@@ -87,15 +93,16 @@ static int are_few(const real *block, const fl_work *work, const fl_box *box) {
 }
 
 /* Steps towards work->wrench_wanted, of which so many in a row have to halve the error: most starts
-   end soon. */
-static void approach(const real *block, fl_work *work, const fl_box *box, real command[][3],
+   end soon. The error over the wrench scale that is left. */
+static real approach(const real *block, fl_work *work, const fl_box *box, real command[][3],
                      int steps) {
   real error = LARGEST_NUMBER;
   for (int k = 0; k < APPROACH_STEPS; k += steps) {
     const real before = error;
     error = fl_refine_commands(block, work, box, work->wrench_wanted, command, steps);
-    if (error <= EXACT || error > before / 2) return;
+    if (error <= EXACT || error > before / 2) break;
   }
+  return error;
 }
 
 /* Whether so many Levenberg-Marquardt steps make commands within a box give work->wrench_wanted,
@@ -105,11 +112,11 @@ static int come_to_give(const real *block, fl_work *work, const fl_box *box, rea
                         int steps, real most_error) {
   real size = 0;
   for (int k = 0; k < 6; k++) size += FABS(work->wrench_wanted[k]) / HEAD(block)->wrench_scale[k];
-  if (most_error > EXACT) {
-    approach(block, work, box, command, APPROACH_ROUND);
-    steps = 0;
-  }
-  const real error = fl_refine_commands(block, work, box, work->wrench_wanted, command, steps);
+  real error;
+  if (most_error > EXACT)
+    error = approach(block, work, box, command, APPROACH_ROUND);
+  else
+    error = fl_refine_commands(block, work, box, work->wrench_wanted, command, steps);
   return error <= most_error + ROUNDING * size;
 }
 
@@ -223,6 +230,9 @@ static real cheapen(const real *block, fl_work *work, const fl_box *box, const r
       draw_tangents(block, work, box, lambda, command);
       fl_prepare_sets(block, work);
       if (k == 0) multipliers_at(block, work, force, lambda);
+      fl_dual_start(block, work, target_reduced, lambda);
+      exact_cost = lagrangian(block, work, target_reduced, lambda, cost, force);
+      if (exact_cost - work->state_found->dual_value <= CHEAPER * cost) break;
       const int status = fl_dual_newton(block, work, target_reduced, lambda, FL_STEPS_AT_KINK);
       const fl_state *state = work->state_found;
       if (status == FL_MET) memcpy(lambda, state->lambda_reduced, sizeof state->lambda_reduced);
@@ -266,8 +276,10 @@ static real meet_and_cheapen(const real *block, fl_work *work, const real *targe
   fl_box box = work->box;
   fl_set before[FL_MOST];
   copy_sets(block, work->set, before);
-  fl_power_of_commands(block, work, command, force);
-  take_sides(block, work, &box, command, force);
+  if (any_gap(block, work)) {
+    fl_power_of_commands(block, work, command, force);
+    take_sides(block, work, &box, command, force);
+  }
   real cost = INFEASIBLE_COST;
   if (come_to_give(block, work, &box, command, EXACT_STEPS, most_error)) {
     cost = fl_power_of_commands(block, work, command, force);
@@ -436,7 +448,7 @@ static void improve_from_stalls(const real *block, fl_work *work, const real *ta
 
 /* Improves on the best commands from the vertices of the lifts that the dual leaves between their
    ends; returns how many there are. */
-static int improve_from_vertices(const real *block, fl_work *work, const real *target_reduced,
+static void improve_from_vertices(const real *block, fl_work *work, const real *target_reduced,
                                  unsigned char *is_spread, real *best_cost) {
   foil_vertices vertices;
   real lambda[6];
@@ -464,7 +476,14 @@ static int improve_from_vertices(const real *block, fl_work *work, const real *t
     improve_from(block, work, target_reduced, lambda, command, best_cost);
   }
   for (int f = 0; f < vertices.foils && count > 1; f++) is_spread[vertices.foil[f]] = 1;
-  return count;
+}
+
+/* Whether a foil that works is not among marked ones (n,). */
+static int any_other_foil(const real *block, const fl_work *work, const unsigned char *is_marked) {
+  for (int i = 0; i < COUNT(block); i++) {
+    if (is_foil(ACTUATOR(block, i)) && !work->span.is_lost[i] && !is_marked[i]) return 1;
+  }
+  return 0;
 }
 
 /* The same as fl_improve_commands of several starts, as steps from a cheap one may end
@@ -474,21 +493,27 @@ void fl_improve_from_starts(const real *block, fl_work *work, const real *target
   real most_cost;
   const real proved = proved_value(block, work, &most_cost);
   const real enough = proved * (1 + CLOSE);
+  const int stalls = may_any_stall(block, work);
+  unsigned char is_spread[FL_MOST];
   real start[FL_MOST][3];
   real lambda[6];
   memcpy(lambda, work->state_found->lambda_reduced, sizeof lambda);
-  fl_commands_for_forces(block, &work->box, work->state_found->force, work->command_previous,
-                         start);
-  unsigned char is_spread[FL_MOST];
+  if (stalls) {
+    fl_commands_for_forces(block, &work->box, work->state_found->force, work->command_previous,
+                           start);
+  }
   improve_from_vertices(block, work, target_reduced, is_spread, best_cost);
   if (*best_cost <= enough) return;
-  if (may_any_stall(block, work)) {
-  improve_from_stalls(block, work, target_reduced, lambda, start, best_cost);
-  if (*best_cost <= enough) return;
-  real unused; real lambda1[6];
-  fl_first_lambda(block, work, target_reduced, lambda1, &unused);
-  fl_dual_start(block, work, target_reduced, lambda1);
-  fl_improve_commands(block, work, target_reduced, best_cost);
+  if (stalls) {
+    improve_from_stalls(block, work, target_reduced, lambda, start, best_cost);
+    if (*best_cost <= enough) return;
+    real lambda_first[6];
+    real unused;
+    fl_first_lambda(block, work, target_reduced, lambda_first, &unused);
+    fl_dual_start(block, work, target_reduced, lambda_first);
+    fl_improve_commands(block, work, target_reduced, best_cost);
+  } else if (!any_other_foil(block, work, is_spread)) {
+    return;
   }
   if (*best_cost > enough && proved <= most_cost) {
     fl_dual_start(block, work, target_reduced, lambda);

@@ -162,7 +162,8 @@ int fl_search_gaps(const real *block, fl_work *work, const real *target_reduced,
     fl_improve_from_starts(block, work, target_reduced, &best_cost);
     fl_dual_start(block, work, target_reduced, lambda_begin);
   }
-  dive(block, work, target_reduced, status, &best_cost);
+  const int worst = fl_worst_gap(block, work, work->state_found->force, lambda_begin);
+  if (!(worst >= 0 && is_foil(ACTUATOR(block, worst)) && best_cost < INFEASIBLE_COST)) dive(block, work, target_reduced, status, &best_cost);
   fl_restore_sets(block, work, work->set_before);
   fl_dual_start(block, work, target_reduced, lambda_begin);
   status = status_begin;
