@@ -395,6 +395,27 @@ static const lattice_point *next_point(const lattice_point *points, int count, r
   return next;
 }
 
+/* Whether the dual proves that commands on the branches of a point of a lattice cost more than is
+   of use, from multipliers on. It says nothing of foils that stall there. */
+static int is_proved_dearer(const real *block, fl_work *work, const foil_lattice *lattice,
+                            const real *target_reduced, const real *lambda,
+                            const lattice_point *point, real cost_of_use) {
+  fl_set before[FL_MOST];
+  if (!(cost_of_use < INFEASIBLE_COST)) return 0;
+  copy_sets(block, work->set, before);
+  const int is_known = fl_sets_of_point(block, work, lattice, point);
+  int status = FL_MET;
+  if (is_known) {
+    const real power_of_use = work->power_of_use;
+    fl_prepare_sets(block, work);
+    work->power_of_use = smaller(power_of_use, cost_of_use);
+    status = fl_dual_newton(block, work, target_reduced, lambda, FL_STEPS_AT_KINK);
+    work->power_of_use = power_of_use;
+  }
+  fl_restore_sets(block, work, before);
+  return status == FL_BEYOND;
+}
+
 /* Improves on the best commands by what steps from a lattice come to: first exact commands
    from many points, then the cheapest of these are made cheaper, but for those that cost
    half as much again as the best so far. */
@@ -412,8 +433,11 @@ static void improve_from_lattice(const real *block, fl_work *work, const real *t
       fl_cheapest_points(block, work, &lattice, target_reduced, *best_cost * (1 - NOTHING), points);
   for (int k = 0; k < count; k++) {
     real unused[FL_MOST][2];
-    begin_at(block, work, &lattice, target_reduced, points + k, command);
     points[k].cost = INFEASIBLE_COST;
+    if (is_proved_dearer(block, work, &lattice, target_reduced, lambda, points + k, *best_cost)) {
+      continue;
+    }
+    begin_at(block, work, &lattice, target_reduced, points + k, command);
     if (come_to_give(block, work, &work->box, command, 0, most_error)) {
       points[k].cost = fl_power_of_commands(block, work, command, unused);
     }

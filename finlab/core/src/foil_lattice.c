@@ -324,3 +324,27 @@ void fl_commands_of_point(const real *block, const fl_work *work, const foil_lat
     box->command_max[i][0] = lattice->edge[f][branch + 1];
   }
 }
+
+/* Leaves of the sets of the foils what their branches at a point give; 0 where a foil stalls there,
+   of which sets do not know. */
+int fl_sets_of_point(const real *block, fl_work *work, const foil_lattice *lattice,
+                     const lattice_point *point) {
+  for (int f = 0; f < lattice->foils; f++) {
+    const int i = lattice->foil[f];
+    const fl_actuator *a = ACTUATOR(block, i);
+    const int branch = (point->node[f] - lattice->first[f]) / lattice->each;
+    real lift[2];
+    for (int end = 0; end < 2; end++) {
+      fl_tangent tangent;
+      fl_foil_at(block, i, lattice->edge[f][branch + end], &tangent);
+      lift[end] = tangent.force[0];
+    }
+    const real middle = (lattice->edge[f][branch] + lattice->edge[f][branch + 1]) / 2;
+    if (FABS(middle - a->zero_lift_angle) > fl_lift_end(block, a)[1]) return 0;
+    const real low = smaller(lift[0], lift[1]);
+    const real high = larger(lift[0], lift[1]);
+    fl_limit_set(block, i, work->set + i, larger(low, work->set[i].force_min),
+                 smaller(high, work->set[i].force_max), 0, 0);
+  }
+  return 1;
+}

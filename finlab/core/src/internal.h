@@ -326,6 +326,8 @@ typedef struct {
 void fl_lay_lattice(const real *block, const fl_work *work, foil_lattice *lattice);
 int fl_cheapest_points(const real *block, const fl_work *work, const foil_lattice *lattice,
                        const real *target_reduced, real cost_of_use, lattice_point *points);
+int fl_sets_of_point(const real *block, fl_work *work, const foil_lattice *lattice,
+                     const lattice_point *point);
 void fl_leave_out_branches(foil_lattice *lattice, real command[][3],
                            const unsigned char *is_on_any);
 void fl_commands_of_point(const real *block, const fl_work *work, const foil_lattice *lattice,
