@@ -257,8 +257,8 @@ static real cheapen(const real *block, fl_work *work, const fl_box *box, const r
       copy_forces(block, force_stepped, force);
       cost = cost_stepped;
       exact_cost -= gain;
-      if (gain > BETTER_THAN_EXPECTED * expected) share = larger(share, 1) * STEP_LONGER;
-      else share = smaller(share, 1);
+      share = STEP_LONGER * share;
+      if (!(gain > BETTER_THAN_EXPECTED * expected)) share = smaller(share, 1);
     } else {
       share *= STEP_SHORTER;
     }
@@ -427,14 +427,16 @@ static void improve_from_lattice(const real *block, fl_work *work, const real *t
   lattice_point points[LATTICE_STARTS];
   real command[FL_MOST][3];
   fl_lay_lattice(block, work, &lattice);
+  int any_spread = 0;
+  for (int i = 0; i < COUNT(block); i++) any_spread |= is_spread[i];
   lattice.known_branch[0] = -2;
-  if (*best_cost < INFEASIBLE_COST && !may_any_stall(block, work)) fl_leave_out_branches(&lattice, work->best_command, is_spread);
+  if (*best_cost < INFEASIBLE_COST && any_spread && !may_any_stall(block, work)) fl_leave_out_branches(&lattice, work->best_command, is_spread);
   const int count =
-      fl_cheapest_points(block, work, &lattice, target_reduced, *best_cost * (1 - NOTHING), points);
+      fl_cheapest_points(block, work, &lattice, target_reduced, may_any_stall(block,work) ? *best_cost * WITHIN_BEST : *best_cost * (1 - NOTHING), points);
   for (int k = 0; k < count; k++) {
     real unused[FL_MOST][2];
     points[k].cost = INFEASIBLE_COST;
-    if (is_proved_dearer(block, work, &lattice, target_reduced, lambda, points + k, *best_cost)) {
+    if (!may_any_stall(block, work) && is_proved_dearer(block, work, &lattice, target_reduced, lambda, points + k, *best_cost)) {
       continue;
     }
     begin_at(block, work, &lattice, target_reduced, points + k, command);
@@ -500,6 +502,19 @@ static void improve_from_vertices(const real *block, fl_work *work, const real *
     improve_from(block, work, target_reduced, lambda, command, best_cost);
   }
   for (int f = 0; f < vertices.foils && count > 1; f++) is_spread[vertices.foil[f]] = 1;
+  for (int k = 0; k < 2 * vertices.foils && count == 1; k++) {
+    real force[FL_MOST][2];
+    real command[FL_MOST][3];
+    const int i = vertices.foil[k / 2];
+    fl_box box = work->box;
+    copy_forces(block, found, force);
+    force[i][0] = k % 2 ? work->set[i].force_max : work->set[i].force_min;
+    fl_commands_for_forces(block, &work->box, force, work->command_previous, command);
+      box.command_min[i][0] = command[i][0];
+      box.command_max[i][0] = command[i][0];
+    approach(block, work, &box, command, APPROACH_ROUND);
+    improve_from(block, work, target_reduced, lambda, command, best_cost);
+  }
 }
 
 /* Whether a foil that works is not among marked ones (n,). */
