@@ -13,8 +13,8 @@
    Prices are in W/N along the actuator's own rows, forces in N. */
 #include "internal.h"
 
-#define SOFT R(0.2)        /* rho of Eq. 20: r of a foil below which it is softened */
-#define SOFT_LEAST R(0.005) /* q of Eq. 20 over rho: at least, so that Newton's method sees a slope */
+#define SOFT R(0.2)         /* rho of Eq. 20: r of a foil below which it is softened */
+#define SOFT_LEAST R(0.005) /* epsilon of Eq. 20: least q over rho */
 
 /* A direction in which a plane may push. */
 typedef struct {

@@ -10,8 +10,9 @@
        (G_mu + mu c max(tr G_mu, tau) M) step = r    with    G_mu = G + mu S
 
    S = sum B (|y|/|s|) B' is the same as G, but of forces over prices, which limits leave as
-   they are. M is the Hessian of quadratic costs over its mean, and tau a millionth of that
-   Hessian's trace (trace_min). c is SATURATED; where foils drag, S is left out and c is 1.
+   they are; of a foil it is that of its lift. M is the Hessian of quadratic costs over its mean,
+   and tau a millionth of that Hessian's trace (trace_min). c is SATURATED. A step that goes too
+   far ends where the lift of a foil jumps, if the dual value is largest there.
    Vectors in the basis have 6 numbers, those behind its range are 0.
 
        lambda  multipliers of the wrench, in the basis of driven directions [W]    Eq. 3
@@ -302,38 +303,68 @@ static real mu_after_refused(real mu, real nu, const step_result *result, real d
   return larger(larger(mu * nu, mu + more), ROUNDING);
 }
 
-/* Where along a step (0 to 1) the dual value is largest, if that is where the lift of a foil jumps
-   from one end to the other, as its drag is welcome; 0 where it is not. A jump takes from the slope
-   along the step what the force of the foil changes. */
+/* Where a foil responds at the middle of a jump along a step of multipliers, as a share of it: the
+   lift of one whose drag is welcome jumps between its ends, where the price of lift and drag along
+   its chord is that of its power. LARGEST_NUMBER where it does not jump. */
+static real share_at_jump(const real *block, const fl_work *work, int i, const real *step,
+                          const fl_state *from, const fl_state *to) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  const fl_set *set = work->set + i;
+  const real range = set->force_max - set->force_min;
+  const real change = to->force[i][0] - from->force[i][0];
+  if (!is_foil(a) || set->tangent || !(FABS(change) > range / 2)) return LARGEST_NUMBER;
+  const real power_slope = (set->cost_at_max - set->cost_at_min) / range; /* of the chord */
+  const real drag_slope = power_slope / a->flow_speed;
+  real s[2];
+  real ds[2];
+  actuator_price(work, i, from->lambda_reduced, s);
+  actuator_price(work, i, step, ds);
+  const real price = s[0] + drag_slope * s[1] - power_slope; /* of lift, along the chord */
+  return -price / (ds[0] + drag_slope * ds[1]);
+}
+
+/* The share of a step (0 to 1) at which the dual value is largest, where that is at the jump of a
+   foil; 0 where it is not. Each jump takes from the slope along the step what it changes. */
 static real share_to_jump(const real *block, const fl_work *work, const real *step,
                           const step_result *result, const fl_state *from, const fl_state *to) {
   real slope = result->slope_begin;
   real last_share = 0;
-  for (;;) {
+  while (slope > 0) {
     real share = 1; /* of the next jump */
-    real drop = 0;
+    real drop = 0;  /* of the slope there */
     for (int i = 0; i < COUNT(block); i++) {
-      if (!is_foil(ACTUATOR(block, i)) || work->span.is_lost[i] || work->set[i].tangent) continue;
-      real s[2];
-      real s_change[2];
-      const real change = to->force[i][0] - from->force[i][0];
-      const real most = work->set[i].force_max - work->set[i].force_min;
-      if (FABS(change) < most / 2) continue;
-      actuator_price(work, i, from->lambda_reduced, s);
-      actuator_price(work, i, step, s_change);
-      const real chord = (work->set[i].cost_at_max - work->set[i].cost_at_min) / most;
-      const real U = ACTUATOR(block, i)->flow_speed;
-      const real from_jump = s[0] + (s[1] / U - 1) * chord;
-      const real jump_share = -from_jump / (s_change[0] + s_change[1] / U * chord);
+      const real jump_share = share_at_jump(block, work, i, step, from, to);
       if (!(jump_share > last_share && jump_share < share)) continue;
+      real ds[2];
+      actuator_price(work, i, step, ds);
+      const real d_lift = to->force[i][0] - from->force[i][0];
+      const real d_drag = to->force[i][1] - from->force[i][1];
       share = jump_share;
-      drop = s_change[0] * change + s_change[1] * (to->force[i][1] - from->force[i][1]);
+      drop = ds[0] * d_lift + ds[1] * d_drag;
     }
     if (!(share < 1)) return 0;
     slope -= drop;
-    if (slope <= 0) return share;
     last_share = share;
   }
+  return last_share;
+}
+
+/* Makes a trial that was refused the dual at the jump of a foil along its step, where the value is
+   largest there. Returns whether it is kept. */
+static int is_kept_at_jump(const real *block, const fl_work *work, const real *target_reduced,
+                           const real *step, const step_result *result, const fl_state *at,
+                           fl_state *trial) {
+  const real share = share_to_jump(block, work, step, result, at, trial);
+  if (!(share > 0)) return 0;
+  real shorter[6];
+  real lambda[6];
+  for (int j = 0; j < 6; j++) {
+    shorter[j] = share * step[j];
+    lambda[j] = at->lambda_reduced[j] + shorter[j];
+  }
+  fl_dual_at(block, work, target_reduced, lambda, trial);
+  const step_result of_shorter = judged_step(shorter, at, trial);
+  return is_kept(&of_shorter, at, trial);
 }
 
 /* Newton's method from multipliers on, or from its own first ones where there are none.
@@ -394,29 +425,18 @@ int fl_dual_newton(const real *block, fl_work *work, const real *target_reduced,
       }
     }
     const step_result result = judged_step(step, at, trial);
-    if (is_kept(&result, at, trial)) {
+    int is_next = is_kept(&result, at, trial);
+    if (is_next) {
       mu = mu_after_kept(mu, &result);
+    } else if (work->has_drag) {
+      is_next = is_kept_at_jump(block, work, target_reduced, step, &result, at, trial);
+    }
+    if (is_next) {
       nu = 2;
       work->state_found = trial;
       trial = at;
       at = work->state_found;
     } else {
-      const real share = work->has_drag ? share_to_jump(block, work, step, &result, at, trial) : 0;
-      if (share > 0) {
-        for (int j = 0; j < 6; j++) {
-          step[j] *= share;
-          lambda_next[j] = at->lambda_reduced[j] + step[j];
-        }
-        fl_dual_at(block, work, target_reduced, lambda_next, trial);
-        const step_result shorter = judged_step(step, at, trial);
-        if (is_kept(&shorter, at, trial)) {
-          nu = 2;
-          work->state_found = trial;
-          trial = at;
-          at = work->state_found;
-          continue;
-        }
-      }
       real damping = 0;
       if (!work->has_kinks) damping = damping_along(block, work, at, trace, step);
       mu = mu_after_refused(mu, nu, &result, damping);

@@ -6,7 +6,6 @@
 
 #define LATTICE (1 << 2 * LATTICE_FOILS) /* points at most: one on each branch of all foils */
 #define EACH_MOST 6                      /* nodes on a branch */
-#define WORTH_SAMPLES 12                 /* parts of a stalled branch that are looked at */
 #define MISS_WEIGHT 12 /* cost of a miss of 1, over the largest cost of all actuators */
 
 /* Ends of the branches of a foil's lift within its limits; how many branches there are. */
@@ -27,56 +26,6 @@ static int edges_of(const real *block, const fl_work *work, int i, real *edge) {
   branches++;
   edge[branches] = high;
   return branches;
-}
-
-/* What a foil is worth most at prices s on a branch of its lift, between two angles [W]: of a stall
-   as near as so many angles tell, else at an end or where the marginal power is its price. */
-static real worth_on_branch(const real *block, const fl_work *work, int i, const real *s, real low,
-                            real high) {
-  const fl_actuator *a = ACTUATOR(block, i);
-  const real stall_angle = fl_lift_end(block, a)[1];
-  const real middle = (low + high) / 2;
-  const int is_stalled = FABS(middle - a->zero_lift_angle) > stall_angle;
-  int samples = 1;
-  if (is_stalled || a->uncertainty_cost > 0) samples = WORTH_SAMPLES;
-  real worth = -LARGEST_NUMBER;
-  for (int k = 0; k <= samples; k++) {
-    fl_tangent tangent;
-    fl_foil_at(block, i, low + (high - low) * (real)k / (real)samples, &tangent);
-    worth = larger(worth, dot(s, tangent.force, 2) - tangent.cost);
-  }
-  if (is_stalled) return worth;
-  const real r = 1 - s[1] / a->flow_speed; /* of Eq. 19 */
-  if (!(r > 0)) return worth;
-  const line_response lift = fl_limited_response(block, a, work->set + i, 1, s[0] / r);
-  real edge[2];
-  for (int k = 0; k < 2; k++) {
-    fl_tangent tangent;
-    fl_foil_at(block, i, k ? high : low, &tangent);
-    edge[k] = tangent.force[0];
-  }
-  const int is_within = lift.force > smaller(edge[0], edge[1]) &&
-                        lift.force < larger(edge[0], edge[1]);
-  if (!is_within) return worth;
-  fl_tangent rest;
-  fl_foil_at(block, i, a->zero_lift_angle, &rest);
-  return larger(worth, r * (lift.conjugate + rest.cost) - rest.cost);
-}
-
-/* How much less than in the dual a foil is worth at most on each of its branches [W], at the
-   multipliers of work->state_found; below 0 where it is worth more, as it stalls. */
-static void find_regrets(const real *block, const fl_work *work, foil_lattice *lattice) {
-  lattice->dual_value = work->state_found->dual_value;
-  for (int f = 0; f < lattice->foils; f++) {
-    const int i = lattice->foil[f];
-    real s[2];
-    actuator_price(work, i, work->state_found->lambda_reduced, s);
-    const real known = fl_response(block, i, work->set + i, s).conjugate;
-    for (int b = 0; b < lattice->branches[f]; b++) {
-      const real *edge = lattice->edge[f] + b;
-      lattice->regret[f][b] = known - worth_on_branch(block, work, i, s, edge[0], edge[1]);
-    }
-  }
 }
 
 /* How many nodes each branch has: as many as the lattice has room for. */
@@ -197,12 +146,18 @@ static real cost_at_point(const real *block, const fl_work *work, const foil_lat
   return cost + MISS_WEIGHT * work->power_cost_max * SQRT(dot(residual, residual, 6));
 }
 
-/* Puts a point among the `count` cheapest ones (LATTICE_STARTS,), which are in order; how many
+/* The branch of a foil in a choice of branches, numbered in mixed radix. */
+int fl_branch_of_choice(const foil_lattice *lattice, int choice, int foil) {
+  for (int f = 0; f < foil; f++) choice /= lattice->branches[f];
+  return choice % lattice->branches[foil];
+}
+
+/* Puts a point among the `count` cheapest ones (FL_LATTICE_STARTS,), which are in order; how many
    there are then. */
 static int put_in_order(lattice_point *points, int count, const lattice_point *added) {
   int index = count;
-  if (count == LATTICE_STARTS) {
-    index = LATTICE_STARTS - 1;
+  if (count == FL_LATTICE_STARTS) {
+    index = FL_LATTICE_STARTS - 1;
     if (!(added->cost < points[index].cost)) return count;
   }
   while (index > 0 && added->cost < points[index - 1].cost) {
@@ -210,7 +165,7 @@ static int put_in_order(lattice_point *points, int count, const lattice_point *a
     index--;
   }
   points[index] = *added;
-  if (count == LATTICE_STARTS) return count;
+  if (count == FL_LATTICE_STARTS) return count;
   return count + 1;
 }
 
@@ -221,13 +176,11 @@ static lattice_point cheapest_of_choice(const real *block, const fl_work *work,
   lattice_point best = {{0}, 0};
   lattice_point tried = {{0}, 0};
   for (int k = 0; k < points; k++) {
-    int branch_digits = choice;
     int node_digits = k;
     for (int f = 0; f < lattice->foils; f++) {
-      const int branch = branch_digits % lattice->branches[f];
+      const int branch = fl_branch_of_choice(lattice, choice, f);
       const int node = node_digits % lattice->each;
       tried.node[f] = (unsigned char)(lattice->first[f] + branch * lattice->each + node);
-      branch_digits /= lattice->branches[f];
       node_digits /= lattice->each;
     }
     real unused[FL_MOST][2];
@@ -237,52 +190,11 @@ static lattice_point cheapest_of_choice(const real *block, const fl_work *work,
   return best;
 }
 
-/* The branch of a foil in a choice of branches, numbered in mixed radix. */
-static int branch_in_choice(const foil_lattice *lattice, int choice, int foil) {
-  for (int f = 0; f < foil; f++) choice /= lattice->branches[f];
-  return choice % lattice->branches[foil];
-}
-
-/* The cost below which nothing on a choice of branches is, as the dual proves [W]. */
-static real least_cost_of_choice(const foil_lattice *lattice, int choice) {
-  real least = lattice->dual_value;
-  for (int f = 0; f < lattice->foils; f++) {
-    least += lattice->regret[f][branch_in_choice(lattice, choice, f)];
-  }
-  return least;
-}
-
-/* Whether a choice of branches is that of commands which are known, but for foils whose branches
-   do not count. */
-static int is_known(const foil_lattice *lattice, int choice) {
-  if (lattice->known_branch[0] == -2) return 0;
-  for (int f = 0; f < lattice->foils; f++) {
-    if (lattice->known_branch[f] < 0) continue;
-    if (lattice->known_branch[f] != branch_in_choice(lattice, choice, f)) return 0;
-  }
-  return 1;
-}
-
-/* Notes that commands (n, 3) are known: no point is on their branches; of foils that are marked
-   (n,) any branch is. */
-void fl_leave_out_branches(foil_lattice *lattice, real command[][3],
-                           const unsigned char *is_on_any) {
-  for (int f = 0; f < lattice->foils; f++) {
-    const int i = lattice->foil[f];
-    lattice->known_branch[f] = -1;
-    if (is_on_any[i]) continue;
-    int branch = 0;
-    while (branch + 1 < lattice->branches[f] && command[i][0] > lattice->edge[f][branch + 1]) {
-      branch++;
-    }
-    lattice->known_branch[f] = branch;
-  }
-}
-
-/* The cheapest point of each choice of branches, and of these the cheapest ones
-   (LATTICE_STARTS,), but for choices that cost more than is of use; how many there are. */
+/* The cheapest point of each choice of branches that is left (`choices_left`, 0: of all), and of these
+   the cheapest ones (FL_LATTICE_STARTS,); how many there are. */
 int fl_cheapest_points(const real *block, const fl_work *work, const foil_lattice *lattice,
-                       const real *target_reduced, real cost_of_use, lattice_point *points) {
+                       const real *target_reduced, const foil_choices *choices_left,
+                       lattice_point *points) {
   int choices = 1;
   int points_of_choice = 1;
   for (int f = 0; f < lattice->foils; f++) {
@@ -291,8 +203,7 @@ int fl_cheapest_points(const real *block, const fl_work *work, const foil_lattic
   }
   int count = 0;
   for (int choice = 0; choice < choices; choice++) {
-    if (least_cost_of_choice(lattice, choice) >= cost_of_use) continue;
-    if (is_known(lattice, choice)) continue;
+    if (choices_left && !fl_is_choice_left(lattice, choices_left, choice)) continue;
     const lattice_point best =
         cheapest_of_choice(block, work, lattice, target_reduced, choice, points_of_choice);
     count = put_in_order(points, count, &best);
@@ -302,7 +213,6 @@ int fl_cheapest_points(const real *block, const fl_work *work, const foil_lattic
 
 void fl_lay_lattice(const real *block, const fl_work *work, foil_lattice *lattice) {
   find_branches(block, work, lattice);
-  find_regrets(block, work, lattice);
   lay_nodes(block, work, lattice);
   lay_rows(block, work, lattice);
 }
@@ -323,28 +233,4 @@ void fl_commands_of_point(const real *block, const fl_work *work, const foil_lat
     box->command_min[i][0] = lattice->edge[f][branch];
     box->command_max[i][0] = lattice->edge[f][branch + 1];
   }
-}
-
-/* Leaves of the sets of the foils what their branches at a point give; 0 where a foil stalls there,
-   of which sets do not know. */
-int fl_sets_of_point(const real *block, fl_work *work, const foil_lattice *lattice,
-                     const lattice_point *point) {
-  for (int f = 0; f < lattice->foils; f++) {
-    const int i = lattice->foil[f];
-    const fl_actuator *a = ACTUATOR(block, i);
-    const int branch = (point->node[f] - lattice->first[f]) / lattice->each;
-    real lift[2];
-    for (int end = 0; end < 2; end++) {
-      fl_tangent tangent;
-      fl_foil_at(block, i, lattice->edge[f][branch + end], &tangent);
-      lift[end] = tangent.force[0];
-    }
-    const real middle = (lattice->edge[f][branch] + lattice->edge[f][branch + 1]) / 2;
-    if (FABS(middle - a->zero_lift_angle) > fl_lift_end(block, a)[1]) return 0;
-    const real low = smaller(lift[0], lift[1]);
-    const real high = larger(lift[0], lift[1]);
-    fl_limit_set(block, i, work->set + i, larger(low, work->set[i].force_min),
-                 smaller(high, work->set[i].force_max), 0, 0);
-  }
-  return 1;
 }

@@ -1,147 +1,174 @@
-/* Where the dual leaves foils between the ends of their lift, what they give is between their curve
-   and its chord, and mostly there are many such forces for the same wrench: two foils of the same
-   effect may share their lift as they like. On the curves drag is largest at the ends. So the foils
-   are moved along directions in lift that no wrench feels until as many as can be are at an end:
-   the vertices of the polytope of these lifts, of which each is where a search may begin. */
+/* Where searches begin for commands of foils whose drag is welcome.
+
+   The dual leaves such foils between the ends of their lift, on the chord of their curve, and
+   mostly there are many such lifts for the same wrench: two foils of the same effect may share
+   theirs as they like. On the curve itself drag is largest at the ends. So foils are moved along
+   directions in lift that no wrench feels, or that other actuators make up for, until as many as
+   can be are at an end: vertices of the polytope of these lifts. Where there is no such direction,
+   searches begin at the lifts of the dual, and with each of the foils at each of its ends. */
 #include "internal.h"
 
-#define NO_EFFECT NEARLY /* share of a column that is left by others, below which it is theirs */
+#define SPANNED CLOSE /* share of a column that others leave, below which they span it */
 
-/* Wrench in the basis by the lift of a foil along its chord. */
-static void column_of(const fl_work *work, int i, real *column) {
-  const fl_set *set = work->set + i;
-  const real(*B)[6] = work->span.effectiveness_reduced[i];
-  const real range = larger(set->force_max - set->force_min, TINY);
-  const real drag_slope = (set->cost_at_max - set->cost_at_min) / range;
-  for (int j = 0; j < 6; j++) column[j] = B[0][j] + drag_slope * B[1][j];
-}
-
-/* Takes of a column what orthogonal ones (count, 6) span. */
-static void take_off(const real q[][6], int count, real *column) {
+/* Takes of a vector (6,) what orthogonal ones (count, 6) span. */
+static void take_off(real orthogonal[][6], int count, real *vector) {
   for (int k = 0; k < count; k++) {
-    const real share = dot(q[k], column, 6) / dot(q[k], q[k], 6);
-    for (int j = 0; j < 6; j++) column[j] -= share * q[k][j];
+    const real *other = orthogonal[k];
+    const real share = dot(other, vector, 6) / dot(other, other, 6);
+    for (int j = 0; j < 6; j++) vector[j] -= share * other[j];
   }
 }
 
-/* Orthogonal columns (6, 6) that span what actuators make up for whose forces still move; how many
-   there are. */
-static int span_of_others(const real *block, const fl_work *work, const foil_vertices *vertices,
-                          real q[][6]) {
+/* Whether so little of a column (6,) is left that others span it. */
+static int is_spanned(const real *left, real size) {
+  return dot(left, left, 6) <= SPANNED * SPANNED * size * size;
+}
+
+/* Wrench in the basis by the lift of a foil along the chord of its curve. */
+static void column_of(const real *block, const fl_work *work, int i, real *column) {
+  const fl_set *set = work->set + i;
+  const real(*B)[6] = work->span.effectiveness_reduced[i];
+  const real range = larger(set->force_max - set->force_min, TINY);
+  const real power_slope = (set->cost_at_max - set->cost_at_min) / range;
+  const real drag_slope = power_slope / ACTUATOR(block, i)->flow_speed;
+  for (int j = 0; j < 6; j++) column[j] = B[0][j] + drag_slope * B[1][j];
+}
+
+/* Orthogonal columns (6, 6) that span what other actuators make up for, those whose forces still
+   move; how many there are. */
+static int span_others(const real *block, const fl_work *work, const foil_vertices *vertices,
+                       real orthogonal[6][6]) {
   const fl_state *state = work->state_found;
+  unsigned char is_between[FL_MOST] = {0};
+  for (int f = 0; f < vertices->foils; f++) is_between[vertices->foil[f]] = 1;
   int count = 0;
   for (int i = 0; i < COUNT(block); i++) {
-    int is_between = 0;
-    for (int f = 0; f < vertices->foils; f++) is_between |= vertices->foil[f] == i;
-    if (is_between || work->span.is_lost[i]) continue;
+    if (is_between[i] || work->span.is_lost[i]) continue;
     int rows = (int)ACTUATOR(block, i)->rows;
     if (is_foil(ACTUATOR(block, i))) rows = 1;
     for (int row = 0; row < rows && count < 6; row++) {
-      if (!(state->dy_ds[i][2 * row] > 0)) continue;
-      const real *B = work->span.effectiveness_reduced[i][row];
-      real rest[6];
-      memcpy(rest, B, sizeof rest);
-      take_off((const real(*)[6])q, count, rest);
-      if (dot(rest, rest, 6) <= NO_EFFECT * NO_EFFECT * dot(B, B, 6)) continue;
-      memcpy(q[count], rest, sizeof rest);
-      count++;
+      const int moves = state->dy_ds[i][2 * row] > 0;
+      real *column = orthogonal[count];
+      memcpy(column, work->span.effectiveness_reduced[i][row], sizeof orthogonal[count]);
+      const real size = SQRT(dot(column, column, 6));
+      take_off(orthogonal, count, column);
+      if (moves && !is_spanned(column, size)) count++;
     }
   }
   return count;
 }
 
-void fl_find_vertices(const real *block, const fl_work *work, foil_vertices *vertices) {
-  const fl_state *state = work->state_found;
-  real q[6][6];
-  vertices->foils = 0;
-  for (int i = 0; i < COUNT(block) && vertices->foils < VERTEX_FOILS; i++) {
-    if (!is_foil(ACTUATOR(block, i)) || work->span.is_lost[i]) continue;
-    if (!(fl_gap_of(block, work, i, state->force[i], 1, state->lambda_reduced) > 0)) continue;
-    vertices->foil[vertices->foils] = i;
-    column_of(work, i, vertices->column[vertices->foils]);
-    vertices->foils++;
-  }
-  const int count = span_of_others(block, work, vertices, q);
-  for (int f = 0; f < vertices->foils; f++) {
-    real *column = vertices->column[f];
-    vertices->size[f] = SQRT(dot(column, column, 6));
-    take_off((const real(*)[6])q, count, column);
-  }
-}
-
-/* A direction (foils,) in the lifts of the foils that are not at an end, along which the wrench
-   stays; 0 where there is none. Gram and Schmidt: the first column that those before it span. */
-static int unfelt_direction(const foil_vertices *vertices, const unsigned char *is_at_end,
-                            real *direction) {
-  real q[VERTEX_FOILS][6];            /* orthogonal columns */
-  real by[VERTEX_FOILS][VERTEX_FOILS]; /* of which columns they are made */
-  int known[VERTEX_FOILS];
+/* A direction (foils,) in the lifts of foils that are not held at an end, which others make up for;
+   0 where there is none. By Gram and Schmidt: the first column that those before it span. */
+static int find_direction(const foil_vertices *vertices, const unsigned char *is_held,
+                          real *direction) {
+  real orthogonal[VERTEX_FOILS][6];
+  real made_of[VERTEX_FOILS][VERTEX_FOILS]; /* of each: shares of columns */
   int count = 0;
   for (int f = 0; f < vertices->foils; f++) {
-    if (is_at_end[f]) continue;
-    const real *column = vertices->column[f];
-    real rest[6];
-    real made[VERTEX_FOILS] = {0};
-    memcpy(rest, column, sizeof rest);
-    made[f] = 1;
+    if (is_held[f]) continue;
+    real *left = orthogonal[count];
+    real *share = made_of[count];
+    memcpy(left, vertices->column[f], sizeof orthogonal[count]);
+    memset(share, 0, sizeof made_of[count]);
+    share[f] = 1;
     for (int k = 0; k < count; k++) {
-      const real *other = q[known[k]];
-      const real share = dot(other, rest, 6) / dot(other, other, 6);
-      for (int j = 0; j < 6; j++) rest[j] -= share * other[j];
-      for (int g = 0; g < vertices->foils; g++) made[g] -= share * by[known[k]][g];
+      const real *other = orthogonal[k];
+      const real part = dot(other, left, 6) / dot(other, other, 6);
+      for (int j = 0; j < 6; j++) left[j] -= part * other[j];
+      for (int g = 0; g < vertices->foils; g++) share[g] -= part * made_of[k][g];
     }
-    const real least = NO_EFFECT * vertices->size[f];
-    if (dot(rest, rest, 6) <= least * least) {
-      memcpy(direction, made, sizeof made);
+    if (is_spanned(left, vertices->size[f])) {
+      memcpy(direction, share, sizeof made_of[count]);
       return 1;
     }
-    memcpy(q[f], rest, sizeof rest);
-    memcpy(by[f], made, sizeof made);
-    known[count] = f;
     count++;
   }
   return 0;
 }
 
-/* Moves lifts along a direction until the first of them is at an end. */
+/* Moves lifts in `force` (n, 2) along a direction until the first of them is at an end, where its
+   foil is held. */
 static void move_to_end(const fl_work *work, const foil_vertices *vertices, const real *direction,
-                        unsigned char *is_at_end, real force[][2]) {
+                        unsigned char *is_held, real force[][2]) {
   real shortest = LARGEST_NUMBER;
-  int first = -1;
   real end_of_first = 0;
+  int first = 0;
   for (int f = 0; f < vertices->foils; f++) {
-    if (is_at_end[f] || direction[f] == 0) continue;
     const int i = vertices->foil[f];
+    if (is_held[f] || direction[f] == 0) continue;
     real end = work->set[i].force_min;
     if (direction[f] > 0) end = work->set[i].force_max;
     const real length = (end - force[i][0]) / direction[f];
     if (!(length < shortest)) continue;
     shortest = length;
-    first = f;
     end_of_first = end;
+    first = f;
   }
-  if (first < 0) return;
   for (int f = 0; f < vertices->foils; f++) {
-    if (!is_at_end[f]) force[vertices->foil[f]][0] += shortest * direction[f];
+    if (!is_held[f]) force[vertices->foil[f]][0] += shortest * direction[f];
   }
   force[vertices->foil[first]][0] = end_of_first;
-  is_at_end[first] = 1;
+  is_held[first] = 1;
 }
 
-/* Makes lifts in `force` (n, 2), of the dual, those of a vertex, whose bits say which way each
-   direction is gone. Marks which of the foils are at an end; returns how many directions there
-   were. */
-int fl_go_to_vertex(const fl_work *work, const foil_vertices *vertices, int vertex,
-                    unsigned char *is_at_end, real force[][2]) {
+/* How many directions lifts can be moved along one after the other: each holds one foil. */
+static int count_directions(const foil_vertices *vertices) {
+  unsigned char is_held[VERTEX_FOILS] = {0};
   real direction[VERTEX_FOILS];
   int directions = 0;
-  memset(is_at_end, 0, VERTEX_FOILS);
-  while (unfelt_direction(vertices, is_at_end, direction)) {
-    if (vertex >> directions & 1) {
-      for (int f = 0; f < vertices->foils; f++) direction[f] = -direction[f];
-    }
-    move_to_end(work, vertices, direction, is_at_end, force);
+  while (find_direction(vertices, is_held, direction)) {
+    int first = 0;
+    while (direction[first] == 0) first++;
+    is_held[first] = 1;
     directions++;
   }
   return directions;
+}
+
+/* Finds the foils that work->state_found leaves between their ends, and at how many vertices of
+   their lifts searches begin. */
+void fl_find_vertices(const real *block, const fl_work *work, foil_vertices *vertices) {
+  const fl_state *state = work->state_found;
+  const real largest = fl_largest_force(block, work->state_found->force);
+  real orthogonal[6][6];
+  vertices->foils = 0;
+  for (int i = 0; i < COUNT(block) && vertices->foils < VERTEX_FOILS; i++) {
+    if (!is_foil(ACTUATOR(block, i)) || work->span.is_lost[i]) continue;
+    const real gap = fl_gap_of(block, work, i, state->force[i], largest, state->lambda_reduced);
+    if (!(gap > 0)) continue;
+    vertices->foil[vertices->foils] = i;
+    vertices->foils++;
+  }
+  const int count = span_others(block, work, vertices, orthogonal);
+  for (int f = 0; f < vertices->foils; f++) {
+    real *column = vertices->column[f];
+    column_of(block, work, vertices->foil[f], column);
+    vertices->size[f] = SQRT(dot(column, column, 6));
+    take_off(orthogonal, count, column);
+  }
+  vertices->directions = count_directions(vertices);
+  vertices->count = 1 + 2 * vertices->foils;
+  if (vertices->directions > 0) vertices->count = 1 << vertices->directions;
+}
+
+/* Makes lifts in `force` (n, 2), those of the dual, the lifts of a vertex. Its bits say which way
+   each direction is gone; without directions the first vertex is the lifts as they are, and the
+   others have one foil at an end. Marks which of the foils are held at an end. */
+void fl_go_to_vertex(const fl_work *work, const foil_vertices *vertices, int vertex,
+                     unsigned char *is_held, real force[][2]) {
+  real direction[VERTEX_FOILS] = {0};
+  memset(is_held, 0, VERTEX_FOILS);
+  if (vertices->directions == 0 && vertex > 0) {
+    direction[(vertex - 1) / 2] = 1;
+    if (vertex % 2) direction[(vertex - 1) / 2] = -1;
+    move_to_end(work, vertices, direction, is_held, force);
+  }
+  for (int k = 0; k < vertices->directions; k++) {
+    if (!find_direction(vertices, is_held, direction)) return;
+    if (vertex >> k & 1) {
+      for (int f = 0; f < vertices->foils; f++) direction[f] = -direction[f];
+    }
+    move_to_end(work, vertices, direction, is_held, force);
+  }
 }
