@@ -12,7 +12,8 @@
    S = sum B (|y|/|s|) B' is the same as G, but of forces over prices, which limits leave as
    they are; of a foil it is that of its lift. M is the Hessian of quadratic costs over its mean,
    and tau a millionth of that Hessian's trace (trace_min). c is SATURATED. A step that goes too
-   far ends where the lift of a foil jumps, if the dual value is largest there.
+   far ends where the dual value is largest along it; where sets have kinks, only where that is at
+   the jump of a foil's lift.
    Vectors in the basis have 6 numbers, those behind its range are 0.
 
        lambda  multipliers of the wrench, in the basis of driven directions [W]    Eq. 3
@@ -25,9 +26,13 @@
        l       share of the slope that is left at the end of a step                Eq. 10 */
 #include "internal.h"
 
-#define JUMPS 4            /* trials with a jump after which Newton's method stands still */
-#define JUMP_STEP R(1e-3)  /* squared step, over squared multipliers, too long to judge */
-#define SHORT_STEP R(1e-7) /* the same, in which any large change of a force is a jump */
+#define OVERSHOT R(-0.3)     /* share of the slope below which a kept step went too far, too */
+#define SEARCH_STEPS 12      /* of the search for where a step that went too far is to end */
+#define SLOPE_ENOUGH R(0.05) /* share of the slope that it may leave */
+#define HALVED 4             /* of so many steps of it one is by halves */
+#define JUMPS 4              /* trials with a jump after which Newton's method stands still */
+#define JUMP_STEP R(1e-3)    /* squared step, over squared multipliers, too long to judge */
+#define SHORT_STEP R(1e-7)   /* the same, in which any large change of a force is a jump */
 /* What squared multipliers count at least in these two, over NOTHING and the squared cost C. */
 #define MULTIPLIERS_MIN 100
 
@@ -367,6 +372,72 @@ static int is_kept_at_jump(const real *block, const fl_work *work, const real *t
   return is_kept(&of_shorter, at, trial);
 }
 
+/* The slope of the dual value along a step of multipliers, at a share of it: step.r. */
+static real slope_at(const real *block, const fl_work *work, const real *target_reduced,
+                     const real *step, const fl_state *from, real share) {
+  real slope = dot(step, target_reduced, 6);
+  for (int i = 0; i < COUNT(block); i++) {
+    real s[2];
+    real ds[2];
+    actuator_price(work, i, from->lambda_reduced, s);
+    actuator_price(work, i, step, ds);
+    for (int row = 0; row < 2; row++) s[row] += share * ds[row];
+    const response y = fl_response(block, i, work->set + i, s);
+    slope -= dot(ds, y.force, 2);
+  }
+  return slope;
+}
+
+/* The share of a step, between 0 and 1, at which the dual value is largest, where its slope is above
+   0 at the beginning and below at the end: by secants of the slope, of which one whose end stays
+   counts half (Illinois), and now and then by halves. */
+static real best_share(const real *block, const fl_work *work, const real *target_reduced,
+                       const real *step, const step_result *result, const fl_state *from) {
+  const real enough = SLOPE_ENOUGH * result->slope_begin;
+  real low = 0;
+  real high = 1;
+  real slope_low = result->slope_begin;
+  real slope_high = result->slope_end;
+  real share = 0;
+  int last_side = 0;
+  for (int k = 0; k < SEARCH_STEPS; k++) {
+    share = (slope_low * high - slope_high * low) / (slope_low - slope_high);
+    if (k % HALVED == HALVED - 1) share = (low + high) / 2;
+    const real slope = slope_at(block, work, target_reduced, step, from, share);
+    if (FABS(slope) <= enough) break;
+    if (slope > 0) {
+      low = share;
+      slope_low = slope;
+      if (last_side > 0) slope_high /= 2;
+      last_side = 1;
+    } else {
+      high = share;
+      slope_high = slope;
+      if (last_side < 0) slope_low /= 2;
+      last_side = -1;
+    }
+  }
+  return share;
+}
+
+/* Makes a trial that went too far the dual where its value is largest along the step. Returns
+   whether it is kept. */
+static int is_kept_at_best(const real *block, const fl_work *work, const real *target_reduced,
+                           const real *step, const step_result *result, const fl_state *at,
+                           fl_state *trial) {
+  if (!(result->slope_begin > 0 && result->slope_end < 0)) return 0;
+  const real share = best_share(block, work, target_reduced, step, result, at);
+  real shorter[6];
+  real lambda[6];
+  for (int j = 0; j < 6; j++) {
+    shorter[j] = share * step[j];
+    lambda[j] = at->lambda_reduced[j] + shorter[j];
+  }
+  fl_dual_at(block, work, target_reduced, lambda, trial);
+  const step_result of_shorter = judged_step(shorter, at, trial);
+  return is_kept(&of_shorter, at, trial);
+}
+
 /* Newton's method from multipliers on, or from its own first ones where there are none.
    work->state_found is the dual at the multipliers that it comes to, however it ends. Returns
    FL_MET, FL_BEYOND (also where all answers take more than work->power_of_use) or
@@ -426,7 +497,10 @@ int fl_dual_newton(const real *block, fl_work *work, const real *target_reduced,
     }
     const step_result result = judged_step(step, at, trial);
     int is_next = is_kept(&result, at, trial);
-    if (is_next) {
+    if (!work->has_kinks && (!is_next || result.slope_left < OVERSHOT)) {
+      is_next = is_kept_at_best(block, work, target_reduced, step, &result, at, trial);
+      if (is_next) mu = larger(mu * MU_KEPT_EARLY, ROUNDING);
+    } else if (is_next) {
       mu = mu_after_kept(mu, &result);
     } else if (work->has_drag) {
       is_next = is_kept_at_jump(block, work, target_reduced, step, &result, at, trial);
