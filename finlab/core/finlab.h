@@ -43,7 +43,9 @@ typedef double fl_wide; /* where differences of large numbers matter, in single 
 #define FL_STEPS_AT_KINK 60   /* the same where sets have kinks or gaps, or at the rim */
 #define FL_DIVE_ROUNDS 12     /* in which a search leaves all gaps on their nearer sides */
 #define FL_FOIL_STEPS 12      /* steps that make commands of foils cheaper, each a target */
-#define FL_LATTICE_FOLLOWED 6 /* points of a lattice of foils' angles that are made cheaper */
+#define FL_FOIL_VERTICES 64   /* vertices of foils' lifts from which commands are made cheaper */
+#define FL_LATTICE_STARTS 60  /* points of a lattice of foils' angles at which steps begin */
+#define FL_LATTICE_FOLLOWED 6 /* of these that are made cheaper */
 #define FL_RAY_SHARES 24      /* shares of a ray that are tried where foils drag */
 
 /* Most steps of Newton's method (fl_answer.newton_steps) of one answer by the usual settings.
@@ -56,16 +58,17 @@ typedef double fl_wide; /* where differences of large numbers matter, in single 
    FL_FORCES  forces for a wrench: its target and a search; beyond reach three targets at the rim,
               one for what is served there, and another search
    FL_STARTS  where foils drag, commands of one search that are made cheaper: those of each part
-              and of the first dive, of both ends of each foil's angles, of two multipliers, and of
-              points of a lattice
+              and of the first dive, of vertices of lifts, of both ends of each foil's angles, of
+              first multipliers, and of points of a lattice
    FL_FOILS   steps for these: of two searches, and twice for each share of a ray (begun at the last
-              commands and anew)
+              commands and anew); and a target for each start of a lattice
    FL_BOUND   forces are found twice in a tick in which drives pass their dead bands */
 #define FL_DIVE (FL_DIVE_ROUNDS * FL_STEPS_AT_KINK)
 #define FL_SEARCH (2 * FL_DIVE + (FL_PARTS + 1) * (FL_DIVE + 2 * FL_STEPS_AT_KINK))
 #define FL_FORCES (2 * (FL_STEPS + FL_SEARCH) + 3 * FL_STEPS_AT_KINK)
-#define FL_STARTS ((FL_PARTS + 2) + 1 + 2 * FL_MOST + 2 + FL_LATTICE_FOLLOWED)
-#define FL_FOILS (FL_FOIL_STEPS * FL_STEPS_AT_KINK * 2 * (FL_STARTS + FL_RAY_SHARES))
+#define FL_STARTS (FL_PARTS + 4 + FL_FOIL_VERTICES + 2 * FL_MOST + FL_LATTICE_FOLLOWED)
+#define FL_FOILS_CHEAPER (FL_FOIL_STEPS * FL_STEPS_AT_KINK * 2 * (FL_STARTS + FL_RAY_SHARES))
+#define FL_FOILS (FL_FOILS_CHEAPER + 2 * FL_LATTICE_STARTS * FL_STEPS_AT_KINK)
 #define FL_BOUND (2 * (FL_FORCES + FL_FOILS))
 
 #define FL_VERSION 17  /* of all structs and functions here */

@@ -56,7 +56,7 @@ typedef struct {
   fl_real residual[6];         /* r of Eq. 6, reduced */
   fl_real force[FL_MOST][2];   /* y of Eq. 5 [N] */
   fl_real dy_ds[FL_MOST][3];   /* its derivative: xx, xy, yy [N^2/W] */
-  fl_real secant[FL_MOST];     /* |y| / |s| of Eq. 9; 0 where it is left out [N^2/W] */
+  fl_real secant[FL_MOST];     /* |y| / |s| of Eq. 9 [N^2/W] */
   fl_real push_angle[FL_MOST]; /* of a plane whose turning costs [rad] */
   fl_real dual_value;          /* g of Eq. 3 [W] */
   fl_real residual_size;       /* |r|, of scaled wrenches */

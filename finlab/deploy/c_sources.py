@@ -72,7 +72,13 @@ TEMPLATES = Path(__file__).with_name("c_files")
 STUBS = Path(__file__).with_name("c_stubs")
 """Files that stand in place of those of foils, in exports of robots without them: a tenth of the
 code."""
-FILES_OF_FOILS = ("foil_drag.c", "foil_lattice.c")
+FILES_OF_FOILS = (
+    "foil_choices.c",
+    "foil_drag.c",
+    "foil_lattice.c",
+    "foil_steps.c",
+    "foil_vertices.c",
+)
 """Files of the core that only robots with foils in a flow need."""
 
 

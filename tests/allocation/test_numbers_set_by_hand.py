@@ -59,6 +59,7 @@ NO_CHOICE = {
     "FL_FORCES",
     "FL_STARTS",
     "FL_FOILS",
+    "FL_FOILS_CHEAPER",
     "FL_BOUND",
     "FL_DEPTH",
     "DEPENDENT",

@@ -31,7 +31,7 @@ FOILS = 6
 NODES = 48
 """Nodes of all foils at most: LATTICE_NODES."""
 STARTS = 60
-"""Points of the lattice that are returned at most: LATTICE_STARTS."""
+"""Points of the lattice that are returned at most: FL_LATTICE_STARTS."""
 POINTS = 4096
 """Points of the lattice at most: LATTICE of foil_lattice.c."""
 NODES_OF_BRANCH = 6
@@ -117,7 +117,7 @@ class Laid:
         """Points that the core has for a target (6,)."""
         points = (Point * STARTS)()
         count = functions().fl_cheapest_points(
-            at(self.robot.block), self.work, ctypes.byref(self.lattice), at(target), points
+            at(self.robot.block), self.work, ctypes.byref(self.lattice), at(target), None, points
         )
         return list(points[:count])
 

@@ -13,7 +13,8 @@
    Prices are in W/N along the actuator's own rows, forces in N. */
 #include "internal.h"
 
-#define SOFT R(0.2) /* rho of Eq. 20: r of a foil below which it is softened */
+#define SOFT R(0.2)         /* rho of Eq. 20: r of a foil below which it is softened */
+#define SOFT_LEAST R(0.005) /* epsilon of Eq. 20: least q over rho */
 
 /* A direction in which a plane may push. */
 typedef struct {
@@ -155,9 +156,9 @@ static soft_ratio soft_ratio_of(real r) {
   soft_ratio ratio = {r, r, 0, 0};
   const real exponent = smaller(r / SOFT - 1, 0);
   const real decay = EXP(exponent);
-  if (decay > CLOSE) ratio.dq = decay; /* 1 where q = r */
+  if (decay > SOFT_LEAST) ratio.dq = decay; /* 1 where q = r */
   if (exponent < 0) {
-    ratio.q = SOFT * larger(decay, CLOSE);
+    ratio.q = SOFT * larger(decay, SOFT_LEAST);
     ratio.ddq = ratio.dq / SOFT;
   }
   return ratio;

@@ -10,8 +10,10 @@
        (G_mu + mu c max(tr G_mu, tau) M) step = r    with    G_mu = G + mu S
 
    S = sum B (|y|/|s|) B' is the same as G, but of forces over prices, which limits leave as
-   they are. M is the Hessian of quadratic costs over its mean, and tau a millionth of that
-   Hessian's trace (trace_min). c is SATURATED; where foils drag, S is left out and c is 1.
+   they are; of a foil it is that of its lift. M is the Hessian of quadratic costs over its mean,
+   and tau a millionth of that Hessian's trace (trace_min). c is SATURATED. A step that goes too
+   far ends where the dual value is largest along it; where sets have kinks, only where that is at
+   the jump of a foil's lift.
    Vectors in the basis have 6 numbers, those behind its range are 0.
 
        lambda  multipliers of the wrench, in the basis of driven directions [W]    Eq. 3
@@ -24,9 +26,13 @@
        l       share of the slope that is left at the end of a step                Eq. 10 */
 #include "internal.h"
 
-#define JUMPS 4            /* trials with a jump after which Newton's method stands still */
-#define JUMP_STEP R(1e-3)  /* squared step, over squared multipliers, too long to judge */
-#define SHORT_STEP R(1e-7) /* the same, in which any large change of a force is a jump */
+#define OVERSHOT R(-0.3)     /* share of the slope below which a kept step went too far, too */
+#define SEARCH_STEPS 12      /* of the search for where a step that went too far is to end */
+#define SLOPE_ENOUGH R(0.05) /* share of the slope that it may leave */
+#define HALVED 4             /* of so many steps of it one is by halves */
+#define JUMPS 4              /* trials with a jump after which Newton's method stands still */
+#define JUMP_STEP R(1e-3)    /* squared step, over squared multipliers, too long to judge */
+#define SHORT_STEP R(1e-7)   /* the same, in which any large change of a force is a jump */
 /* What squared multipliers count at least in these two, over NOTHING and the squared cost C. */
 #define MULTIPLIERS_MIN 100
 
@@ -124,10 +130,10 @@ void fl_restore_sets(const real *block, fl_work *work, const fl_set *set) {
   fl_prepare_sets(block, work);
 }
 
-/* Size of a force, or of a price, along one direction or in a plane. */
+/* Size of a force, or of a price, along one direction or in a plane; of a foil that of its lift. */
 static real length(const fl_actuator *a, const real *vector) {
-  if (a->rows == 1) return FABS(vector[0]);
-  return size_of(vector);
+  if (is_plane(a)) return size_of(vector);
+  return FABS(vector[0]);
 }
 
 /* Evaluates the dual at multipliers, for a target in the basis: its value, its gradient and
@@ -151,11 +157,9 @@ void fl_dual_at(const real *block, const fl_work *work, const real *target_reduc
     state->push_angle[i] = answer.angle;
     const real size_s = length(a, s);
     const real size_y = length(a, y);
-    state->secant[i] = 0;
-    if (!work->has_drag) { /* |y| / |s| of S, Eq. 9; near rest that of quadratic costs */
-      const real price_quadratic = a->row_force_max[0] / a->secant[0];
-      state->secant[i] = size_y / larger(size_s, price_quadratic);
-    }
+    /* |y| / |s| of S, Eq. 9; near rest that of quadratic costs */
+    const real price_quadratic = a->row_force_max[0] / a->secant[0];
+    state->secant[i] = size_y / larger(size_s, price_quadratic);
     conjugate += answer.conjugate;
     const real(*B)[6] = work->span.effectiveness_reduced[i];
     for (int j = 0; j < 6; j++) wrench[j] += y[0] * B[0][j] + y[1] * B[1][j];
@@ -184,12 +188,6 @@ static void add_plane(real H[6][6], const real *bx, const real *by, real xx, rea
   }
 }
 
-/* c of Eq. 8. */
-static real share_of_metric(const fl_work *work) {
-  if (work->has_drag) return 1; /* S is left out there */
-  return SATURATED;
-}
-
 /* Solves (G_mu + mu c max(tr G_mu, tau) M) step = r with G_mu = G + mu S, Eq. 8; 0 where that is
    singular to rounding. Also max(tr G_mu, tau). */
 static int newton_step(const real *block, const fl_work *work, const fl_state *at, real mu,
@@ -200,14 +198,15 @@ static int newton_step(const real *block, const fl_work *work, const fl_state *a
     const real *dy_ds = at->dy_ds[i];
     const real xx = dy_ds[0] + mu * at->secant[i];
     const real xy = dy_ds[1];
-    const real yy = dy_ds[2] + mu * at->secant[i];
+    real yy = dy_ds[2];
+    if (is_plane(ACTUATOR(block, i))) yy += mu * at->secant[i];
     if (ACTUATOR(block, i)->rows != 1)
       add_plane(H, B[0], B[1], xx, xy, yy);
     else if (xx > 0)
       fl_add_square(H, B[0], xx);
   }
   *trace = larger(fl_trace(H), work->trace_min);
-  const real weight = share_of_metric(work) * mu * *trace; /* of M */
+  const real weight = SATURATED * mu * *trace; /* of M */
   for (int row = 0; row < 6; row++) {
     for (int col = 0; col <= row; col++) H[row][col] += weight * work->metric[row][col];
   }
@@ -232,7 +231,7 @@ static real damping_along(const real *block, const fl_work *work, const fl_state
       of_metric += 2 * work->metric[row][col] * step[row] * step[col];
     }
   }
-  return sum + share_of_metric(work) * trace * of_metric;
+  return sum + SATURATED * trace * of_metric;
 }
 
 /* How many responses jump between two states a step apart; where wanted they are marked as
@@ -309,6 +308,136 @@ static real mu_after_refused(real mu, real nu, const step_result *result, real d
   return larger(larger(mu * nu, mu + more), ROUNDING);
 }
 
+/* Where a foil responds at the middle of a jump along a step of multipliers, as a share of it: the
+   lift of one whose drag is welcome jumps between its ends, where the price of lift and drag along
+   its chord is that of its power. LARGEST_NUMBER where it does not jump. */
+static real share_at_jump(const real *block, const fl_work *work, int i, const real *step,
+                          const fl_state *from, const fl_state *to) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  const fl_set *set = work->set + i;
+  const real range = set->force_max - set->force_min;
+  const real change = to->force[i][0] - from->force[i][0];
+  if (!is_foil(a) || set->tangent || !(FABS(change) > range / 2)) return LARGEST_NUMBER;
+  const real power_slope = (set->cost_at_max - set->cost_at_min) / range; /* of the chord */
+  const real drag_slope = power_slope / a->flow_speed;
+  real s[2];
+  real ds[2];
+  actuator_price(work, i, from->lambda_reduced, s);
+  actuator_price(work, i, step, ds);
+  const real price = s[0] + drag_slope * s[1] - power_slope; /* of lift, along the chord */
+  return -price / (ds[0] + drag_slope * ds[1]);
+}
+
+/* The share of a step (0 to 1) at which the dual value is largest, where that is at the jump of a
+   foil; 0 where it is not. Each jump takes from the slope along the step what it changes. */
+static real share_to_jump(const real *block, const fl_work *work, const real *step,
+                          const step_result *result, const fl_state *from, const fl_state *to) {
+  real slope = result->slope_begin;
+  real last_share = 0;
+  while (slope > 0) {
+    real share = 1; /* of the next jump */
+    real drop = 0;  /* of the slope there */
+    for (int i = 0; i < COUNT(block); i++) {
+      const real jump_share = share_at_jump(block, work, i, step, from, to);
+      if (!(jump_share > last_share && jump_share < share)) continue;
+      real ds[2];
+      actuator_price(work, i, step, ds);
+      const real d_lift = to->force[i][0] - from->force[i][0];
+      const real d_drag = to->force[i][1] - from->force[i][1];
+      share = jump_share;
+      drop = ds[0] * d_lift + ds[1] * d_drag;
+    }
+    if (!(share < 1)) return 0;
+    slope -= drop;
+    last_share = share;
+  }
+  return last_share;
+}
+
+/* Makes a trial that was refused the dual at the jump of a foil along its step, where the value is
+   largest there. Returns whether it is kept. */
+static int is_kept_at_jump(const real *block, const fl_work *work, const real *target_reduced,
+                           const real *step, const step_result *result, const fl_state *at,
+                           fl_state *trial) {
+  const real share = share_to_jump(block, work, step, result, at, trial);
+  if (!(share > 0)) return 0;
+  real shorter[6];
+  real lambda[6];
+  for (int j = 0; j < 6; j++) {
+    shorter[j] = share * step[j];
+    lambda[j] = at->lambda_reduced[j] + shorter[j];
+  }
+  fl_dual_at(block, work, target_reduced, lambda, trial);
+  const step_result of_shorter = judged_step(shorter, at, trial);
+  return is_kept(&of_shorter, at, trial);
+}
+
+/* The slope of the dual value along a step of multipliers, at a share of it: step.r. */
+static real slope_at(const real *block, const fl_work *work, const real *target_reduced,
+                     const real *step, const fl_state *from, real share) {
+  real slope = dot(step, target_reduced, 6);
+  for (int i = 0; i < COUNT(block); i++) {
+    real s[2];
+    real ds[2];
+    actuator_price(work, i, from->lambda_reduced, s);
+    actuator_price(work, i, step, ds);
+    for (int row = 0; row < 2; row++) s[row] += share * ds[row];
+    const response y = fl_response(block, i, work->set + i, s);
+    slope -= dot(ds, y.force, 2);
+  }
+  return slope;
+}
+
+/* The share of a step, between 0 and 1, at which the dual value is largest, where its slope is above
+   0 at the beginning and below at the end: by secants of the slope, of which one whose end stays
+   counts half (Illinois), and now and then by halves. */
+static real best_share(const real *block, const fl_work *work, const real *target_reduced,
+                       const real *step, const step_result *result, const fl_state *from) {
+  const real enough = SLOPE_ENOUGH * result->slope_begin;
+  real low = 0;
+  real high = 1;
+  real slope_low = result->slope_begin;
+  real slope_high = result->slope_end;
+  real share = 0;
+  int last_side = 0;
+  for (int k = 0; k < SEARCH_STEPS; k++) {
+    share = (slope_low * high - slope_high * low) / (slope_low - slope_high);
+    if (k % HALVED == HALVED - 1) share = (low + high) / 2;
+    const real slope = slope_at(block, work, target_reduced, step, from, share);
+    if (FABS(slope) <= enough) break;
+    if (slope > 0) {
+      low = share;
+      slope_low = slope;
+      if (last_side > 0) slope_high /= 2;
+      last_side = 1;
+    } else {
+      high = share;
+      slope_high = slope;
+      if (last_side < 0) slope_low /= 2;
+      last_side = -1;
+    }
+  }
+  return share;
+}
+
+/* Makes a trial that went too far the dual where its value is largest along the step. Returns
+   whether it is kept. */
+static int is_kept_at_best(const real *block, const fl_work *work, const real *target_reduced,
+                           const real *step, const step_result *result, const fl_state *at,
+                           fl_state *trial) {
+  if (!(result->slope_begin > 0 && result->slope_end < 0)) return 0;
+  const real share = best_share(block, work, target_reduced, step, result, at);
+  real shorter[6];
+  real lambda[6];
+  for (int j = 0; j < 6; j++) {
+    shorter[j] = share * step[j];
+    lambda[j] = at->lambda_reduced[j] + shorter[j];
+  }
+  fl_dual_at(block, work, target_reduced, lambda, trial);
+  const step_result of_shorter = judged_step(shorter, at, trial);
+  return is_kept(&of_shorter, at, trial);
+}
+
 /* Newton's method from multipliers on, or from its own first ones where there are none.
    work->state_found is the dual at the multipliers that it comes to, however it ends. Returns
    FL_MET, FL_BEYOND (also where all answers take more than work->power_of_use) or
@@ -367,8 +496,16 @@ int fl_dual_newton(const real *block, fl_work *work, const real *target_reduced,
       }
     }
     const step_result result = judged_step(step, at, trial);
-    if (is_kept(&result, at, trial)) {
+    int is_next = is_kept(&result, at, trial);
+    if (!work->has_kinks && (!is_next || result.slope_left < OVERSHOT)) {
+      is_next = is_kept_at_best(block, work, target_reduced, step, &result, at, trial);
+      if (is_next) mu = larger(mu * MU_KEPT_EARLY, ROUNDING);
+    } else if (is_next) {
       mu = mu_after_kept(mu, &result);
+    } else if (work->has_drag) {
+      is_next = is_kept_at_jump(block, work, target_reduced, step, &result, at, trial);
+    }
+    if (is_next) {
       nu = 2;
       work->state_found = trial;
       trial = at;

@@ -82,13 +82,6 @@ static real mean_power(const real *block, const fl_work *work, const real *previ
   return larger(power, LEAST_POWER * full) / (real)count;
 }
 
-/* Adds to the normal equations H lambda = right that a newton along a direction b (6,) in the basis
-   has a price [W/N], b' lambda = price, with a weight. */
-static void add_price(real H[6][6], real *right, const real *direction, real weight, real price) {
-  fl_add_square(H, direction, weight);
-  for (int j = 0; j < 6; j++) right[j] += weight * price * direction[j];
-}
-
 /* Sets the multipliers in the basis [W] at which the actuators gave what they did before, by least
    squares: along its force each had its own price (n,), and across it a pod that stood still had
    none. Newton's method begins there in a tick. A tick is a small step, and its narrow arcs make
@@ -114,8 +107,8 @@ static void begin_as_before(const real *block, fl_work *work, const real *previo
       ahead[j] = c * B[0][j] + s * B[1][j];
       across[j] = c * B[1][j] - s * B[0][j];
     }
-    add_price(H, right, ahead, a->secant[0], price[i]);
-    add_price(H, right, across, ACROSS * a->secant[0], 0);
+    fl_add_equation(H, right, ahead, a->secant[0], price[i]);
+    fl_add_equation(H, right, across, ACROSS * a->secant[0], 0);
   }
   const int is_at_rest = !(dot(right, right, 6) > 0);
   if (is_at_rest) return; /* multipliers of 0 tell Newton's method nothing */

@@ -1,196 +1,32 @@
 /* Commands of robots whose foils drag. A foil gives a lift and with it a drag, a curve; the
    dual takes what lies between the curve and its chord for it, too. Steps on the angles of
-   the foils lead from its forces to commands that give a wrench by the curves. A step is the
-   dual's answer where each curve is its tangent, curved as much as the cost less the worth
-   of the force, whatever the sign (sequential quadratic programming); all other sets are
-   whole. Levenberg-Marquardt steps make it exact, and it is kept where it is cheaper.
+   the foils (foil_steps.c) lead from its forces to commands that give a wrench by the curves.
 
-   Steps lead to what is near. With few actuators what foils give is a curved sheet, which
-   turns back where they stall: a wrench on it is met at few commands, far from each other,
-   and from elsewhere steps end at a least miss. Where the starts that the dual has come to
-   no cost that it proves, others are taken from a lattice over the angles of all foils
-   (foil_lattice.c), each kept within the branches of the lifts on which it lies. */
+   Steps lead to what is near. Where the dual leaves foils between their ends, as their drag is
+   welcome, steps begin at the vertices of these lifts (foil_vertices.c). With few actuators what
+   foils give is a curved sheet, which turns back where they stall: a wrench on it is met at few
+   commands, far from each other, and from elsewhere steps end at a least miss. Where the starts
+   that the dual has come to no cost that it proves, others are taken from a lattice over the angles
+   of all foils (foil_lattice.c), each kept within the branches of the lifts on which it lies, but
+   for branches that the dual proves to be dearer (foil_choices.c). */
 #include "internal.h"
 
-#define APPROACH_STEPS 24         /* steps on commands from a start towards a wrench, at most */
-#define APPROACH_ROUND 6          /* the same in a row, which have to halve the error */
-#define EXACT_STEPS 24            /* steps that end them, to rounding */
-#define SURE_STEPS 12             /* the same from forces that the dual is sure of */
-#define STALL_SAMPLES 12          /* angles of a stalled foil that are looked at for its worth */
-#define CHEAPER (R(0.1) * NEARLY) /* share of the cost below which a gain ends the steps */
-#define STEP_SHORTER R(0.25)      /* a step that is no cheaper is shortened to this share */
+#define SURE_STEPS 12    /* steps on commands from forces that the dual is sure of */
+#define STALL_SAMPLES 12 /* angles of a stalled foil that are looked at for its worth */
 /* commands that cost more than this times the best are left alone */
 #define WITHIN_BEST R(1.5)
 /* share of a ray that stalled foils may add to what tables give */
 #define STALLED_MORE R(0.1)
 
-static int has_gap(const fl_actuator *a, const fl_set *set) {
-  if (is_plane(a)) return set->is_forked || set->force_max_reverse > 0;
-  return a->dead_band > 0;
-}
-
-/* Narrows sets and limits of other actuators to the side of a gap on which their forces are. */
-static void take_sides(const real *block, fl_work *work, fl_box *box, real command[][3],
-                       real force[][2]) {
-  for (int i = 0; i < COUNT(block); i++) {
-    const fl_actuator *a = ACTUATOR(block, i);
-    fl_set *set = work->set + i;
-    if (has_gap(a, set)) {
-      fl_narrow_set(block, i, set, force[i], fl_nearer_side(block, i, set, force[i]));
-    }
-    const int k = fl_form_of(a)->force_number;
-    const int has_dead_band = k != NO_NUMBER && a->dead_band > 0;
-    if (!has_dead_band || fl_aims_force(a)) continue;
-    real low = set->force_min;
-    real high = set->force_max;
-    if (!(a->command_sign > 0)) {
-      low = -set->force_max;
-      high = -set->force_min;
-    }
-    box->command_min[i][k] = larger(box->command_min[i][k], low);
-    box->command_max[i][k] = smaller(box->command_max[i][k], high);
-    command[i][k] = fl_clip_number(box, i, k, NO_NUMBER, command[i][k]);
-  }
-}
-
-/* Makes commands those that a share of the step from forces to the dual's answer leads to. */
-static void take_step(const real *block, const fl_work *work, const fl_box *box, real force[][2],
-                      real share, real command[][3]) {
-  for (int i = 0; i < COUNT(block); i++) {
-    if (work->span.is_lost[i]) continue;
-    const real *answer = work->state_found->force[i];
-    const real change[2] = {share * (answer[0] - force[i][0]), share * (answer[1] - force[i][1])};
-    if (is_foil(ACTUATOR(block, i))) { /* the angle whose tangent comes nearest to the change */
-      const real *slope = work->tangent[i].force_slope;
-      const real turn = dot(change, slope, 2) / larger(dot(slope, slope, 2), TINY);
-      command[i][0] = fl_clip_number(box, i, 0, NO_NUMBER, command[i][0] + turn);
-      continue;
-    }
-    const real wanted[2] = {force[i][0] + change[0], force[i][1] + change[1]};
-    fl_command_for_force(block, i, box, wanted, command[i], command[i]);
-  }
-}
-
-/* Whether commands within a box are fewer than the directions in which the robot drives:
-   what they give is a sheet, and that of the tables lies beside that of the laws, by FINE at
-   most. A wrench on the one is then met by no commands of the other. */
-static int are_few(const real *block, const fl_work *work, const fl_box *box) {
-  int free = 0;
-  for (int i = 0; i < COUNT(block); i++) {
-    if (work->span.is_lost[i]) continue;
-    for (int c = 0; c < 3; c++) free += box->command_max[i][c] > box->command_min[i][c];
-  }
-  return free < work->span.rank;
-}
-
-/* Steps towards work->wrench_wanted, of which so many in a row have to halve the error: most starts
-   end soon. */
-static void approach(const real *block, fl_work *work, const fl_box *box, real command[][3],
-                     int steps) {
-  real error = LARGEST_NUMBER;
-  for (int k = 0; k < APPROACH_STEPS; k += steps) {
-    const real before = error;
-    error = fl_refine_commands(block, work, box, work->wrench_wanted, command, steps);
-    if (error <= EXACT || error > before / 2) return;
-  }
-}
-
-/* Whether so many Levenberg-Marquardt steps make commands within a box give work->wrench_wanted,
-   to an error over the wrench scale and to rounding. Where that is what tables leave, steps on
-   their error end soon. */
-static int come_to_give(const real *block, fl_work *work, const fl_box *box, real command[][3],
-                        int steps, real most_error) {
-  real size = 0;
-  for (int k = 0; k < 6; k++) size += FABS(work->wrench_wanted[k]) / HEAD(block)->wrench_scale[k];
-  if (most_error > EXACT) {
-    approach(block, work, box, command, APPROACH_ROUND);
-    steps = 0;
-  }
-  const real error = fl_refine_commands(block, work, box, work->wrench_wanted, command, steps);
-  return error <= most_error + ROUNDING * size;
-}
-
-/* Largest error over the wrench scale of commands that are said to give a wrench: what tables
-   leave where these are few. */
-static real error_allowed(const real *block, const fl_work *work, const fl_box *box) {
-  if (are_few(block, work, box)) return FINE;
-  return EXACT;
-}
-
-/* Sets of a step: of each foil its tangent at its command. */
-static void draw_tangents(const real *block, fl_work *work, const fl_box *box, const real *lambda,
-                          real command[][3]) {
-  for (int i = 0; i < COUNT(block); i++) {
-    if (!is_foil(ACTUATOR(block, i)) || work->span.is_lost[i]) continue;
-    real s[2];
-    actuator_price(work, i, lambda, s);
-    fl_draw_tangent(block, i, box, command[i][0], s, work->tangent + i, work->set + i);
-  }
-}
-
-/* Makes commands cheaper, from their forces and cost [W] on, by steps of sequential quadratic
-   programming that keep giving work->wrench_wanted; `lambda` becomes that of the last step, and
-   work->state_found the dual of its tangents. Their cost. */
-static real cheapen(const real *block, fl_work *work, const fl_box *box, const real *target_reduced,
-                    real most_error, real cost, real *lambda, real command[][3], real force[][2]) {
-  real share = 1;
-  int has_moved = 1;
-  for (int k = 0; k < FL_FOIL_STEPS; k++) {
-    if (has_moved) draw_tangents(block, work, box, lambda, command);
-    fl_prepare_sets(block, work);
-    if (has_moved &&
-        fl_dual_newton(block, work, target_reduced, lambda, FL_STEPS_AT_KINK) == FL_MET) {
-      memcpy(lambda, work->state_found->lambda_reduced, sizeof work->state_found->lambda_reduced);
-    }
-    real stepped[FL_MOST][3];
-    real force_stepped[FL_MOST][2];
-    copy_commands(block, command, stepped);
-    take_step(block, work, box, force, share, stepped);
-    real gain = -INFEASIBLE_COST;
-    if (come_to_give(block, work, box, stepped, EXACT_STEPS, most_error)) {
-      gain = cost - fl_power_of_commands(block, work, stepped, force_stepped);
-    }
-    has_moved = gain > 0;
-    if (has_moved) {
-      copy_commands(block, stepped, command);
-      copy_forces(block, force_stepped, force);
-      cost -= gain;
-    } else {
-      share *= STEP_SHORTER;
-    }
-    if (FABS(gain) <= CHEAPER * cost) break;
-  }
-  return cost;
-}
-
-/* Makes commands give work->wrench_wanted, in the basis `target_reduced`, to an error over the
-   wrench scale, and then cheaper; `lambda` becomes that of the last step. Their forces along the
-   rows, and their cost [W]; INFEASIBLE_COST where they do not come to give it. */
-static real meet_and_cheapen(const real *block, fl_work *work, const real *target_reduced,
-                             real most_error, real *lambda, real command[][3], real force[][2]) {
-  fl_box box = work->box;
-  fl_set before[FL_MOST];
-  copy_sets(block, work->set, before);
-  fl_power_of_commands(block, work, command, force);
-  take_sides(block, work, &box, command, force);
-  real cost = INFEASIBLE_COST;
-  if (come_to_give(block, work, &box, command, EXACT_STEPS, most_error)) {
-    cost = fl_power_of_commands(block, work, command, force);
-    cost = cheapen(block, work, &box, target_reduced, most_error, cost, lambda, command, force);
-  }
-  fl_restore_sets(block, work, before);
-  return cost;
-}
-
 /* Remembers what commands and multipliers lead to, where it costs less than the best so far. */
 static void improve_from(const real *block, fl_work *work, const real *target_reduced,
                          const real *lambda, real command[][3], real *best_cost) {
-  const real most_error = error_allowed(block, work, &work->box);
+  const real most_error = fl_error_allowed(block, work, &work->box);
   real force[FL_MOST][2];
   real lambda_near[6];
   memcpy(lambda_near, lambda, sizeof lambda_near);
   const real cost =
-      meet_and_cheapen(block, work, target_reduced, most_error, lambda_near, command, force);
+      fl_meet_and_cheapen(block, work, target_reduced, most_error, lambda_near, command, force);
   if (!(cost < *best_cost)) return;
   *best_cost = cost;
   copy_commands(block, command, work->best_command);
@@ -216,6 +52,15 @@ static int may_stall(const real *block, const fl_work *work, int i, int end, rea
   if (!is_foil(a) || work->span.is_lost[i]) return 0;
   const real stall_angle = fl_lift_end(block, a)[1];
   return FABS(*command - a->zero_lift_angle) > stall_angle;
+}
+
+/* Whether some foil may stall within its limits: it then gives more than its table. */
+static int may_any_stall(const real *block, const fl_work *work) {
+  real unused;
+  for (int i = 0; i < COUNT(block); i++) {
+    if (may_stall(block, work, i, 0, &unused) || may_stall(block, work, i, 1, &unused)) return 1;
+  }
+  return 0;
 }
 
 /* How much more than its conjugate in the dual a foil is worth, at the multipliers so far,
@@ -264,8 +109,8 @@ static void begin_at(const real *block, fl_work *work, const foil_lattice *latti
                      const real *target_reduced, const lattice_point *point, real command[][3]) {
   fl_box branches = work->box;
   fl_commands_of_point(block, work, lattice, target_reduced, point, &branches, command);
-  approach(block, work, &branches, command, APPROACH_ROUND);
-  approach(block, work, &work->box, command, APPROACH_ROUND);
+  fl_approach(block, work, &branches, command);
+  fl_approach(block, work, &work->box, command);
 }
 
 /* The cheapest point that costs more than the last one followed: commands that cost the same
@@ -279,22 +124,45 @@ static const lattice_point *next_point(const lattice_point *points, int count, r
   return next;
 }
 
+/* Finds which choices of branches may be cheaper than the best commands, at the multipliers of
+   work->state_found; but for their own where vertices have `spread` the lifts of foils (n,). */
+static void find_choices(const real *block, fl_work *work, const foil_lattice *lattice,
+                         const unsigned char *is_spread, real best_cost, foil_choices *choices) {
+  int is_any_spread = 0;
+  for (int i = 0; i < COUNT(block); i++) is_any_spread |= is_spread[i];
+  fl_find_choices(block, work, lattice, best_cost * (1 - NOTHING), choices);
+  if (is_any_spread) fl_leave_out_choice(lattice, work->best_command, is_spread, choices);
+}
+
 /* Improves on the best commands by what steps from a lattice come to: first exact commands
    from many points, then the cheapest of these are made cheaper, but for those that cost
-   half as much again as the best so far. */
+   half as much again as the best so far. `lambda` are the multipliers of work->state_found. */
 static void improve_from_lattice(const real *block, fl_work *work, const real *target_reduced,
-                                 const real *lambda, real enough, real *best_cost) {
-  const real most_error = error_allowed(block, work, &work->box);
+                                 const real *lambda, real enough, const unsigned char *is_spread,
+                                 real *best_cost) {
+  const real most_error = fl_error_allowed(block, work, &work->box);
+  /* Foils that stall may lead steps to other branches. */
+  const int has_bounds = *best_cost < INFEASIBLE_COST && !may_any_stall(block, work);
   foil_lattice lattice;
-  lattice_point points[LATTICE_STARTS];
+  foil_choices choices;
+  lattice_point points[FL_LATTICE_STARTS];
   real command[FL_MOST][3];
   fl_lay_lattice(block, work, &lattice);
-  const int count = fl_cheapest_points(block, work, &lattice, target_reduced, points);
+  const foil_choices *choices_left = 0; /* all */
+  if (has_bounds) {
+    find_choices(block, work, &lattice, is_spread, *best_cost, &choices);
+    choices_left = &choices;
+  }
+  const int count = fl_cheapest_points(block, work, &lattice, target_reduced, choices_left, points);
   for (int k = 0; k < count; k++) {
     real unused[FL_MOST][2];
-    begin_at(block, work, &lattice, target_reduced, points + k, command);
     points[k].cost = INFEASIBLE_COST;
-    if (come_to_give(block, work, &work->box, command, 0, most_error)) {
+    if (has_bounds && fl_is_proved_dearer(block, work, &lattice, target_reduced, lambda, *best_cost,
+                                          points + k)) {
+      continue;
+    }
+    begin_at(block, work, &lattice, target_reduced, points + k, command);
+    if (fl_come_to_give(block, work, &work->box, command, 0, most_error)) {
       points[k].cost = fl_power_of_commands(block, work, command, unused);
     }
   }
@@ -326,6 +194,47 @@ static void improve_from_stalls(const real *block, fl_work *work, const real *ta
   }
 }
 
+/* Improves on the best commands from the vertices of the lifts that work->state_found leaves between
+   their ends; marks the foils (n,) whose lifts these spread. */
+static void improve_from_vertices(const real *block, fl_work *work, const real *target_reduced,
+                                  unsigned char *is_spread, real *best_cost) {
+  foil_vertices vertices;
+  real lambda[6];
+  real found[FL_MOST][2];
+  fl_find_vertices(block, work, &vertices);
+  memcpy(lambda, work->state_found->lambda_reduced, sizeof lambda);
+  copy_forces(block, work->state_found->force, found);
+  for (int vertex = 0; vertex < vertices.count; vertex++) {
+    real force[FL_MOST][2];
+    real command[FL_MOST][3];
+    unsigned char is_held[VERTEX_FOILS];
+    fl_box box = work->box;
+    copy_forces(block, found, force);
+    fl_go_to_vertex(work, &vertices, vertex, is_held, force);
+    fl_commands_for_forces(block, &work->box, force, work->command_previous, command);
+    for (int f = 0; f < vertices.foils; f++) {
+      const int i = vertices.foil[f];
+      if (!is_held[f]) continue;
+      box.command_min[i][0] = command[i][0];
+      box.command_max[i][0] = command[i][0];
+    }
+    fl_approach(block, work, &box, command);
+    improve_from(block, work, target_reduced, lambda, command, best_cost);
+  }
+  memset(is_spread, 0, (size_t)COUNT(block));
+  for (int f = 0; f < vertices.foils && vertices.directions > 0; f++) {
+    is_spread[vertices.foil[f]] = 1;
+  }
+}
+
+/* Whether a foil that works is not among marked ones (n,). */
+static int any_other_foil(const real *block, const fl_work *work, const unsigned char *is_marked) {
+  for (int i = 0; i < COUNT(block); i++) {
+    if (is_foil(ACTUATOR(block, i)) && !work->span.is_lost[i] && !is_marked[i]) return 1;
+  }
+  return 0;
+}
+
 /* The same as fl_improve_commands of several starts, as steps from a cheap one may end
    early: each has its own valley. work->state_found is of the last steps, too. */
 void fl_improve_from_starts(const real *block, fl_work *work, const real *target_reduced,
@@ -333,21 +242,31 @@ void fl_improve_from_starts(const real *block, fl_work *work, const real *target
   real most_cost;
   const real proved = proved_value(block, work, &most_cost);
   const real enough = proved * (1 + CLOSE);
+  const int stalls = may_any_stall(block, work);
+  unsigned char is_spread[FL_MOST];
   real start[FL_MOST][3];
   real lambda[6];
   memcpy(lambda, work->state_found->lambda_reduced, sizeof lambda);
-  fl_commands_for_forces(block, &work->box, work->state_found->force, work->command_previous,
-                         start);
-  fl_improve_commands(block, work, target_reduced, best_cost);
+  if (stalls) {
+    fl_commands_for_forces(block, &work->box, work->state_found->force, work->command_previous,
+                           start);
+  }
+  improve_from_vertices(block, work, target_reduced, is_spread, best_cost);
   if (*best_cost <= enough) return;
-  improve_from_stalls(block, work, target_reduced, lambda, start, best_cost);
-  if (*best_cost <= enough) return;
-  real unused;
-  fl_first_lambda(block, work, target_reduced, lambda, &unused);
-  fl_dual_start(block, work, target_reduced, lambda);
-  fl_improve_commands(block, work, target_reduced, best_cost);
+  if (stalls) {
+    improve_from_stalls(block, work, target_reduced, lambda, start, best_cost);
+    if (*best_cost <= enough) return;
+    real lambda_first[6];
+    real unused;
+    fl_first_lambda(block, work, target_reduced, lambda_first, &unused);
+    fl_dual_start(block, work, target_reduced, lambda_first);
+    fl_improve_commands(block, work, target_reduced, best_cost);
+  } else if (!any_other_foil(block, work, is_spread)) {
+    return;
+  }
   if (*best_cost > enough && proved <= most_cost) {
-    improve_from_lattice(block, work, target_reduced, lambda, enough, best_cost);
+    fl_dual_start(block, work, target_reduced, lambda);
+    improve_from_lattice(block, work, target_reduced, lambda, enough, is_spread, best_cost);
   }
 }
 
@@ -369,17 +288,8 @@ int fl_take_sure_forces(const real *block, fl_work *work) {
   copy_forces(block, state->force, work->best_force);
   fl_commands_for_forces(block, &work->box, work->best_force, work->command_previous,
                          work->best_command);
-  const real most_error = error_allowed(block, work, &work->box);
-  return come_to_give(block, work, &work->box, work->best_command, SURE_STEPS, most_error);
-}
-
-/* Whether some foil may stall within its limits: it then gives more than its table. */
-static int may_any_stall(const real *block, const fl_work *work) {
-  real unused;
-  for (int i = 0; i < COUNT(block); i++) {
-    if (may_stall(block, work, i, 0, &unused) || may_stall(block, work, i, 1, &unused)) return 1;
-  }
-  return 0;
+  const real most_error = fl_error_allowed(block, work, &work->box);
+  return fl_come_to_give(block, work, &work->box, work->best_command, SURE_STEPS, most_error);
 }
 
 /* Commands that give the largest share of a wrench that steps come to, Eq. 14: between the
@@ -417,7 +327,7 @@ void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, 
         copy_commands(block, start, command);
       memcpy(lambda, out->lambda_reduced, sizeof lambda);
       real force[FL_MOST][2];
-      is_met = meet_and_cheapen(block, work, target_reduced, EXACT, lambda, command, force) <
+      is_met = fl_meet_and_cheapen(block, work, target_reduced, EXACT, lambda, command, force) <
                INFEASIBLE_COST;
     }
     if (!is_met) {

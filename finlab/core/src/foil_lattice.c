@@ -146,12 +146,18 @@ static real cost_at_point(const real *block, const fl_work *work, const foil_lat
   return cost + MISS_WEIGHT * work->power_cost_max * SQRT(dot(residual, residual, 6));
 }
 
-/* Puts a point among the `count` cheapest ones (LATTICE_STARTS,), which are in order; how many
+/* The branch of a foil in a choice of branches, numbered in mixed radix. */
+int fl_branch_of_choice(const foil_lattice *lattice, int choice, int foil) {
+  for (int f = 0; f < foil; f++) choice /= lattice->branches[f];
+  return choice % lattice->branches[foil];
+}
+
+/* Puts a point among the `count` cheapest ones (FL_LATTICE_STARTS,), which are in order; how many
    there are then. */
 static int put_in_order(lattice_point *points, int count, const lattice_point *added) {
   int index = count;
-  if (count == LATTICE_STARTS) {
-    index = LATTICE_STARTS - 1;
+  if (count == FL_LATTICE_STARTS) {
+    index = FL_LATTICE_STARTS - 1;
     if (!(added->cost < points[index].cost)) return count;
   }
   while (index > 0 && added->cost < points[index - 1].cost) {
@@ -159,7 +165,7 @@ static int put_in_order(lattice_point *points, int count, const lattice_point *a
     index--;
   }
   points[index] = *added;
-  if (count == LATTICE_STARTS) return count;
+  if (count == FL_LATTICE_STARTS) return count;
   return count + 1;
 }
 
@@ -170,13 +176,11 @@ static lattice_point cheapest_of_choice(const real *block, const fl_work *work,
   lattice_point best = {{0}, 0};
   lattice_point tried = {{0}, 0};
   for (int k = 0; k < points; k++) {
-    int branch_digits = choice;
     int node_digits = k;
     for (int f = 0; f < lattice->foils; f++) {
-      const int branch = branch_digits % lattice->branches[f];
+      const int branch = fl_branch_of_choice(lattice, choice, f);
       const int node = node_digits % lattice->each;
       tried.node[f] = (unsigned char)(lattice->first[f] + branch * lattice->each + node);
-      branch_digits /= lattice->branches[f];
       node_digits /= lattice->each;
     }
     real unused[FL_MOST][2];
@@ -186,10 +190,11 @@ static lattice_point cheapest_of_choice(const real *block, const fl_work *work,
   return best;
 }
 
-/* The cheapest point of each choice of branches, and of these the cheapest ones
-   (LATTICE_STARTS,); how many there are. */
+/* The cheapest point of each choice of branches that is left (`choices_left`, 0: of all), and of these
+   the cheapest ones (FL_LATTICE_STARTS,); how many there are. */
 int fl_cheapest_points(const real *block, const fl_work *work, const foil_lattice *lattice,
-                       const real *target_reduced, lattice_point *points) {
+                       const real *target_reduced, const foil_choices *choices_left,
+                       lattice_point *points) {
   int choices = 1;
   int points_of_choice = 1;
   for (int f = 0; f < lattice->foils; f++) {
@@ -198,6 +203,7 @@ int fl_cheapest_points(const real *block, const fl_work *work, const foil_lattic
   }
   int count = 0;
   for (int choice = 0; choice < choices; choice++) {
+    if (choices_left && !fl_is_choice_left(lattice, choices_left, choice)) continue;
     const lattice_point best =
         cheapest_of_choice(block, work, lattice, target_reduced, choice, points_of_choice);
     count = put_in_order(points, count, &best);

@@ -101,6 +101,7 @@ static inline void add_wrench(const real *r, const real *f, real *wrench) {
 
 real fl_wrap_angle(real angle);
 void fl_add_square(real H[6][6], const real *b, real weight);
+void fl_add_equation(real H[6][6], real *right, const real *b, real weight, real value);
 real fl_trace(real H[6][6]);
 int fl_factor(real A[6][6]);
 void fl_solve(real factor[6][6], const real *right, real *x);
@@ -303,10 +304,9 @@ void fl_draw_tangent(const real *block, int i, const fl_box *box, real angle, co
                      fl_tangent *tangent, fl_set *set);
 
 /* foil_lattice.c: where searches for commands of foils may begin */
-enum { BRANCHES = 4 };    /* of a foil's lift */
-#define LATTICE_FOILS 6   /* foils on the lattice at most; others begin at rest */
-#define LATTICE_NODES 48  /* nodes of all foils at most, angles of which a point has one a foil */
-#define LATTICE_STARTS 60 /* points at which steps on the commands begin */
+enum { BRANCHES = 4 };   /* of a foil's lift */
+#define LATTICE_FOILS 6  /* foils on the lattice at most; others begin at rest */
+#define LATTICE_NODES 48 /* nodes of all foils at most, angles of which a point has one a foil */
 typedef struct {
   int foils;                              /* how many there are */
   int foil[LATTICE_FOILS];                /* which actuators these are */
@@ -323,12 +323,55 @@ typedef struct {
   unsigned char node[LATTICE_FOILS]; /* of each foil */
   real cost;                         /* [W], with the price of a miss */
 } lattice_point;
+struct foil_choices;
 void fl_lay_lattice(const real *block, const fl_work *work, foil_lattice *lattice);
 int fl_cheapest_points(const real *block, const fl_work *work, const foil_lattice *lattice,
-                       const real *target_reduced, lattice_point *points);
+                       const real *target_reduced, const struct foil_choices *choices_left,
+                       lattice_point *points);
+int fl_branch_of_choice(const foil_lattice *lattice, int choice, int foil);
 void fl_commands_of_point(const real *block, const fl_work *work, const foil_lattice *lattice,
                           const real *target_reduced, const lattice_point *point, fl_box *box,
                           real command[][3]);
+
+/* foil_choices.c: branches of foils' lifts on which cheaper commands may be */
+enum { ANY_BRANCH = -1 };
+typedef struct foil_choices {
+  real dual_value;                      /* at the multipliers of the regrets [W] */
+  real cost_of_use;                     /* commands that cost more are of no use [W] */
+  real regret[LATTICE_FOILS][BRANCHES]; /* worth that a foil has less on each branch [W] */
+  int known_branch[LATTICE_FOILS];      /* of each foil in commands that are known */
+  int has_known;                        /* whether there are such commands */
+} foil_choices;
+void fl_find_choices(const real *block, const fl_work *work, const foil_lattice *lattice,
+                     real cost_of_use, foil_choices *choices);
+void fl_leave_out_choice(const foil_lattice *lattice, real command[][3],
+                         const unsigned char *is_on_any, foil_choices *choices);
+int fl_is_choice_left(const foil_lattice *lattice, const foil_choices *choices, int choice);
+int fl_is_proved_dearer(const real *block, fl_work *work, const foil_lattice *lattice,
+                        const real *target_reduced, const real *lambda, real cost_of_use,
+                        const lattice_point *point);
+
+/* foil_vertices.c: lifts of foils that the dual leaves between their ends */
+#define VERTEX_FOILS 6 /* such foils at most; others stay where they are */
+typedef struct {
+  int foils;                    /* how many there are */
+  int foil[VERTEX_FOILS];       /* which actuators these are */
+  real column[VERTEX_FOILS][6]; /* of each: wrench by its lift that no others make up for */
+  real size[VERTEX_FOILS];      /* of each: size of that wrench, whoever makes up for it */
+  int directions;               /* in the lifts along which the wrench stays */
+  int count;                    /* of vertices */
+} foil_vertices;
+void fl_find_vertices(const real *block, const fl_work *work, foil_vertices *vertices);
+void fl_go_to_vertex(const fl_work *work, const foil_vertices *vertices, int vertex,
+                     unsigned char *is_held, real force[][2]);
+
+/* foil_steps.c: steps on the commands of robots with foils */
+real fl_approach(const real *block, fl_work *work, const fl_box *box, real command[][3]);
+int fl_come_to_give(const real *block, fl_work *work, const fl_box *box, real command[][3],
+                    int steps, real most_error);
+real fl_error_allowed(const real *block, const fl_work *work, const fl_box *box);
+real fl_meet_and_cheapen(const real *block, fl_work *work, const real *target_reduced,
+                         real most_error, real *lambda, real command[][3], real force[][2]);
 
 /* foil_drag.c: commands of robots whose foils drag */
 void fl_improve_commands(const real *block, fl_work *work, const real *target_reduced,

@@ -12,6 +12,12 @@ void fl_add_square(real H[6][6], const real *b, real weight) {
   }
 }
 
+/* Adds b'x = value, with a weight, to the normal equations H x = right of least squares. */
+void fl_add_equation(real H[6][6], real *right, const real *b, real weight, real value) {
+  fl_add_square(H, b, weight);
+  for (int j = 0; j < 6; j++) right[j] += weight * value * b[j];
+}
+
 real fl_trace(real H[6][6]) {
   real sum = 0;
   for (int k = 0; k < 6; k++) sum += H[k][k];

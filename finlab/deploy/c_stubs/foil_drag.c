@@ -1,5 +1,5 @@
-/* In place of foil_drag.c and foil_lattice.c, for a robot none of whose actuators is a foil in a
-   flow: nothing calls these functions, which the other files name. */
+/* In place of foil_drag.c and the files that it needs, for a robot none of whose actuators is a foil
+   in a flow: nothing calls these functions, which the other files name. */
 #include "internal.h"
 
 void fl_improve_commands(const real *block, fl_work *work, const real *target_reduced,
