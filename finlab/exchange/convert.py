@@ -186,13 +186,14 @@ def _plain_values(text: str, suffix: str) -> Any:
         return parse_toml(text, "", LayoutError)
     if FORMAT_OF_SUFFIX.get(suffix) != "layout":
         bare = without_comments(text)
-        if bare.lstrip()[:1] in ("{", "["):
-            # A TOML file may begin with the bracket of a table.
-            if not _TOML_TABLE.match(bare.lstrip()):
-                return parse_json(bare, "", LayoutError)
-            return parse_toml(text, "", LayoutError)
-        if _TOML_KEY.match(bare.lstrip()):
-            return parse_toml(text, "", LayoutError)
+        start = bare.lstrip()
+        if _TOML_TABLE.match(start) or _TOML_KEY.match(start):
+            try:
+                return parse_toml(text, "", LayoutError)
+            except LayoutError as error:
+                raise LayoutError(f"{UNKNOWN_FORMAT}; as TOML it {error.problem}") from None
+        if start[:1] in ("{", "["):
+            return parse_json(bare, "", LayoutError)
     return parse_yaml(text, "", LayoutError)
 
 

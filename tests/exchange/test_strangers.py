@@ -245,6 +245,7 @@ def test_devices_beside_the_thrusters_and_symmetries() -> None:
         ("a.toml", "a = " + "[" * 500 + "]" * 500, "nested"),
         ("a.toml", "a = 1\n" + "#" * 400_000, "is TOML of more than 100,000 characters"),
         ("a.toml", "day = 2020-01-01\n", "has no matrix"),
+        ("a.conf", "[section]\nkey = a word\n", "holds none of the forms .* as TOML it is not valid TOML"),
         ("a.conf", '{"a": 1 // one\n "b": 2}', "is not valid JSON: line 2"),
         ("a.json", '{"a": "x // y" "b": 2}', "is not valid JSON: line 1"),
     ],
