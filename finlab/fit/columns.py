@@ -55,6 +55,8 @@ MAX_RAW_HEADER_LENGTH = 10_000
 """Characters of a header that are looked at, with all its blanks."""
 AGREEMENT = 0.01
 """Share of the largest value by which two columns of one quantity may differ."""
+SLIPS = 0.05
+"""As `AGREEMENT`, of two columns of which one names no unit."""
 
 
 def read_sheets(path: Path, is_header: IsHeader) -> tuple[dict[str, CsvTable], tuple[str, ...]]:
@@ -139,6 +141,8 @@ class Columns:
     """Names of those whose header names no unit."""
     sources: tuple[str, ...]
     """File and line of each of the n rows."""
+    left_aside: tuple[str, ...] = ()
+    """Headers without a unit of columns beside which another one names the unit."""
 
 
 class Header(NamedTuple):
@@ -196,7 +200,7 @@ def read_columns(
     """Returns the columns of a CSV file, or of a table, that have a name.
 
     Of several columns for one quantity that agree, such as a force in kgf and in N, the first is
-    taken.
+    taken. Where they are proportional, and one alone names a unit, that one is.
 
     Args:
         file: the file, or a table of a workbook.
@@ -227,6 +231,7 @@ def read_columns(
     numbers, lines = table.numbers(used)
     values: dict[str, Array] = {}
     column_of: dict[str, int] = {}
+    left_aside: list[str] = []
     for i, column in zip(used, numbers.T, strict=True):
         scaled = column * headers[i].scale
         name = headers[i].name
@@ -234,14 +239,38 @@ def read_columns(
             values[name] = scaled
             column_of[name] = i
             continue
-        tolerance = AGREEMENT * np.abs(scaled).max()
-        if not np.allclose(scaled, values[name], rtol=0.0, atol=tolerance, equal_nan=True):
+        if _agree(scaled, values[name]):
+            continue
+        first = headers[column_of[name]]
+        if bool(first.unit) != bool(headers[i].unit) and _are_proportional(scaled, values[name]):
+            unnamed = i
+            if headers[i].unit:
+                unnamed = column_of[name]
+                values[name] = scaled
+                column_of[name] = i
+            left_aside.append(table.header[unnamed])
+        else:
             pair = f"{table.header[column_of[name]]:.40} and {table.header[i]:.40}"
             raise DataError(f"{path}: two columns stand for {name}, {pair}, and differ; keep one")
     header_of = {name: table.header[i] for name, i in column_of.items()}
     without_unit = tuple(name for name, i in column_of.items() if not headers[i].unit)
     sources = tuple(f"{Path(path).name} line {line}" for line in lines)
-    return Columns(values, header_of, without_unit, sources)
+    return Columns(values, header_of, without_unit, sources, tuple(left_aside))
+
+
+def _agree(one: Array, other: Array) -> bool:
+    """Whether two columns (n,) are the same, but for rounding."""
+    tolerance = AGREEMENT * np.abs(one).max()
+    return np.allclose(one, other, rtol=0.0, atol=tolerance, equal_nan=True)
+
+
+def _are_proportional(one: Array, other: Array) -> bool:
+    """Whether two columns (n,) are the same but for their unit, and slips of a few percent."""
+    square = float(other @ other)
+    if square <= 0.0:
+        return False
+    ratio = float(one @ other) / square
+    return float(np.abs(one - ratio * other).max()) <= SLIPS * float(np.abs(one).max())
 
 
 def command_columns(layout: Layout) -> list[list[str]]:

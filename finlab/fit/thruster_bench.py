@@ -278,8 +278,10 @@ def _columns_of(table: CsvTable) -> list[Columns]:
     for voltage, names in by_voltage.items():
         own = table.columns(names)
         columns = read_columns(own, NAMES, NEEDED_COLUMNS, EXPECTED_COLUMNS)
-        if "voltage" not in columns.values:
-            _add_voltage(columns, voltage)
+        measured = columns.values.get("voltage")
+        if measured is not None and "power" not in columns.values:
+            columns.values["power"] = np.abs(measured * columns.values["current"])
+        _add_voltage(columns, voltage)  # a supply sags under load; its name is what users know
         tables.append(columns)
     return tables
 
@@ -311,6 +313,11 @@ def _with_pulse_column(columns: Columns) -> Columns:
 def _rows_by_voltage(file: Columns, kind: str, notes: list[str]) -> list[Rows]:
     """Rows of one table with signed forces, split by voltage; adds sentences to the notes."""
     values = file.values
+    if file.left_aside:
+        notes.append(
+            f"{', '.join(file.left_aside)} is left aside: it names no unit, and another column of "
+            "the same does"
+        )
     command = values[kind]
     force = values["force"]
     if kind == "rpm" and named_column(file.headers[kind], NAMES).unit == "rpm":

@@ -216,6 +216,14 @@ def test_voltages_may_stand_in_the_header(tmp_path: Path) -> None:
     shared = {"PWM": PWM} | {key: value for key, value in columns.items() if "pwm" not in key}
     path = write_csv(tmp_path / "shared.csv", shared)
     np.testing.assert_allclose(fitted(path, volts=16.0).force, ENDS, rtol=1e-3)
+    sagging = {key: value for key, value in columns.items() if "power" not in key}
+    for volts in (12.0, 16.0):
+        supply = volts - true_power(volts) / 400.0
+        sagging[f"voltage {volts:g}V"] = supply
+        sagging[f"current {volts:g}V"] = true_power(volts) / supply
+    fit = fitted(write_csv(tmp_path / "sagging.csv", sagging), volts=16.0)
+    np.testing.assert_allclose(fit.force, ENDS, rtol=1e-3)
+    assert fit.table.rows[-1][2] == pytest.approx(391.0, rel=0.01)
     text = (tmp_path / "both.csv").read_text().splitlines()
     ragged = [text[0], *(row + "," for row in text[1:])]
     ragged[0] += ",remarks"
@@ -225,6 +233,18 @@ def test_voltages_may_stand_in_the_header(tmp_path: Path) -> None:
     np.testing.assert_allclose(
         fitted(tmp_path / "ragged.csv", volts=12.0).force, np.array(ENDS) * 0.75, rtol=1e-3
     )
+
+
+def test_of_two_columns_of_one_force_the_one_with_a_unit_counts(tmp_path: Path) -> None:
+    pounds = {"thrust": true_force() / N_PER_LB, "thrust (kgf)": true_force() / N_PER_KGF}
+    rest = {"PWM": PWM, "power": true_power()}
+    for columns in (pounds | rest, dict(reversed([*pounds.items()])) | rest):
+        fit = fitted(write_csv(tmp_path / "two.csv", columns))
+        np.testing.assert_allclose(fit.force, ENDS, rtol=1e-3)
+        assert any("thrust is left aside: it names no unit" in note for note in fit.notes)
+    other = pounds | rest | {"thrust": np.abs(true_force())}
+    with pytest.raises(DataError, match="two columns stand for force, thrust and thrust .kgf."):
+        fitted(write_csv(tmp_path / "two.csv", other))
 
 
 def test_noise_at_rest_is_no_reverse_thrust(tmp_path: Path) -> None:
