@@ -316,8 +316,11 @@ def listed(names: Iterable[str]) -> str:
 
 
 def numbers_in(values: Any) -> Array | None:
-    """Returns nested numbers, or text that stands for them, as an array of their shape; None where
-    some are no numbers, or as large as 1e9."""
+    """Returns nested numbers, or text that stands for them (`0.1 0 0`, `(0.1, 0, 0)`), as an array
+    of their shape; None where some are no numbers, or as large as 1e9."""
+    if isinstance(values, str):
+        values = re.split(r"[\s,;]+", values[:1000].strip(" ()[]"))
+        values = values[0] if len(values) == 1 else values
     try:
         array = np.array(values, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):

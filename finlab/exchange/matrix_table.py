@@ -12,13 +12,25 @@ from typing import Any, NamedTuple
 from finlab.errors import LayoutError
 from finlab.exchange import labels
 from finlab.exchange.labels import axis_of, plain
-from finlab.files.csv_table import number_in
+from finlab.files.csv_table import LENGTHS, number_in
 
 FACTORS = ("roll", "pitch", "yaw", "throttle", "forward", "lateral")
 """Columns of motor factors of ArduSub, in the order of its calls."""
 MEASUREMENT_COLUMNS = {"phi", "pwm", "escsignal", "rpm", "current", "power", "voltage", "t", "time"}
 """Columns by which a table of measurements is recognized, which `finlab fit` reads."""
-VECTOR_COLUMNS = {"px", "posx", "dx", "ax", "nx", "ux", *labels.POSITION.split()}
+VECTOR_COLUMNS = {
+    "x",
+    "px",
+    "posx",
+    "xpos",
+    "xdir",
+    "dirx",
+    "dx",
+    "ax",
+    "nx",
+    "ux",
+    *labels.POSITION.split(),
+}
 """Columns by which a table with a row for each thruster is recognized."""
 MAX_ROWS = 1000
 """Most rows and columns that are read; a robot has up to 256 actuators."""
@@ -115,7 +127,9 @@ def plain_of(table: Table) -> dict[str, Any]:
     if axes_of_rows > 1:
         return _by_axis(header, rows, width)
     axes_of_columns = sum(axis_of(cell) is not None for cell in header)
-    if axes_of_columns > 1 or columns & VECTOR_COLUMNS:
+    vectors = " ".join(VECTOR_COLUMNS)
+    has_vectors = any(labels.is_key_of(cell, vectors, LENGTHS) for cell in header)
+    if axes_of_columns > 1 or has_vectors:
         return {"thrusters": records_of(table)}
     names = {"names": header} if header else {}
     return {**names, "matrix": [_numbers(row.line, row.cells, width) for row in rows]}
