@@ -25,7 +25,7 @@ THREADS := OMP_NUM_THREADS=1 MKL_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 THREADS += MALLOC_TRIM_THRESHOLD_=1073741824 MALLOC_MMAP_THRESHOLD_=1073741824
 
 .DEFAULT_GOAL := help
-.PHONY: docs schemas figures help setup core core-test golden app board-tools test fuzz test-all test-near test-durations mutate test-fast check format checkpoint wheel wheels sdist wheel-check clean
+.PHONY: test-pythons docs schemas figures help setup core core-test golden app board-tools test fuzz test-all test-near test-durations mutate test-fast check format checkpoint wheel wheels sdist wheel-check clean
 
 help:
 	@echo "make setup        make .venv with all that developers need, pinned in constraints.txt (gigabytes, with torch)"
@@ -36,6 +36,7 @@ help:
 	@echo "make test         every test, browser tests included; of long tables of cases a share"
 	@echo "make test-all     every test and every case"
 	@echo "make fuzz         a million mutated robots and wild wrenches for the core in C, under sanitizers"
+	@echo "make test-pythons  tests near the core by Python 3.10 and 3.13, where they are installed"
 	@echo "make test-near    the tests near what was changed since the branch main, a minute"
 	@echo "make test-durations  time every test, by which make test-near chooses"
 	@echo "make mutate       small random faults, and whether near tests find them: make mutate SEED=1 COUNT=60"
@@ -52,7 +53,7 @@ help:
 setup: $(STAMP) $(LIBRARY)
 
 $(STAMP): pyproject.toml constraints.txt
-	@test -n "$(PYTHON)" || { echo "finlab needs Python 3.11 or newer: apt-get install python3"; exit 1; }
+	@test -n "$(PYTHON)" || { echo "finlab needs Python 3.10 or newer: apt-get install python3"; exit 1; }
 	test -x $(BIN)/pip || tools/make-venv "$(PYTHON)"
 	$(BIN)/pip install --disable-pip-version-check --no-compile -c constraints.txt hatchling -e '.[$(EXTRA)]'
 	@touch $@
@@ -86,6 +87,9 @@ test: setup board-tools
 
 fuzz: setup board-tools
 	FUZZ=250000 $(BIN)/python -m pytest -n 2 -m "" -o faulthandler_timeout=0 -k fuzzer tests/core
+
+test-pythons: setup
+	tools/other-pythons
 
 test-all: CASES := -m ""
 test-all: test

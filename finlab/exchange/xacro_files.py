@@ -230,6 +230,8 @@ class _Expansion:
             path = None if Path(name).is_absolute() else folder / name
         try:
             inside = path is not None and path.resolve().is_relative_to(self._folder)
+        except RecursionError:  # a file that includes itself, which `expand` says
+            raise
         except (OSError, RuntimeError, ValueError):  # a circle of links, a NUL byte
             inside = False
         if path is None or not inside:

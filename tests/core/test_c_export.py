@@ -78,6 +78,14 @@ def test_self_test_holds(
     assert ran(words, exported(name, 200, flow)).startswith("0 of 200 ")
 
 
+@pytest.mark.parametrize("single", ["", "-DFL_SINGLE"])
+@pytest.mark.parametrize("name", ["bluerov2", "A"])
+def test_policy_falling_is_compiled_by_a_macro(name: str, single: str, tmp_path: Path) -> None:
+    """Its questions are in every self-test; without the macro they have to be refused."""
+    words = f"gcc -std=c99 -O1 {single} -DFL_WITH_FALLING *.c -lm -o {tmp_path}/it"
+    assert ran(f"{words} && {tmp_path}/it", exported(name, 200)).startswith("0 of 200 ")
+
+
 @pytest.mark.exhaustive
 def test_single_precision_chooses_the_same_parts_of_sets_with_gaps(tmp_path: Path) -> None:
     """Of parts that all give a wrench, the miss is rounding, which is to choose no side."""
