@@ -381,7 +381,7 @@ int fl_dual_newton(const real *block, fl_work *work, const real *target_reduced,
     const int is_too_far = !is_next || (!work->has_kinks && result.slope_left < OVERSHOT);
     if (is_too_far && is_kept_at_top(block, work, target_reduced, step, &result, at, trial)) {
       is_next = 1;
-      mu = larger(mu * MU_KEPT_EARLY, ROUNDING);
+      mu = larger(mu * MU_KEPT_LEAST, ROUNDING);
     } else if (is_next) {
       mu = mu_after_kept(mu, &result);
     }
