@@ -75,6 +75,7 @@ code."""
 FILES_OF_FOILS = (
     "foil_choices.c",
     "foil_drag.c",
+    "foil_jump.c",
     "foil_lattice.c",
     "foil_steps.c",
     "foil_vertices.c",

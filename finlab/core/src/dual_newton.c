@@ -29,7 +29,6 @@
 #define OVERSHOT R(-0.3)     /* share of the slope below which a kept step went too far, too */
 #define SEARCH_STEPS 12      /* of the search for where a step that went too far is to end */
 #define SLOPE_ENOUGH R(0.05) /* share of the slope that it may leave */
-#define HALVED 4             /* of so many steps of it one is by halves */
 #define JUMPS 4              /* trials with a jump after which Newton's method stands still */
 #define JUMP_STEP R(1e-3)    /* squared step, over squared multipliers, too long to judge */
 #define SHORT_STEP R(1e-7)   /* the same, in which any large change of a force is a jump */
@@ -189,9 +188,9 @@ static void add_plane(real H[6][6], const real *bx, const real *by, real xx, rea
 }
 
 /* Solves (G_mu + mu c max(tr G_mu, tau) M) step = r with G_mu = G + mu S, Eq. 8; 0 where that is
-   singular to rounding. Also max(tr G_mu, tau). */
+   singular to rounding. */
 static int newton_step(const real *block, const fl_work *work, const fl_state *at, real mu,
-                       real *step, real *trace) {
+                       real *step) {
   real H[6][6] = {{0}}; /* G_mu */
   for (int i = 0; i < COUNT(block); i++) {
     const real(*B)[6] = work->span.effectiveness_reduced[i];
@@ -205,33 +204,14 @@ static int newton_step(const real *block, const fl_work *work, const fl_state *a
     else if (xx > 0)
       fl_add_square(H, B[0], xx);
   }
-  *trace = larger(fl_trace(H), work->trace_min);
-  const real weight = SATURATED * mu * *trace; /* of M */
+  const real trace = larger(fl_trace(H), work->trace_min);
+  const real weight = SATURATED * mu * trace; /* of M */
   for (int row = 0; row < 6; row++) {
     for (int col = 0; col <= row; col++) H[row][col] += weight * work->metric[row][col];
   }
   if (!fl_factor(H)) return 0;
   fl_solve(H, at->residual, step);
   return 1;
-}
-
-/* d'(S + c max(tr G_mu, tau) M) d of a step d: what mu weighs in the curvature along it. */
-static real damping_along(const real *block, const fl_work *work, const fl_state *at, real trace,
-                          const real *step) {
-  real sum = 0;
-  for (int i = 0; i < COUNT(block); i++) {
-    real s[2];
-    actuator_price(work, i, step, s);
-    sum += at->secant[i] * (s[0] * s[0] + s[1] * s[1]);
-  }
-  real of_metric = 0;
-  for (int row = 0; row < 6; row++) {
-    of_metric += work->metric[row][row] * step[row] * step[row];
-    for (int col = 0; col < row; col++) {
-      of_metric += 2 * work->metric[row][col] * step[row] * step[col];
-    }
-  }
-  return sum + SATURATED * trace * of_metric;
 }
 
 /* How many responses jump between two states a step apart; where wanted they are marked as
@@ -264,6 +244,11 @@ typedef struct {
   real slope_left; /* l, Eq. 10 */
 } step_result;
 
+/* Multipliers at a share of a step. */
+static void lambda_after(const fl_state *from, const real *step, real share, real *lambda) {
+  for (int j = 0; j < 6; j++) lambda[j] = from->lambda_reduced[j] + share * step[j];
+}
+
 static step_result judged_step(const real *step, const fl_state *from, const fl_state *to) {
   step_result result;
   result.slope_begin = dot(step, from->residual, 6);
@@ -287,155 +272,52 @@ static real mu_after_kept(real mu, const step_result *result) {
   return larger(mu * factor, ROUNDING);
 }
 
-/* The mu at which the share of a step is tried at which the cubic along it, of both values and
-   slopes, is largest. `damping` is what mu weighs in the curvature along the step: with it the mu
-   is the one at which the step would be that share of itself, were it as long as its curvature
-   says. Where it is not known (0), as sets have kinks and steps of other mu other directions, mu is
-   divided by the share. */
-static real mu_after_refused(real mu, real nu, const step_result *result, real damping) {
+/* The mu that a share of the step asks for, at which the cubic along it, of both values and slopes,
+   is largest. */
+static real mu_after_refused(real mu, real nu, const step_result *result) {
   const real a = 3 * (result->slope_begin + result->slope_end - 2 * result->rise);
   const real b = result->slope_end - result->slope_begin - a;
   const real discriminant = b * b - 4 * a * result->slope_begin;
   real share = R(0.5);
   if (discriminant > 0) share = 2 * result->slope_begin / (SQRT(discriminant) - b);
-  if (!(damping > 0)) {
-    const real factor = larger(nu, 1 / clipped(share, SHARE_LEAST_AT_KINK, SHARE_MOST));
-    return larger(mu * factor, ROUNDING);
-  }
-  const real shorter = 1 / clipped(share, SHARE_LEAST, SHARE_MOST);
-  /* Along the step its curvature is its slope at the beginning. */
-  const real more = (shorter - 1) * result->slope_begin / damping;
-  return larger(larger(mu * nu, mu + more), ROUNDING);
+  const real factor = larger(nu, 1 / clipped(share, SHARE_LEAST_AT_KINK, SHARE_MOST));
+  return mu * factor;
 }
 
-/* Where a foil responds at the middle of a jump along a step of multipliers, as a share of it: the
-   lift of one whose drag is welcome jumps between its ends, where the price of lift and drag along
-   its chord is that of its power. LARGEST_NUMBER where it does not jump. */
-static real share_at_jump(const real *block, const fl_work *work, int i, const real *step,
-                          const fl_state *from, const fl_state *to) {
-  const fl_actuator *a = ACTUATOR(block, i);
-  const fl_set *set = work->set + i;
-  const real range = set->force_max - set->force_min;
-  const real change = to->force[i][0] - from->force[i][0];
-  if (!is_foil(a) || set->tangent || !(FABS(change) > range / 2)) return LARGEST_NUMBER;
-  const real power_slope = (set->cost_at_max - set->cost_at_min) / range; /* of the chord */
-  const real drag_slope = power_slope / a->flow_speed;
-  real s[2];
-  real ds[2];
-  actuator_price(work, i, from->lambda_reduced, s);
-  actuator_price(work, i, step, ds);
-  const real price = s[0] + drag_slope * s[1] - power_slope; /* of lift, along the chord */
-  return -price / (ds[0] + drag_slope * ds[1]);
-}
-
-/* The share of a step (0 to 1) at which the dual value is largest, where that is at the jump of a
-   foil; 0 where it is not. Each jump takes from the slope along the step what it changes. */
-static real share_to_jump(const real *block, const fl_work *work, const real *step,
-                          const step_result *result, const fl_state *from, const fl_state *to) {
-  real slope = result->slope_begin;
-  real last_share = 0;
-  while (slope > 0) {
-    real share = 1; /* of the next jump */
-    real drop = 0;  /* of the slope there */
-    for (int i = 0; i < COUNT(block); i++) {
-      const real jump_share = share_at_jump(block, work, i, step, from, to);
-      if (!(jump_share > last_share && jump_share < share)) continue;
-      real ds[2];
-      actuator_price(work, i, step, ds);
-      const real d_lift = to->force[i][0] - from->force[i][0];
-      const real d_drag = to->force[i][1] - from->force[i][1];
-      share = jump_share;
-      drop = ds[0] * d_lift + ds[1] * d_drag;
-    }
-    if (!(share < 1)) return 0;
-    slope -= drop;
-    last_share = share;
-  }
-  return last_share;
-}
-
-/* Makes a trial that was refused the dual at the jump of a foil along its step, where the value is
-   largest there. Returns whether it is kept. */
-static int is_kept_at_jump(const real *block, const fl_work *work, const real *target_reduced,
-                           const real *step, const step_result *result, const fl_state *at,
-                           fl_state *trial) {
-  const real share = share_to_jump(block, work, step, result, at, trial);
-  if (!(share > 0)) return 0;
-  real shorter[6];
-  real lambda[6];
-  for (int j = 0; j < 6; j++) {
-    shorter[j] = share * step[j];
-    lambda[j] = at->lambda_reduced[j] + shorter[j];
-  }
-  fl_dual_at(block, work, target_reduced, lambda, trial);
-  const step_result of_shorter = judged_step(shorter, at, trial);
-  return is_kept(&of_shorter, at, trial);
-}
-
-/* The slope of the dual value along a step of multipliers, at a share of it: step.r. */
-static real slope_at(const real *block, const fl_work *work, const real *target_reduced,
-                     const real *step, const fl_state *from, real share) {
-  real slope = dot(step, target_reduced, 6);
-  for (int i = 0; i < COUNT(block); i++) {
-    real s[2];
-    real ds[2];
-    actuator_price(work, i, from->lambda_reduced, s);
-    actuator_price(work, i, step, ds);
-    for (int row = 0; row < 2; row++) s[row] += share * ds[row];
-    const response y = fl_response(block, i, work->set + i, s);
-    slope -= dot(ds, y.force, 2);
-  }
-  return slope;
-}
-
-/* The share of a step, between 0 and 1, at which the dual value is largest, where its slope is above
-   0 at the beginning and below at the end: by secants of the slope, of which one whose end stays
-   counts half (Illinois), and now and then by halves. */
-static real best_share(const real *block, const fl_work *work, const real *target_reduced,
-                       const real *step, const step_result *result, const fl_state *from) {
-  const real enough = SLOPE_ENOUGH * result->slope_begin;
-  real low = 0;
-  real high = 1;
+/* Makes a trial that went too far along a step the dual where its value is largest: at the jump of
+   a foil, or else where secants and halves of the slope, in turn, lead to. Where sets have kinks
+   the slope does not tell. Returns whether the trial is kept. */
+static int is_kept_at_top(const real *block, const fl_work *work, const real *target_reduced,
+                          const real *step, const step_result *result, const fl_state *at,
+                          fl_state *trial) {
   real slope_low = result->slope_begin;
   real slope_high = result->slope_end;
-  real share = 0;
-  int last_side = 0;
-  for (int k = 0; k < SEARCH_STEPS; k++) {
-    share = (slope_low * high - slope_high * low) / (slope_low - slope_high);
-    if (k % HALVED == HALVED - 1) share = (low + high) / 2;
-    const real slope = slope_at(block, work, target_reduced, step, from, share);
-    if (FABS(slope) <= enough) break;
+  real low = 0;
+  real high = 1;
+  int steps = SEARCH_STEPS;
+  if (work->has_kinks) {
+    if (!fl_go_to_jump(block, work, target_reduced, step, slope_low, at, trial)) return 0;
+    steps = 0;
+  }
+  for (int k = 0; k < steps; k++) {
+    real lambda[6];
+    real part = R(0.5); /* of the interval, from its low end */
+    if (k % 2 == 0) part = slope_low / (slope_low - slope_high);
+    const real share = low + part * (high - low);
+    lambda_after(at, step, share, lambda);
+    fl_dual_at(block, work, target_reduced, lambda, trial);
+    const real slope = dot(step, trial->residual, 6);
+    if (FABS(slope) <= SLOPE_ENOUGH * result->slope_begin) break;
     if (slope > 0) {
       low = share;
       slope_low = slope;
-      if (last_side > 0) slope_high /= 2;
-      last_side = 1;
     } else {
       high = share;
       slope_high = slope;
-      if (last_side < 0) slope_low /= 2;
-      last_side = -1;
     }
   }
-  return share;
-}
-
-/* Makes a trial that went too far the dual where its value is largest along the step. Returns
-   whether it is kept. */
-static int is_kept_at_best(const real *block, const fl_work *work, const real *target_reduced,
-                           const real *step, const step_result *result, const fl_state *at,
-                           fl_state *trial) {
-  if (!(result->slope_begin > 0 && result->slope_end < 0)) return 0;
-  const real share = best_share(block, work, target_reduced, step, result, at);
-  real shorter[6];
-  real lambda[6];
-  for (int j = 0; j < 6; j++) {
-    shorter[j] = share * step[j];
-    lambda[j] = at->lambda_reduced[j] + shorter[j];
-  }
-  fl_dual_at(block, work, target_reduced, lambda, trial);
-  const step_result of_shorter = judged_step(shorter, at, trial);
-  return is_kept(&of_shorter, at, trial);
+  const step_result shorter = judged_step(step, at, trial);
+  return is_kept(&shorter, at, trial);
 }
 
 /* Newton's method from multipliers on, or from its own first ones where there are none.
@@ -480,13 +362,12 @@ int fl_dual_newton(const real *block, fl_work *work, const real *target_reduced,
     work->newton_steps++;
 
     real step[6];
-    real trace;
-    if (!newton_step(block, work, at, mu, step, &trace)) {
+    if (!newton_step(block, work, at, mu, step)) {
       mu *= MU_SINGULAR;
       continue;
     }
     real lambda_next[6];
-    for (int j = 0; j < 6; j++) lambda_next[j] = at->lambda_reduced[j] + step[j];
+    lambda_after(at, step, 1, lambda_next);
     fl_dual_at(block, work, target_reduced, lambda_next, trial);
     if (work->has_turn_cost && jumps_between(block, work, at, trial, step, 0)) {
       jumps++;
@@ -497,13 +378,12 @@ int fl_dual_newton(const real *block, fl_work *work, const real *target_reduced,
     }
     const step_result result = judged_step(step, at, trial);
     int is_next = is_kept(&result, at, trial);
-    if (!work->has_kinks && (!is_next || result.slope_left < OVERSHOT)) {
-      is_next = is_kept_at_best(block, work, target_reduced, step, &result, at, trial);
-      if (is_next) mu = larger(mu * MU_KEPT_EARLY, ROUNDING);
+    const int is_too_far = !is_next || (!work->has_kinks && result.slope_left < OVERSHOT);
+    if (is_too_far && is_kept_at_top(block, work, target_reduced, step, &result, at, trial)) {
+      is_next = 1;
+      mu = larger(mu * MU_KEPT_LEAST, ROUNDING);
     } else if (is_next) {
       mu = mu_after_kept(mu, &result);
-    } else if (work->has_drag) {
-      is_next = is_kept_at_jump(block, work, target_reduced, step, &result, at, trial);
     }
     if (is_next) {
       nu = 2;
@@ -511,9 +391,7 @@ int fl_dual_newton(const real *block, fl_work *work, const real *target_reduced,
       trial = at;
       at = work->state_found;
     } else {
-      real damping = 0;
-      if (!work->has_kinks) damping = damping_along(block, work, at, trace, step);
-      mu = mu_after_refused(mu, nu, &result, damping);
+      mu = mu_after_refused(mu, nu, &result);
       nu *= 2;
       /* A refused step does not count as idle: its growing mu ends the loop. */
       idle--;

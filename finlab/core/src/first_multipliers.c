@@ -103,13 +103,7 @@ void fl_first_lambda(const real *block, const fl_work *work, const real *target_
     if (share > NEAR_LIMIT) *mu = MU_NEAR_LIMIT;
   }
   solve_regular(H, NOTHING, target_reduced, lambda); /* regular behind the range, too */
-  for (int i = 0; i < COUNT(block) && work->has_drag; i++) {
-    const fl_actuator *a = ACTUATOR(block, i);
-    real s[2];
-    actuator_price(work, i, lambda, s);
-    const int is_drag_welcome = is_foil(a) && s[1] > a->flow_speed; /* its lift is at an end */
-    if (is_drag_welcome) *mu = MU_NEAR_LIMIT;
-  }
+  if (fl_is_drag_welcome(block, work, lambda)) *mu = MU_NEAR_LIMIT;
 }
 
 /* Price [W/N] from which on an actuator gives its largest force. */

@@ -194,8 +194,8 @@ static void improve_from_stalls(const real *block, fl_work *work, const real *ta
   }
 }
 
-/* Improves on the best commands from the vertices of the lifts that work->state_found leaves between
-   their ends; marks the foils (n,) whose lifts these spread. */
+/* Improves on the best commands from the vertices of the lifts that work->state_found leaves
+   between their ends; marks the foils (n,) whose lifts these spread. */
 static void improve_from_vertices(const real *block, fl_work *work, const real *target_reduced,
                                   unsigned char *is_spread, real *best_cost) {
   foil_vertices vertices;
@@ -268,6 +268,20 @@ void fl_improve_from_starts(const real *block, fl_work *work, const real *target
     fl_dual_start(block, work, target_reduced, lambda);
     improve_from_lattice(block, work, target_reduced, lambda, enough, is_spread, best_cost);
   }
+}
+
+/* Whether commands are known, and no force is in a gap but those of foils: these are no gaps of
+   sets, and the starts of foils have looked at their sides. */
+int fl_is_done_by_foils(const real *block, const fl_work *work, real best_cost) {
+  if (!work->has_drag || !(best_cost < INFEASIBLE_COST)) return 0;
+  const fl_state *state = work->state_found;
+  const real largest = fl_largest_force(block, work->state_found->force);
+  for (int i = 0; i < COUNT(block); i++) {
+    if (is_foil(ACTUATOR(block, i))) continue;
+    const real *force = state->force[i];
+    if (fl_gap_of(block, work, i, force, largest, state->lambda_reduced) > 0) return 0;
+  }
+  return 1;
 }
 
 /* Takes the forces of work->state_found as the best ones where the dual is sure of them (no foil is

@@ -190,8 +190,8 @@ static lattice_point cheapest_of_choice(const real *block, const fl_work *work,
   return best;
 }
 
-/* The cheapest point of each choice of branches that is left (`choices_left`, 0: of all), and of these
-   the cheapest ones (FL_LATTICE_STARTS,); how many there are. */
+/* The cheapest point of each choice of branches that is left (`choices_left`, 0: of all), and of
+   these the cheapest ones (FL_LATTICE_STARTS,); how many there are. */
 int fl_cheapest_points(const real *block, const fl_work *work, const foil_lattice *lattice,
                        const real *target_reduced, const foil_choices *choices_left,
                        lattice_point *points) {

@@ -191,8 +191,8 @@ static void multipliers_at(const real *block, const fl_work *work, real force[][
   if (fl_factor(H)) fl_solve(H, right, lambda);
 }
 
-/* What commands of a cost [W] would cost if their forces left nothing of the target: the Lagrangian at
-   multipliers in the basis. In a dead band there is no force. */
+/* What commands of a cost [W] would cost if their forces left nothing of the target: the Lagrangian
+   at multipliers in the basis. In a dead band there is no force. */
 static real lagrangian(const real *block, const fl_work *work, const real *target_reduced,
                        const real *lambda, real cost, real command[][3], real force[][2]) {
   real left[6];
@@ -205,8 +205,8 @@ static real lagrangian(const real *block, const fl_work *work, const real *targe
   return cost + dot(lambda, left, 6);
 }
 
-/* What costs of commands are compared by: the Lagrangian, or the cost itself where tables leave more
-   than can be made up for. */
+/* What costs of commands are compared by: the Lagrangian, or the cost itself where tables leave
+   more than can be made up for. */
 static real compared_cost(const real *block, const fl_work *work, const real *target_reduced,
                           real most_error, const real *lambda, real cost, real command[][3],
                           real force[][2]) {

@@ -142,20 +142,6 @@ static fl_cut *last_cheaper_cut(const real *block, fl_work *work, int *depth, re
   }
 }
 
-/* Whether commands are known, and no force is in a gap but those of foils: these are no gaps of
-   sets, and the starts of foils have looked at their sides. */
-static int is_done_by_foils(const real *block, const fl_work *work, real best_cost) {
-  if (!work->has_drag || !(best_cost < INFEASIBLE_COST)) return 0;
-  const fl_state *state = work->state_found;
-  const real largest = fl_largest_force(block, work->state_found->force);
-  for (int i = 0; i < COUNT(block); i++) {
-    if (is_foil(ACTUATOR(block, i))) continue;
-    const real *force = state->force[i];
-    if (fl_gap_of(block, work, i, force, largest, state->lambda_reduced) > 0) return 0;
-  }
-  return 1;
-}
-
 /* Least power for a target at whose multipliers some force is in a gap, from what Newton's
    method came to (`status`, work->state_found). Forces are in work->best_force; with foils
    commands in work->best_command, and multipliers near to these in work->best_lambda, too;
@@ -176,7 +162,7 @@ int fl_search_gaps(const real *block, fl_work *work, const real *target_reduced,
     fl_improve_from_starts(block, work, target_reduced, &best_cost);
     fl_dual_start(block, work, target_reduced, lambda_begin);
   }
-  if (!is_done_by_foils(block, work, best_cost)) {
+  if (!fl_is_done_by_foils(block, work, best_cost)) {
     dive(block, work, target_reduced, status, &best_cost);
   }
   fl_restore_sets(block, work, work->set_before);

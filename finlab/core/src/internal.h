@@ -303,6 +303,11 @@ void fl_foil_at(const real *block, int i, real angle, fl_tangent *tangent);
 void fl_draw_tangent(const real *block, int i, const fl_box *box, real angle, const real *s,
                      fl_tangent *tangent, fl_set *set);
 
+/* foil_jump.c: where the lift of a foil jumps */
+int fl_go_to_jump(const real *block, const fl_work *work, const real *target_reduced,
+                  const real *step, real slope, const fl_state *from, fl_state *trial);
+int fl_is_drag_welcome(const real *block, const fl_work *work, const real *lambda);
+
 /* foil_lattice.c: where searches for commands of foils may begin */
 enum { BRANCHES = 4 };   /* of a foil's lift */
 #define LATTICE_FOILS 6  /* foils on the lattice at most; others begin at rest */
@@ -378,6 +383,7 @@ void fl_improve_commands(const real *block, fl_work *work, const real *target_re
                          real *best_cost);
 void fl_improve_from_starts(const real *block, fl_work *work, const real *target_reduced,
                             real *best_cost);
+int fl_is_done_by_foils(const real *block, const fl_work *work, real best_cost);
 int fl_take_sure_forces(const real *block, fl_work *work);
 void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, real found,
                           real most, fl_answer *out);

@@ -30,3 +30,29 @@ void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, 
   (void)most;
   (void)out;
 }
+
+int fl_go_to_jump(const real *block, const fl_work *work, const real *target_reduced,
+                  const real *step, real slope, const fl_state *from, fl_state *trial) {
+  (void)block;
+  (void)work;
+  (void)target_reduced;
+  (void)step;
+  (void)slope;
+  (void)from;
+  (void)trial;
+  return 0;
+}
+
+int fl_is_drag_welcome(const real *block, const fl_work *work, const real *lambda) {
+  (void)block;
+  (void)work;
+  (void)lambda;
+  return 0;
+}
+
+int fl_is_done_by_foils(const real *block, const fl_work *work, real best_cost) {
+  (void)block;
+  (void)work;
+  (void)best_cost;
+  return 0;
+}
