@@ -378,14 +378,13 @@ int fl_dual_newton(const real *block, fl_work *work, const real *target_reduced,
     }
     const step_result result = judged_step(step, at, trial);
     int is_next = is_kept(&result, at, trial);
-    const int is_too_far = !is_next || (!work->has_kinks && result.slope_left < OVERSHOT);
-    if (is_too_far && is_kept_at_top(block, work, target_reduced, step, &result, at, trial)) {
-      is_next = 1;
-      mu = larger(mu * MU_KEPT_LEAST, ROUNDING);
-    } else if (is_next) {
-      mu = mu_after_kept(mu, &result);
+    real mu_next = mu_after_kept(mu, &result);
+    if (!is_next || (!work->has_kinks && result.slope_left < OVERSHOT)) {
+      is_next = is_kept_at_top(block, work, target_reduced, step, &result, at, trial);
+      mu_next = larger(mu * MU_KEPT_LEAST, ROUNDING);
     }
     if (is_next) {
+      mu = mu_next;
       nu = 2;
       work->state_found = trial;
       trial = at;

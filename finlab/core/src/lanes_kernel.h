@@ -8,6 +8,9 @@
 
 #define CHUNK 64                /* targets that are on the stack at once */
 #define PRICE_STEPS 5           /* of Newton's method to a price of first multipliers */
+/* Scaled wrench that may be left: near the rim multipliers magnify it, and a single question, which
+   takes other steps, has to come to the same ones. */
+#define LANES_ENOUGH (TOLERANCE / 10)
 #define LANES_STEPS 100         /* steps of Newton's method in a lane; what takes more is left */
 #define LARGEST_IN_LANES R(1e9) /* wrench [N, N m]; larger ones are left */
 #define SLIGHT R(1e-3) /* turn [rad] up to which its sine and cosine are those of their series */
@@ -703,7 +706,7 @@ static void newton_in_lanes(const lanes_robot *robot, candidate *candidates, con
   lanes.is_fresh = no_lanes();
   for (;;) {
     /* What has come to its end leaves. */
-    const mask is_met = at->residual_size <= TOLERANCE;
+    const mask is_met = at->residual_size <= LANES_ENOUGH;
     const mask is_beyond = at->dual_value > beyond;
     const mask has_diverged = ~(lanes.mu <= 1 / ROUNDING); /* or is NaN */
     const mask is_late = lanes.steps >= LANES_STEPS;
