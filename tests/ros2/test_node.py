@@ -108,6 +108,7 @@ def test_a_refused_wrench_commands_nothing(
     wrench: Any, given: dict[str, Any], words: str, node: NodeProcess, listener: Listener
 ) -> None:
     listener.ask(PUSH)
+    listener.spin(0.1)  # what comes late from before
     before = len(listener.commands)
     listener.send(wrench, **given)
     status = listener.next_status(lambda: words in listener.words)
