@@ -10,7 +10,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import Bounds, LinearConstraint, linprog, minimize
 
 from finlab.analysis.moves import Moves
 from finlab.analysis.slopes import GoalPoint, SlopedGoal, difference, nudged
@@ -208,6 +207,8 @@ class Climb:
         Returns:
             The step (D,), and the gain.
         """
+        from scipy.optimize import linprog  # here: an authority does not wait for scipy
+
         low = np.maximum((self._low - self.point.vector) / self._width, -self.radius)
         high = np.minimum((self._high - self.point.vector) / self._width, self.radius)
         gap = np.maximum(self.rules.gaps(self.point.vector[None])[0], 0.0)
@@ -262,6 +263,8 @@ def _best_quadratic_step(
     Returns:
         The step (D,), and the gain.
     """
+    from scipy.optimize import Bounds, LinearConstraint, minimize
+
     constraints = [LinearConstraint(gap_slope, -gap, np.inf)] if len(gap) else []
 
     def loss(p: Array) -> tuple[float, Array]:

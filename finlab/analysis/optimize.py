@@ -10,8 +10,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import Bounds as Box
-from scipy.optimize import differential_evolution
 
 from finlab.allocation.question import check_flow
 from finlab.analysis.authority import commanded_axes, named_axes
@@ -307,6 +305,9 @@ class _Search:
 
     def evolve(self, measure: Goal, seed: int) -> None:
         """Searches by differential evolution, for goals and rules without slopes."""
+        from scipy.optimize import Bounds as Box
+        from scipy.optimize import differential_evolution
+
         moves = self._moves
         cost_min = np.inf
 

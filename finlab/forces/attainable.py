@@ -8,7 +8,6 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial import ConvexHull
 
 from finlab.arrays import Array
 from finlab.display import Table, html
@@ -82,6 +81,8 @@ def _hull_of(points: Array, kind: WrenchHalf) -> AttainableSet:
     basis = axes[is_thick]
     flat = axes[~is_thick]
     if dimension == 2:
+        from scipy.spatial import ConvexHull  # here: few ask for a hull, and it takes long to load
+
         polygon = ConvexHull(principal[:, is_thick])
         corners = polygon.vertices
         lines = polygon.equations
@@ -112,6 +113,8 @@ def _hull_of(points: Array, kind: WrenchHalf) -> AttainableSet:
 
 def _polytope(points: Array, kind: WrenchHalf) -> AttainableSet:
     """The convex hull of points (P, 3) that do not lie in a plane."""
+    from scipy.spatial import ConvexHull
+
     hull = ConvexHull(points)
     corners = hull.vertices
     vertex_of_point = np.zeros(len(points), dtype=np.intp)

@@ -108,6 +108,7 @@ def test_a_refused_wrench_commands_nothing(
     wrench: Any, given: dict[str, Any], words: str, node: NodeProcess, listener: Listener
 ) -> None:
     listener.ask(PUSH)
+    listener.spin(0.1)  # what comes late from before
     before = len(listener.commands)
     listener.send(wrench, **given)
     status = listener.next_status(lambda: words in listener.words)
@@ -362,11 +363,13 @@ def test_a_bundle_its_end_and_a_start_in_three_seconds(ros: None, tmp_path: Path
         assert own.set(lost=[lost])[0]
         own.ask([10, 0, 0, 0, 0, 0])
         own.spin(0.1)
-        expected = finlab.Allocator(layout).allocate([10, 0, 0, 0, 0, 0], lost=[lost]).commands
         inputs = dict(zip(own.pwm[-1].name, own.pwm[-1].position, strict=True))
         assert set(inputs) == set(layout.names) and inputs.pop(lost) == pytest.approx(1500, abs=20)
+        sent = dict(zip(own.commands[-1][1].name, own.commands[-1][1].effort, strict=True))
         for name, value in inputs.items():
-            assert value == pytest.approx(expected[name].input, abs=1e-6)
+            command = layout.actuator(name).command(np.array([sent[name], 0.0, 0.0]))
+            assert value == command.input, name
+        assert len({round(value) for value in inputs.values()}) > 2
         for file in sorted(folder.rglob("*"), reverse=True):
             file.unlink() if file.is_file() else file.rmdir()
         folder.rmdir()

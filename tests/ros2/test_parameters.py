@@ -48,7 +48,7 @@ def test_a_value_is_taken(name: str, value: Any, taken: Any) -> None:
     ("name", "value", "sentence"),
     [
         ("robot", 3, "robot: expected a text, got 3"),
-        ("policy", "best", "policy: expected one of closest, direction, priority, got 'best'"),
+        ("policy", "best", "policy: expected one of closest, direction, priority"),
         ("period_s", 0.0, "period_s: expected a number from 0.001 to 60 s, got 0.0"),
         ("period_s", float("nan"), "period_s: expected a number from 0.001 to 60 s, got nan"),
         ("watchdog_s", True, "watchdog_s: expected a number from 0.001 to 60 s, got True"),
