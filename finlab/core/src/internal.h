@@ -176,6 +176,12 @@ real fl_support_of_set(const real *block, int i, const fl_set *set, const real *
 real fl_drag_of_lift(const real *block, int i, real force);
 int fl_undecided(const real *block, int i, const fl_set *set, const real *price, real *off);
 
+/* line_pairs.c: responses of lines, two at a time */
+void fl_read_price_table(const real *block, int offset, fl_price_table *table);
+void fl_prepare_lines(const real *block, fl_work *work);
+void fl_add_lines(const real *block, const fl_work *work, const real *lambda, fl_state *state,
+                  real *wrench, real *conjugate);
+
 /* turning_cost.c: responses where turning costs */
 response fl_response_with_turning(const real *block, int i, const fl_set *set, const real *price);
 int fl_has_jumped(const real *block, int i, const fl_set *set, const fl_state *one,
