@@ -477,6 +477,9 @@ class Allocation(Answer[float]):
             asked = values.get("_asked")
             if asked is not None and "answered" not in values:
                 prepared, row = asked
+                if name == "multipliers":  # which the next tick reads alone
+                    values[name] = row.multipliers[0]
+                    return values[name]
                 question = prepared.question_of(row)
                 solution = prepared.solved(row, question)
                 values["previous"] = question.previous

@@ -273,27 +273,22 @@ class Allocator:
         state = self._whole
         if damage is not None or lost is not _NO_NAMES or free is not _NO_NAMES:
             state = self._state_of_question(damage, lost, free)
+        multipliers: Array | None = None
+        if isinstance(previous, Allocation):
+            multipliers = previous.multipliers
+            previous = previous.command
         if flow is None and reference is None and seed is _USUAL_SEED:
             prepared = state.closest if policy is CLOSEST else state.prepared_question(policy)
-            previous_multipliers: Array | None = None
-            previous_command = previous
-            if isinstance(previous, Allocation):
-                previous_multipliers = previous.multipliers
-                previous_command = previous.command
             start = time.perf_counter()
-            row = prepared.answer(wrench, previous_command, previous_multipliers)
+            row = prepared.answer(wrench, previous, multipliers)
             if row is not None:
                 return Allocation.of_row(row, (time.perf_counter() - start) * 1e3, prepared)
         wrench_asked = check_target(wrench)
         checked_policy = policy if policy is CLOSEST else as_policy(policy)
         checked_seed = check_seed(seed)
         checked_flow = None if flow is None else check_flow(flow)
-        multipliers: Array | None = None
         checked_previous: Array | None = None
         if previous is not None:
-            if isinstance(previous, Allocation):
-                multipliers = previous.multipliers
-                previous = previous.command
             checked_previous = check_previous(previous, state.layout)
 
         start = time.perf_counter()

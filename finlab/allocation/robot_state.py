@@ -144,7 +144,10 @@ class RobotState:
             CommandError: no policy is called so.
             AllocationError: the method does not know the policy.
         """
-        prepared = self._prepared.get(policy)
+        try:
+            prepared = self._prepared.get(policy)
+        except TypeError:  # weights in a list, which cannot be looked up; or no policy at all
+            return PreparedQuestion(self, as_policy(policy))
         if prepared is None:
             checked = as_policy(policy)
             self.method.check_policy(checked)

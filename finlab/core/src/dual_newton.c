@@ -77,8 +77,10 @@ void fl_wrench_of_forces(const real *block, const fl_work *work, real force[][2]
   real reduced[6] = {0};
   for (int i = 0; i < COUNT(block); i++) {
     for (int row = 0; row < (int)ACTUATOR(block, i)->rows; row++) {
-      for (int j = 0; j < span->rank; j++)
+      /* all six, so that compilers know how many */
+      for (int j = 0; j < 6; j++) {
         reduced[j] += force[i][row] * span->effectiveness_reduced[i][row][j];
+      }
     }
   }
   for (int k = 0; k < 6; k++) wrench[k] = span->axis_scale[k] * dot(span->basis[k], reduced, 6);

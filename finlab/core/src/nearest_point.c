@@ -25,13 +25,21 @@ wide fl_normalized_axis(const real *block, const fl_work *work, const real *redu
 
 /* Sets the wrench over the wrench scale, in weighted axes, that each force gives per newton. */
 void fl_weigh_axes(const real *block, fl_work *work, const wide *weight) {
+  const fl_span *span = &work->span;
+  wide scale[6]; /* from a scaled wrench to weighted axes */
   memcpy(work->axis_weight, weight, sizeof work->axis_weight);
+  for (int k = 0; k < 6; k++) {
+    scale[k] = weight[k] * (wide)span->axis_scale[k] / (wide)HEAD(block)->wrench_scale[k];
+  }
   for (int i = 0; i < COUNT(block); i++) {
     work->polygon_offset[i] = 0;
-    for (int q = 0; q < 2; q++) {
-      const real *row = work->span.effectiveness_reduced[i][q];
+    memset(work->effectiveness_weighted[i], 0, sizeof work->effectiveness_weighted[i]);
+    for (int q = 0; q < (int)ACTUATOR(block, i)->rows; q++) {
+      const real *row = span->effectiveness_reduced[i][q];
       for (int k = 0; k < 6; k++) {
-        work->effectiveness_weighted[i][q][k] = weight[k] * fl_normalized_axis(block, work, row, k);
+        wide sum = 0;
+        for (int j = 0; j < 6; j++) sum += (wide)span->basis[k][j] * (wide)row[j];
+        work->effectiveness_weighted[i][q][k] = scale[k] * sum;
       }
     }
   }
@@ -70,6 +78,13 @@ static void append_farthest(const real *block, const fl_work *work, const wide *
   m->actuators = COUNT(block);
   for (int i = 0; i < COUNT(block); i++) {
     const wide(*column)[6] = work->effectiveness_weighted[i];
+    if (ACTUATOR(block, i)->rows == 1) {
+      /* Chosen by index: which end it is, no processor can foresee. */
+      const real ends[2] = {work->set[i].force_min, work->set[i].force_max};
+      force[i][0] = ends[dot_wide(column[0], normal, 6) > 0];
+      force[i][1] = 0;
+      continue;
+    }
     const real s[2] = {(real)dot_wide(column[0], normal, 6), (real)dot_wide(column[1], normal, 6)};
     if (work->polygon_offset[i] > 0)
       farthest_corner(block + work->polygon_offset[i], s, force[i]);

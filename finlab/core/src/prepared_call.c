@@ -29,9 +29,11 @@ typedef struct {
   void *internal;
 } python_buffer;
 
-#define WITH_FORMAT_AND_STRIDES 0x1c /* PyBUF_FORMAT | PyBUF_STRIDES */
-#define MANY_ARGUMENTS 0x80          /* METH_FASTCALL */
-#define ROW_ITEMS 5                  /* of an `AnswerRow` in finlab/core/calls.py */
+enum {
+  WITH_FORMAT_AND_STRIDES = 0x1c, /* PyBUF_FORMAT | PyBUF_STRIDES */
+  MANY_ARGUMENTS = 0x80,          /* METH_FASTCALL */
+  ROW_ITEMS = 5                   /* of an `AnswerRow` in finlab/core/calls.py */
+};
 
 /* Functions of Python's C API: what they return, their names, their arguments. */
 #define PYTHON_FUNCTIONS(F)                                              \

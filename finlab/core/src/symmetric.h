@@ -6,9 +6,6 @@
 
 #ifdef HAS_PAIRS
 
-/* Whose arguments k are known when it is compiled. */
-#define ALWAYS_INLINE static inline __attribute__((always_inline))
-
 /* Rows in pairs of columns, from the pair with the diagonal on. */
 typedef struct {
   pair row[6][3];
@@ -80,7 +77,8 @@ static inline real trace_of(const symmetric *H) {
 }
 
 /* Takes a share of row U from a row, from a pair of columns on. */
-ALWAYS_INLINE void take_off(pair *row, const pair *U, real share, int first) {
+static inline __attribute__((always_inline)) void take_off(pair *row, const pair *U, real share,
+                                                           int first) {
   if (first <= 0) row[0] -= both(share) * U[0];
   if (first <= 1) row[1] -= both(share) * U[1];
   row[2] -= both(share) * U[2];
@@ -89,7 +87,7 @@ ALWAYS_INLINE void take_off(pair *row, const pair *U, real share, int first) {
 /* Takes row k of H from those below it, and from the right side r, so that they have no column k
    any more: H = L D L', of which row k now is that of D L'. Returns 1 / D of it, 0 where H is
    singular to rounding. Written out for the same reason as add_product. */
-ALWAYS_INLINE real eliminate(symmetric *H, pair *r, int k) {
+static inline __attribute__((always_inline)) real eliminate(symmetric *H, pair *r, int k) {
   const pair *U = H->row[k];
   const real pivot = U[k / 2][k % 2];
   if (!(pivot > 0)) return 0;
@@ -117,8 +115,8 @@ ALWAYS_INLINE real eliminate(symmetric *H, pair *r, int k) {
 }
 
 /* Number k of the solution, from those behind it. */
-ALWAYS_INLINE real substitute(const symmetric *H, const pair *r, real inverse, const real *x,
-                              int k) {
+static inline __attribute__((always_inline)) real substitute(const symmetric *H, const pair *r,
+                                                             real inverse, const real *x, int k) {
   const pair *U = H->row[k];
   real sum = r[k / 2][k % 2];
   if (k < 1) sum -= U[0][1] * x[1];
