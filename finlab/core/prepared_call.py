@@ -49,7 +49,7 @@ def prepared_answer(
         most_error: error up to which commands are exact [1].
 
     Returns:
-        A function that answers as `Core.answer_row` does, in a third of the time around the core;
+        A function that answers as `Core.answer_row` does, in a fraction of the time around C;
         None where this interpreter has none.
     """
     if not has_builtin_functions():

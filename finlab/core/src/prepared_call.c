@@ -1,5 +1,5 @@
 /* Single questions as a function of Python: who asks the same robot one wrench after the other
-   calls C as he calls `len`, without ctypes, in a third of the time around a solve.
+   calls C as he calls `len`, without ctypes.
 
    The library does not link to Python, and needs none of its headers: the few functions of its C
    API that stand here come as addresses (fl_use_python), which ctypes knows. All are exported by
