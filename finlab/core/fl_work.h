@@ -72,6 +72,18 @@ typedef struct {
   int actuator;            /* which one it is */
 } fl_line;
 
+/* Whether the processor has vectors of two numbers, by which lines are answered two at a time:
+   pairs.h in finlab/core/src. */
+#if defined(__SSE2__) || defined(__aarch64__)
+#define FL_HAS_VECTORS
+#endif
+#if defined(__GNUC__) && defined(FL_HAS_VECTORS) && !defined(FL_SINGLE) && !defined(FL_NO_PAIRS)
+#define FL_PAIRS_OF_LINES
+#define FL_LINES FL_MOST /* lines that are kept */
+#else
+#define FL_LINES 1
+#endif
+
 /* Multipliers, and what they give. */
 typedef struct {
   fl_real lambda_reduced[6];   /* [W] */
@@ -143,9 +155,9 @@ struct fl_work {
   fl_box box;           /* of this question */
   fl_settings settings; /* that bound searches */
 
-  fl_line line[FL_MOST]; /* all lines of the robot */
-  int line_count;        /* how many there are */
-  int has_line_cells;    /* whether one has a table of several cells */
+  fl_line line[FL_LINES]; /* all lines of the robot, where they are answered in pairs */
+  int line_count;         /* how many there are */
+  int has_line_cells;     /* whether one has a table of several cells */
 
   /* Newton's method. */
   fl_state state[2];            /* the one so far, and a trial */

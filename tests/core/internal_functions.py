@@ -50,6 +50,7 @@ _DEPTH = 16 + MOST
 """FL_DEPTH_OF(FL_MOST), a formula and no number in `fl_work.h`."""
 _LENGTHS = {
     "FL_MOST": MOST,
+    "FL_LINES": MOST,
     "FL_POINTS": POINTS,
     "FL_SCORES": _macro("FL_SCORES"),
     "FL_DEPTH": _DEPTH,

@@ -81,8 +81,8 @@ static void read_actuator(const real *block, const fl_work *work, int i, lanes_a
   int reverse = (int)a->force_table;
   if (!own->is_plane && a->force_table_reverse > 0) reverse = (int)a->force_table_reverse;
   own->has_reverse = reverse != (int)a->force_table;
-  fl_read_price_table(block, (int)a->force_table, own->table);
-  fl_read_price_table(block, reverse, own->table + 1);
+  read_price_table(block, (int)a->force_table, own->table);
+  read_price_table(block, reverse, own->table + 1);
   own->is_one_cell = own->table[0].cells == 1 && own->table[1].cells == 1;
   own->force_scale = a->force_scale;
   own->power_scale = a->power_scale;

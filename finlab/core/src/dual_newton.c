@@ -38,19 +38,19 @@
 /* Scaled wrench in the basis. */
 void fl_reduce_wrench(const fl_work *work, const real *wrench, real *target_reduced) {
   const fl_span *span = &work->span;
-  for (int j = 0; j < 6; j++) {
-    target_reduced[j] = 0;
-    for (int k = 0; k < 6; k++)
-      target_reduced[j] += span->basis[k][j] * (wrench[k] / span->axis_scale[k]);
+  memset(target_reduced, 0, 6 * sizeof *target_reduced);
+  for (int k = 0; k < 6; k++) {
+    const real scaled = wrench[k] / span->axis_scale[k];
+    for (int j = 0; j < 6; j++) target_reduced[j] += span->basis[k][j] * scaled;
   }
 }
 
 /* Multipliers in the basis [W] of those of the wrench [W/N, W/(N m)]. */
 void fl_reduce_lambda(const fl_work *work, const real *lambda, real *lambda_reduced) {
   const fl_span *span = &work->span;
-  for (int j = 0; j < 6; j++) {
-    lambda_reduced[j] = 0;
-    for (int k = 0; k < 6; k++) {
+  memset(lambda_reduced, 0, 6 * sizeof *lambda_reduced);
+  for (int k = 0; k < 6; k++) {
+    for (int j = 0; j < 6; j++) {
       lambda_reduced[j] += span->basis[k][j] * span->axis_scale[k] * lambda[k];
     }
   }

@@ -2,17 +2,14 @@
    says them one by one. Robots of thrusters spend most of their time here. */
 #include "pairs.h"
 
-void fl_read_price_table(const real *block, int offset, fl_price_table *table) {
-  const real *numbers = block + offset;
-  table->offset = offset + 3;
-  table->price_max = numbers[0];
-  table->over_price = 1 / numbers[0];
-  table->cells = numbers[1];
-  table->each = 1 / numbers[1];
-  const real *last = numbers + 3 + 3 * (int)numbers[1];
-  table->force_max = last[0];
-  table->conjugate_max = last[2];
+#ifndef HAS_PAIRS
+
+void fl_prepare_lines(const real *block, fl_work *work) {
+  (void)block;
+  work->line_count = 0;
 }
+
+#else
 
 void fl_prepare_lines(const real *block, fl_work *work) {
   work->line_count = 0;
@@ -24,8 +21,8 @@ void fl_prepare_lines(const real *block, fl_work *work) {
     int reverse = (int)a->force_table;
     if (a->force_table_reverse > 0) reverse = (int)a->force_table_reverse;
     line->actuator = i;
-    fl_read_price_table(block, (int)a->force_table, line->table);
-    fl_read_price_table(block, reverse, line->table + 1);
+    read_price_table(block, (int)a->force_table, line->table);
+    read_price_table(block, reverse, line->table + 1);
     line->force_scale[0] = a->force_scale;
     line->force_scale[1] = -a->force_scale;
     line->power_scale = a->power_scale;
@@ -37,8 +34,6 @@ void fl_prepare_lines(const real *block, fl_work *work) {
     work->line_count++;
   }
 }
-
-#ifdef HAS_PAIRS
 
 /* Forces of two lines, their derivatives by the prices, and the conjugates. */
 typedef struct {

@@ -1,12 +1,12 @@
 /* Pairs of numbers, with which compilers of the GNU family do the same arithmetic on two numbers at
-   once (SSE2, NEON): in their place, without such vectors, two operations one after the other. All
-   operations are those of IEEE 754 in one order, without contraction, so the bits are the same on
-   every machine. Other compilers, single precision and -DFL_NO_PAIRS take the loops beside them. */
+   once, by SSE2 or NEON. All operations are those of IEEE 754 in one order, without contraction, so
+   the bits are the same on all such machines. Other compilers and processors, single precision and
+   -DFL_NO_PAIRS take the loops beside them. */
 #ifndef FL_PAIRS_H
 #define FL_PAIRS_H
 #include "internal.h"
 
-#if defined(__GNUC__) && !defined(FL_SINGLE) && !defined(FL_NO_PAIRS)
+#ifdef FL_PAIRS_OF_LINES
 #define HAS_PAIRS
 
 typedef real pair __attribute__((vector_size(2 * sizeof(real))));
