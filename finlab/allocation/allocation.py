@@ -454,7 +454,7 @@ class Allocation(Answer[float]):
         return made
 
     @classmethod
-    def of_row(cls, row: AnswerRow, solve_ms: float, prepared: "PreparedQuestion") -> Self:
+    def of_row(cls, row: AnswerRow, solve_ms: float, prepared: "PreparedQuestion") -> "Self":
         """Makes an answer of what a prepared question was answered, as `to_read` does.
 
         Args:

@@ -25,21 +25,14 @@ wide fl_normalized_axis(const real *block, const fl_work *work, const real *redu
 
 /* Sets the wrench over the wrench scale, in weighted axes, that each force gives per newton. */
 void fl_weigh_axes(const real *block, fl_work *work, const wide *weight) {
-  const fl_span *span = &work->span;
-  wide scale[6]; /* from a scaled wrench to weighted axes */
   memcpy(work->axis_weight, weight, sizeof work->axis_weight);
-  for (int k = 0; k < 6; k++) {
-    scale[k] = weight[k] * (wide)span->axis_scale[k] / (wide)HEAD(block)->wrench_scale[k];
-  }
   for (int i = 0; i < COUNT(block); i++) {
     work->polygon_offset[i] = 0;
-    memset(work->effectiveness_weighted[i], 0, sizeof work->effectiveness_weighted[i]);
+    memset(work->effectiveness_weighted[i][1], 0, sizeof work->effectiveness_weighted[i][1]);
     for (int q = 0; q < (int)ACTUATOR(block, i)->rows; q++) {
-      const real *row = span->effectiveness_reduced[i][q];
+      const real *row = work->span.effectiveness_reduced[i][q];
       for (int k = 0; k < 6; k++) {
-        wide sum = 0;
-        for (int j = 0; j < 6; j++) sum += (wide)span->basis[k][j] * (wide)row[j];
-        work->effectiveness_weighted[i][q][k] = scale[k] * sum;
+        work->effectiveness_weighted[i][q][k] = weight[k] * fl_normalized_axis(block, work, row, k);
       }
     }
   }
