@@ -19,7 +19,7 @@ from finlab.allocation.question import MethodQuestion
 from finlab.allocation.report import allocation_blocks, answer_notes, doubts, next_measurement
 from finlab.allocation.solution import CANDIDATE_ARRAYS, Candidates, PlainData, Solved
 from finlab.arrays import Array, has_nan
-from finlab.core.calls import CommandFigures
+from finlab.core.calls import AnswerRow, CommandFigures
 from finlab.display import html, text
 from finlab.layout.damage import Damage
 from finlab.layout.effectiveness import body_force
@@ -30,7 +30,7 @@ from finlab.physics.plant import Plant, plant_of
 if TYPE_CHECKING:
     from typing_extensions import Self  # Python 3.10 has none of its own
 
-    from finlab.allocation.robot_state import RobotState
+    from finlab.allocation.robot_state import PreparedQuestion, RobotState
 
 Number = TypeVar("Number", float, Array)
 """A figure of one answer, or of each of many (N,)."""
@@ -196,7 +196,7 @@ class Answer(PlainData, Generic[Number]):
     unknown_fins: tuple[str, ...] = field(default_factory=tuple)
     """Names of fins whose model the method's networks have not learned; answers for them are
     wrong."""
-    answered: LazyFigures | None = field(default=None, compare=False)
+    answered: LazyFigures | None = field(default_factory=_none, compare=False)
     """Computes the lazy properties; None in copies, which have them all."""
 
     def __post_init__(self) -> None:
@@ -410,7 +410,12 @@ class Allocation(Answer[float]):
 
     LAZY: ClassVar[tuple[str, ...]] = (*Answer.LAZY, "calm_power", "candidates", "samples")
     ARRAYS: ClassVar[tuple[str, ...]] = (*Answer.ARRAYS, "previous", "multipliers")
-    NOT_COPIED: ClassVar[tuple[str, ...]] = (*Answer.NOT_COPIED, "_figures", "_own_forces")
+    NOT_COPIED: ClassVar[tuple[str, ...]] = (
+        *Answer.NOT_COPIED,
+        "_figures",
+        "_own_forces",
+        "_asked",
+    )
 
     solve_ms: float = field(compare=False)
     """Time spent solving [ms], judging not included."""
@@ -448,11 +453,37 @@ class Allocation(Answer[float]):
         object.__setattr__(made, "__dict__", known)
         return made
 
+    @classmethod
+    def of_row(cls, row: AnswerRow, solve_ms: float, prepared: "PreparedQuestion") -> "Self":
+        """Makes an answer of what a prepared question was answered, as `to_read` does.
+
+        Args:
+            row: the answer.
+            solve_ms: time spent solving [ms].
+            prepared: the question.
+        """
+        made = object.__new__(cls)
+        values = made.__dict__  # which is written to in half the time of a new one
+        values["command"] = row.command
+        values["solve_ms"] = solve_ms
+        values["_asked"] = (prepared, row)
+        return made
+
     if not TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> Any:
             """Sets the fields that follow from the question, when the first of them is read."""
             values = self.__dict__
+            asked = values.get("_asked")
+            if asked is not None and "answered" not in values:
+                prepared, row = asked
+                if name == "multipliers":  # which the next tick reads alone
+                    values[name] = row.multipliers[0]
+                    return values[name]
+                question = prepared.question_of(row)
+                solution = prepared.solved(row, question)
+                values["previous"] = question.previous
+                values["answered"] = LazyFigures(prepared.state, question, row.wrench, solution)
             answered = values.get("answered")
             if answered is not None and "layout" not in values:
                 values.update(answered.fields_of_one())

@@ -17,10 +17,11 @@ from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finlab.allocation.policy import Policy, PolicyName
 from finlab.allocation.question import MethodQuestion
-from finlab.allocation.solution import Candidates, Solution, Solved
+from finlab.allocation.solution import Candidates, PreparedAnswers, Solution, Solved
 from finlab.arrays import Array
 from finlab.errors import AllocationError, LayoutError
 from finlab.layout.layout import Layout
@@ -270,6 +271,22 @@ class Method(ABC):
         Returns:
             Commands (N, n, 3) within the limits, and what else the method has to tell.
         """
+
+    def prepared_answers(
+        self, policy: Policy, lost: NDArray[np.bool_] | None, free: NDArray[np.bool_] | None
+    ) -> PreparedAnswers | None:
+        """Prepares questions about single wrenches, at rest in the water and without a reference.
+
+        Args:
+            policy: what to give out of reach.
+            lost: which actuators (n,) do not work; None where all do.
+            free: which axes (6,) may take any wrench; None for none.
+
+        Returns:
+            What answers them as `solve` does, but more quickly; None where the method has nothing
+            of the kind.
+        """
+        return None
 
     def refinement(self, target: Array, *, flow: Array | None, seed: int) -> tuple[Candidates, ...]:
         """Returns what a network proposes for one target, step by step.

@@ -96,11 +96,16 @@ class Policy:
 
 CLOSEST = Policy()
 """The least plain error, the default: all axes weigh the same."""
+_BY_NAME = {name: CLOSEST if name == CLOSEST.kind else Policy(name) for name in POLICY_NAMES}
+"""Policies with their usual weights and order: a control loop names the same one in each tick."""
 
 
 def as_policy(policy: Policy | PolicyName) -> Policy:
     """Returns a policy from its name, or itself. Raises CommandError: no policy is called so."""
-    return policy if isinstance(policy, Policy) else Policy(policy)
+    if isinstance(policy, Policy):
+        return policy
+    usual = _BY_NAME.get(policy) if isinstance(policy, str) else None
+    return Policy(policy) if usual is None else usual
 
 
 def policy_from(

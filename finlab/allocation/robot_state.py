@@ -6,20 +6,25 @@ for it, and keeps the last ones.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.method import Method
-from finlab.allocation.policy import CLOSEST, Policy
+from finlab.allocation.policy import CLOSEST, Policy, PolicyName, as_policy
 from finlab.allocation.question import MethodQuestion
-from finlab.allocation.solution import Solution, Solved, among_all
+from finlab.allocation.solution import PreparedAnswers, Solution, Solved, among_all
 from finlab.arrays import Array
 from finlab.layout.damage import Damage
 from finlab.layout.layout import Layout
 from finlab.physics.plant import Plant
+
+if TYPE_CHECKING:
+    from finlab.core.calls import AnswerRow
+    from finlab.core.prepared_call import Answer
 
 
 def working_actuators(damaged: Layout, damage: Damage) -> NDArray[np.bool_]:
@@ -60,6 +65,57 @@ def without_lost(damaged: Layout, damage: Damage) -> Layout:
     return damaged.without(damage.lost) if damage.lost else damaged
 
 
+MAX_POLICIES = 8
+"""Policies by which a state keeps prepared questions; where they are more, all are forgotten."""
+
+
+class PreparedQuestion:
+    """A question to the method of a robot in a state, of which all is known but the wrench, and in
+    a tick the command before.
+
+    The first such question prepares nothing, since it is mostly the last one.
+    """
+
+    __slots__ = ("_prepared", "answer", "policy", "state")
+
+    def __init__(self, state: RobotState, policy: Policy) -> None:
+        """Takes what is known.
+
+        Args:
+            state: of the robot.
+            policy: what to give out of reach.
+        """
+        self.state = state
+        self.policy = policy
+        self.answer: Answer = self._answer_first
+        """Answers a wrench; None where `RobotState.solve` has to be asked."""
+        self._prepared: PreparedAnswers | None = None
+
+    def question_of(self, row: AnswerRow) -> MethodQuestion:
+        """Returns the question that was answered in a row."""
+        return self.state.question(row.wrench[None], self.policy, None, 0, row.previous)
+
+    def solved(self, row: AnswerRow, question: MethodQuestion) -> Solved:
+        """Returns the solution of a question that was answered in a row."""
+        assert self._prepared is not None
+        return self._prepared.solved(row, question)
+
+    def _answer_first(self, wrench: object, previous: object, multipliers: Array | None) -> None:
+        self.answer = self._answer_second
+
+    def _answer_second(
+        self, wrench: object, previous: object, multipliers: Array | None
+    ) -> AnswerRow | None:
+        state = self.state
+        self._prepared = state.method.prepared_answers(self.policy, state.lost, state.free)
+        self.answer = _left_to_method if self._prepared is None else self._prepared.answer
+        return self.answer(wrench, previous, multipliers)
+
+
+def _left_to_method(wrench: object, previous: object, multipliers: Array | None) -> None:
+    """Answers nothing."""
+
+
 @dataclass(frozen=True, eq=False)
 class RobotState:
     """A robot as damage has left it, asked for some axes of the wrench, with a method that is ready
@@ -77,6 +133,34 @@ class RobotState:
     """Of all n actuators at rest in the water; judges answers."""
     free: NDArray[np.bool_] | None
     """Axes (6,) of the wrench that may take any value; None where all are commanded."""
+
+    _prepared: dict[Policy | PolicyName, PreparedQuestion] = field(default_factory=dict)
+    """Prepared questions by their policies, as these were given."""
+
+    def prepared_question(self, policy: Policy | PolicyName) -> PreparedQuestion:
+        """Returns the question with a policy.
+
+        Raises:
+            CommandError: no policy is called so.
+            AllocationError: the method does not know the policy.
+        """
+        try:
+            prepared = self._prepared.get(policy)
+        except TypeError:  # weights in a list, which cannot be looked up; or no policy at all
+            return PreparedQuestion(self, as_policy(policy))
+        if prepared is None:
+            checked = as_policy(policy)
+            self.method.check_policy(checked)
+            prepared = PreparedQuestion(self, checked)
+            if len(self._prepared) >= MAX_POLICIES:
+                self._prepared.clear()
+            self._prepared[policy] = prepared
+        return prepared
+
+    @cached_property
+    def closest(self) -> PreparedQuestion:
+        """The question with the usual policy."""
+        return PreparedQuestion(self, CLOSEST)
 
     @cached_property
     def healthy(self) -> Layout:

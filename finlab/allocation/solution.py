@@ -11,9 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.arrays import Array
+from finlab.core.calls import AnswerRow
 
 if TYPE_CHECKING:
     from typing_extensions import Self  # Python 3.10 has none of its own
+
+    from finlab.allocation.question import MethodQuestion
+    from finlab.core.prepared_call import Answer
 
 CANDIDATE_ARRAYS = ("command", "wrench", "err_norm", "effort", "power")
 """Fields of `Candidates` that are arrays with a row of each."""
@@ -161,6 +165,15 @@ class Solved(Protocol):
     @property
     def notes(self) -> Callable[[], tuple[str, ...]] | None:
         """Gives sentences about these answers; None for methods that have none."""
+
+
+class PreparedAnswers(NamedTuple):
+    """Answers to single wrenches at rest in the water, of which a method knows all else."""
+
+    answer: "Answer"
+    """Answers a wrench."""
+    solved: "Callable[[AnswerRow, MethodQuestion], Solved]"
+    """Makes a solution of what that returned to a question."""
 
 
 class Solution(NamedTuple):

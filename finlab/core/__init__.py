@@ -9,7 +9,7 @@ from typing import TypeVar
 
 from finlab.errors import FinlabError
 
-VERSION = 17
+VERSION = 18
 """What `fl_version()` of the C files returns; both rise together where a signature or a struct
 changes."""
 SIGNATURES = {
@@ -21,6 +21,9 @@ SIGNATURES = {
     "fl_prepare": "ipp",
     "fl_answer_one": "ipppp",
     "fl_answer_into_row": "ippprp",
+    "fl_python_names": "s",
+    "fl_use_python": "vpp",
+    "fl_python_method": "p",
     "fl_widest_lanes": "i",
     "fl_answer_many": "ipppipipppppppp",
     "fl_commands": "vpppipp",

@@ -6,7 +6,7 @@ commands that give their forces. The structs are those of finlab/core/fl_fields.
 
 import ctypes
 from collections.abc import Sequence
-from functools import cache
+from functools import cache, cached_property
 from threading import Lock
 from typing import NamedTuple
 
@@ -19,7 +19,7 @@ from finlab.core.fields import Record, constant, count_of, struct
 from finlab.errors import CommandError, DataError
 
 ROWS = 32
-"""Rows that are allocated at once; an answer that is kept keeps their memory, some 14 kB for eight
+"""Rows that are allocated at once; an answer that is kept keeps their memory, some 24 kB for eight
 actuators."""
 
 
@@ -27,30 +27,52 @@ class AnswerMemory:
     """Memory into which the core writes answers to single wrenches, of a robot of n actuators: a
     row of numbers each, which is written once.
 
-    A row is an `fl_answer_row`, then the commands and the forces. Its numbers are read when they
-    are asked for, through views of the memory: a control loop reads the command alone.
+    A row is an `fl_answer_row`, then commands, forces and the commands of the tick before. Its
+    numbers are read when they are asked for, through views of the memory: a control loop reads the
+    command alone.
     """
 
     def __init__(self, n: int) -> None:
         """Allocates the rows."""
-        head = count_of("fl_answer_row")
-        begin_of_forces = head + 3 * n
-        length = begin_of_forces + 2 * n
-        numbers = np.empty((ROWS, length))
-        first_address = numbers.ctypes.data
-        stride = numbers.strides[0]
-        self.addresses = [first_address + stride * row for row in range(ROWS)]
-        """Of each row, for the core."""
-        # Nobody but the core writes, which has the addresses; views of the rows are read-only, too.
+        self._n = n
+        self._head_length = count_of("fl_answer_row")
+        self.row_length = self._head_length + 8 * n
+        """Numbers of a row."""
+        numbers = np.empty((ROWS, self.row_length))
+        self.address = numbers.ctypes.data
+        """Of the rows, for the core."""
+        self._stride = numbers.strides[0]
+        # Nobody but the core writes, which has the address; views of the rows are read-only, too.
         numbers.setflags(write=False)
-        self.head = numbers[:, :head].view(struct("fl_answer_row"))[:, 0]
+        self._numbers = numbers
+        self.command = self._part(0, 3)
+        """(ROWS, n, 3), NaN of lost actuators."""
+
+    def address_of(self, row: int) -> int:
+        """Returns the address of a row."""
+        return self.address + self._stride * row
+
+    def _part(self, begin: int, width: int) -> Array:
+        """Arrays (ROWS, n, width) behind the heads of the rows, where `begin` numbers of each
+        actuator stand before them."""
+        first = self._head_length + begin * self._n
+        return self._numbers[:, first : first + width * self._n].reshape(ROWS, self._n, width)
+
+    @cached_property
+    def head(self) -> Record:
         """All that is neither command nor force (ROWS,)."""
-        self.command = numbers[:, head:begin_of_forces].reshape(ROWS, 1, n, 3)
-        """(ROWS, 1, n, 3), NaN of lost actuators."""
-        self.force = numbers[:, begin_of_forces:].reshape(ROWS, 1, n, 2)
-        """(ROWS, 1, n, 2) [N]."""
-        self.multipliers = self.head["multipliers"][:, None]
-        """(ROWS, 1, 6) [W/N, W/(N m)]."""
+        heads = self._numbers[:, : self._head_length]
+        return heads.view(struct("fl_answer_row"))[:, 0]
+
+    @cached_property
+    def force(self) -> Array:
+        """(ROWS, n, 2) [N]."""
+        return self._part(3, 2)
+
+    @cached_property
+    def previous(self) -> Array:
+        """Commands (ROWS, n, 3) of the ticks before, in rows of ticks."""
+        return self._part(5, 3)
 
 
 class AnswerRows:
@@ -85,40 +107,47 @@ class AnswerRows:
         Raises:
             CommandError: the core could not work with the numbers of the question.
         """
+        command = memory.command[row]
         if code == 0:
-            return AnswerRow(memory, row, True, True)
+            return AnswerRow(memory, row, True, True, command)
         is_best_beyond_reach = code == self._beyond_reach
         if not is_best_beyond_reach and code != self._unfinished:
             raise_refusal(code)
-        return AnswerRow(memory, row, False, is_best_beyond_reach)
+        return AnswerRow(memory, row, False, is_best_beyond_reach, command)
 
 
-class AnswerRow:
-    """One answer of the core, in a row of memory. What each number is, `CoreAnswer` says."""
+class AnswerRow(NamedTuple):
+    """One answer of the core, in a row of memory. What each number is, `CoreAnswer` says.
 
-    __slots__ = ("_memory", "_row", "command", "is_finished", "is_met")
+    C makes these tuples, too (finlab/core/src/prepared_call.c): its fields have this order there.
+    """
 
-    def __init__(self, memory: AnswerMemory, row: int, is_met: bool, is_finished: bool) -> None:
-        """Takes a row that the core has written.
+    memory: AnswerMemory
+    """Of the row."""
+    row: int
+    """Its index."""
+    is_met: bool
+    """Whether the wrench is within reach, and the commands are exact."""
+    is_finished: bool
+    """Whether it is met, or no step by the laws themselves can better it."""
+    command: Array
+    """Command (n, 3), read-only; NaN of lost actuators where it is finished."""
 
-        Args:
-            memory: of the row.
-            row: its index.
-            is_met: whether the wrench is within reach, and the commands are exact.
-            is_finished: whether it is met, or no step by the laws themselves can better it.
-        """
-        self._memory = memory
-        self._row = row
-        self.is_met = is_met
-        self.is_finished = is_finished
-        self.command: Array = memory.command[row]
-        """Command (1, n, 3), read-only; NaN of lost actuators where it is finished."""
+    @property
+    def wrench(self) -> Array:
+        """Wrench (6,) that was asked for [N, N m], read-only."""
+        wrench: Array = self._head["wrench"][0]
+        return wrench
+
+    @property
+    def previous(self) -> Array | None:
+        """Command (n, 3) of the tick before, read-only; None outside of ticks."""
+        return self.memory.previous[self.row] if self._head["is_tick"][0] else None
 
     @property
     def multipliers(self) -> Array:
         """(1, 6) [W/N, W/(N m)], read-only."""
-        multipliers: Array = self._memory.multipliers[self._row]
-        return multipliers
+        return self._head["multipliers"]
 
     @property
     def wrench_served(self) -> Array:
@@ -134,12 +163,12 @@ class AnswerRow:
         """Returns the answer with N = 1, in arrays of its own."""
         head = self._head
         return CoreAnswer(
-            force=self._memory.force[self._row].copy(),
+            force=self.memory.force[self.row][None].copy(),
             multipliers=self.multipliers.copy(),
             wrench_served=head["wrench_served"].copy(),
             gap_power_bound=head["gap_power_bound"].copy(),
             is_attainable=head["is_attainable"] != 0.0,
-            command=self.command.copy(),
+            command=self.command[None].copy(),
             error=head["error"].copy(),
             is_truncated=bool(head["is_truncated"][0]),
         )
@@ -147,7 +176,7 @@ class AnswerRow:
     @property
     def _head(self) -> Record:
         """The fields (1,) beside command and force."""
-        return self._memory.head[self._row : self._row + 1]
+        return self.memory.head[self.row : self.row + 1]
 
 
 class CoreAnswer(NamedTuple):
@@ -439,7 +468,8 @@ class Core:
         self._unlocked_core = unlocked_library()
         self._lanes = widest_lanes()
         self._block = block
-        self._n = n
+        self.n = n
+        """How many actuators there are."""
         self._work = prepared_work(block)
         self._lock = Lock()
         """Held during a call: work area, question and answer are the same for all threads."""
@@ -448,6 +478,8 @@ class Core:
         self._answer_into_row = self._core.fl_answer_into_row
         self._question = QuestionRecord(n)
         self._rows = AnswerRows(n)
+        self._is_busy = np.zeros(1, np.int32)
+        """Not 0 while a batch is answered in the work area, without the interpreter's lock."""
         self._spare_areas: list[WorkArea] = []
         """Work areas of batches that were answered at the same time, which nobody uses now."""
 
@@ -484,9 +516,17 @@ class Core:
                 self._work_address,
                 question.address,
                 most_error,
-                memory.addresses[row],
+                memory.address_of(row),
             )
         return self._rows.written(memory, row, code)
+
+    def prepared_call(self) -> Record:
+        """Returns an `fl_prepared_call` (1,) of this robot, without question and rows."""
+        record = np.zeros(1, struct("fl_prepared_call"))
+        record["block"] = self._block_address
+        record["work"] = self._work_address
+        record["is_busy"] = self._is_busy.ctypes.data
+        return record
 
     def answer_one(
         self,
@@ -534,18 +574,19 @@ class Core:
         wrenches = np.ascontiguousarray(wrenches)
         count = len(wrenches)
         answer = CoreAnswer(
-            force=np.empty((count, self._n, 2)),
+            force=np.empty((count, self.n, 2)),
             multipliers=np.empty((count, 6)),
             wrench_served=np.empty((count, 6)),
             gap_power_bound=np.empty(count),
             is_attainable=np.empty(count, np.bool_),
-            command=np.empty((count, self._n, 3)),
+            command=np.empty((count, self.n, 3)),
             error=np.empty(count),
             is_truncated=False,
         )
         is_truncated = np.empty(count, np.bool_)
         if self._lock.acquire(blocking=False):
             try:
+                self._is_busy[0] = 1
                 self._answer_many(
                     self._work_address,
                     self._question,
@@ -556,6 +597,7 @@ class Core:
                     is_truncated,
                 )
             finally:
+                self._is_busy[0] = 0
                 self._lock.release()
         else:
             # Another thread is answered at this moment.
@@ -573,7 +615,7 @@ class Core:
         try:
             return self._spare_areas.pop()
         except IndexError:
-            return WorkArea(self._block, self._n)
+            return WorkArea(self._block, self.n)
 
     def _answer_many(
         self,
@@ -617,7 +659,7 @@ class Core:
             Commands (N, n, 3).
         """
         force = np.ascontiguousarray(force)
-        command = np.empty((len(force), self._n, 3))
+        command = np.empty((len(force), self.n, 3))
         previous_address = None
         if previous is not None:
             previous = np.ascontiguousarray(previous)
@@ -667,7 +709,7 @@ class Core:
             CommandError: the core cannot work with these numbers.
         """
         multipliers = np.ascontiguousarray(multipliers)
-        records = np.empty((len(multipliers), self._n), struct("fl_actuator_conjugate"))
+        records = np.empty((len(multipliers), self.n), struct("fl_actuator_conjugate"))
         with self._lock:
             self._question.write_conditions(conditions)
             code = self._core.fl_conjugates(

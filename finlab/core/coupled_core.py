@@ -241,7 +241,7 @@ class CoupledCore:
                 self._work_address,
                 self._question.address,
                 most_error,
-                memory.addresses[row],
+                memory.address_of(row),
             )
             self._raise_from_callback()
         return self._rows.written(memory, row, code)

@@ -71,7 +71,7 @@ typedef double fl_wide; /* where differences of large numbers matter, in single 
 #define FL_FOILS (FL_FOILS_CHEAPER + 2 * FL_LATTICE_STARTS * FL_STEPS_AT_KINK)
 #define FL_BOUND (2 * (FL_FORCES + FL_FOILS))
 
-#define FL_VERSION 17  /* of all structs and functions here */
+#define FL_VERSION 18  /* of all structs and functions here */
 #define FL_MAGIC 41721 /* first number of a block */
 
 /* The structs that cross the border of the library. */
@@ -79,6 +79,10 @@ typedef unsigned char fl_byte;
 typedef const fl_byte *fl_bytes;
 typedef const fl_real *fl_reals;
 typedef const struct fl_policy *fl_policy_at;
+typedef const struct fl_question *fl_question_at;
+typedef struct fl_work *fl_work_at;
+typedef fl_real *fl_row_at;
+typedef const int *fl_flag_at;
 
 /* The wrench offset of actuators that act on each other, o of Eq. 18.
 
@@ -203,7 +207,8 @@ int fl_answer_one(const fl_real *block, fl_work *work, const fl_question *questi
                   fl_answer *answer);
 
 /* Finds commands for one wrench, and writes the answer as a row of numbers: an fl_answer_row, then
-   commands (n, 3) and forces (n, 2) [N].
+   commands (n, 3), forces (n, 2) [N], and in a tick the commands before (n, 3), which the question
+   may have there already.
 
    @param most_error  error up to which commands are exact; below 0 where the grids of the laws
                       cannot tell
@@ -214,6 +219,22 @@ int fl_answer_one(const fl_real *block, fl_work *work, const fl_question *questi
                       themselves may be better, or the search ended early; else as fl_answer_one */
 int fl_answer_into_row(const fl_real *block, fl_work *work, const fl_question *question,
                        fl_real most_error, fl_real *row);
+
+/* Single questions as a function of Python, which is called without ctypes: prepared_call.c. */
+
+/* @return names of the functions of Python's C API that it calls, each with a space behind it */
+const char *fl_python_names(void);
+
+/* @param functions  addresses of these functions
+   @param objects    addresses of None, True, False, and of the types float, int, list, tuple and
+                     numpy.ndarray */
+void fl_use_python(const void *functions, const void *objects);
+
+/* @return the `PyMethodDef` of a function answer(wrench, previous, multipliers), to be bound to a
+           list: address of an fl_prepared_call, type of an answer (a tuple of memory, row, is_met,
+           is_finished, command), memory of the rows, their commands (row_count, n, 3), and a
+           function that allocates other rows. It returns None where it does not answer. */
+const void *fl_python_method(void);
 
 /* @return how many lanes the widest vectors of this machine have that fl_answer_many knows; 1 where
            it knows none. Asking the processor may take microseconds: ask once. */

@@ -114,10 +114,29 @@ FL_FIELD(fl_real, error, , "1", "as of fl_answer")
 FL_FIELD(fl_real, gap_power_bound, , "W", "as of fl_answer")
 FL_FIELD(fl_real, is_attainable, , "1", "1 where the target is within reach, else 0")
 FL_FIELD(fl_real, is_truncated, , "1", "1 where a search ended at its bound, else 0")
+FL_FIELD(fl_real, is_tick, , "1", "1 where the question has commands of the tick before, else 0")
+FL_FIELD(fl_real, wrench, [6], "N, N m", "as of fl_question")
 FL_FIELD(fl_real, multipliers, [6], "W/N, W/(N m)", "as of fl_answer")
 FL_FIELD(fl_real, wrench_served, [6], "N, N m",
-         "as of fl_answer; commands (n, 3), NaN if lost, and forces (n, 2) stand behind it")
+         "as of fl_answer; behind it stand commands (n, 3), NaN if lost, forces (n, 2), and in a "
+         "tick the commands before (n, 3)")
 FL_END(fl_answer_row)
+
+FL_BEGIN(fl_prepared_call)
+FL_FIELD(fl_reals, block, , "address", "numbers of the robot")
+FL_FIELD(fl_work_at, work, , "address", "its prepared work area")
+FL_FIELD(fl_question_at, question, , "address",
+         "all that is asked but wrench, commands of the tick before, calm and multipliers")
+FL_FIELD(fl_row_at, rows, , "address", "(row_count, row_numbers) of answers")
+FL_FIELD(fl_flag_at, is_busy, , "address",
+         "1 while another call works with the work area, without the lock of the interpreter")
+FL_FIELD(fl_real, most_wrench, , "1", "largest wrench, as a vector of six numbers")
+FL_FIELD(fl_real, most_error, , "1", "error up to which commands are exact")
+FL_FIELD(fl_real, calm, , "1", "fl_question.calm of a tick")
+FL_FIELD(int, row_numbers, , "1", "numbers of a row")
+FL_FIELD(int, row_count, , "1", "rows")
+FL_FIELD(int, used, , "1", "rows that hold answers")
+FL_END(fl_prepared_call)
 
 FL_BEGIN(fl_actuator_conjugate)
 FL_FIELD(fl_real, price_ahead, , "W/N",

@@ -50,6 +50,40 @@ typedef struct {
   const fl_tangent *tangent;
 } fl_set;
 
+/* A table of force over price as it is asked most. */
+typedef struct {
+  int offset;            /* of its first knot in the block */
+  fl_real cells;         /* how many */
+  fl_real each;          /* 1 / cells */
+  fl_real price_max;     /* price of the largest force, and what follows are of the table [W/N] */
+  fl_real over_price;    /* 1 / price_max [N/W] */
+  fl_real force_max;     /* largest force [N] */
+  fl_real conjugate_max; /* conjugate at that price [W] */
+} fl_price_table;
+
+/* An actuator that pushes along one direction. */
+typedef struct {
+  fl_price_table table[2]; /* ahead and in reverse */
+  fl_real force_scale[2];  /* k_T of Eq. 16, force over that of the tables; below 0 in reverse */
+  fl_real power_scale;     /* k_P, the same of power */
+  fl_real price_ratio;     /* k_T / k_P */
+  fl_real slope_scale;     /* k_T k_T / k_P, slope over that of the tables */
+  fl_real price_quadratic; /* least price that counts in a secant [W/N] */
+  int actuator;            /* which one it is */
+} fl_line;
+
+/* Whether the processor has vectors of two numbers, by which lines are answered two at a time:
+   pairs.h in finlab/core/src. */
+#if defined(__SSE2__) || defined(__aarch64__)
+#define FL_HAS_VECTORS
+#endif
+#if defined(__GNUC__) && defined(FL_HAS_VECTORS) && !defined(FL_SINGLE) && !defined(FL_NO_PAIRS)
+#define FL_PAIRS_OF_LINES
+#define FL_LINES FL_MOST /* lines that are kept */
+#else
+#define FL_LINES 1
+#endif
+
 /* Multipliers, and what they give. */
 typedef struct {
   fl_real lambda_reduced[6];   /* [W] */
@@ -120,6 +154,10 @@ struct fl_work {
   fl_set set[FL_MOST];  /* of each actuator, as a search has cut it */
   fl_box box;           /* of this question */
   fl_settings settings; /* that bound searches */
+
+  fl_line line[FL_LINES]; /* all lines of the robot, where they are answered in pairs */
+  int line_count;         /* how many there are */
+  int has_line_cells;     /* whether one has a table of several cells */
 
   /* Newton's method. */
   fl_state state[2];            /* the one so far, and a trial */

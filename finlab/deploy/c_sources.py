@@ -42,6 +42,7 @@ FILES_LEFT_OUT = (
     "outer_starts.c",
     "ray_reach.c",
     "for_python.c",
+    "prepared_call.c",
     "answer_many.c",
     "lanes.h",
     "lanes_vector.h",

@@ -53,6 +53,7 @@ NO_CHOICE = {
     "FL_VERSION",
     "FL_MAGIC",
     "FL_POINTS",
+    "FL_LINES",
     "FL_SCORES",
     "FL_DIVE",
     "FL_SEARCH",

@@ -30,6 +30,13 @@ PATIENT = ("ipopt", "sqp")
 """Methods of the table that are left to their own tests here."""
 
 
+def test_a_name_stands_for_one_policy_with_the_usual_weights_and_order() -> None:
+    for name in POLICY_NAMES:
+        assert as_policy(name) == Policy(name)
+        assert as_policy(name) is as_policy(name)
+    assert as_policy("closest") is CLOSEST
+
+
 def test_the_core_knows_every_policy_and_no_other() -> None:
     numbers = [constant(f"FL_{name.upper()}") for name in POLICY_NAMES]
     assert sorted(numbers) == list(range(constant("FL_POLICIES")))

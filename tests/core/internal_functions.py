@@ -50,6 +50,7 @@ _DEPTH = 16 + MOST
 """FL_DEPTH_OF(FL_MOST), a formula and no number in `fl_work.h`."""
 _LENGTHS = {
     "FL_MOST": MOST,
+    "FL_LINES": MOST,
     "FL_POINTS": POINTS,
     "FL_SCORES": _macro("FL_SCORES"),
     "FL_DEPTH": _DEPTH,
@@ -128,7 +129,20 @@ class Box(ctypes.Structure):
     _fields_ = _members("fl_work.h", "fl_box")
 
 
+class PriceTable(ctypes.Structure):
+    """A table of force over price: `fl_price_table`."""
+
+    _fields_ = _members("fl_work.h", "fl_price_table")
+
+
 _KINDS["fl_set"] = Set
+_KINDS["fl_price_table"] = PriceTable
+
+
+class Line(ctypes.Structure):
+    """An actuator that pushes along one direction: `fl_line`."""
+
+    _fields_ = _members("fl_work.h", "fl_line")
 
 
 class Cut(ctypes.Structure):
@@ -139,6 +153,7 @@ class Cut(ctypes.Structure):
 
 _KINDS |= {
     "fl_cut": Cut,
+    "fl_line": Line,
     "fl_mixture": Mixture,
     "fl_tangent": Tangent,
     "fl_span": Span,

@@ -39,9 +39,9 @@ class NewtonSteps(NamedTuple):
 
 
 MOST_STEPS = {
-    "thrusters": NewtonSteps(176, 761, 60),
+    "thrusters": NewtonSteps(176, 845, 60),
     "azimuths": NewtonSteps(82, 543, 34),
-    "fins": NewtonSteps(99, 888, 94),
+    "fins": NewtonSteps(99, 888, 145),
     "fins any shaft": NewtonSteps(69, 838, 66),
     "fins uneven": NewtonSteps(80, 1015, 29),
     "wide arcs": NewtonSteps(257, 1853, 68),

@@ -41,11 +41,11 @@ def code_of_many(
     wrenches = np.ascontiguousarray(wrenches)
     count = len(wrenches)
     answers: dict[str, Any] = {
-        "force": np.full((count, core._n, 2), np.nan),
+        "force": np.full((count, core.n, 2), np.nan),
         "multipliers": np.full((count, 6), np.nan),
         "wrench_served": np.full((count, 6), np.nan),
         "gap_power_bound": np.full(count, np.nan),
-        "command": np.full((count, core._n, 3), np.nan),
+        "command": np.full((count, core.n, 3), np.nan),
         "is_attainable": np.zeros(count, np.bool_),
         "error": np.full(count, np.nan),
         "is_truncated": np.ones(count, np.bool_),

@@ -113,7 +113,9 @@ def test_two_robots_link_into_a_program_in_cpp(tmp_path: Path) -> None:
 
 _COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 """A comment of C."""
-_PROTOTYPE = re.compile(r"^(int|void|fl_real|const char \*)\s*(fl_\w+)\(([^()]*)\);", re.MULTILINE)
+_PROTOTYPE = re.compile(
+    r"^(int|void|fl_real|const char \*|const void \*)\s*(fl_\w+)\(([^()]*)\);", re.MULTILINE
+)
 """A function of `finlab.h`: what it returns, its name, its arguments."""
 
 

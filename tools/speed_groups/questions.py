@@ -12,7 +12,7 @@ from finlab.allocation.dual.compiled import Compiled, core_policy
 from finlab.allocation.policy import CLOSEST
 from finlab.arrays import Array
 from finlab.core import library
-from finlab.core.calls import NOMINAL, AnswerMemory, Conditions, QuestionRecord, prepared_work
+from finlab.core.calls import NOMINAL, ROWS, AnswerMemory, Conditions, QuestionRecord, prepared_work
 from finlab.layout import Layout
 from finlab.physics import plant_of
 from tools.speed_groups.timing import Side
@@ -124,7 +124,7 @@ def core_side(
         conditions = NOMINAL if previous is None else Conditions(previous=previous[i])
         record.write(policy, None, conditions)
         records.append(record)
-        row = memory.addresses[i % len(memory.addresses)]
+        row = memory.address_of(i % ROWS)
         questions.append((block_address, work_address, record.address, -1.0, row))
     solve = library().fl_answer_into_row
 

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from finlab.allocation.dual.compiled import Compiled, core_policy
 from finlab.allocation.method import Method, Settings, number
 from finlab.allocation.policy import CLOSEST, Policy
-from finlab.allocation.question import MethodQuestion
-from finlab.allocation.solution import Solution, Solved
+from finlab.allocation.question import MAX_WRENCH, MethodQuestion
+from finlab.allocation.solution import PreparedAnswers, Solution, Solved
 from finlab.arrays import EXACT, NEARLY, NOTHING, ROUNDING, Array
 from finlab.axes import axes_in
 from finlab.core.calls import NOMINAL, AnswerRow, Conditions, CoreAnswer
@@ -82,7 +82,7 @@ class FinishedSolution:
         self._conditions = conditions
         self._targets = targets
         self._row = row
-        self.command = row.command
+        self.command = row.command[None]
         """Command (1, n, 3)."""
 
     @property
@@ -227,6 +227,34 @@ class Dual(Method):
         return method.solve_under(
             conditions, question.targets, question.policy, question.multipliers
         )
+
+    def prepared_answers(
+        self, policy: Policy, lost: NDArray[np.bool_] | None, free: NDArray[np.bool_] | None
+    ) -> PreparedAnswers | None:
+        """Prepares questions about single wrenches; see `Method.prepared_answers`."""
+        if self.plant.interaction is not None or not self._most_core_error >= 0.0:
+            return None
+        from finlab.core.prepared_call import prepared_answer
+
+        conditions = Conditions(None, lost, free)
+        answer = prepared_answer(
+            self.compiled.core,
+            core_policy(policy),
+            conditions,
+            self.settings.calm,
+            MAX_WRENCH,
+            self._most_core_error,
+        )
+        if answer is None:
+            return None
+
+        def solved(row: AnswerRow, question: MethodQuestion) -> FinishedSolution:
+            asked = conditions
+            if question.previous is not None:
+                asked = Conditions(question.previous, lost, free, self.settings.calm)
+            return FinishedSolution(self, asked, question.targets, row)
+
+        return PreparedAnswers(answer, solved)
 
     @cached_property
     def turn_rates(self) -> Array:

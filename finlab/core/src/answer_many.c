@@ -53,18 +53,6 @@ static lanes_kernel kernel_of(int lanes) {
   return 0;
 }
 
-static void read_table(const real *block, int offset, lanes_table *table) {
-  const real *numbers = block + offset;
-  table->offset = offset + 3;
-  table->price_max = numbers[0];
-  table->over_price = 1 / numbers[0];
-  table->cells = numbers[1];
-  table->each = 1 / numbers[1];
-  const real *last = numbers + 3 + 3 * (int)numbers[1];
-  table->force_max = last[0];
-  table->conjugate_max = last[2];
-}
-
 /* Whether four knots of an axis of so many stand in a row, or there is one alone. */
 static int has_window(real count) { return count == 1 || count >= 4; }
 
@@ -93,8 +81,8 @@ static void read_actuator(const real *block, const fl_work *work, int i, lanes_a
   int reverse = (int)a->force_table;
   if (!own->is_plane && a->force_table_reverse > 0) reverse = (int)a->force_table_reverse;
   own->has_reverse = reverse != (int)a->force_table;
-  read_table(block, (int)a->force_table, own->table);
-  read_table(block, reverse, own->table + 1);
+  read_price_table(block, (int)a->force_table, own->table);
+  read_price_table(block, reverse, own->table + 1);
   own->is_one_cell = own->table[0].cells == 1 && own->table[1].cells == 1;
   own->force_scale = a->force_scale;
   own->power_scale = a->power_scale;

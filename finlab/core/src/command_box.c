@@ -30,6 +30,7 @@ static real edge_of_band(const fl_actuator *a, real command) {
 void fl_leave_dead_bands(const real *block, real force[][2], real command[][3]) {
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
+    if (!(a->dead_band > 0)) continue;
     const int k = fl_form_of(a)->force_number;
     if (k == NO_NUMBER || !fl_is_in_dead_band(a, command[i])) continue;
     if (size_of(force[i]) < AT_EDGE * a->dead_band) continue;
@@ -42,6 +43,7 @@ void fl_leave_dead_bands(const real *block, real force[][2], real command[][3]) 
 void fl_rest_in_dead_bands(const real *block, const fl_box *box, real command[][3]) {
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
+    if (!(a->dead_band > 0)) continue;
     const int k = fl_form_of(a)->force_number;
     if (k == NO_NUMBER || !(FABS(command[i][k]) < a->dead_band)) continue;
     if (!fl_is_in_dead_band(a, command[i]))

@@ -21,9 +21,13 @@ static real residual_of(const real *block, const fl_work *work, const real *wren
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
     if (span->is_lost[i]) continue;
+    if (a->dead_band > 0 && fl_is_in_dead_band(a, command[i])) continue;
     real force[3];
     fl_force_of_command(block, i, command[i], force, 0);
-    if (fl_is_in_dead_band(a, command[i])) memset(force, 0, sizeof force);
+    if (a->rows == 1) { /* a thruster has one direction */
+      for (int k = 0; k < 6; k++) residual[k] -= force[0] * a->effectiveness_normalized[0][k];
+      continue;
+    }
     for (int k = 0; k < 6; k++) {
       residual[k] -= force[0] * a->effectiveness_normalized[0][k] +
                      force[1] * a->effectiveness_normalized[1][k] +

@@ -24,7 +24,7 @@
        mu, nu  damping of the step; its growth after a refused one                 Eq. 8
        S       secants of the responses                                            Eq. 9
        l       share of the slope that is left at the end of a step                Eq. 10 */
-#include "internal.h"
+#include "symmetric.h"
 
 #define OVERSHOT R(-0.3)     /* share of the slope below which a kept step went too far, too */
 #define SEARCH_STEPS 12      /* of the search for where a step that went too far is to end */
@@ -38,19 +38,19 @@
 /* Scaled wrench in the basis. */
 void fl_reduce_wrench(const fl_work *work, const real *wrench, real *target_reduced) {
   const fl_span *span = &work->span;
-  for (int j = 0; j < 6; j++) {
-    target_reduced[j] = 0;
-    for (int k = 0; k < 6; k++)
-      target_reduced[j] += span->basis[k][j] * (wrench[k] / span->axis_scale[k]);
+  memset(target_reduced, 0, 6 * sizeof *target_reduced);
+  for (int k = 0; k < 6; k++) {
+    const real scaled = wrench[k] / span->axis_scale[k];
+    for (int j = 0; j < 6; j++) target_reduced[j] += span->basis[k][j] * scaled;
   }
 }
 
 /* Multipliers in the basis [W] of those of the wrench [W/N, W/(N m)]. */
 void fl_reduce_lambda(const fl_work *work, const real *lambda, real *lambda_reduced) {
   const fl_span *span = &work->span;
-  for (int j = 0; j < 6; j++) {
-    lambda_reduced[j] = 0;
-    for (int k = 0; k < 6; k++) {
+  memset(lambda_reduced, 0, 6 * sizeof *lambda_reduced);
+  for (int k = 0; k < 6; k++) {
+    for (int j = 0; j < 6; j++) {
       lambda_reduced[j] += span->basis[k][j] * span->axis_scale[k] * lambda[k];
     }
   }
@@ -77,8 +77,10 @@ void fl_wrench_of_forces(const real *block, const fl_work *work, real force[][2]
   real reduced[6] = {0};
   for (int i = 0; i < COUNT(block); i++) {
     for (int row = 0; row < (int)ACTUATOR(block, i)->rows; row++) {
-      for (int j = 0; j < span->rank; j++)
+      /* all six, so that compilers know how many */
+      for (int j = 0; j < 6; j++) {
         reduced[j] += force[i][row] * span->effectiveness_reduced[i][row][j];
+      }
     }
   }
   for (int k = 0; k < 6; k++) wrench[k] = span->axis_scale[k] * dot(span->basis[k], reduced, 6);
@@ -141,8 +143,17 @@ void fl_dual_at(const real *block, const fl_work *work, const real *target_reduc
                 const real *lambda, fl_state *state) {
   real wrench[6] = {0}; /* sum B y */
   real conjugate = 0;   /* sum c*(s) */
-  for (int i = 0; i < COUNT(block); i++) {
+#ifdef HAS_PAIRS
+  fl_add_lines(block, work, lambda, state, wrench, &conjugate);
+  const int has_others = work->line_count < COUNT(block);
+#else
+  const int has_others = 1;
+#endif
+  for (int i = 0; has_others && i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
+#ifdef HAS_PAIRS
+    if (a->rows == 1) continue;
+#endif
     real s[2];
     actuator_price(work, i, lambda, s);
     const response answer = fl_response(block, i, work->set + i, s); /* y, dy/ds, c*(s): Eq. 4, 5 */
@@ -178,20 +189,11 @@ void fl_dual_start(const real *block, fl_work *work, const real *target_reduced,
   fl_dual_at(block, work, target_reduced, lambda, work->state);
 }
 
-/* Adds B D B' to the lower triangle of H, of a plane: B = (bx, by), D = (xx, xy; xy, yy). */
-static void add_plane(real H[6][6], const real *bx, const real *by, real xx, real xy, real yy) {
-  for (int row = 0; row < 6; row++) {
-    const real DBx = xx * bx[row] + xy * by[row];
-    const real DBy = xy * bx[row] + yy * by[row];
-    for (int col = 0; col <= row; col++) H[row][col] += DBx * bx[col] + DBy * by[col];
-  }
-}
-
 /* Solves (G_mu + mu c max(tr G_mu, tau) M) step = r with G_mu = G + mu S, Eq. 8; 0 where that is
    singular to rounding. */
 static int newton_step(const real *block, const fl_work *work, const fl_state *at, real mu,
                        real *step) {
-  real H[6][6] = {{0}}; /* G_mu */
+  symmetric sum = no_matrix(); /* G_mu */
   for (int i = 0; i < COUNT(block); i++) {
     const real(*B)[6] = work->span.effectiveness_reduced[i];
     const real *dy_ds = at->dy_ds[i];
@@ -199,19 +201,16 @@ static int newton_step(const real *block, const fl_work *work, const fl_state *a
     const real xy = dy_ds[1];
     real yy = dy_ds[2];
     if (is_plane(ACTUATOR(block, i))) yy += mu * at->secant[i];
-    if (ACTUATOR(block, i)->rows != 1)
-      add_plane(H, B[0], B[1], xx, xy, yy);
-    else if (xx > 0)
-      fl_add_square(H, B[0], xx);
+    if (ACTUATOR(block, i)->rows != 1) {
+      add_plane(&sum, B[0], B[1], xx, xy, yy);
+    } else {
+      add_square(&sum, B[0], xx);
+    }
   }
-  const real trace = larger(fl_trace(H), work->trace_min);
-  const real weight = SATURATED * mu * trace; /* of M */
-  for (int row = 0; row < 6; row++) {
-    for (int col = 0; col <= row; col++) H[row][col] += weight * work->metric[row][col];
-  }
-  if (!fl_factor(H)) return 0;
-  fl_solve(H, at->residual, step);
-  return 1;
+  symmetric H = sum;
+  const real trace = larger(trace_of(&H), work->trace_min);
+  add_matrix(&H, work->metric, SATURATED * mu * trace);
+  return solve_symmetric(&H, at->residual, step);
 }
 
 /* How many responses jump between two states a step apart; where wanted they are marked as

@@ -147,6 +147,7 @@ static int prepare_newton(const real *block, fl_work *work) {
   for (int j = 0; j < 6; j++) {
     for (int k = 0; k <= j; k++) {
       work->metric[j][k] = H[j][k] * (real)span->rank / larger(trace, TINY);
+      work->metric[k][j] = work->metric[j][k];
     }
     work->metric[j][j] += NEARLY;
   }

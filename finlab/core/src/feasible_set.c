@@ -259,6 +259,7 @@ int fl_prepare(const real *block, fl_work *work) {
   work->residual_enough = TOLERANCE;
   work->power_of_use = INFEASIBLE_COST;
   fl_usual_settings(&work->settings);
+  fl_prepare_lines(block, work);
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
     work->slope_max[i] = 0;

@@ -1,6 +1,6 @@
 /* Where Newton's method on the dual begins: multipliers of a target within reach, and of one at the
    rim of the attainable set. */
-#include "internal.h"
+#include "symmetric.h"
 
 /* Multipliers along a normal of the rim, over those at which all forces are the largest: where a
    turn of forces is measured, and the most. */
@@ -55,7 +55,7 @@ static real secant_at(const real *block, const fl_work *work, int i, real price,
 /* Adds to H the forces over prices that an actuator has at the force that it gives to multipliers
    where costs are quadratic. Returns that force over its largest one. */
 static real add_secants(const real *block, const fl_work *work, int i, const real *lambda_quadratic,
-                        real H[6][6]) {
+                        symmetric *H) {
   const fl_actuator *a = ACTUATOR(block, i);
   real s[2];
   actuator_price(work, i, lambda_quadratic, s);
@@ -67,24 +67,21 @@ static real add_secants(const real *block, const fl_work *work, int i, const rea
   real weight = secant_at(block, work, i, s[0], clipped(share, CLOSE, 1), &cost);
   if (share > 1 && !work->has_drag) weight = 1 / share; /* at a limit the force stays */
   for (int row = 0; row < (int)a->rows; row++) {
-    fl_add_square(H, work->span.effectiveness_reduced[i][row], weight * cost.secant[row]);
+    add_square(H, work->span.effectiveness_reduced[i][row], weight * cost.secant[row]);
   }
   return share;
 }
 
 /* Solves H lambda = target, H made regular by a share of its trace. */
-static void solve_regular(real H[6][6], real ridge_share, const real *target_reduced,
+static void solve_regular(symmetric *H, real ridge_share, const real *target_reduced,
                           real *lambda) {
-  const real trace = fl_trace(H);
+  const real trace = trace_of(H);
   if (!(trace > 0)) { /* nobody pushes, such as lost actuators: any multipliers are as good */
     memset(lambda, 0, 6 * sizeof *lambda);
     return;
   }
-  for (int j = 0; j < 6; j++) H[j][j] += ridge_share * trace;
-  if (fl_factor(H)) {
-    fl_solve(H, target_reduced, lambda);
-    return;
-  }
+  add_to_diagonal(H, ridge_share * trace);
+  if (solve_symmetric(H, target_reduced, lambda)) return;
   for (int j = 0; j < 6; j++) lambda[j] = target_reduced[j] / trace;
 }
 
@@ -96,13 +93,13 @@ void fl_first_lambda(const real *block, const fl_work *work, const real *target_
      is only read. */
   real lambda_quadratic[6];
   fl_solve((real(*)[6])work->hessian_factor, target_reduced, lambda_quadratic);
-  real H[6][6] = {{0}};
+  symmetric H = no_matrix();
   *mu = NEARLY;
   for (int i = 0; i < COUNT(block); i++) {
-    const real share = add_secants(block, work, i, lambda_quadratic, H);
+    const real share = add_secants(block, work, i, lambda_quadratic, &H);
     if (share > NEAR_LIMIT) *mu = MU_NEAR_LIMIT;
   }
-  solve_regular(H, NOTHING, target_reduced, lambda); /* regular behind the range, too */
+  solve_regular(&H, NOTHING, target_reduced, lambda); /* regular behind the range, too */
   if (fl_is_drag_welcome(block, work, lambda)) *mu = MU_NEAR_LIMIT;
 }
 
@@ -146,20 +143,20 @@ static void find_rim_actuators(const real *block, const fl_work *work, const rea
 /* Multipliers nu at which the others give a residual, as those of fl_first_lambda do. */
 static void multipliers_of_others(const real *block, const fl_work *work, const rim_actuators *rim,
                                   const real *residual, real *nu) {
-  real H[6][6] = {{0}};
-  real H_quadratic[6][6] = {{0}};
+  symmetric H = no_matrix();
+  symmetric H_quadratic = no_matrix();
   real nu_quadratic[6];
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
     for (int row = 0; row < (int)a->rows && rim->is_other[i]; row++) {
-      fl_add_square(H_quadratic, work->span.effectiveness_reduced[i][row], a->secant[row]);
+      add_square(&H_quadratic, work->span.effectiveness_reduced[i][row], a->secant[row]);
     }
   }
-  solve_regular(H_quadratic, NEARLY, residual, nu_quadratic);
+  solve_regular(&H_quadratic, NEARLY, residual, nu_quadratic);
   for (int i = 0; i < COUNT(block); i++) {
-    if (rim->is_other[i]) add_secants(block, work, i, nu_quadratic, H);
+    if (rim->is_other[i]) add_secants(block, work, i, nu_quadratic, &H);
   }
-  solve_regular(H, NEARLY, residual, nu);
+  solve_regular(&H, NEARLY, residual, nu);
 }
 
 /* What the forces at t n + nu give less along n than the farthest ones: their residual along n, and

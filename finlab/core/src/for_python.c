@@ -78,19 +78,25 @@ const char *fl_fields(void) {
 #undef FL_END
 
 /* Writes an answer as a row of numbers; returns its commands. */
-static real *write_row(const real *block, const fl_answer *out, real *row) {
+static real *write_row(const real *block, const fl_question *q, const fl_answer *out, real *row) {
   const size_t n = (size_t)COUNT(block);
   fl_answer_row *head = (fl_answer_row *)row;
   real *command = row + sizeof *head / sizeof *row;
   real *force = command + 3 * n;
+  real *previous = force + 2 * n;
   head->error = out->error;
   head->gap_power_bound = out->gap_power_bound;
   head->is_attainable = (real)out->is_attainable;
   head->is_truncated = (real)out->is_truncated;
+  head->is_tick = (real)(q->previous != 0);
+  memcpy(head->wrench, q->wrench, sizeof q->wrench);
   memcpy(head->multipliers, out->multipliers, sizeof out->multipliers);
   memcpy(head->wrench_served, out->wrench_served, sizeof out->wrench_served);
   memcpy(command, out->command, 3 * n * sizeof *command);
   memcpy(force, out->force, 2 * n * sizeof *force);
+  if (q->previous && q->previous != previous) {
+    memcpy(previous, q->previous, 3 * n * sizeof *previous);
+  }
   return command;
 }
 
@@ -134,7 +140,7 @@ int fl_answer_into_row(const real *block, fl_work *work, const fl_question *ques
   fl_answer out;
   const int code = fl_answer_one(block, work, question, &out);
   if (code) return code;
-  real *command = write_row(block, &out, row);
+  real *command = write_row(block, question, &out, row);
   if (out.is_truncated || !(most_error >= 0)) return FL_UNFINISHED;
   if (out.is_attainable && !(out.error <= most_error)) return FL_UNFINISHED;
   if (!out.is_attainable && !is_best_beyond_reach(block, work, question, &out)) {
@@ -151,7 +157,7 @@ int fl_answer_coupled_into_row(const fl_coupled_robot *robot, real *block, fl_wo
   const int code = fl_answer_coupled(robot, block, work, question, &out, &result);
   if (code) return code;
   out.gap_power_bound = 0;
-  real *command = write_row(block, &out, row);
+  real *command = write_row(block, question, &out, row);
   const int is_met = out.is_attainable && out.error <= most_error;
   if (!(most_error >= 0) || (out.is_attainable && !is_met)) return FL_UNFINISHED;
   mark_lost(block, work, question, command);

@@ -176,6 +176,22 @@ real fl_support_of_set(const real *block, int i, const fl_set *set, const real *
 real fl_drag_of_lift(const real *block, int i, real force);
 int fl_undecided(const real *block, int i, const fl_set *set, const real *price, real *off);
 
+/* line_pairs.c: responses of lines, two at a time */
+static inline void read_price_table(const real *block, int offset, fl_price_table *table) {
+  const real *numbers = block + offset;
+  table->offset = offset + 3;
+  table->price_max = numbers[0];
+  table->over_price = 1 / numbers[0];
+  table->cells = numbers[1];
+  table->each = 1 / numbers[1];
+  const real *last = numbers + 3 + 3 * (int)numbers[1];
+  table->force_max = last[0];
+  table->conjugate_max = last[2];
+}
+void fl_prepare_lines(const real *block, fl_work *work);
+void fl_add_lines(const real *block, const fl_work *work, const real *lambda, fl_state *state,
+                  real *wrench, real *conjugate);
+
 /* turning_cost.c: responses where turning costs */
 response fl_response_with_turning(const real *block, int i, const fl_set *set, const real *price);
 int fl_has_jumped(const real *block, int i, const fl_set *set, const fl_state *one,

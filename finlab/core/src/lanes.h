@@ -23,17 +23,6 @@
 /* Numbers of a vector by each kernel. */
 enum { LANES_BASELINE = 2, LANES_AVX2 = 4, LANES_AVX512 = 8 };
 
-/* A table of force over price as lanes read it; see fl_work.h. */
-typedef struct {
-  int offset;         /* of its first knot in the block */
-  real cells;         /* how many */
-  real each;          /* 1 / cells */
-  real price_max;     /* price of the largest force, and what follows are of the table [W/N] */
-  real over_price;    /* 1 / price_max [N/W] */
-  real force_max;     /* largest force [N] */
-  real conjugate_max; /* conjugate at that price [W] */
-} lanes_table;
-
 /* An actuator as lanes read it. Of what there is ahead and in reverse, the first is that ahead. */
 typedef struct {
   int kind;          /* of its command: FL_THRUSTER, FL_POD or FL_FIN */
@@ -41,7 +30,7 @@ typedef struct {
   int has_reverse;   /* whether a line has another table in reverse */
   int is_one_cell;   /* whether its tables have one cell each */
   real column[2][6]; /* of B: scaled wrench in the basis per newton of each row [1/N] */
-  lanes_table table[2];
+  fl_price_table table[2];
   real force_scale; /* k_T of Eq. 16, force over that of the tables */
   real power_scale; /* k_P, the same of power */
   real price_ratio; /* k_T / k_P */

@@ -94,8 +94,8 @@ static inline vector slope_in_lanes(const lanes_cubic *p, vector t) {
    that in reverse: fl_force_of_price. */
 static inline lanes_line table_at(const lanes_robot *robot, const lanes_actuator *a,
                                   mask is_reverse, vector price) {
-  const lanes_table *ahead = &a->table[0];
-  const lanes_table *back = &a->table[1];
+  const fl_price_table *ahead = &a->table[0];
+  const fl_price_table *back = &a->table[1];
   vector price_max = lanes_of(ahead->price_max);
   vector dt_dv = lanes_of(ahead->over_price);
   vector force_max = lanes_of(ahead->force_max);
@@ -448,8 +448,8 @@ static vector damping_along_lanes(const lanes_robot *robot, const lanes_state *a
 static vector price_of_force(const lanes_robot *robot, const lanes_actuator *a, mask is_reverse,
                              vector size) {
   const real *block = robot->block;
-  const lanes_table *ahead = &a->table[0];
-  const lanes_table *back = &a->table[1];
+  const fl_price_table *ahead = &a->table[0];
+  const fl_price_table *back = &a->table[1];
   const vector cells = select_lanes(is_reverse, lanes_of(back->cells), lanes_of(ahead->cells));
   const vector each = select_lanes(is_reverse, lanes_of(back->each), lanes_of(ahead->each));
   const vector price_max =

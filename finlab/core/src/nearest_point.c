@@ -28,7 +28,8 @@ void fl_weigh_axes(const real *block, fl_work *work, const wide *weight) {
   memcpy(work->axis_weight, weight, sizeof work->axis_weight);
   for (int i = 0; i < COUNT(block); i++) {
     work->polygon_offset[i] = 0;
-    for (int q = 0; q < 2; q++) {
+    memset(work->effectiveness_weighted[i][1], 0, sizeof work->effectiveness_weighted[i][1]);
+    for (int q = 0; q < (int)ACTUATOR(block, i)->rows; q++) {
       const real *row = work->span.effectiveness_reduced[i][q];
       for (int k = 0; k < 6; k++) {
         work->effectiveness_weighted[i][q][k] = weight[k] * fl_normalized_axis(block, work, row, k);
@@ -70,6 +71,13 @@ static void append_farthest(const real *block, const fl_work *work, const wide *
   m->actuators = COUNT(block);
   for (int i = 0; i < COUNT(block); i++) {
     const wide(*column)[6] = work->effectiveness_weighted[i];
+    if (ACTUATOR(block, i)->rows == 1) {
+      /* Chosen by index: which end it is, no processor can foresee. */
+      const real ends[2] = {work->set[i].force_min, work->set[i].force_max};
+      force[i][0] = ends[dot_wide(column[0], normal, 6) > 0];
+      force[i][1] = 0;
+      continue;
+    }
     const real s[2] = {(real)dot_wide(column[0], normal, 6), (real)dot_wide(column[1], normal, 6)};
     if (work->polygon_offset[i] > 0)
       farthest_corner(block + work->polygon_offset[i], s, force[i]);

@@ -1,0 +1,123 @@
+"""Single questions to the core as a builtin function of Python, whose calls need no ctypes.
+
+The core holds functions of Python's C API by their addresses, which ctypes gives it once; so the
+library neither links to Python nor is compiled with its headers (finlab/core/src/prepared_call.c).
+Where there is no such function, `Core.answer_row` answers alone.
+"""
+
+import ctypes
+import sys
+from collections.abc import Callable
+from functools import cache
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from finlab.arrays import Array
+from finlab.core import library
+from finlab.core.calls import ROWS, AnswerMemory, AnswerRow, Conditions, Core, QuestionRecord
+from finlab.core.fields import Record
+
+Answer: TypeAlias = Callable[[object, object, Array | None], AnswerRow | None]
+"""Answers a wrench, with the command (n, 3) of the tick before and multipliers (6,) to begin with,
+each None for none. Returns a finished answer; None where `Core.answer_row` has to be asked: it says
+what is wrong with a question, and gives answers that are not finished, too."""
+
+
+_MEMORY = 2
+"""Index of the memory of the rows in what C reads."""
+_COMMANDS = 3
+"""Index of the commands of these rows."""
+
+
+def prepared_answer(
+    core: Core,
+    policy: Record | None,
+    conditions: Conditions,
+    calm: float,
+    most_wrench: float,
+    most_error: float,
+) -> Answer | None:
+    """Prepares a question of which all is known but the wrench, and in a tick the command before.
+
+    Args:
+        core: the robot.
+        policy: of `policy_record`, what to give out of reach.
+        conditions: what holds of the robot, outside of ticks.
+        calm: what turning costs in a tick.
+        most_wrench: largest size of a wrench, as a vector of six numbers.
+        most_error: error up to which commands are exact [1].
+
+    Returns:
+        A function that answers as `Core.answer_row` does, in a fraction of the time around C;
+        None where this interpreter has none.
+    """
+    if not has_builtin_functions():
+        return None
+    question = QuestionRecord(core.n)
+    question.write(policy, None, conditions)
+    record = core.prepared_call()
+    record["question"] = question.address
+    record["most_wrench"] = most_wrench
+    record["most_error"] = most_error
+    record["calm"] = calm
+    rows = _Rows(record, core.n, (core, question))
+    answer: Answer = _functions_of_python()(library().fl_python_method(), rows.bound, None)
+    return answer
+
+
+class _Rows:
+    """The rows that C writes into, one answer after the other."""
+
+    def __init__(self, record: Record, n: int, pointed_at: object) -> None:
+        """Allocates the first ones.
+
+        Args:
+            record: an `fl_prepared_call` (1,), which C reads.
+            n: how many actuators the robot has.
+            pointed_at: what the record points at, which has to live as long.
+        """
+        self._record = record
+        self._n = n
+        self._pointed_at = pointed_at
+        self.bound: list[object] = [record.ctypes.data, AnswerRow, None, None, self._renew]
+        """What the function of C is bound to; see `fl_python_method` in finlab/core/finlab.h."""
+        self._renew()
+
+    def _renew(self) -> None:
+        """Allocates rows; C calls it when all are used."""
+        memory = AnswerMemory(self._n)
+        record = self._record
+        record["rows"] = memory.address
+        record["row_numbers"] = memory.row_length
+        record["row_count"] = ROWS
+        record["used"] = 0
+        self.bound[_MEMORY] = memory
+        self.bound[_COMMANDS] = memory.command
+
+
+@cache
+def has_builtin_functions() -> bool:
+    """Returns whether C may be called without ctypes: by CPython with its lock, which keeps two
+    threads from one work area."""
+    if sys.implementation.name != "cpython":
+        return False
+    is_locked: Callable[[], bool] | None = getattr(sys, "_is_gil_enabled", None)
+    return is_locked is None or is_locked()
+
+
+@cache
+def _functions_of_python() -> Any:
+    """Tells C of Python, and returns the function that makes builtin ones."""
+    core = library()
+    names: bytes = core.fl_python_names()
+    addresses = []
+    for name in names.decode().split():
+        function = getattr(ctypes.pythonapi, name)
+        addresses.append(ctypes.cast(function, ctypes.c_void_p).value)
+    known = [None, True, False, float, int, list, tuple, np.ndarray]
+    functions = np.array(addresses, np.uintp)
+    objects = np.array([id(each) for each in known], np.uintp)  # of CPython its address
+    core.fl_use_python(functions.ctypes.data, objects.ctypes.data)
+    kind = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.c_void_p, ctypes.py_object, ctypes.c_void_p)
+    return kind(("PyCFunction_NewEx", ctypes.pythonapi))
