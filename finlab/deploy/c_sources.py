@@ -79,6 +79,7 @@ FILES_OF_FOILS = (
     "foil_jump.c",
     "foil_lattice.c",
     "foil_steps.c",
+    "foil_tangent.c",
     "foil_vertices.c",
 )
 """Files of the core that only robots with foils in a flow need."""

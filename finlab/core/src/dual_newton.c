@@ -29,6 +29,7 @@
 #define OVERSHOT R(-0.3)     /* share of the slope below which a kept step went too far, too */
 #define SEARCH_STEPS 12      /* of the search for where a step that went too far is to end */
 #define SLOPE_ENOUGH R(0.05) /* share of the slope that it may leave */
+#define SURE_SHARE R(0.1)    /* of the residual that is enough, below which no step follows */
 #define JUMPS 4              /* trials with a jump after which Newton's method stands still */
 #define JUMP_STEP R(1e-3)    /* squared step, over squared multipliers, too long to judge */
 #define SHORT_STEP R(1e-7)   /* the same, in which any large change of a force is a jump */
@@ -342,9 +343,14 @@ int fl_dual_newton(const real *block, fl_work *work, const real *target_reduced,
   real best_size = at->residual_size;
   int idle = 0;
   int jumps = 0;
+  int is_met = 0;
   for (int i = 0; work->has_turn_cost && i < COUNT(block); i++) work->set[i].has_jumped = 0;
   for (int k = 0;; k++) {
-    if (at->residual_size <= work->residual_enough) return FL_MET;
+    if (at->residual_size <= work->residual_enough) {
+      /* Near the rim multipliers magnify what is left: one step more makes it nothing. */
+      if (is_met || at->residual_size <= SURE_SHARE * work->residual_enough) return FL_MET;
+      is_met = 1;
+    }
     if (at->dual_value > beyond) return FL_BEYOND;
     const int has_risen = at->dual_value > best_value + ROUNDING * FABS(best_value);
     if (has_risen || at->residual_size < FELL * best_size) {

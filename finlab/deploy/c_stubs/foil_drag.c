@@ -56,3 +56,10 @@ int fl_is_done_by_foils(const real *block, const fl_work *work, real best_cost) 
   (void)best_cost;
   return 0;
 }
+
+void fl_foil_at(const real *block, int i, real angle, fl_tangent *tangent) {
+  (void)block;
+  (void)i;
+  (void)angle;
+  (void)tangent;
+}

@@ -302,7 +302,7 @@ def test_beyond_reach_the_core_finishes_answers_of_thrusters(kind: str) -> None:
         if row.is_met or not row.is_finished:
             continue  # the last linear model has the target within reach
         finished += 1
-        wrench = plant.wrench(row.command[0])
+        wrench = plant.wrench(row.command)
         served = row.wrench_served[0]
         if kind == "direction":
             along = target / allocator.scale
@@ -312,7 +312,7 @@ def test_beyond_reach_the_core_finishes_answers_of_thrusters(kind: str) -> None:
             assert np.linalg.norm((wrench - served) / allocator.scale) <= 1e-6
         # Steps by the laws themselves find nothing nearer to what is served.
         problem = dual.problem_under(NOMINAL)
-        refined = refine(problem, served[None] / problem.error_scale, row.command, ROUNDS)
-        error = problem.error(row.command, served[None] / problem.error_scale)
+        refined = refine(problem, served[None] / problem.error_scale, row.command[None], ROUNDS)
+        error = problem.error(row.command[None], served[None] / problem.error_scale)
         assert error[0] <= refined.error[0] * 1.05 + 1e-6
     assert finished >= 4
