@@ -13,6 +13,7 @@ from finlab.layout import Layout
 from finlab.layout.damage import Damage
 from finlab.research.evaluation.experiments.hard_days import BUILT_OFF
 from finlab.swim.control import FaultMonitor, Measurement, MonitorSettings
+from finlab.swim.control.hypotheses import LOST
 from finlab.swim.simulation import (
     NOISE_ALONE,
     ClosedLoop,
@@ -161,19 +162,20 @@ def test_what_somebody_knows_is_believed(layout_a: Layout) -> None:
 
 
 def test_a_single_odd_sample_decides_nothing(layout_a: Layout) -> None:
+    """A fault that is all but certain in one sample and not in the next is not acted on."""
     monitor = FaultMonitor(layout_a)
-    nowhere = np.full(4, np.nan)
-    beliefs = monitor._hypotheses
-    before = beliefs._probability.copy(), beliefs.doubt
-    beliefs._age_s = monitor.settings.settle_s  # long enough under way to be believed
-    for sure in (True, False, True):
-        beliefs._probability = before[0].copy()
-        beliefs.doubt = before[1]
-        if sure:
-            beliefs.probability[2, 0] = beliefs.doubt = 0.99
-        monitor._decide(nowhere)
+    hypotheses = monitor._hypotheses
+    hypotheses.age_s = monitor.settings.settle_s  # long enough under way to be believed
+    hypotheses._begin_onset()
+    hypotheses._onset_age[:] = 1.0
+    nothing = hypotheses.evidence()
+    sure = nothing._replace(log_odds=nothing.log_odds.copy())
+    sure.log_odds[0, 2, LOST] = 20.0
+    for evidence in (sure, nothing, sure):
+        hypotheses.evidence = lambda evidence=evidence: evidence  # type: ignore[method-assign]
+        monitor._decide(0.1)
         assert monitor.verdict().damage == Damage()
-    monitor._decide(nowhere)
+    monitor._decide(0.1)
     assert monitor.verdict().damage.lost == (layout_a.names[2],), "the second in a row decides"
 
 
