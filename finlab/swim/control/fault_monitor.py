@@ -1,5 +1,5 @@
-"""Notices actuators that are lost, weak, wired the wrong way or stuck, from how the robot moves, and
-takes repaired ones back.
+"""Notices actuators that are lost, weak, wired the wrong way or stuck, from how the robot moves,
+and takes repaired ones back.
 
 `Hypotheses` says how likely each fault is; here is decided which of them to act on, what the
 allocator is told, and what is sent to the drives.
@@ -49,8 +49,17 @@ KIND_ODDS = 10.0
 KIND_WAIT_S = 2.0
 """Time in which these odds go down to 1: one whose kind is in doubt is then taken for the likeliest
 [s]."""
+CAUTION_S = 15.0
+"""Time after a fault was named in which another actuator is named more cautiously: the robot moves
+as it never did before [s]."""
+CAUTIOUS_CONFIRM_S = 1.0
+"""How long another fault must then be certain [s]."""
+CAUTIOUS_LOG_ODDS = 30.0
+"""Logarithm of its odds that it then takes."""
 UNKNOWN_WAIT_S = 1.0
 """Time after which a motion that nothing explains is said to be so [s]."""
+JOLT_WAIT_S = 3.0
+"""Time after which a wrench that no fault explains is taken for one that stays [s]."""
 MODEL_MISFIT_MAX = 1e3
 """A misfit of the motion, a variance over that of the settings, from which on nothing can be told
 of it."""
@@ -136,6 +145,7 @@ class FaultMonitor:
         self._sent = np.full((n, 3), np.nan)
         self._suspect = (-1, -1)
         """Actuator and kind that are likeliest to be a new fault."""
+        self._last_named_s = -math.inf
         self._certain_s = 0.0
         """Time for which that has been all but certain [s]."""
         self._doubtful_s = 0.0
@@ -154,6 +164,7 @@ class FaultMonitor:
         self._velocity_time = -math.inf
         self._depth = math.nan
         self.evidence: Evidence | None = None
+        """How likely each jump was at the last call; None before there is any."""
 
     @property
     def opposed(self) -> tuple[str, ...]:
@@ -196,17 +207,17 @@ class FaultMonitor:
         for _ in range(parts):
             step = self._model.step(hypotheses.state, m.yaw, command, duration / parts)
             hypotheses.predict(step, duration / parts)
-        if not np.isfinite(hypotheses.state).all():
-            hypotheses._restart(measured)
+        if hypotheses.has_diverged or not self._correct(m, step) or hypotheses.has_diverged:
+            hypotheses.restart(measured)
             return self.verdict()
-        self._correct(m, step)
         self._decide(duration)
         return self.verdict()
 
     def _moving(self, m: Measurement) -> Array:
         """The moving part of the state (9,), as measured."""
         velocity = np.where(np.isfinite(m.velocity), m.velocity, 0.0)
-        return np.array([*velocity.tolist(), *m.rates.tolist(), m.roll, m.pitch, m.depth])
+        depth = m.depth if math.isfinite(m.depth) else 0.0
+        return np.array([*velocity.tolist(), *m.rates.tolist(), m.roll, m.pitch, depth])
 
     def _is_new_velocity(self, m: Measurement) -> bool:
         """Whether there is a sample of the velocity that has not been seen."""
@@ -214,8 +225,9 @@ class FaultMonitor:
         self._velocity = np.array(m.velocity)
         return is_other and bool(np.isfinite(m.velocity).all())
 
-    def _correct(self, m: Measurement, step: ModelStep) -> None:
-        """Corrects the filter by the samples of a measurement."""
+    def _correct(self, m: Measurement, step: ModelStep) -> bool:
+        """Corrects the filter by the samples of a measurement; returns whether the model says
+        anything of the motion."""
         s = self.settings
         state = self._hypotheses.state
         size = len(state)
@@ -241,7 +253,7 @@ class FaultMonitor:
             variance[count] = s.depth_noise**2
             count += 1
         self._depth = m.depth
-        self._hypotheses.update(rows[:count], innovation[:count], variance[:count])
+        return self._hypotheses.update(rows[:count], innovation[:count], variance[:count])
 
     def tell(self, name: str, strength: float = 1.0, stuck: float = math.nan) -> Diagnosis:
         """The state of an actuator is known: its strength, and where it is stuck [rad, N] if it is.
@@ -393,7 +405,7 @@ class FaultMonitor:
         """
         hypotheses = self._hypotheses
         self._follow_strength()
-        if not len(hypotheses._onset_age):
+        if not len(hypotheses.onset_age):
             return
         evidence = hypotheses.evidence()
         self.evidence = evidence
@@ -421,7 +433,8 @@ class FaultMonitor:
         threshold = self.settings.threshold
         share = math.exp(float(with_pairs[k]) - everything)
         of_kind = math.exp(float(by_kind[k, kind] - by_actuator[k]))
-        if pair - everything > math.log(threshold):
+        is_calm = self._clock_s - self._last_named_s >= CAUTION_S
+        if is_calm and pair - everything > math.log(threshold):
             self._hold((-2, int(pairs.argmax())), duration)
             if self._certain_s >= CONFIRM_S - 1e-9:
                 self._adopt_pair(evidence, int(pairs.argmax()))
@@ -439,7 +452,11 @@ class FaultMonitor:
         of_single = math.exp(float(by_actuator[k] - with_pairs[k]))
         of_best = max(of_kind * of_single, 1.0 - of_single)
         is_clear = of_best > (1.0 - of_best) * odds_needed or waited == 1.0
-        if self._certain_s < CONFIRM_S - 1e-9 or not is_clear:
+        confirm_s = CONFIRM_S
+        if self._clock_s - self._last_named_s < CAUTION_S and self._kind[k] == WHOLE:
+            confirm_s = CAUTIOUS_CONFIRM_S
+            is_clear &= float(with_pairs[k]) > CAUTIOUS_LOG_ODDS
+        if self._certain_s < confirm_s - 1e-9 or not is_clear:
             return
         if of_single < 0.5:
             self._adopt_pair(evidence, int(pairs.argmax()))
@@ -460,11 +477,11 @@ class FaultMonitor:
         onset, place = np.unravel_index(int(odds.argmax()), odds.shape)
         target = int(OF_KIND[kind][place])
         hypotheses = self._hypotheses
-        since = self._clock_s - float(hypotheses._onset_age[onset])
+        since = self._clock_s - float(hypotheses.onset_age[onset])
         mean = evidence.mean[onset, k, target]
         variance = evidence.variance[onset, k, target]
         hypotheses.adopt(int(onset), k, mean, variance)
-        if kind == STUCK and self._is_negligible(k):
+        if kind == STUCK and self._is_negligible(k) and self._is_lost.sum() < self.layout.n - 1:
             kind = LOST
             hypotheses.believe(k, 0.0)
         self._mark(k, kind, since, certainty)
@@ -485,16 +502,20 @@ class FaultMonitor:
         if self._is_lost.sum() + 2 >= self.layout.n:
             return
         onset = int(evidence.both[:, first, second].argmax())
-        since = self._clock_s - float(self._hypotheses._onset_age[onset])
+        since = self._clock_s - float(self._hypotheses.onset_age[onset])
         self._hypotheses.adopt_loss(onset, [first, second])
         for k in (first, second):
             self._mark(k, LOST, since, self.settings.threshold)
 
     def _watch_unexplained(self, evidence: Evidence, everything: float, duration: float) -> None:
-        """Says so where the motion is surely not as believed, and nothing explains it."""
+        """Says so where the motion is surely not as believed, and no fault explains it."""
         is_refuted = everything > -math.log(1.0 - self.settings.threshold)
         self._unexplained_s = self._unexplained_s + duration if is_refuted else 0.0
         self._is_unknown = self._unexplained_s > UNKNOWN_WAIT_S
+        onset = int(evidence.jolt.argmax())
+        is_jolt = float(evidence.jolt[onset]) > everything - math.log(2.0)
+        if is_jolt and self._unexplained_s > JOLT_WAIT_S:
+            self._hypotheses.adopt_jolt(onset)
 
     def _follow_strength(self) -> None:
         """Takes weak ones for lost or whole, as their strength goes."""
@@ -514,6 +535,8 @@ class FaultMonitor:
         self._since[k] = since
         self._certainty[k] = certainty if kind != WHOLE else 0.0
         self._is_announced[k] = False
+        if kind != WHOLE:
+            self._last_named_s = self._clock_s
         self._certain_s = 0.0
         self._doubtful_s = 0.0
         self._probability = self._probability.copy()

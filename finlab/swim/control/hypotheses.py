@@ -25,6 +25,7 @@ from finlab.swim.control.motion_model import (
     INERTIA,
     MOTION,
     N_MOVING,
+    RATES,
     RIGHTING,
     TILT,
     UNKNOWN,
@@ -107,9 +108,18 @@ ADAPTATION = 0.03
 ADAPTATION_EARLY = 0.1
 """The same before all has settled."""
 TEMPER = 0.5
-"""By what logarithms of likelihoods are divided as the misfit grows, beyond 1, per its logarithm."""
+"""By what logarithms of likelihoods are divided as the misfit grows: 1 and so much per its
+logarithm."""
 MISFIT_MAX = 1e5
 """Greatest misfit."""
+ORDINARY_TILT = 0.5
+"""Roll or pitch [rad] at which the terms of the equation are off by twice as much as at rest."""
+ORDINARY_RATE = 0.8
+"""Angular rate [rad/s] of which the same holds."""
+DIVERGED_SPEED = 30.0
+"""Velocity [m/s] or rate [rad/s] at which nothing swims."""
+DIVERGED_VARIANCE = 100.0
+"""Variance of a velocity beyond which the model says nothing of it [m^2/s^2, rad^2/s^2]."""
 DIVERGED_DISTANCE = 1e6
 """Squared innovation, in variances, beyond which the model says nothing of the motion, as of a
 robot that tumbles."""
@@ -213,6 +223,7 @@ class Hypotheses:
         variance[RIGHTING] = s.damping**2
         variance[model.strength] = s.strength**2
         self._variance_at_start = variance
+        self._variance_limit = variance[CURRENT.start : model.strength.stop].copy()
         self.covariance = np.diag(variance)
         """P (d, d)."""
         noise = np.zeros(d)
@@ -263,7 +274,7 @@ class Hypotheses:
         """Lambda of the jumps at each onset (o, c, c)."""
         self._score = np.zeros((0, c))
         """eta of them (o, c)."""
-        self._onset_age = np.zeros(0)
+        self.onset_age = np.zeros(0)
         """[s]."""
         self._onset_motion = np.zeros((0, self.model.n_held))
         """What each actuator would have given on had it stuck at each onset (o, h)."""
@@ -274,7 +285,7 @@ class Hypotheses:
         """Indices of the onsets at which a jump explains most."""
         self._since_onset = math.inf
 
-    def _restart(self, measured: Array) -> None:
+    def restart(self, measured: Array) -> None:
         """Of the motion only what is measured (9,) is known; what has been learned of the body and
         of strengths stays."""
         self.state[:N_MOVING] = measured
@@ -300,7 +311,7 @@ class Hypotheses:
         if self._since_onset >= ONSET_EVERY_S - 1e-9:
             self._begin_onset()
         self._since_onset += dt
-        self._onset_age += dt
+        self.onset_age += dt
         F = step.transition
         self.state = step.state
         P = self.covariance
@@ -311,25 +322,30 @@ class Hypotheses:
         variance = P.ravel()[:: len(P) + 1]
         variance += self._noise * dt
         of_terms, of_changes, of_turning = step.noise
-        variance[MOTION] += of_terms * (s.term_share**2 * dt) + of_changes * s.lag_s**2
+        share = s.term_share * self._excursion()
+        variance[MOTION] += of_terms * (share**2 * dt) + of_changes * s.lag_s**2
         variance[MOTION] += of_turning * dt**2
         variance[MOTION] += self._misfit_noise * ((self.misfit - 1.0) * dt)
         self._limit_variance(variance)
         self._sensitivity[:N_MOVING] = F @ self._sensitivity
 
+    def _excursion(self) -> float:
+        """How much more the terms are off than in ordinary motion, as the robot heels and turns: 1
+        at rest."""
+        heel = float(np.abs(self.state[TILT]).max()) / ORDINARY_TILT
+        turn = float(np.abs(self.state[RATES]).max()) / ORDINARY_RATE
+        return 1.0 + heel**2 + turn**2
+
     def _limit_variance(self, variance: Array) -> None:
-        """What drifts without being seen is never less known than at the start."""
+        """What drifts without being seen is never less known than at the start, or than when it was
+        found."""
         rest = slice(CURRENT.start, self.model.strength.stop)
-        limit = np.maximum(self._variance_at_start[rest], self._variance_of_found)
+        limit = self._variance_limit
         if True in (variance[rest] > limit).tolist():
             scale = np.ones(len(variance))
             scale[rest] = np.sqrt(np.minimum(limit / np.maximum(variance[rest], 1e-300), 1.0))
             self.covariance *= scale
             self.covariance *= scale[:, None]
-
-    @property
-    def _variance_of_found(self) -> float:
-        return 0.0
 
     def _begin_onset(self) -> None:
         """A jump may happen from now on."""
@@ -337,7 +353,7 @@ class Hypotheses:
         c = self._n_columns
         new = np.zeros((d, c))
         new[self._columns, np.arange(c)] = 1.0
-        ages = self._onset_age
+        ages = self.onset_age
         keep = np.ones(len(ages), dtype=bool)
         keep[ages > OLDEST_S] = False
         if keep.sum() >= ONSETS:
@@ -352,7 +368,7 @@ class Hypotheses:
         self._sensitivity = S.reshape(d, -1)
         self._information = np.concatenate([self._information[keep], np.zeros((1, c, c))])
         self._score = np.concatenate([self._score[keep], np.zeros((1, c))])
-        self._onset_age = np.append(ages[keep], 0.0)
+        self.onset_age = np.append(ages[keep], 0.0)
         motion = self.model.held_now()[None]
         self._onset_motion = np.concatenate([self._onset_motion[keep], motion])
         self._onset_strength = np.concatenate([self._onset_strength[keep], self.strength[None]])
@@ -360,7 +376,7 @@ class Hypotheses:
         self._best_onsets = np.zeros(0, dtype=int)
         self._since_onset = 0.0
 
-    def update(self, rows: Array, innovation: Array, variance: Array) -> None:
+    def update(self, rows: Array, innovation: Array, variance: Array) -> bool:
         """Corrects the filter by a measurement, and weighs the jumps by it.
 
         With the innovation nu, its covariance S and the effects V = H Sigma of the jumps on it:
@@ -372,20 +388,29 @@ class Hypotheses:
             rows: H (m, d).
             innovation: what was measured less what was expected (m,).
             variance: of the measurement's noise (m,).
+
+        Returns:
+            Whether the model still says something of the motion; nothing is changed otherwise.
         """
         HP = rows @ self.covariance
         S = HP @ rows.T
         S.ravel()[:: len(S) + 1] += variance
-        L_inverse = np.linalg.inv(np.linalg.cholesky(S))
+        try:
+            L_inverse = np.linalg.inv(np.linalg.cholesky(S))
+        except np.linalg.LinAlgError:
+            return False
         whitened = L_inverse @ innovation
-        self.distance = float(whitened @ whitened)
+        distance = float(whitened @ whitened)
+        if not distance < DIVERGED_DISTANCE:
+            return False
+        self.distance = distance
         V = L_inverse @ (rows @ self._sensitivity)
         gain = L_inverse @ HP  # K = gain^T L^-1
         self.state = self.state + whitened @ gain
         P = self.covariance - gain.T @ gain
         self.covariance = 0.5 * (P + P.T)  # what rounding makes uneven would grow
         m = len(rows)
-        o = len(self._onset_age)
+        o = len(self.onset_age)
         if o:
             by_onset = V.reshape(m, o, -1).transpose(1, 0, 2)
             self._information += by_onset.transpose(0, 2, 1) @ by_onset
@@ -394,6 +419,14 @@ class Hypotheses:
         excess = min(self.distance / m, NIS_MAX) - 1.0
         rate = ADAPTATION if self.settled else ADAPTATION_EARLY
         self.misfit = min(max(self.misfit * math.exp(rate * excess), 1.0), MISFIT_MAX)
+        return True
+
+    @property
+    def has_diverged(self) -> bool:
+        """Whether the filter says nothing of the motion any more."""
+        motion = np.abs(self.state[MOTION])
+        variance = self.covariance.diagonal()[MOTION]
+        return not (motion.max() < DIVERGED_SPEED and variance.max() < DIVERGED_VARIANCE)
 
     @property
     def strength(self) -> Array:
@@ -421,10 +454,9 @@ class Hypotheses:
         with r = eta - Lambda m.
         """
         s = self.settings
-        o = len(self._onset_age)
+        o = len(self.onset_age)
         n = self.n
         c = self._n_columns
-        t = len(TARGETS)
         padded = np.zeros((o, c + 1, c + 1))
         padded[:, :c, :c] = self._information
         eta_padded = np.zeros((o, c + 1))
@@ -435,7 +467,9 @@ class Hypotheses:
         mean, variance = self._priors()
         log_ratio = np.empty(mean.shape[:-1])
         stuck = slice(FIRST_STUCK, FIRST_WHOLE)
-        log_ratio[:, :, stuck] = _log_ratio(Lambda, eta, mean[:, :, stuck], variance[:, :, stuck])
+        log_ratio[:, :, stuck] = log_likelihood_ratio(
+            Lambda, eta, mean[:, :, stuck], variance[:, :, stuck]
+        )
         # Of the others only the strength is in doubt.
         Lm = (Lambda @ mean[..., None])[..., 0]
         linear = ((eta - 0.5 * Lm) * mean).sum(axis=-1)
@@ -449,7 +483,7 @@ class Hypotheses:
         share[self.model.sticks_at_angle, REVERSED_TARGET] *= REVERSED_AT_ANGLE
         prior = np.log(share * s.failures)
         # Each onset stands for the time since the one before it.
-        span = np.log(-np.diff(np.append(self._onset_age, 0.0)).clip(max=-0.5 * ONSET_EVERY_S))
+        span = np.log(-np.diff(np.append(self.onset_age, 0.0)).clip(max=-0.5 * ONSET_EVERY_S))
         # Where the noise is not as assumed, it is not white either, and counts for less.
         temper = 1.0 + TEMPER * math.log(self.misfit)
         log_ratio /= temper
@@ -481,7 +515,7 @@ class Hypotheses:
 
     def _stuck_at_nothing(self) -> NDArray[np.bool_]:
         """At which onsets thrusters (o, n) gave so little that one that stuck is a lost one."""
-        result = np.zeros((len(self._onset_age), self.n), dtype=bool)
+        result = np.zeros((len(self.onset_age), self.n), dtype=bool)
         small = np.abs(self._onset_motion) < NOTHING_SHARE * self.held_scale
         keeps_force = ~self.model.sticks_at_angle[self.model.held_owner]
         result[:, self.model.held_owner[keeps_force]] = small[:, keeps_force]
@@ -489,7 +523,7 @@ class Hypotheses:
 
     def _priors(self) -> tuple[Array, Array]:
         """Means and variances (o, n, t, 3) of the jumps by the targets."""
-        o = len(self._onset_age)
+        o = len(self.onset_age)
         t = len(TARGETS)
         model = self.model
         mean = np.zeros((o, self.n, t, 3))
@@ -522,7 +556,7 @@ class Hypotheses:
         Lambda = self._information[:, columns[:, None], columns]
         eta = self._score[:, columns]
         variance = np.square(self.settings.jolt * self._by_acceleration)
-        return _log_ratio(Lambda, eta, np.zeros(6), variance)
+        return log_likelihood_ratio(Lambda, eta, np.zeros(6), variance)
 
     def _pair_ratio(self, Lambda_own: Array, eta: Array, temper: float, span: Array) -> Array:
         """Log odds (o, n, n) that two were lost at one moment; below the diagonal -inf."""
@@ -558,7 +592,14 @@ class Hypotheses:
         S = self._sensitivity.reshape(self.model.size, -1, self._n_columns)[:, onset][:, own]
         self.state = self.state + S @ delta
         self.covariance = self.covariance + S @ (0.5 * (gain + gain.T)) @ S.T
+        self._note_variance(actuator)
         self.forget_jumps()
+
+    def _note_variance(self, actuator: int) -> None:
+        """How well the strength of an actuator is known, at least, from now on."""
+        row = self.model.strength.start + actuator
+        variance = max(float(self.covariance[row, row]), self.settings.strength**2)
+        self._variance_limit[row - CURRENT.start] = variance
 
     def adopt_loss(self, onset: int, actuators: list[int]) -> None:
         """Several are taken for lost at one moment."""
@@ -591,6 +632,7 @@ class Hypotheses:
             self.covariance[each] = 0.0
             self.covariance[:, each] = 0.0
         self.covariance[row, row] = self.settings.strength**2
+        self._note_variance(actuator)
         self.forget_jumps()
 
     @property
@@ -614,7 +656,7 @@ class Evidence(NamedTuple):
     """Of them (o, n, t, 3)."""
 
 
-def _log_ratio(Lambda: Array, eta: Array, mean: Array, variance: Array) -> Array:
+def log_likelihood_ratio(Lambda: Array, eta: Array, mean: Array, variance: Array) -> Array:
     """Log likelihood ratio of jumps, see `Hypotheses.evidence`, with a diagonal C (..., k)."""
     k = eta.shape[-1]
     Lm = (Lambda @ mean[..., None])[..., 0]

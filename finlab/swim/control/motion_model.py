@@ -52,6 +52,8 @@ SHARE_MIN = -0.7
 """Least of those shares: what is beyond it is no body."""
 SHARE_MAX = 3.0
 """Greatest of them."""
+NORM_MAX = 100.0
+"""Norm of A dt at which a motion is over within a thousandth of the period, or has no bounds."""
 TURN_ABOUT_COSINE = -0.9
 """Cosine of the angle to a direction below which an actuator that is to turn there may go either
 way round."""
@@ -383,6 +385,9 @@ def exponential(A: Array, dt: float) -> tuple[Array, Array]:
     X = A * dt
     norm = float(np.abs(X).sum(axis=1).max())
     halvings = 0
+    if norm > NORM_MAX:
+        X *= NORM_MAX / norm
+        norm = NORM_MAX
     if norm > EXPONENT_MAX:
         halvings = min(math.ceil(math.log2(norm / EXPONENT_MAX)), 40)
         X = X / 2.0**halvings

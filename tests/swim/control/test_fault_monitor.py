@@ -167,7 +167,7 @@ def test_a_single_odd_sample_decides_nothing(layout_a: Layout) -> None:
     hypotheses = monitor._hypotheses
     hypotheses.age_s = monitor.settings.settle_s  # long enough under way to be believed
     hypotheses._begin_onset()
-    hypotheses._onset_age[:] = 1.0
+    hypotheses.onset_age[:] = 1.0
     nothing = hypotheses.evidence()
     sure = nothing._replace(log_odds=nothing.log_odds.copy())
     sure.log_odds[0, 2, LOST] = 20.0
