@@ -11,7 +11,9 @@ import pytest
 
 from finlab.allocation.allocator import Allocator
 from finlab.layout import load_layout
-from tests.plant_mujoco import NO_NOISE, NO_SPREAD, MujocoRobot, TrueFault, random_frame
+from finlab.swim.control import FaultMonitor
+from finlab.swim.control.contract import axes_of
+from tests.plant_mujoco import NO_NOISE, NO_SPREAD, MujocoRobot, Path, TrueFault, random_frame
 from tools.judge_monitor import Run, is_right, judged
 
 FIRST = 20_016
@@ -85,3 +87,27 @@ def test_nothing_is_named_where_nothing_breaks(offset: int, sensors: str) -> Non
     result = judged(Run(FIRST + offset, sensors, None))
     assert result["events"] == []
     assert result["unknown_s"] == 0.0
+
+
+def test_a_tether_that_pulls_is_no_fault() -> None:
+    """A force that no actuator gives is said to be unknown, and nothing is named."""
+    layout = load_layout("bluerov2_heavy")
+    robot = MujocoRobot(layout, 11)
+    axes = axes_of(layout)
+    path = Path(layout, axes, 11, gentle=False)
+    allocator = Allocator(layout)
+    monitor = FaultMonitor(layout)
+    command = None
+    was_unknown = False
+    for tick in range(220):
+        if tick == 150:
+            robot.data.xfrc_applied[1, :3] = 6.0, -9.0, 4.0
+        measurement = robot.measure()
+        verdict = monitor.step(measurement, command)
+        assert verdict.findings == ()
+        was_unknown |= verdict.unknown
+        wrench = path.wrench(0.1 * tick, measurement, is_closed=True)
+        answer = allocator.allocate(wrench, damage=verdict.damage, policy="closest")
+        command = monitor.sent(answer.command)
+        robot.step(command, 0.1)
+    assert was_unknown
