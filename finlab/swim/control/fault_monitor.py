@@ -17,6 +17,7 @@ from finlab.layout.damage import NO_DAMAGE, Damage
 from finlab.physics import plant_of
 from finlab.swim.control.contract import Measurement, asked_of_weak
 from finlab.swim.control.hypotheses import (
+    IS_OF_KIND,
     KINDS,
     LOST,
     OF_KIND,
@@ -410,7 +411,7 @@ class FaultMonitor:
         evidence = hypotheses.evidence()
         self.evidence = evidence
         odds = evidence.log_odds
-        by_kind = np.stack([_log_sum(odds[:, :, targets], (0, 2)) for targets in OF_KIND], axis=1)
+        by_kind = _log_sum_of_kinds(odds)
         if not hypotheses.settled:
             by_kind[:, [LOST, WEAK, STUCK, WHOLE]] = -np.inf
         by_actuator = _log_sum(by_kind, (1,))
@@ -541,6 +542,16 @@ class FaultMonitor:
         self._doubtful_s = 0.0
         self._probability = self._probability.copy()
         self._probability[k] = 0.0 if kind == WHOLE else 1.0
+
+
+def _log_sum_of_kinds(log_odds: Array) -> Array:
+    """Logarithm of the odds (n, 5) of each kind of fault, of those (o, n, t) of onsets and
+    targets."""
+    top = log_odds.max(axis=(0, 2))
+    top = np.where(np.isfinite(top), top, 0.0)
+    total = np.exp(log_odds - top[:, None]).sum(axis=0) @ IS_OF_KIND
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.log(total) + top[:, None])
 
 
 def _log_sum(values: Array, axes: tuple[int, ...]) -> Array:

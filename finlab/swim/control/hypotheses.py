@@ -81,6 +81,8 @@ REVERSED_AT_ANGLE = 0.05
 do."""
 OF_KIND = [np.flatnonzero([target.kind == kind for target in TARGETS]) for kind in range(5)]
 """Targets of each kind."""
+IS_OF_KIND = np.array([[float(target.kind == kind) for kind in range(5)] for target in TARGETS])
+"""The same as a matrix (t, 5)."""
 PAIR_SHARE = 0.1
 """How often two given actuators are lost at one moment (a cable, a collision), as a share of how
 often one is."""
@@ -256,6 +258,7 @@ class Hypotheses:
         )
         c = len(self._columns)
         self._n_columns = c
+        self._is_pair = np.triu(np.ones((n, n), dtype=bool), 1)
         self._jolt_columns = np.arange(c - 6, c)
         # Of each actuator: its columns, three of them, the last ones empty where it has fewer.
         self._own_columns = np.full((n, 3), c)
@@ -567,7 +570,8 @@ class Hypotheses:
         alone = eta * m - 0.5 * m**2 * Lambda_own
         both = alone[:, :, None] + alone[:, None, :] - m[:, :, None] * m[:, None, :] * Lambda
         rate = self.settings.failures * TARGETS[0].share * PAIR_SHARE
-        possible = np.triu(np.outer(strength > 0.5, strength > 0.5), 1)
+        works = strength > 0.5
+        possible = self._is_pair & works & works[:, None]
         return np.where(possible, both / temper + math.log(rate) + span[:, None, None], -np.inf)
 
     def adopt(self, onset: int, actuator: int, mean: Array, variance: Array) -> None:
