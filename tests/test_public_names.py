@@ -21,7 +21,7 @@ NAMES = {
     "finlab.analysis": "AXES AttainableSet Authority Bounds GOALS Improvement Loss Progress "
     "ScoreCard SecondLoss attainable_set authority least_power losses mirror_pairs "
     "optimize_layout score_card second_losses",
-    "finlab.swim.control": "CONTROLLERS Completion Controller Diagnosis FaultMonitor Foresighted "
+    "finlab.swim.control": "CONTROLLERS Completion Controller Diagnosis FaultMonitor Finding Foresighted "
     "Learner Measurement MonitorSettings MotionObserver Setpoint TrackingController "
     "VelocityController WaypointController gains_for make_controller steerable_loss steers",
     "finlab.exchange": "Exchange FOREIGN convert is_robot_table mujoco_control read_any read_robot",

@@ -17,6 +17,7 @@ from finlab.swim.control.contract import steerable_loss as steerable_loss
 from finlab.swim.control.contract import steers as steers
 from finlab.swim.control.fault_monitor import Diagnosis as Diagnosis
 from finlab.swim.control.fault_monitor import FaultMonitor as FaultMonitor
+from finlab.swim.control.fault_monitor import Finding as Finding
 from finlab.swim.control.hypotheses import MonitorSettings as MonitorSettings
 from finlab.swim.control.observer import MotionObserver as MotionObserver
 from finlab.swim.control.tracking_controller import TrackingController as TrackingController
@@ -28,6 +29,7 @@ __all__ = [
     "Controller",
     "Diagnosis",
     "FaultMonitor",
+    "Finding",
     "Foresighted",
     "Learner",
     "Measurement",

@@ -1,8 +1,8 @@
-"""Notices fins that are torn, lost or stuck, from how the robot moves, and takes repaired ones
-back.
+"""Notices actuators that are lost, weak, wired the wrong way or stuck, from how the robot moves,
+and takes repaired ones back.
 
-`Hypotheses` says how likely each fault is; here is decided which of them to act on, and what the
-allocator is told.
+`Hypotheses` says how likely each fault is; here is decided which of them to act on, what the
+allocator is told, and what is sent to the drives.
 """
 
 import math
@@ -12,99 +12,166 @@ import numpy as np
 
 from finlab.allocation.rates import Rates
 from finlab.arrays import Array
-from finlab.axes import TURN
 from finlab.layout import Layout
 from finlab.layout.damage import NO_DAMAGE, Damage
 from finlab.physics import plant_of
-from finlab.swim.control.contract import Measurement
-from finlab.swim.control.hypotheses import LEVELS, OPPOSED, Hypotheses, MonitorSettings
-from finlab.swim.control.motion_model import MotionModel
+from finlab.swim.control.contract import Measurement, asked_of_weak
+from finlab.swim.control.hypotheses import (
+    IS_OF_KIND,
+    KINDS,
+    LOST,
+    OF_KIND,
+    REVERSED,
+    STUCK,
+    WEAK,
+    WHOLE,
+    Evidence,
+    Hypotheses,
+    MonitorSettings,
+)
+from finlab.swim.control.motion_model import DEPTH, N_MOVING, VELOCITY, ModelStep, MotionModel
 from finlab.swim.control.probe import Probe
 
-LOST_BELOW = 0.2
-"""A strength below which a fin is given up as lost."""
-OPPOSED_BELOW = -0.3
-"""A strength below which an actuator pushes the other way than the layout says."""
-OPPOSED_DEVIATIONS = 3.0
-"""Standard deviations by which it then lies below 0, too."""
+LOST_BELOW = 0.15
+"""A strength below which an actuator is given up as lost."""
+GONE_BELOW = 0.2
+"""A strength below which it lies within a standard deviation, too."""
+REVERSED_BELOW = -0.3
+"""A strength below which it pushes the other way than the layout says."""
 WHOLE_ABOVE = 0.9
-"""A strength from which a fin that was torn is whole again."""
+"""A strength from which one that was weak is whole again."""
+TORN_BELOW = 0.7
+"""Share of its force below which one that is stuck at an angle is torn, too."""
 CONFIRM_S = 0.2
-"""A belief is acted on once it has been certain for so long [s]: a single odd sample decides
+"""A fault is acted on once it has been certain for so long [s]: a single odd sample decides
 nothing."""
-CONFIRM_EARLY_S = 0.5
-"""The same before current and trim are learned, when only what pushes the other way is acted on
+KIND_ODDS = 10.0
+"""Odds of the likeliest kind of fault against the others from which on it is named at once."""
+KIND_WAIT_S = 2.0
+"""Time in which these odds go down to 1: one whose kind is in doubt is then taken for the likeliest
 [s]."""
-MODEL_MISFIT_MAX = 1e4
+CAUTION_S = 15.0
+"""Time after a fault was named in which another actuator is named more cautiously: the robot moves
+as it never did before [s]."""
+CAUTIOUS_CONFIRM_S = 1.0
+"""How long another fault must then be certain [s]."""
+CAUTIOUS_LOG_ODDS = 30.0
+"""Logarithm of its odds that it then takes."""
+UNKNOWN_WAIT_S = 1.0
+"""Time after which a motion that nothing explains is said to be so [s]."""
+JOLT_WAIT_S = 3.0
+"""Time after which a wrench that no fault explains is taken for one that stays [s]."""
+MODEL_MISFIT_MAX = 1e3
 """A misfit of the motion, a variance over that of the settings, from which on nothing can be told
 of it."""
 STRENGTH_STEP = 0.05
 """The allocator is given strengths in steps of this size, so that its problem is the same for many
 ticks."""
+NEGLIGIBLE = 0.004
+"""Share of its largest force below which a stuck thruster is a lost one."""
+STUCK_STEP = 0.005
+"""The same of the force of a stuck one, as a share of its largest, and of an angle [rad]."""
+PERIOD_MAX_S = 0.25
+"""Longest step of the model [s]; a longer period is cut."""
+GAP_MAX_S = 2.0
+"""A pause between samples after which the motion is unknown [s]."""
+
+
+class Finding(NamedTuple):
+    """One actuator that is not whole."""
+
+    name: str
+    """Of the actuator."""
+    kind: str
+    """`lost`, `weak`, `reversed` or `stuck`."""
+    since_s: float
+    """When it happened, as far as is known, by the clock of the measurements [s]."""
+    probability: float
+    """Of that kind of fault, when it was named; 1 where it was told."""
+    value: float
+    """Share of the force that a weak one gives; the force of a stuck thruster [N], or the angle at
+    which another one is stuck [rad]; 0 of a lost one, -1 of a reversed one."""
 
 
 class Diagnosis(NamedTuple):
-    """What a monitor believes of n fins."""
+    """What a monitor believes of n actuators."""
 
     damage: Damage
-    """The actuators that are lost, torn or stuck, for an allocator: `allocate(...,
-    damage=damage)`."""
+    """The actuators that are lost, weak, torn or stuck, for an allocator: `allocate(...,
+    damage=damage)`. A reversed one counts as lost until the layout is put right."""
     probability: Array
-    """Of each fin not being whole (n,), 0 to 1."""
+    """Of each actuator not being whole (n,), 0 to 1."""
     strength: Array
-    """Share of its law's thrust that each fin gives (n,)."""
+    """Share of its law's thrust that each actuator gives (n,)."""
     strength_std: Array
     """Standard deviation of that share (n,)."""
+    findings: tuple[Finding, ...] = ()
+    """What is wrong with which actuator."""
+    unknown: bool = False
+    """Whether the robot moves as no named fault explains: something is wrong, and it cannot be
+    said what."""
 
 
 class FaultMonitor:
-    """Watches one robot; to be called at a fixed rate, before the allocator.
+    """Watches one robot; to be called in each period, before the allocator.
 
         monitor = FaultMonitor(layout)
         while swimming:
             verdict = monitor.step(measurement, command)  # the command that was in force until now
             answer = allocator.allocate(wrench, damage=verdict.damage)
-            command = monitor.probed(answer.command)
+            command = monitor.sent(answer.command)
 
-    A fin that rests cannot be distinguished from one that is lost: its probability stays where it
-    was.
+    An actuator that rests cannot be distinguished from one that is lost: its probability stays
+    where it was.
     """
 
     period_s = 0.1
-    """Time between calls [s]."""
+    """Time between calls [s], where the measurements' times do not say it."""
 
     def __init__(self, layout: Layout, settings: MonitorSettings | None = None) -> None:
-        """Believes that all fins of a layout are whole, with a noise and expectations."""
+        """Believes that all actuators of a layout are whole."""
         self.layout = layout
         self.settings = MonitorSettings() if settings is None else settings
-        self._model = MotionModel(layout, self.period_s)
-        self._hypotheses = Hypotheses(layout.n, self._model.inertia, self.settings)
+        self._model = MotionModel(layout)
+        self._hypotheses = Hypotheses(self._model, self.settings)
         self._probe = Probe(layout, self.settings, self.period_s)
         n = layout.n
-        self._is_torn = np.zeros(n, dtype=bool)
-        self._is_lost = np.zeros(n, dtype=bool)
+        self._kind = np.full(n, WHOLE)
+        """What each actuator is taken for, index in `KINDS`."""
+        self._since = np.zeros(n)
+        self._certainty = np.zeros(n)
         self._is_announced = np.zeros(n, dtype=bool)  # lost by what was said, and left alone
-        self._is_opposed = np.zeros(n, dtype=bool)
         self._is_returning = np.zeros(n, dtype=bool)  # from a probe to what is commanded
         self._rates = Rates(plant_of(layout), layout.rates * self.period_s)
         self._sent = np.full((n, 3), np.nan)
-        self._suspect = 0
-        """The fin that is likeliest to have changed, index."""
-        self._n_certain = 0
-        """Ticks for which that has been all but certain."""
-        self._stuck_at = np.full(n, np.nan)
-        self._direction_at_event = self._model.motion.direction.copy()
+        self._suspect = (-1, -1)
+        """Actuator and kind that are likeliest to be a new fault."""
+        self._last_named_s = -math.inf
+        self._certain_s = 0.0
+        """Time for which that has been all but certain [s]."""
+        self._doubtful_s = 0.0
+        """Time for which a fault has been certain and its kind has not [s]."""
+        self._unexplained_s = 0.0
+        self._is_unknown = False
+        self._probability = np.zeros(n)
         self._reported_strength = np.ones(n)
+        self._reported_held = np.zeros(self._model.n_held)
         self._told_faults: tuple[list[str], dict[str, float], dict[str, float]] = ([], {}, {})
         self._told_damage = NO_DAMAGE
         self._tables = [fin for fin in layout.fins if fin.model.type == "table"]
+        self._time = math.nan
+        self._clock_s = 0.0
         self._velocity: Array | None = None
+        self._velocity_time = -math.inf
+        self._depth = math.nan
+        self.evidence: Evidence | None = None
+        """How likely each jump was at the last call; None before there is any."""
 
     @property
     def opposed(self) -> tuple[str, ...]:
         """Names of those that push the other way than the layout says; the allocator does without
         them until the layout is put right."""
-        return tuple(self.layout.names[k] for k in np.flatnonzero(self._is_opposed))
+        return tuple(self.layout.names[k] for k in np.flatnonzero(self._kind == REVERSED))
 
     @property
     def tells(self) -> bool:
@@ -112,39 +179,107 @@ class FaultMonitor:
         says."""
         return self._hypotheses.misfit < MODEL_MISFIT_MAX
 
+    @property
+    def _is_lost(self) -> Array:
+        return np.asarray((self._kind == LOST) | (self._kind == REVERSED))
+
     def step(self, measurement: Measurement, command: Array | None) -> Diagnosis:
         """Takes what has been measured and says what is believed.
 
         Args:
-            measurement: of now. A velocity counts as new where its array is another one than last
-            time.
-            command: (n, 3) [rad, Hz, rad] in force since the last call, NaN for fins at rest; None
-                before the first.
+            measurement: of now. Samples of velocity and depth count as new where their numbers
+                have changed, and a velocity is that of its age; NaN is no sample.
+            command: (n, 3) [rad, Hz, rad] in force since the last call, as it was sent to the
+                drives, NaN for actuators at rest; None before the first.
         """
         hypotheses = self._hypotheses
         m = measurement
-        measured = np.array([*m.velocity.tolist(), *m.rates.tolist(), m.roll, m.pitch])
-        velocity_before = self._velocity
-        self._velocity = m.velocity
-        if velocity_before is None or command is None:
-            hypotheses.state[:8] = measured
+        duration = m.time - self._time if m.time > self._time else self.period_s
+        is_first = math.isnan(self._time)
+        self._time = m.time
+        measured = self._moving(m)
+        if is_first or command is None or duration > GAP_MAX_S:
+            hypotheses.state[:N_MOVING] = measured
+            self._is_new_velocity(m)
+            self._depth = m.depth
             return self.verdict()
-        other = self._other_direction(hypotheses.mix(self.period_s))
-        step = self._model.step(hypotheses.state, m.yaw, command, self._stuck_at, other)
-        hypotheses.predict(step, self.period_s)
-        hypotheses.update(measured, m.velocity is velocity_before)
-        self._decide(other)
+        self._clock_s += duration
+        parts = math.ceil(duration / PERIOD_MAX_S - 1e-9)
+        for _ in range(parts):
+            step = self._model.step(hypotheses.state, m.yaw, command, duration / parts)
+            hypotheses.predict(step, duration / parts)
+        if hypotheses.has_diverged or not self._correct(m, step) or hypotheses.has_diverged:
+            hypotheses.restart(measured)
+            return self.verdict()
+        self._decide(duration)
         return self.verdict()
 
-    def tell(self, name: str, strength: float = 1.0, stuck: float = math.nan) -> Diagnosis:
-        """The state of a fin is known: its strength, and where it is stuck [rad] if it is.
+    def _moving(self, m: Measurement) -> Array:
+        """The moving part of the state (9,), as measured."""
+        velocity = np.where(np.isfinite(m.velocity), m.velocity, 0.0)
+        depth = m.depth if math.isfinite(m.depth) else 0.0
+        return np.array([*velocity.tolist(), *m.rates.tolist(), m.roll, m.pitch, depth])
 
-        A fin that is said to be lost is left alone until another state is said: no probe moves it.
-        Raises LayoutError: there is no fin of that name."""
-        fin = self.layout.index(name)
-        self._hypotheses.believe(fin, strength)
-        self._mark(fin, strength, stuck)
-        self._is_announced[fin] = self._is_lost[fin]
+    def _is_new_velocity(self, m: Measurement) -> bool:
+        """Whether there is a sample of the velocity that has not been seen."""
+        is_other = self._velocity is None or not np.array_equal(m.velocity, self._velocity)
+        self._velocity = np.array(m.velocity)
+        return is_other and bool(np.isfinite(m.velocity).all())
+
+    def _correct(self, m: Measurement, step: ModelStep) -> bool:
+        """Corrects the filter by the samples of a measurement; returns whether the model says
+        anything of the motion."""
+        s = self.settings
+        state = self._hypotheses.state
+        size = len(state)
+        rows = np.zeros((9, size))
+        rows[range(5), range(3, 8)] = 1.0
+        values = [*m.rates.tolist(), m.roll, m.pitch]
+        innovation = np.zeros(9)
+        innovation[:5] = values - state[3:8]
+        variance = np.array([s.rate_noise**2] * 3 + [s.tilt_noise**2] * 2 + [0.0] * 4)
+        count = 5
+        if self._is_new_velocity(m):
+            age = m.ages[2]
+            # v(t - age) = v - age v'
+            expected = state[VELOCITY] - age * step.acceleration[VELOCITY]
+            rows[5:8] = -age * step.acceleration_slope[VELOCITY]
+            rows[range(5, 8), range(3)] += 1.0
+            innovation[5:8] = m.velocity - expected
+            variance[5:8] = s.velocity_noise**2
+            count = 8
+        if math.isfinite(m.depth) and m.depth != self._depth:
+            rows[count, DEPTH] = 1.0
+            innovation[count] = m.depth - state[DEPTH]
+            variance[count] = s.depth_noise**2
+            count += 1
+        self._depth = m.depth
+        return self._hypotheses.update(rows[:count], innovation[:count], variance[:count])
+
+    def tell(self, name: str, strength: float = 1.0, stuck: float = math.nan) -> Diagnosis:
+        """The state of an actuator is known: its strength, and where it is stuck [rad, N] if it is.
+
+        One that is said to be lost is left alone until another state is said: no probe moves it.
+        Raises LayoutError: there is no actuator of that name."""
+        k = self.layout.index(name)
+        model = self._model
+        held = None
+        kind = WHOLE
+        if not math.isnan(stuck) and model.sticks[k] and strength >= LOST_BELOW:
+            kind = STUCK
+            numbers = [math.cos(stuck), math.sin(stuck)] if model.sticks_at_angle[k] else [stuck]
+            held = strength * np.array(numbers)
+            self._hypotheses.believe(k, 0.0, held)
+        else:
+            self._hypotheses.believe(k, strength)
+            if strength < REVERSED_BELOW:
+                kind = REVERSED
+            elif strength < LOST_BELOW or not math.isnan(stuck):
+                kind = LOST
+            elif strength < WHOLE_ABOVE:
+                kind = WEAK
+        self._mark(k, kind, self._clock_s, 1.0)
+        self._is_announced[k] = kind in (LOST, REVERSED)
         return self.verdict()
 
     def adopt(self, layout: Layout) -> None:
@@ -153,16 +288,20 @@ class FaultMonitor:
         self.layout = layout
         self._model.adopt(layout)
         self._rates = Rates(plant_of(layout), layout.rates * self.period_s)
-        self._is_torn[:] = False
-        self._is_lost &= ~self._is_opposed
-        self._is_opposed[:] = False
-        for k in np.flatnonzero(~self._is_lost):
+        for k in np.flatnonzero(self._kind != LOST):
             self._hypotheses.believe(int(k), 1.0)
+            self._kind[k] = WHOLE
+
+    def sent(self, command: Array) -> Array:
+        """The command (n, 3) for the drives, of what the allocator answers: a weak thruster is
+        asked for more than it is to give, and `probed` keeps resting ones known."""
+        damage = self._told_damage if (self._kind != WHOLE).any() else NO_DAMAGE
+        return self.probed(asked_of_weak(self.layout, damage, command))
 
     def probed(self, command: Array) -> Array:
-        """The command (n, 3) with what keeps the fins known.
+        """The command (n, 3) with what keeps the actuators known.
 
-        Now and then a fin that the monitor has called lost beats for two seconds: if it gives
+        Now and then one that the monitor has called lost is tried for two seconds: if it gives
         nothing by it, it is lost, and of one that has been repaired the robot feels it, and takes
         it back. Fins that all but rest push a little, see `MonitorSettings.least_push`. Both change
         no faster than the rates of the drives allow from what was returned last, as does the way
@@ -186,18 +325,35 @@ class FaultMonitor:
         """What is believed now."""
         hypotheses = self._hypotheses
         strength = hypotheses.strength.copy()
-        by_kind = hypotheses.probability
-        probability = hypotheses.changed
-        stuck = ~np.isnan(self._stuck_at)
+        is_stuck = self._kind == STUCK
+        strength[is_stuck] = 1.0  # it pushes, and does not obey
+        is_broken = self._kind != WHOLE
         damage = NO_DAMAGE
-        broken = self._is_lost | self._is_torn | stuck
-        if True in broken.tolist():
-            # The last but one hypothesis is a whole fin, the last one of a stuck fin that it turns
-            # again.
-            works = by_kind[:, -2] + np.where(stuck, by_kind[:, -1], 0.0)
-            probability = np.where(broken, 1.0 - works, probability)
-            damage = self._damage(strength)
-        return Diagnosis(damage, probability, strength, hypotheses.strength_std)
+        findings: tuple[Finding, ...] = ()
+        if True in is_broken.tolist():
+            damage = self._damage(hypotheses.strength)
+            findings = tuple(self._finding(int(k)) for k in np.flatnonzero(is_broken))
+        return Diagnosis(
+            damage, self._probability, strength, hypotheses.strength_std, findings, self._is_unknown
+        )
+
+    def _stuck_value(self, k: int) -> float:
+        """The force [N] or the angle [rad] at which an actuator is stuck."""
+        held = self._reported_held[self._model.held_of[k]]
+        return float(held[0]) if len(held) == 1 else math.atan2(held[1], held[0])
+
+    def _finding(self, k: int) -> Finding:
+        kind = int(self._kind[k])
+        value = {LOST: 0.0, REVERSED: -1.0}.get(kind, float(self._reported_strength[k]))
+        if kind == STUCK:
+            value = self._stuck_value(k)
+        return Finding(
+            self.layout.names[k],
+            KINDS[kind],
+            float(self._since[k]),
+            float(self._certainty[k]),
+            value,
+        )
 
     def _damage(self, strength: Array) -> Damage:
         """What an allocator should know; a table's thrust cannot be scaled."""
@@ -208,12 +364,16 @@ class FaultMonitor:
             np.clip(np.round(strength / STRENGTH_STEP), 1, round(1 / STRENGTH_STEP)) * STRENGTH_STEP
         )
         self._reported_strength = np.where(is_far, rounded, self._reported_strength)
-        torn = [k for k in np.flatnonzero(self._is_torn) if parts[k] not in self._tables]
-        stuck = np.flatnonzero(~np.isnan(self._stuck_at) & ~self._is_lost)
+        held = self._hypotheses.held
+        scale = STUCK_STEP * self._hypotheses.held_scale
+        is_far = np.abs(held - self._reported_held) > 0.75 * scale
+        self._reported_held = np.where(is_far, held, self._reported_held)
+        weak = [k for k in np.flatnonzero(self._kind == WEAK) if parts[k] not in self._tables]
+        stuck = np.flatnonzero(self._kind == STUCK)
         faults = (
             [names[k] for k in np.flatnonzero(self._is_lost)],
-            {names[k]: float(self._reported_strength[k]) for k in torn},
-            {names[k]: float(self._stuck_at[k]) for k in stuck},
+            {names[k]: float(self._reported_strength[k]) for k in weak} | self._torn_and_stuck(),
+            {names[k]: self._within(k, self._stuck_value(k)) for k in stuck.tolist()},
         )
         # The same damage for as long as nothing changes: making one takes time.
         if faults != self._told_faults:
@@ -221,88 +381,183 @@ class FaultMonitor:
             self._told_damage = Damage.representing(self.layout, *faults)
         return self._told_damage
 
-    def _other_direction(self, new_share: Array) -> Array:
-        """Where actuators (n,) are by the hypotheses that they stick: where they were when it may
-        have begun.
+    def _torn_and_stuck(self) -> dict[str, float]:
+        """Shares of the force of those that are stuck at an angle and give far less than they
+        should."""
+        shares = {}
+        for k in np.flatnonzero((self._kind == STUCK) & self._model.sticks_at_angle).tolist():
+            share = math.hypot(*self._reported_held[self._model.held_of[k]].tolist())
+            if share < TORN_BELOW and self.layout.actuators[k] not in self._tables:
+                shares[self.layout.names[k]] = max(round(share / STRENGTH_STEP), 1) * STRENGTH_STEP
+        return shares
 
-        Args:
-            new_share: how much of each hypothesis about a fin is new (n, m).
-        """
-        turn = self._model.motion.direction - self._direction_at_event
-        turn -= TURN * np.round(turn / TURN) * self._model.motion.angles
-        self._direction_at_event += new_share[:, -1] * turn
-        return np.where(np.isnan(self._stuck_at), self._direction_at_event, np.nan)
+    def _within(self, k: int, value: float) -> float:
+        """A stuck force within what the thruster can give; angles as they are."""
+        part = self.layout.actuators[k]
+        if part.KIND.sticks_at_angle:
+            return value
+        return min(max(value, part.lower[0]), part.upper[0])
 
-    def _decide(self, other: Array) -> None:
+    def _decide(self, duration: float) -> None:
         """Acts on what has become all but certain.
 
         Args:
-            other: where actuators (n,) stick by the hypotheses that they do, see
-                `_other_direction`.
+            duration: time since the last call [s].
         """
         hypotheses = self._hypotheses
-        self._mark_opposed()
-        self._follow_torn()
-        if hypotheses.doubt < self.settings.threshold:
-            self._n_certain = 0
+        self._follow_strength()
+        if not len(hypotheses.onset_age):
             return
-        by_kind = hypotheses.probability
-        changed = hypotheses.changed if hypotheses.settled else by_kind[:, OPPOSED]
-        fin = int(changed.argmax())
-        if float(changed[fin]) < self.settings.threshold:
-            self._n_certain = 0
-        elif fin == self._suspect:
-            self._n_certain += 1
-        else:
-            self._n_certain = 1
-        self._suspect = fin
-        confirm_s = CONFIRM_S if hypotheses.settled else CONFIRM_EARLY_S
-        if self._n_certain * self.period_s < confirm_s - 1e-9:
+        evidence = hypotheses.evidence()
+        self.evidence = evidence
+        odds = evidence.log_odds
+        by_kind = _log_sum_of_kinds(odds)
+        if not hypotheses.settled:
+            by_kind[:, [LOST, WEAK, STUCK, WHOLE]] = -np.inf
+        by_actuator = _log_sum(by_kind, (1,))
+        pairs = _log_sum(evidence.both, (0,)) if hypotheses.settled else np.full((1, 1), -np.inf)
+        jolt = float(_log_sum(evidence.jolt, (0,)))
+        everything = float(np.logaddexp(0.0, _log_sum(by_actuator, (0,))))
+        pair = float(_log_sum(pairs, (0, 1)))
+        everything = float(np.logaddexp(np.logaddexp(everything, jolt), pair))
+        # One that is lost with another is no less lost.
+        with_pairs = by_actuator
+        if hypotheses.settled:
+            in_pairs = np.logaddexp(_log_sum(pairs, (0,)), _log_sum(pairs, (1,)))
+            with_pairs = np.logaddexp(by_actuator, in_pairs)
+        is_whole = np.exp(by_kind[:, WHOLE] - everything)
+        self._probability = np.where(
+            self._kind == WHOLE, np.exp(with_pairs - everything), 1.0 - is_whole
+        )
+        k = int(by_actuator.argmax())
+        kind = int(by_kind[k].argmax())
+        threshold = self.settings.threshold
+        share = math.exp(float(with_pairs[k]) - everything)
+        of_kind = math.exp(float(by_kind[k, kind] - by_actuator[k]))
+        is_calm = self._clock_s - self._last_named_s >= CAUTION_S
+        if is_calm and pair - everything > math.log(threshold):
+            self._hold((-2, int(pairs.argmax())), duration)
+            if self._certain_s >= CONFIRM_S - 1e-9:
+                self._adopt_pair(evidence, int(pairs.argmax()))
             return
-        kind = int(by_kind[fin].argmax())
-        n_lost = self._is_lost.sum()
-        with_fin = (hypotheses.pairs == fin).any(axis=1)
-        both = np.where(with_fin, hypotheses.both, 0.0)
-        if n_lost + 2 < self.layout.n and both.max() > by_kind[fin, kind]:
-            pair = int(both.argmax())
-            hypotheses.adopt_both(pair)
-            for each in hypotheses.pairs[pair].tolist():
-                self._is_announced[each] = False
-                self._mark(each, 0.0, math.nan)
+        if share < threshold:
+            self._certain_s = 0.0
+            self._doubtful_s = 0.0
+            self._watch_unexplained(evidence, everything, duration)
             return
-        has_turned = kind == len(LEVELS)
-        level = float(hypotheses.strength[fin]) if has_turned else LEVELS[kind]
-        if level < LOST_BELOW and n_lost == self.layout.n - 1:
+        self._hold((k, -1), duration)
+        self._doubtful_s += duration
+        waited = min(self._doubtful_s / KIND_WAIT_S, 1.0)
+        odds_needed = KIND_ODDS + (1.0 - KIND_ODDS) * waited
+        # What the likeliest explanation has of all those of this actuator.
+        of_single = math.exp(float(by_actuator[k] - with_pairs[k]))
+        of_best = max(of_kind * of_single, 1.0 - of_single)
+        is_clear = of_best > (1.0 - of_best) * odds_needed or waited == 1.0
+        confirm_s = CONFIRM_S
+        if self._clock_s - self._last_named_s < CAUTION_S and self._kind[k] == WHOLE:
+            confirm_s = CAUTIOUS_CONFIRM_S
+            is_clear &= float(with_pairs[k]) > CAUTIOUS_LOG_ODDS
+        if self._certain_s < confirm_s - 1e-9 or not is_clear:
+            return
+        if of_single < 0.5:
+            self._adopt_pair(evidence, int(pairs.argmax()))
+            return
+        loses = kind in (LOST, REVERSED) and self._kind[k] not in (LOST, REVERSED)
+        if loses and self._is_lost.sum() >= self.layout.n - 1:
             return  # the last one that works
-        hypotheses.adopt(fin, kind)
-        self._is_announced[fin] = False
-        self._mark(fin, level, float(other[fin]) if has_turned else float(self._stuck_at[fin]))
+        self._adopt(evidence, k, kind, share * of_kind)
 
-    def _mark_opposed(self) -> None:
-        """Takes actuators with a negative strength for ones that push the other way."""
-        strength = self._hypotheses.strength
-        is_certain = strength < -OPPOSED_DEVIATIONS * self._hypotheses.strength_std
-        opposed = (strength < OPPOSED_BELOW) & is_certain & ~self._is_opposed
-        if opposed.any() and (self._is_lost | opposed).sum() < self.layout.n:
-            for each in np.flatnonzero(opposed):
-                self._mark(int(each), -1.0, math.nan)
+    def _hold(self, suspect: tuple[int, int], duration: float) -> None:
+        """Counts for how long one suspicion has been certain."""
+        self._certain_s = self._certain_s + duration if suspect == self._suspect else duration
+        self._suspect = suspect
 
-    def _follow_torn(self) -> None:
-        """Takes torn fins for lost or whole, as their strength goes."""
-        if True not in self._is_torn.tolist():
+    def _adopt(self, evidence: Evidence, k: int, kind: int, certainty: float) -> None:
+        """Takes a fault for true."""
+        odds = evidence.log_odds[:, k, OF_KIND[kind]]
+        onset, place = np.unravel_index(int(odds.argmax()), odds.shape)
+        target = int(OF_KIND[kind][place])
+        hypotheses = self._hypotheses
+        since = self._clock_s - float(hypotheses.onset_age[onset])
+        mean = evidence.mean[onset, k, target]
+        variance = evidence.variance[onset, k, target]
+        hypotheses.adopt(int(onset), k, mean, variance)
+        if kind == STUCK and self._is_negligible(k) and self._is_lost.sum() < self.layout.n - 1:
+            kind = LOST
+            hypotheses.believe(k, 0.0)
+        self._mark(k, kind, since, certainty)
+
+    def _is_negligible(self, k: int) -> bool:
+        """Whether what a stuck actuator gives is too little to count."""
+        if self._model.sticks_at_angle[k]:
+            return False
+        hypotheses = self._hypotheses
+        numbers = self._model.held_of[k]
+        return bool(
+            (np.abs(hypotheses.held[numbers]) < NEGLIGIBLE * hypotheses.held_scale[numbers]).all()
+        )
+
+    def _adopt_pair(self, evidence: Evidence, pair: int) -> None:
+        """Takes two for lost."""
+        first, second = divmod(pair, self.layout.n)
+        if self._is_lost.sum() + 2 >= self.layout.n:
+            return
+        onset = int(evidence.both[:, first, second].argmax())
+        since = self._clock_s - float(self._hypotheses.onset_age[onset])
+        self._hypotheses.adopt_loss(onset, [first, second])
+        for k in (first, second):
+            self._mark(k, LOST, since, self.settings.threshold)
+
+    def _watch_unexplained(self, evidence: Evidence, everything: float, duration: float) -> None:
+        """Says so where the motion is surely not as believed, and no fault explains it."""
+        is_refuted = everything > -math.log(1.0 - self.settings.threshold)
+        self._unexplained_s = self._unexplained_s + duration if is_refuted else 0.0
+        self._is_unknown = self._unexplained_s > UNKNOWN_WAIT_S
+        onset = int(evidence.jolt.argmax())
+        is_jolt = float(evidence.jolt[onset]) > everything - math.log(2.0)
+        if is_jolt and self._unexplained_s > JOLT_WAIT_S:
+            self._hypotheses.adopt_jolt(onset)
+
+    def _follow_strength(self) -> None:
+        """Takes weak ones for lost or whole, as their strength goes."""
+        if not (self._kind == WEAK).any():
             return
         strength = self._hypotheses.strength
-        gone = self._is_torn & (strength < LOST_BELOW)
-        if gone.any() and (self._is_lost | gone).sum() < self.layout.n:
-            self._is_lost |= gone
-            self._is_torn &= ~gone
-            for index in np.flatnonzero(gone):
-                self._hypotheses.believe(int(index), 0.0)
-        self._is_torn &= strength < WHOLE_ABOVE
+        gone = (strength < LOST_BELOW) & (strength + self._hypotheses.strength_std < GONE_BELOW)
+        for k in np.flatnonzero((self._kind == WEAK) & gone).tolist():
+            if self._is_lost.sum() < self.layout.n - 1:
+                self._hypotheses.believe(k, 0.0)
+                self._kind[k] = LOST
+        self._kind[(self._kind == WEAK) & (strength > WHOLE_ABOVE)] = WHOLE
 
-    def _mark(self, fin: int, strength: float, stuck: float) -> None:
-        """Notes the state of a fin: its strength, and where it is stuck (NaN: it is not)."""
-        self._is_lost[fin] = strength < LOST_BELOW
-        self._is_opposed[fin] = strength < OPPOSED_BELOW
-        self._is_torn[fin] = LOST_BELOW <= strength < WHOLE_ABOVE
-        self._stuck_at[fin] = stuck if strength >= LOST_BELOW else math.nan
+    def _mark(self, k: int, kind: int, since: float, certainty: float) -> None:
+        """Notes what an actuator is taken for."""
+        self._kind[k] = kind
+        self._since[k] = since
+        self._certainty[k] = certainty if kind != WHOLE else 0.0
+        self._is_announced[k] = False
+        if kind != WHOLE:
+            self._last_named_s = self._clock_s
+        self._certain_s = 0.0
+        self._doubtful_s = 0.0
+        self._probability = self._probability.copy()
+        self._probability[k] = 0.0 if kind == WHOLE else 1.0
+
+
+def _log_sum_of_kinds(log_odds: Array) -> Array:
+    """Logarithm of the odds (n, 5) of each kind of fault, of those (o, n, t) of onsets and
+    targets."""
+    top = log_odds.max(axis=(0, 2))
+    top = np.where(np.isfinite(top), top, 0.0)
+    total = np.exp(log_odds - top[:, None]).sum(axis=0) @ IS_OF_KIND
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.log(total) + top[:, None])
+
+
+def _log_sum(values: Array, axes: tuple[int, ...]) -> Array:
+    """Logarithm of the sum of exponentials along axes."""
+    top = values.max(axis=axes, keepdims=True)
+    top = np.where(np.isfinite(top), top, 0.0)
+    total = np.exp(values - top).sum(axis=axes)
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.log(total) + top.reshape(total.shape))

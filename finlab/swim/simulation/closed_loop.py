@@ -29,7 +29,7 @@ from finlab.swim.control import (
     Setpoint,
     TrackingController,
 )
-from finlab.swim.control.contract import NO_WRENCH
+from finlab.swim.control.contract import NO_WRENCH, asked_of_weak
 from finlab.swim.simulation.devices import (
     DRIVING_POWER,
     FORCE,
@@ -298,9 +298,10 @@ class ClosedLoop:
             seed=self.seed,
         )
         self._allocation_before = allocation
-        command = self._for_weak(allocation.command)
-        if self.monitor is not None:
-            command = self.monitor.probed(command)
+        if self.monitor is None:
+            command = asked_of_weak(self.layout, self.damage, allocation.command)
+        else:
+            command = self.monitor.sent(allocation.command)
         tick = self._simulate(measurement, setpoint, wrench, command, allocation.solve_ms)
         self._command = command
         self._setpoints.popleft()
@@ -372,16 +373,6 @@ class ClosedLoop:
             )
         return self._completion[lost]
 
-    def _for_weak(self, command: Array) -> Array:
-        """A command (n, 3) for torn thrusters, which are asked for more than they are to give."""
-        if not self.damage.weak:
-            return command
-        result = command.copy()
-        for name, share in self.damage.weak.items():
-            index = self.layout.index(name)
-            result[index, self.layout.actuators[index].KIND.force_number or 0] /= share
-        return result
-
     def _for_drives(self, command: Array) -> Array:
         """What drives make of a command (n, 3): a lost actuator is not moved, a stuck one does not
         turn."""
@@ -413,7 +404,7 @@ class ClosedLoop:
         dt = self.period_s / n_steps
         sent = command if self.learner is None else command * self.learner.factor
         mean = self._swim(self._for_drives(sent), dt, n_steps, time)
-        beliefs = (self._no_beliefs,) * 3 if self.verdict is None else self.verdict[1:]
+        beliefs = (self._no_beliefs,) * 3 if self.verdict is None else self.verdict[1:4]
         return Tick(
             time=time,
             position=before[:3].copy(),

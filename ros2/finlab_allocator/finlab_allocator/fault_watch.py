@@ -33,8 +33,8 @@ class FaultWatch:
         """What is believed; None before the first step."""
         self._attitude: tuple[float, float, float] | None = None  # roll, pitch, yaw
         self._rates = np.zeros(3)
-        # The monitor takes a velocity for new where its array is another one.
-        self._velocity = np.zeros(3)
+        # The monitor takes a velocity for new where its numbers are others; NaN is none.
+        self._velocity = np.full(3, np.nan)
         self._imu_at_s = -math.inf
 
     @property

@@ -9,10 +9,11 @@ import pytest
 
 from finlab.allocation.allocator import Allocator
 from finlab.errors import LayoutError
-from finlab.layout import Layout
+from finlab.layout import Layout, load_layout
 from finlab.layout.damage import Damage
 from finlab.research.evaluation.experiments.hard_days import BUILT_OFF
 from finlab.swim.control import FaultMonitor, Measurement, MonitorSettings
+from finlab.swim.control.hypotheses import LOST
 from finlab.swim.simulation import (
     NOISE_ALONE,
     ClosedLoop,
@@ -21,6 +22,8 @@ from finlab.swim.simulation import (
     make_trajectory,
     perturbed,
 )
+from finlab.swim.vehicle.fossen import complete_body
+from finlab.swim.vehicle.vehicle import Vehicle
 from tests.allocator_cache import AllocatorCache
 from tests.ripple_force import rippled
 
@@ -161,19 +164,20 @@ def test_what_somebody_knows_is_believed(layout_a: Layout) -> None:
 
 
 def test_a_single_odd_sample_decides_nothing(layout_a: Layout) -> None:
+    """A fault that is all but certain in one sample and not in the next is not acted on."""
     monitor = FaultMonitor(layout_a)
-    nowhere = np.full(4, np.nan)
-    beliefs = monitor._hypotheses
-    before = beliefs._probability.copy(), beliefs.doubt
-    beliefs._age_s = monitor.settings.settle_s  # long enough under way to be believed
-    for sure in (True, False, True):
-        beliefs._probability = before[0].copy()
-        beliefs.doubt = before[1]
-        if sure:
-            beliefs.probability[2, 0] = beliefs.doubt = 0.99
-        monitor._decide(nowhere)
+    hypotheses = monitor._hypotheses
+    hypotheses.age_s = monitor.settings.settle_s  # long enough under way to be believed
+    hypotheses._begin_onset()
+    hypotheses.onset_age[:] = 1.0
+    nothing = hypotheses.evidence()
+    sure = nothing._replace(log_odds=nothing.log_odds.copy())
+    sure.log_odds[0, 2, LOST] = 20.0
+    for evidence in (sure, nothing, sure):
+        hypotheses.evidence = lambda evidence=evidence: evidence  # type: ignore[method-assign]
+        monitor._decide(0.1)
         assert monitor.verdict().damage == Damage()
-    monitor._decide(nowhere)
+    monitor._decide(0.1)
     assert monitor.verdict().damage.lost == (layout_a.names[2],), "the second in a row decides"
 
 
@@ -200,3 +204,104 @@ def test_the_last_fin_that_works_is_never_called_lost(layout_a: Layout) -> None:
         verdict = monitor.step(still, command)
     assert verdict.strength[0] < 0.9 or verdict.probability[0] > 0.5, "the case is not hard enough"
     assert layout_a.names[0] not in verdict.damage.lost
+
+
+def at_rest(time: float, velocity: np.ndarray) -> Measurement:
+    """What a robot measures that lies still."""
+    return Measurement(time, np.zeros(3), 0.0, velocity, 0.0, np.zeros(3), 0.0, 0.0)
+
+
+def test_a_weak_thruster_is_asked_for_more() -> None:
+    heavy = load_layout("bluerov2_heavy")
+    monitor = FaultMonitor(heavy)
+    command = np.zeros((heavy.n, 3))
+    command[:, 0] = 4.0
+    np.testing.assert_array_equal(monitor.sent(command), command)
+    verdict = monitor.tell("rear_left", 0.5)
+    (finding,) = verdict.findings
+    assert (finding.name, finding.kind, finding.value) == ("rear_left", "weak", 0.5)
+    weak = heavy.index("rear_left")
+    np.testing.assert_allclose(monitor.sent(command)[weak, 0], 8.0)
+    np.testing.assert_array_equal(np.delete(monitor.sent(command), weak, axis=0)[:, 0], 4.0)
+    monitor.tell("rear_left")
+    np.testing.assert_array_equal(monitor.sent(command), command)
+
+
+def test_the_force_of_a_stuck_thruster_is_public() -> None:
+    monitor = FaultMonitor(load_layout("bluerov2_heavy"))
+    verdict = monitor.tell("front_left", stuck=7.5)
+    assert verdict.damage.lost == ()
+    assert verdict.damage.stuck["front_left"] == pytest.approx(7.5, abs=0.2)
+    (finding,) = verdict.findings
+    assert finding.kind == "stuck" and finding.value == verdict.damage.stuck["front_left"]
+
+
+def test_a_sample_of_the_velocity_counts_once() -> None:
+    """A node that makes a new array of its last message in each call feeds no new sample."""
+    heavy = load_layout("bluerov2_heavy")
+    rng = np.random.default_rng(0)
+    samples = 0.01 * rng.normal(size=(10, 3))
+    command = np.zeros((heavy.n, 3))
+    command[:, 0] = 2.0
+    monitors = FaultMonitor(heavy), FaultMonitor(heavy)
+    for tick in range(50):
+        sample = samples[tick // 5]
+        kept, copied = [
+            monitor.step(at_rest(0.1 * tick, velocity), command if tick else None)
+            for monitor, velocity in zip(monitors, (sample, sample.copy()), strict=True)
+        ]
+    np.testing.assert_array_equal(kept.strength, copied.strength)
+    assert (monitors[0]._hypotheses.state == monitors[1]._hypotheses.state).all()
+
+
+def test_no_velocity_is_no_velocity() -> None:
+    """NaN, or the same numbers for ever, say nothing; the filter stays finite."""
+    heavy = load_layout("bluerov2_heavy")
+    command = np.zeros((heavy.n, 3))
+    command[:4, 0] = -2.0, -2.0, 2.0, 2.0  # ahead
+    speeds = []
+    for velocity in (np.full(3, np.nan), np.zeros(3)):
+        monitor = FaultMonitor(heavy)
+        for tick in range(40):
+            monitor.step(at_rest(0.1 * tick, velocity), command if tick else None)
+        speeds.append(monitor._hypotheses.state[0])
+    assert abs(speeds[0]) > 0.1, "it is taken to swim"
+    assert speeds[0] == speeds[1]
+
+
+@pytest.mark.parametrize("times", [1, 2, 4])
+def test_any_period_will_do(times: int) -> None:
+    """Looked at more and less often, a robot without a velocity is expected where the simulated
+    body comes to."""
+    heavy = load_layout("bluerov2_heavy")
+    body = np.array([0.0, 0.0, 0.0, 1.0, *np.zeros(9)])
+    thrust = 8.0 * np.sqrt(0.5)
+    for _ in range(195):  # 0.1 s less: actuators lag by that
+        ahead = Vehicle(complete_body(heavy)).step(body, [thrust, 0.0, 0.0, 0.0, 0.0, 0.0], 0.02)
+        body[7] = ahead[7]
+    command = np.zeros((heavy.n, 3))
+    command[:4, 0] = -2.0, -2.0, 2.0, 2.0
+    monitor = FaultMonitor(heavy)
+    for tick in range(20 * times + 1):
+        time = tick * 0.2 / times
+        monitor.step(at_rest(time, np.full(3, np.nan)), command if tick else None)
+    assert monitor._clock_s == pytest.approx(4.0)
+    assert monitor._hypotheses.state[0] == pytest.approx(body[7], rel=0.04)
+
+
+def test_a_robot_that_tumbles_leaves_the_monitor_finite() -> None:
+    """What no model says of a motion is no exception, and no number that is none."""
+    heavy = load_layout("bluerov2_heavy")
+    rng = np.random.default_rng(1)
+    monitor = FaultMonitor(heavy)
+    for tick in range(150):
+        command = rng.uniform(-40.0, 40.0, (heavy.n, 3)) * [1.0, 0.0, 0.0]
+        measurement = at_rest(0.1 * tick, rng.normal(size=3))._replace(
+            rates=10.0 * rng.normal(size=3),
+            roll=rng.uniform(-3.0, 3.0),
+            pitch=rng.uniform(-1.5, 1.5),
+        )
+        verdict = monitor.step(measurement, command if tick else None)
+        assert np.isfinite(verdict.probability).all() and np.isfinite(verdict.strength).all()
+        assert len(verdict.damage.lost) < heavy.n
+        Allocator(heavy).allocate(np.ones(6), damage=verdict.damage)

@@ -2,69 +2,147 @@
 differences."""
 
 import numpy as np
+import pytest
 
-from finlab.layout import Layout
-from finlab.swim.control.motion_model import FIRST_FIN, MotionModel
+from finlab.arrays import Array
+from finlab.layout import Layout, load_layout
+from finlab.physics import plant_of
+from finlab.swim.control.motion_model import (
+    COUPLING,
+    CURRENT,
+    DAMPING,
+    INERTIA,
+    MOTION,
+    N_MOVING,
+    RIGHTING,
+    TILT,
+    UNKNOWN,
+    MotionModel,
+    exponential,
+)
 from finlab.swim.vehicle.attitude import euler
 from finlab.swim.vehicle.fossen import complete_body
 from finlab.swim.vehicle.vehicle import Vehicle
 
+PERIOD_S = 0.1
+"""Of the model [s]."""
 
-def test_the_model_goes_where_the_vehicle_goes_and_its_slopes_are_its_own(layout_a: Layout) -> None:
-    """Period by period in a current, against the simulated body; slopes by differences, Munk's
-    moments among them: that of water that sinks past a robot under way is the largest of all."""
+
+def any_state(model: MotionModel, seed: int) -> Array:
+    """A state in which nothing is zero."""
+    rng = np.random.default_rng(seed)
+    z = np.zeros(model.size)
+    z[MOTION] = 0.3 * rng.normal(size=6)
+    z[TILT] = 0.3 * rng.normal(size=2)
+    z[CURRENT] = 0.1 * rng.normal(size=3)
+    z[UNKNOWN] = rng.normal(size=6)
+    z[INERTIA] = 0.1 * rng.normal(size=6)
+    z[COUPLING] = 0.03 * rng.normal(size=15)
+    z[DAMPING] = 0.1 * rng.normal(size=6)
+    z[RIGHTING] = 0.1
+    z[model.strength] = 1.0 + 0.1 * rng.normal(size=model.n)
+    z[model.held] = 0.5 * rng.normal(size=model.n_held)
+    return z
+
+
+def settled(layout: Layout, seed: int) -> tuple[MotionModel, Array]:
+    """A model whose actuators have followed a command (n, 3)."""
+    rng = np.random.default_rng(seed)
+    model = MotionModel(layout)
+    middle = 0.5 * (layout.lower + layout.upper)
+    command = middle + 0.2 * rng.uniform(-1.0, 1.0, middle.shape) * (layout.upper - layout.lower)
+    z = any_state(model, seed)
+    for _ in range(400):  # until differences of what they do are below rounding
+        model.step(z, 0.3, command, PERIOD_S)
+    return model, command
+
+
+@pytest.mark.parametrize("name", ["bluerov2_heavy", "catamaran", "turtle_hybrid", "A"])
+def test_its_slopes_are_those_of_its_accelerations(name: str) -> None:
+    model, command = settled(load_layout(name), 1)
+    z = any_state(model, 2)
+    step = model.step(z, 0.3, command, PERIOD_S)
+    size = 1e-5
+    for column in range(model.size):
+        moved = [z.copy(), z.copy()]
+        moved[0][column] -= size
+        moved[1][column] += size
+        below, above = [model.step(each, 0.3, command, PERIOD_S).acceleration for each in moved]
+        np.testing.assert_allclose(
+            step.acceleration_slope[:, column],
+            (above - below) / (2.0 * size),
+            rtol=1e-5,
+            atol=1e-6,
+            err_msg=f"column {column}",
+        )
+
+
+def test_the_model_goes_where_the_vehicle_goes(layout_a: Layout) -> None:
+    """Period by period in a current, against the simulated body."""
     vehicle = Vehicle(complete_body(layout_a), (0.05, -0.03, 0.0))
-    model = MotionModel(layout_a, 0.1)
+    model = MotionModel(layout_a)
     body = np.array([0.0, 0.0, 0.0, 1.0, *np.zeros(9)])
-    z = np.zeros(FIRST_FIN + 4)
-    z[FIRST_FIN:] = 1.0
-    z[8:10] = (0.05, -0.03)
+    z = np.zeros(model.size)
+    z[model.strength] = 1.0
+    z[CURRENT] = (0.05, -0.03, 0.0)
     command = np.array([[0.5, 1.0, 0.1], [0.5, 1.0, 3.0], [0.5, 1.05, 3.1], [0.5, 1.0, 0.0]])
-    free = np.full(4, np.nan)
+    plant = plant_of(layout_a)
     for _ in range(50):
-        wrench, _ = model._wrenches(command, free, free, np.zeros(6))
-        for _ in range(5):
-            body = vehicle.step(body, wrench.sum(axis=0).tolist(), 0.02)
+        before = plant.wrench(model.motion.command)
         w, x, y, q = body[3:7]
         yaw = float(np.arctan2(2 * (w * q + x * y), 1 - 2 * (y * y + q * q)))
-        model._wrenches = lambda *_, wrench=wrench: (wrench, 0.0 * wrench)  # type: ignore[method-assign]
-        before = z.copy()
-        after = model.step(before, yaw, command, free, free).state
-        np.testing.assert_allclose(after[:6], body[7:], atol=5e-3)  # half of the gyro's noise
-        z[:8] = *body[7:], *euler(body[3:7])[:2]
-        del model._wrenches
-    model._wrenches = lambda *_: (wrench, 0.0 * wrench)  # type: ignore[method-assign]
-    step = model.step(before, yaw, command, free, free)
-    assert abs(step.transition[4, 10]) > 0.05, "the case has no moment of Munk's worth the name"
-    for column in range(FIRST_FIN + 4):
-        moved = before.copy()
-        moved[column] += 1e-4
-        slope = (model.step(moved, yaw, command, free, free).state - step.state) / 1e-4
-        np.testing.assert_allclose(
-            step.transition[:, column], slope, 0.2, 0.03, err_msg=f"{column}"
-        )
+        z = model.step(z, yaw, command, PERIOD_S).state
+        mean = 0.5 * (before + plant.wrench(model.motion.command))
+        for _ in range(5):
+            body = vehicle.step(body, mean.tolist(), PERIOD_S / 5)
+        np.testing.assert_allclose(z[MOTION], body[7:], atol=5e-3)  # half of the gyro's noise
+        z[MOTION] = body[7:]
+        z[TILT] = euler(body[3:7])[:2]
+    assert np.abs(body[7:]).max() > 0.1, "it moved"
+
+
+def test_what_a_stuck_one_gives_is_linear_in_what_the_state_holds(layout_a: Layout) -> None:
+    """A fin stuck at an angle by the state pushes as one that points there by its command."""
+    model, command = settled(layout_a, 3)
+    z = np.zeros(model.size)
+    z[model.strength] = 1.0
+    z[model.strength][1] = 0.0
+    z[model.held][model.held_of[1]] = np.cos(0.7), np.sin(0.7)
+    stuck = model.step(z, 0.0, command, PERIOD_S)
+    does = model.motion.command
+    does[1, 2] = 0.7
+    force = plant_of(layout_a).force(does)
+    wrench = plant_of(layout_a).wrench_of(force)
+    np.testing.assert_allclose(stuck.acceleration[MOTION] * model.inertia, wrench, atol=1e-9)
 
 
 def test_a_fin_that_is_told_to_turn_about_may_go_either_way(layout_a: Layout) -> None:
     """For a second its force may be the opposite of what is expected."""
-    model = MotionModel(layout_a, 0.1)
-    free = np.full(4, np.nan)
-    z = np.zeros(FIRST_FIN + 4)
-    z[FIRST_FIN:] = 1.0
+    model = MotionModel(layout_a)
+    z = np.zeros(model.size)
+    z[model.strength] = 1.0
     ahead = np.tile([0.5, 1.5, 0.0], (4, 1))
     for _ in range(20):
-        step = model.step(z, 0.0, ahead, free, free)
-    assert step.turn_about_covariance is None and not model.is_turning_about.any()
+        step = model.step(z, 0.0, ahead, PERIOD_S)
+    assert not step.noise[2].any()
     about = ahead.copy()
     about[1, 2] = 3.1
-    step = model.step(z, 0.0, about, free, free)
-    assert model.is_turning_about.tolist() == [False, True, False, False]
-    assert step.turn_about_covariance is not None
-    wrench, _ = model._wrenches(about, free, free, z[:6])
-    np.testing.assert_array_less(
-        np.abs(0.1 * wrench[1] / model.inertia),
-        np.sqrt(np.diag(step.turn_about_covariance)) + 1e-12,
-    )
+    step = model.step(z, 0.0, about, PERIOD_S)
+    of_one = model._wrench_before[1] / model.inertia
+    assert (np.sqrt(step.noise[2]) >= 1.9 * np.abs(of_one)).all()
     for _ in range(15):
-        step = model.step(z, 0.0, about, free, free)
-    assert step.turn_about_covariance is None and not model.is_turning_about.any()
+        step = model.step(z, 0.0, about, PERIOD_S)
+    assert not step.noise[2].any()
+
+
+@pytest.mark.parametrize("size", [1e-3, 1.0, 30.0])
+def test_the_exponential_and_its_integral(size: float) -> None:
+    """Against an eigenvalue decomposition: e^(A t) and A^-1 (e^(A t) - 1)."""
+    rng = np.random.default_rng(0)
+    A = size * (rng.normal(size=(N_MOVING, N_MOVING)) - 3.0 * np.eye(N_MOVING))
+    F, phi = exponential(A, PERIOD_S)
+    values, vectors = np.linalg.eig(A)
+    expected = (vectors * np.exp(values * PERIOD_S)) @ np.linalg.inv(vectors)
+    np.testing.assert_allclose(F, expected.real, rtol=1e-6, atol=1e-9)
+    integral = np.linalg.solve(A, expected.real - np.eye(N_MOVING))
+    np.testing.assert_allclose(phi, integral, rtol=1e-6, atol=1e-9)

@@ -8,6 +8,7 @@ import pytest
 from finlab.layout import Layout
 from finlab.physics import plant_of
 from finlab.swim.control import FaultMonitor, MonitorSettings
+from finlab.swim.control.hypotheses import LOST
 from finlab.swim.control.probe import PROBE_FORCE_N, Probe
 
 LEAST_PUSH = MonitorSettings().least_push
@@ -46,7 +47,7 @@ def test_a_lost_fin_is_probed_unless_somebody_said_that_it_is_lost(layout_a: Lay
     told = FaultMonitor(layout_a, settings=settings)
     told.tell(layout_a.names[2], 0.0)
     found = FaultMonitor(layout_a, settings=settings)
-    found._is_lost[2] = True
+    found._kind[2] = LOST
     beats = [np.isfinite(found.probed(command)[2, 0]) for _ in range(90)]
     assert beats == [30 <= k % 60 < 50 or k >= 60 and k < 80 for k in range(1, 91)]
     assert all(np.isnan(told.probed(command)[2, 0]) for _ in range(90))
@@ -64,7 +65,7 @@ def test_pushes_and_the_way_back_are_held_to_the_rates(layout_a: Layout) -> None
     settings = replace(MonitorSettings(), probe_every_s=3.0)
     monitor = FaultMonitor(layout_a, settings=settings)
     rng = np.random.default_rng(0)
-    monitor._is_lost[2] = True
+    monitor._kind[2] = LOST
     command = np.tile([0.3, 0.2, 0.0], (4, 1))
     most = 0.1 * layout_a.rates
     before = None
