@@ -25,9 +25,10 @@
   }, { capture: true });
 
   // What is typed counts when it is whole: with Enter, or when the box is left. Viser would send every key, and write
-  // over half a text; so until then what the framework writes is only remembered. The text then comes as if it were put
-  // over all that stood there: Mantine tells from the selection before what has changed.
-  const BOXES = '.mantine-NumberInput-input, .mantine-TextInput-input, .mantine-Textarea-input';
+  // over half a text; so until then what the framework writes is only remembered. The text of a number box goes to the
+  // server as it was typed (`number_boxes.py`): Mantine would drop what is no digit, and hold it to the slider's ends.
+  const NUMBER = '.mantine-NumberInput-input', BOXES = `${NUMBER}, .mantine-TextInput-input, .mantine-Textarea-input`;
+  const LONGEST = 80; // signs of a number that are sent
   let box = null, before = '', own = null;
   const plain = () => Object.getOwnPropertyDescriptor(Object.getPrototypeOf(box), 'value');
 
@@ -36,23 +37,32 @@
     const { get } = plain();
     Object.defineProperty(box, 'value', { configurable: true, get, set: (text) => { before = text; } });
   }
-  function end(text) {
+  // A number box is told by its label's input, and of several by its place.
+  function owner(box) {
+    let row = box.parentElement;
+    while (!row.querySelector('label[for]')) row = row.parentElement;
+    return `${row.querySelector('label[for]').htmlFor} ${[...row.querySelectorAll(NUMBER)].indexOf(box)}`;
+  }
+  function end(text, steps = 0) {
     const ended = box, { set } = plain();
     box = null;
     delete ended.value;
     if (own) Object.defineProperty(ended, 'value', own);
     ended.value = before;
-    if (text === before || (!text.trim() && ended.matches('.mantine-NumberInput-input'))) return;
+    if (text === before) return;
+    if (ended.matches(NUMBER)) {
+      window.finlabPresses?.tell('number', `${owner(ended)} ${steps}`, text.slice(0, LONGEST));
+      return;
+    }
     window.finlabPresses?.tell('typed', '', '');
-    ended.select();
-    ended.dispatchEvent(new KeyboardEvent('keydown', { key: 'Unidentified', bubbles: true }));
     set.call(ended, text);
     ended.dispatchEvent(new InputEvent('input', { bubbles: true }));
   }
-  const commit = () => end(box.value);
+  const commit = (steps) => end(box.value, steps);
 
   const listen = (kind, hear) => window.addEventListener(kind, hear, { capture: true });
-  listen('beforeinput', ({ target }) => {
+  listen('beforeinput', ({ target, inputType }) => {
+    if (target.tagName === 'INPUT' && inputType === 'insertLineBreak') return; // Enter, which changes nothing
     if (target === box || !target.matches?.(BOXES) || !target.closest('.mantine-Flex-root')) return;
     if (box) commit();
     begin(target);
@@ -61,10 +71,34 @@
   listen('change', (event) => { if (event.isTrusted && event.target === box) { event.stopImmediatePropagation(); commit(); } });
   listen('focusout', ({ target }) => { if (target === box) commit(); });
   listen('mousedown', ({ target }) => { if (box && target !== box) commit(); });
-  listen('keydown', ({ key, target, isTrusted }) => {
+  // A step up or down goes on from what is typed; from what is asked it is Mantine's.
+  function step(event, steps) {
+    const isTyped = box.value !== before && box.matches(NUMBER);
+    commit(steps);
+    if (isTyped) { event.preventDefault(); event.stopImmediatePropagation(); }
+  }
+  listen('pointerdown', (event) => {
+    const arrow = event.target.closest?.('.mantine-NumberInput-control');
+    if (box && arrow?.closest('.mantine-NumberInput-root')?.contains(box)) step(event, arrow.dataset.direction === 'down' ? -1 : 1);
+  });
+  listen('keydown', (event) => {
+    const { key, target, isTrusted } = event;
     if (target !== box || !isTrusted) return;
     if (key === 'Escape') end(before);
-    else if (box.tagName === 'INPUT' && ['Enter', 'ArrowUp', 'ArrowDown'].includes(key)) commit();
+    else if (box.tagName !== 'INPUT') return;
+    else if (key === 'Enter') commit();
+    else if (key === 'ArrowUp' || key === 'ArrowDown') step(event, key === 'ArrowUp' ? 1 : -1);
+  });
+
+  // Each drag of a slider is a step of undo, and all keys that follow each other within a second.
+  const QUICK_MS = 1000;
+  let lastKey = 0;
+  const begins = () => window.finlabPresses?.tell('typed', '', '');
+  listen('pointerdown', ({ target }) => { if (target.closest?.('.mantine-Slider-root')) begins(); });
+  listen('keydown', ({ key, target, timeStamp }) => {
+    if (!/^(Arrow|Page|Home|End)/.test(key) || !target.matches?.(`[role=slider], ${NUMBER}`)) return;
+    if (timeStamp - lastKey > QUICK_MS) begins();
+    lastKey = timeStamp;
   });
 
   // What is typed into a list takes the place of what is chosen there, and Enter takes the first that is left.
@@ -112,6 +146,11 @@
         if (box.id === label.htmlFor && !place) continue;
         const called = label.textContent + place;
         if (box.getAttribute('aria-label') !== called) box.setAttribute('aria-label', called);
+      }
+      // The arrow keys do the same in the number box beside a slider: Tab goes from box to box.
+      for (const box of found) {
+        const isTwice = box.getAttribute('role') === 'slider' && row.querySelector(NUMBER);
+        if (isTwice && box.tabIndex !== -1) box.tabIndex = -1;
       }
     }
   }

@@ -16,6 +16,7 @@ from finlab.bundle_files import MAX_BUNDLE_BYTES
 from webapp.board import Board
 from webapp.handles import Asking, Presses, on_user_change
 from webapp.intents import Intents
+from webapp.number_boxes import NumberBoxes
 from webapp.scene.scenery import Scenery
 from webapp.tasks.context import Context
 from webapp.tasks.designs import Designs, Opening
@@ -46,6 +47,9 @@ class Page:
         self.deferred = Deferred(context.pools.brief, context.bell, intents.do)
         self.scenery = Scenery(client, session, self.jobs.swimming, self.board, intents)
         self.presses = Presses(client.gui, intents.do, context.bell)
+        self.number_boxes = NumberBoxes(
+            self.presses, intents.do, lambda _: session.history.end_merge()
+        )
         self.ask = Asking(client.gui, self.presses).ask
         self.designs = Designs(client, session, solver, self.deferred, intents.notify)
         self.presses.on("design-link", lambda _, text: self.designs.open_link(text))
@@ -64,16 +68,26 @@ class Page:
         """What is on the robot."""
         return self.jobs.answering.shown_answer().shown_allocation
 
-    def on_change(self, handle: Any, act: Callable[[Any], object]) -> None:
-        """Carry out `act(value)` when the user changes an input."""
+    def undo(self) -> None:
+        """Take back the last step, and say which."""
+        self.notify("Undone", self.session.undo(), calm=True)
+
+    def redo(self) -> None:
+        """Bring back the step taken back last, and say which."""
+        self.notify("Done again", self.session.redo(), calm=True)
+
+    def on_change(self, handle: Any, act: Callable[[Any], object], **box: bool) -> None:
+        """Carry out `act(value)` when the user changes an input; `box` as `NumberBoxes.add` has
+        it."""
+        self.number_boxes.add(handle, act, **box)
         on_user_change(handle, lambda value: self.do(partial(act, value), handle))
 
     def bind(
-        self, handle: Input, act: Callable[[Any], object], value: Callable[..., object]
+        self, handle: Input, act: Callable[[Any], object], value: Callable[..., object], **box: bool
     ) -> Input:
         """An input that carries out `act(value)` when the user changes it, and else shows `value`
-        of the facts."""
-        self.on_change(handle, act)
+        of the facts; `box` as `NumberBoxes.add` has it."""
+        self.on_change(handle, act, **box)
         self.board.show(handle, value=value)
         return handle
 
@@ -83,9 +97,10 @@ class Page:
         act: Callable[[Any], object],
         value: Callable[..., Any],
         digits: int = 4,
+        may_be_empty: bool = False,
     ) -> Input:
         """A slider, number or vector; `digits` are shown behind the point. What the page only shows
-        rounded stays as exact as it is."""
+        rounded stays as exact as it is. A box that `may_be_empty` means None then."""
 
         exact: Any = None
 
@@ -104,7 +119,7 @@ class Page:
             act(typed)
 
         handle.precision = digits  # type: ignore[attr-defined]
-        return self.bind(handle, meant, rounded)
+        return self.bind(handle, meant, rounded, may_be_empty=may_be_empty)
 
     def add_html(
         self, content: Callable[..., str], **made: Callable[..., object]

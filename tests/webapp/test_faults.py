@@ -26,7 +26,7 @@ from webapp.tasks import analysing
 from webapp.tasks.slot import Pools
 from webapp.tasks.solver import Solver
 from webapp.view import View
-from webapp.viser_internals import start_server, stop_server
+from webapp.viser_internals import start_server, stop_server, uuid_of
 
 BEFORE, OPENED, AFTER = (load_layout(shipped_layouts()[name]) for name in ("A", "B", "ucat"))
 DISPLAY = Display(frozen=True, drawn="forces")
@@ -104,6 +104,12 @@ class Tab:
     def open(self, layout: Any) -> None:
         """Open a layout, and wait for its answer."""
         self.on_loop(lambda: self.view.do(lambda: self.view.session.open_layout(layout)))
+        self.settle()
+
+    def type(self, handle: Any, text: str, place: int = 0, steps: int = 0) -> None:
+        """Type a text into a number box, and wait for what comes of it."""
+        key = f"{uuid_of(handle)} {place} {steps}"
+        self.on_loop(lambda: self.view.page.number_boxes._take(key, text))
         self.settle()
 
     def settle(self) -> None:

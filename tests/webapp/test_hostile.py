@@ -91,7 +91,7 @@ def test_garbage_from_the_page_changes_nothing_but_raises_no_fault(
     session = view.session
     kept = repr((session.state, session.display, session.draft, session.swim))
     assert "alert" not in kept and "xxx" not in kept and "=nan" not in kept
-    states = [state for _, state in view.session.history.past]
+    states = [step.state for step in view.session.history.past]
     assert any(set(before.names) <= set(state.layout.names) for state in states), (
         "buttons may well add fins"
     )

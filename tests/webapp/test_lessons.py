@@ -111,6 +111,42 @@ def test_tour_and_lesson_end_each_other() -> None:
     assert session.state == before
 
 
+@pytest.mark.parametrize("start", [LESSONS[0], TOUR[0]], ids=lambda stop: stop.name)
+def test_a_robot_that_was_made_meanwhile_is_there_by_undo(start: Stop) -> None:
+    session = Session(load_layout("penta"))
+    session.set_target(1, 0.5)
+    mine = session.state
+    word = "tour" if start in TOUR else "lesson"
+    session.guide.open(start.name)
+    session.new_layout("thruster")
+    session.add("thruster")
+    made = session.state
+    assert start.title in session.guide.reminder and word in session.guide.reminder
+    session.guide.go(1)
+    assert session.state != made and session.undo().startswith("Open ")
+    assert session.state == made
+    session.redo()
+    session.guide.go(-1)
+    assert session.undo().startswith("Open ") and session.undo().startswith("Open ")
+    assert session.state == made
+    session.guide.end()
+    assert session.state == mine and session.history.undo_name == f"Close the {word}"
+    while session.state.layout != made.layout:
+        session.undo()
+    while session.history.undo_name != "Ask for Fy":
+        session.undo()
+    assert session.state == mine and session.guide.reminder == ""
+
+
+def test_starting_over_in_a_lesson_keeps_the_work_before_it() -> None:
+    session = Session(load_layout("penta"))
+    session.set_target(1, 0.5)
+    mine = session.state
+    session.guide.open(LESSONS[0].name)
+    session.start_over()
+    assert session.undo() == "Start over" and session.state == mine
+
+
 def test_unknown_lessons_are_refused() -> None:
     with pytest.raises(FinlabError, match="lesson: expected one of wrench, .*got 'sailing'"):
         Session(load_layout("A")).guide.open("sailing")

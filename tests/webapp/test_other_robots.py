@@ -177,9 +177,10 @@ def test_a_table_of_thrust_on_the_server_is_not_opened(tmp_path: Path) -> None:
 
 def test_a_method_that_does_not_take_a_robot_gives_way_when_that_is_opened() -> None:
     session = Session(load_layout("ucat"))
+    session.set_setting("method", "mdn")
     session.open_layout(load_layout("bluerov2_heavy"))
     session.undo()
-    session.set_setting("method", "mdn")
+    assert session.state.method == "mdn"
     session.redo()
     assert session.state.layout.name == "bluerov2_heavy" and session.state.method == "dual"
     session.open_layout(load_layout("ucat"))
@@ -190,7 +191,7 @@ def test_a_method_that_does_not_take_a_robot_gives_way_when_that_is_opened() -> 
     assert session.state.method == "dual"
 
 
-def test_a_box_is_empty_where_nothing_is_said_and_zero_empties_it(tab: Tab) -> None:
+def test_a_box_is_empty_where_nothing_is_said_and_zero_is_refused(tab: Tab) -> None:
     session = tab.view.session
     tab.open(FISH)
     tab.on_loop(lambda: tab.view.do(lambda: (session.show_task("Design"), session.select("pod"))))
@@ -204,6 +205,10 @@ def test_a_box_is_empty_where_nothing_is_said_and_zero_empties_it(tab: Tab) -> N
     tab.settle()  # else the page may write the box once more
     use(tab.server, tab.view, box, 0.0)
     tab.settle()
+    pod = session.state.layout.actuators[session.state.layout.index("pod")]
+    assert isinstance(pod, Azimuth) and pod.turn_rate == pytest.approx(np.pi / 6)
+    assert box.value == 30.0 and "Turn rate [°/s]: expected more than 0" in tab.client.notes[-1]
+    tab.type(box, "")
     pod = session.state.layout.actuators[session.state.layout.index("pod")]
     assert isinstance(pod, Azimuth) and pod.turn_rate is None and np.isnan(box.value)
 

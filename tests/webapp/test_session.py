@@ -1,14 +1,13 @@
 """The session: checked intents, undo by steps that make sense, nothing lost on refusal."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
-from finlab.layout import Damage, load_layout
+from finlab.layout import load_layout
 from tests.webapp.stand_in import turn_fin
 from webapp.markup.answer import wrench_bars
 from webapp.session import Session
@@ -51,20 +50,52 @@ def test_slider_steps_merge_only_in_quick_succession(session: Session) -> None:
         session.undo()
 
 
-def test_undo_is_of_the_robot_and_not_of_the_question(session: Session) -> None:
-    session.set_target(0, 1.5)
-    session.set_setting("method", "qp")
-    assert session.history.undo_name is None
+def test_undo_takes_back_what_was_done_last_robot_or_question(session: Session) -> None:
     name = session.state.layout.names[0]
-    session.toggle_loss(name)
-    session.set_preset("Dive")
-    session.set_setting("policy", "priority")
-    asked = session.state
-    assert session.undo() == f"Fail {name}" and session.state.lost == ()
-    assert session.state == replace(asked, damage=Damage())
-    session.keep_least("effort")
-    session.redo()
-    assert session.state == replace(asked, method="mdn")
+    acts = {
+        "Ask for Fx": lambda: session.set_target(0, 1.5),
+        f"Fail {name}": lambda: session.toggle_loss(name),
+        "Ask for: Dive": lambda: session.set_preset("Dive"),
+        "Policy priority": lambda: session.set_setting("policy", "priority"),
+        "Method qp": lambda: session.set_setting("method", "qp"),
+        "Speed through the water": lambda: session.set_speed(1.0),
+        "Temperature": lambda: session.set_setting("temperature", 0.5),
+    }
+    states = [session.state]
+    for act in acts.values():
+        act()
+        states.append(session.state)
+    for step, before in zip(reversed(acts), reversed(states[:-1]), strict=True):
+        assert session.undo() == step and session.state == before
+    for step, after in zip(acts, states[1:], strict=True):
+        assert session.redo() == step and session.state == after
+
+
+def test_a_drag_of_a_wrench_slider_is_one_step_however_slow(session: Session) -> None:
+    now = 0.0
+    session.history._clock = lambda: now
+    start = session.state
+    for value in range(300):
+        now += 3.0
+        session.set_target(0, 0.01 * value)
+    session.history.end_merge()  # the next drag begins
+    session.set_target(0, 9.0)
+    assert session.undo() == "Ask for Fx" and session.state.target[0] == 2.99
+    assert session.undo() == "Ask for Fx" and session.state == start
+    assert session.history.undo_name is None
+
+
+def test_a_way_along_the_null_space_is_a_step(session: Session) -> None:
+    session.shift(0, 1.0)
+    session.shift(0, 2.0)
+    session.shift(1, 0.5)
+    session.set_target(0, 1.5)
+    assert session.shifts == (), "another question has another null space"
+    session.undo()
+    assert session.shifts == (2.0, 0.5) and session.mode == 1
+    assert session.undo() == "Null space 2" and session.shifts == (2.0,)
+    assert session.undo() == "Null space 1" and session.shifts == () and session.mode == 0
+    assert session.redo() == "Null space 1" and session.shifts == (2.0,)
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, 1e9, "1", None, True])

@@ -186,7 +186,13 @@ def positive_axis(word: str, values: Array, max_ticks: int = MOST_TICKS) -> Axis
 
 def exact_axis(word: str, values: Array) -> Axis:
     """An axis from the first of some values (N,) to the last, in the unit that `word` names."""
-    axis = cost_axis(word, values)._replace(low=float(values[0]), high=float(values[-1]))
+    low = float(values[0])
+    high = float(values[-1])
+    if high <= low:  # limits that leave a single value
+        half_width = 0.5 * max(abs(low), 1.0)
+        low -= half_width
+        high += half_width
+    axis = cost_axis(word, values)._replace(low=low, high=high)
     ticks = [tick for tick in axis.ticks if axis.low <= tick[0] <= axis.high]
     return axis._replace(ticks=tuple(ticks))
 

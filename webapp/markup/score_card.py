@@ -137,11 +137,13 @@ def _losses(layout: Layout, card: ScoreCard) -> str:
     rows = []
     for loss in card.losses:
         style = "missing" if loss.lost else "dim"
-        name = html("{}{}", swatch(layout.index(loss.actuator)), loss.actuator)
+        badge = swatch(layout.index(loss.actuator))
+        template = "{}<span class='name' title='{}'>{}</span>"
+        name = html(template, badge, loss.actuator, loss.actuator)
         template = "<tr><td>{}</td><td>{}</td><td class='words {}'>{}</td></tr>"
         texts = [cell_text(column, loss) for column in columns]
         rows.append(html(template, name, texts[0], style, texts[1]))
-    return html("<table>{}{}</table>", head_row((WITHOUT, *columns)), rows)
+    return html("<table class='losses'>{}{}</table>", head_row((WITHOUT, *columns)), rows)
 
 
 def check_card(quick: QuickCheck, has_several: bool, warnings: tuple[str, ...]) -> str:

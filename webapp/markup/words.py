@@ -115,7 +115,8 @@ COMPONENT = "component "
 MOST_LISTED = 2
 """Components of a mixture that are named; of more their number is told."""
 ROUNDING = 1e-9
-"""Normalized error below which the digits are those of the computer's rounding."""
+"""Normalized error, and size of a quantity in its unit, below which the digits are those of the
+computer's rounding."""
 AT_LIMIT = 0.995
 """Share of the upper limit from which a command counts as saturated."""
 
@@ -146,7 +147,9 @@ def degrees(angle: float) -> str:
 
 def three_digits(value: float | None) -> str:
     """Three significant digits, as the library writes them, with a real minus sign; a dash where
-    there is no number."""
+    there is no number, and 0 where it is the computer's rounding."""
+    if value is not None and abs(value) < ROUNDING:
+        return "0"
     text = finlab.display.three_digits(value)
     return DASH if text == NO_NUMBER else text.replace("-", "−")
 

@@ -11,6 +11,7 @@ from markupsafe import Markup
 
 from finlab.actuators.actuator import Actuator
 from finlab.axes import Vector3
+from finlab.errors import FinlabError
 from finlab.layout import Layout
 from webapp.markup.answer import swatch
 from webapp.markup.words import html
@@ -176,18 +177,23 @@ def _add_range_box(page: Page, box: RangeBox) -> None:
 
 
 def _add_number_box(page: Page, box: NumberBox) -> None:
-    """A box that may be empty is so where the field is None, and a 0 empties it again."""
+    """A box that may be empty is so where the field is None."""
 
     def set_number(typed: Any) -> None:
-        value = _in_field(box, typed)
-        page.session.set_value(box.key, None if box.may_be_empty and not value else value)
+        if typed == 0.0 and box.may_be_empty:
+            raise FinlabError(f"{box.label}: expected more than 0, or an empty box; {box.hint}")
+        page.session.set_value(box.key, None if typed is None else _in_field(box, typed))
 
     handle = page.gui.add_number(
         box.label, box.default, step=box.step, hint=box.hint, visible=False
     )
     digits = 2 if box.degrees else 5
     page.bind_number(
-        handle, set_number, of_selected(lambda actuator: _value(actuator, box)), digits
+        handle,
+        set_number,
+        of_selected(lambda actuator: _value(actuator, box)),
+        digits,
+        may_be_empty=box.may_be_empty,
     )
     page.board.show(handle, visible=of_selected(lambda actuator: _has(actuator, box)))
 

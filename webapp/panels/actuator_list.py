@@ -28,14 +28,14 @@ LEVEL = 0.5
 
 
 def add_actuator_list(page: Page) -> None:
-    """A table, and below it what can be done with what is selected in it."""
+    """What can be done with what is selected in a table, and below it the table: no button moves
+    where the table grows."""
     session = page.session
 
     def select(key: str, modifier: str) -> None:
         names = session.state.layout.names
         (session.select_also if modifier else session.select)(names[placed(key, len(names))])
 
-    page.add_html(actuator_list)
     page.presses.on("fin", select)
     page.presses.on("robot", lambda _key, _modifier: session.select(None))
     adds = {kind.capitalize(): partial(session.add, kind) for kind in KINDS}
@@ -48,14 +48,7 @@ def add_actuator_list(page: Page) -> None:
     }
     hint = "What Mirror (M) makes moves along until it is unlinked."
     add_html(page.gui, marker("fl-deletes"))
-    buttons = page.add_buttons("Selected", edits, hint=hint)
-
-    def there(state: State, selected: str | None) -> tuple[str, ...]:
-        """All but the one of Mirror and Unlink that does nothing."""
-        paired = selected is not None and partner(state.links, selected) is not None
-        return tuple(word for word in edits if word != ("Mirror" if paired else "Unlink"))
-
-    page.board.show(buttons, options=there)
+    page.add_buttons("Selected", edits, hint=hint)
     axis = page.gui.add_dropdown(
         "Around", tuple(AXES), hint="The axis for copies of the selected one."
     )
@@ -64,9 +57,8 @@ def add_actuator_list(page: Page) -> None:
         session.ring(count, AXES[axis.value])
 
     hint = "Copies of the selected one, so that so many stand evenly around the axis, turned along."
-    rings = page.add_buttons("Copies", {str(k): partial(ring, k) for k in RING_SIZES}, hint=hint)
-    for handle in (buttons, axis, rings):
-        page.board.show(handle, visible=lambda selected: selected is not None)
+    page.add_buttons("Copies", {str(k): partial(ring, k) for k in RING_SIZES}, hint=hint)
+    page.add_html(actuator_list)
 
 
 def actuator_list(state: State, selection: tuple[str, ...]) -> str:

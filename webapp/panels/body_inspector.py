@@ -124,7 +124,9 @@ def add_body(page: Page) -> None:
     )
     for key, number_box in NUMBERS.items():
         box = gui.add_number(number_box.label, 0.0, step=number_box.step, hint=number_box.hint)
-        page.bind_number(box, partial(session.set_dynamics, key), _number_of(key))
+        page.bind_number(
+            box, partial(session.set_dynamics, key), _number_of(key), may_be_empty=True
+        )
     for key, rows in VECTORS.items():
         for row in rows:
             boxes = gui.add_vector3(row.label, (0.0, 0.0, 0.0), step=0.1, hint=row.hint)

@@ -171,14 +171,11 @@ def add_file(page: Page) -> None:
 
 def add_history(page: Page) -> None:
     """Buttons that undo and redo, with the name of the step."""
-    session = page.session
     add_html(page.gui, marker("fl-history"))
-    undo_button = page.add_button(
-        "Undo", session.undo, icon=viser.Icon.ARROW_BACK_UP, hint="Ctrl+Z"
-    )
+    undo_button = page.add_button("Undo", page.undo, icon=viser.Icon.ARROW_BACK_UP, hint="Ctrl+Z")
     page.board.show(undo_button, label=lambda undo: f"Undo: {undo}" if undo else "Undo")
     redo_button = page.add_button(
-        "Redo", session.redo, icon=viser.Icon.ARROW_FORWARD_UP, hint="Ctrl+Y or Ctrl+Shift+Z"
+        "Redo", page.redo, icon=viser.Icon.ARROW_FORWARD_UP, hint="Ctrl+Y or Ctrl+Shift+Z"
     )
     page.board.show(redo_button, label=lambda redo: f"Redo: {redo}" if redo else "Redo")
 

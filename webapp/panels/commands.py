@@ -55,8 +55,8 @@ def page_commands(page: Page) -> list[Command]:
         commands.append(Command(task, partial(session.show_task, task), str(number), ALT))
     commands += [
         Command("Fold or open the drawer", session.fold_drawer, "J", CTRL),
-        Command("Undo", session.undo, "Z", CTRL),
-        Command("Redo", session.redo, "Z", CTRL_SHIFT),
+        Command("Undo", page.undo, "Z", CTRL),
+        Command("Redo", page.redo, "Z", CTRL_SHIFT),
         Command("Select the next fin", session.select_next, "N"),
         Command("Select nothing", partial(session.select, None), "escape"),
         Command("Duplicate the selected fin", session.duplicate, "D", CTRL),

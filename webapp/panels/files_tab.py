@@ -122,7 +122,7 @@ def add_designs(page: Page) -> None:
 
     def open_layout(name: str) -> None:
         if name in shipped():
-            page.session.open_layout(shipped()[name])
+            page.designs.open_shipped(shipped()[name])
 
     def entry(layout: Layout, saved: Layout) -> str:
         return shipped_name(layout) or _own_entry(layout, saved)

@@ -65,7 +65,7 @@ class NumberBox:
         hint: shown when the pointer rests on it.
         step: of the box, in its unit.
         degrees: whether the field is in radians and the box in degrees.
-        may_be_empty: whether the field may be None; a 0 empties it.
+        may_be_empty: whether the field may be None, as the hint says of an empty box.
         model: type of the model that the field belongs to; empty for one of the actuator.
         default: shown of an actuator that does not have the field.
     """
@@ -108,7 +108,7 @@ PROPELLER_LIMITS: tuple[Box, ...] = (
     NumberBox(
         label="Rate [N/s]",
         key="rate",
-        hint="How fast the force changes; 0: at once.",
+        hint="How fast the force changes; empty: at once.",
         may_be_empty=True,
     ),
     NumberBox(
@@ -117,7 +117,7 @@ PROPELLER_LIMITS: tuple[Box, ...] = (
     NumberBox(
         label="Diameter [m]",
         key="diameter",
-        hint="Of the propeller, for its jet; 0: by its force.",
+        hint="Of the propeller, for its jet; empty: by its force.",
         step=0.01,
         may_be_empty=True,
     ),
@@ -139,7 +139,7 @@ POWER_LAW: tuple[Box, ...] = (
     NumberBox(
         label="Astern [W]",
         key="reverse",
-        hint="The same of a negative force; 0: as ahead.",
+        hint="The same of a negative force; empty: as ahead.",
         may_be_empty=True,
         model="power_law",
     ),
@@ -217,7 +217,7 @@ def _azimuth() -> Inspector:
     turn_rate = NumberBox(
         label="Turn rate [°/s]",
         key="turn_rate",
-        hint="How fast it turns; 0: at once.",
+        hint="How fast it turns; empty: at once.",
         step=STEP_DEGREES,
         degrees=True,
         may_be_empty=True,
@@ -238,7 +238,7 @@ def _rudder() -> Inspector:
         NumberBox(
             label="Rate [°/s]",
             key="rate",
-            hint="How fast it turns; 0: at once.",
+            hint="How fast it turns; empty: at once.",
             step=STEP_DEGREES,
             degrees=True,
             may_be_empty=True,
@@ -258,7 +258,7 @@ def _rudder() -> Inspector:
         NumberBox(
             label="Lift slope [1/rad]",
             key="lift_slope",
-            hint="0: by the aspect ratio.",
+            hint="Empty: by the aspect ratio.",
             may_be_empty=True,
         ),
         NumberBox(
@@ -324,7 +324,7 @@ def inspector_by_fields(kind: type[Actuator]) -> Inspector:
                 NumberBox(
                     label=f"{key_words(number.rate)} [{unit}/s]",
                     key=number.rate,
-                    hint=f"How fast its {number.name} changes; 0: at once.",
+                    hint=f"How fast its {number.name} changes; empty: at once.",
                     step=step,
                     degrees=is_angle,
                     may_be_empty=True,

@@ -8,7 +8,7 @@ import viser
 
 from finlab.physics.objective import REACHED
 from webapp.handles import add_html, set_properties
-from webapp.markup.words import html, marker
+from webapp.markup.words import html, marker, three_digits
 from webapp.page import Page
 from webapp.panels.modes_tab import add_saving, mode_table
 from webapp.tasks.null_space_modes import MOST
@@ -42,10 +42,12 @@ def add_null_space(page: Page) -> None:
             high = math.floor(high / step) * step
             value = shifts[k] if k < len(shifts) else 0.0
             ends = {"max": max(high, value, step), "min": min(low, value, -step)}
+            ends_words = f"From {three_digits(low)} to {three_digits(high)} N"
             set_properties(
                 slider,
-                label=f"{space.names[k]} [N]",
-                hint=f"Shares: {space.about[k]}.",
+                label=f"{k + 1}: {space.names[k]} [N]",
+                hint=f"{ends_words}, as far as every actuator has a command. "
+                f"Shares: {space.about[k]}.",
                 step=step,
                 **ends,
             )

@@ -7,12 +7,13 @@ import numpy as np
 from markupsafe import Markup
 
 from finlab.allocation.allocation import Allocation
+from finlab.allocation.report import is_proved_least
 from finlab.axes import AXES, UNITS
 from finlab.layout import Layout
 from finlab.physics.objective import REACHED
 from webapp.handles import set_properties
 from webapp.markup.verdict import COLORS, WORKING, verdict_of, verdict_sentence
-from webapp.markup.words import error_digits, html, parts_word, three_digits
+from webapp.markup.words import ROUNDING, error_digits, html, parts_word, three_digits
 from webapp.page import Page
 from webapp.scene.stage import arrow_size
 from webapp.scene.wrench_nodes import Scale, set_scale
@@ -210,7 +211,9 @@ def _figures(allocation: Allocation, least: bool, in_reach: bool, refined: str, 
     color = DEAD if refined else COLORS[verdict_of(allocation, in_reach)]
     sentence = refined or verdict_sentence(allocation, in_reach)
     pill = "pill long" if len(sentence) > LONG else "pill"
-    missing = zip(AXES, allocation.unallocated.tolist(), UNITS, strict=True)
+    unallocated = allocation.unallocated.tolist()
+    unallocated = [value if abs(value) >= ROUNDING else 0.0 for value in unallocated]
+    missing = zip(AXES, unallocated, UNITS, strict=True)
     rest = ", ".join([f"{axis} {value:+.2g} {unit}" for axis, value, unit in missing]).replace(
         "-", "−"
     )
@@ -226,7 +229,10 @@ def _figures(allocation: Allocation, least: bool, in_reach: bool, refined: str, 
     for word, kind, value, unit in kinds:
         if value is None:  # effort is of fins
             continue
-        label = f"least {word}" if least and LEAST.get(kind) == method else word
+        is_least = least and LEAST.get(kind) == method
+        if word == "power":
+            is_least = is_least and is_proved_least(allocation)
+        label = f"least {word}" if is_least else word
         figures.append(
             f"<span><span class='dim'>{label}</span> <b class='{word}'>{three_digits(value)}</b>"
             f"{unit}</span>"

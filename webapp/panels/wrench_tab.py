@@ -21,7 +21,7 @@ from webapp.handles import add_html, placed, press
 from webapp.markup.answer import bars_of, fin_table
 from webapp.markup.reach import reach_style
 from webapp.markup.verdict import answer_sentence
-from webapp.markup.words import SPEED, error_digits, html, marker, row, three_digits
+from webapp.markup.words import ROUNDING, SPEED, error_digits, html, marker, row, three_digits
 from webapp.page import Page
 from webapp.panels.damage import add_fin_buttons
 from webapp.session.state import MAX_SPEED, Flow, State
@@ -89,12 +89,11 @@ def add_target(page: Page) -> None:
     ) -> None:
         """Show the target; first the ends: a value beyond them would not be shown."""
         for axis, slider in enumerate(sliders):
-            value = target[axis]
-            limit = max(ends[axis], abs(value))
+            rounded = round(target[axis], DIGITS) + 0.0
+            limit = max(ends[axis], abs(rounded))
             if limit != limits[axis]:
                 limits[axis] = slider.max = limit
                 slider.min = -limit
-            rounded = round(value, DIGITS) + 0.0
             # What the page has sent may have more digits, of which it shows no other ones.
             if round(slider.value, DIGITS) != rounded:
                 slider.value = rounded
@@ -154,7 +153,7 @@ def _add_slider(page: Page, axis: int) -> viser.GuiSliderHandle[float]:
     slider = page.gui.add_slider(label, -10.0, 10.0, step, 0.0, hint=hint, marks=())
     page.board.show(slider, disabled=lambda layout: not layout.commanded[axis])
     slider.precision = DIGITS
-    page.on_change(slider, partial(session.set_target, axis))
+    page.on_change(slider, partial(session.set_target, axis), widens=True)
     return slider
 
 
@@ -192,6 +191,8 @@ def _ranges_error(ranges_error: str | None) -> str:
 def _hint(axis: int, low: float, reach: float) -> str:
     word = MOTIONS[axis].capitalize()
     unit = UNITS[axis]
+    if reach < ROUNDING:
+        return f"{word}: no working actuator pushes along it."
     at_most = f"±{three_digits(reach)} {unit} if nothing else is asked to stay"
     if not np.isfinite(low):
         return f"{word}: the other five are out of reach as they are; {at_most}."

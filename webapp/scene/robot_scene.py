@@ -41,6 +41,8 @@ CAMERAS = {
 }
 """Where the camera stands in each view [m]."""
 SPEED = 0.5
+LONGEST_NAME = 24
+"""Letters of a name that stand over the robot; of a longer one so many."""
 FORCES_ONLY = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
 NO_WRENCH = [0.0] * 6
 
@@ -351,5 +353,9 @@ class RobotScene:
 
 
 def _named(actuator: Actuator) -> str:
-    position = ", ".join([f"{value:.3f}" for value in actuator.position])
-    return f"{actuator.name}, {position} m".replace("-", "−")
+    # Rounded first, so that no −0.000 stands there.
+    position = ", ".join([f"{round(value, 3) + 0.0:.3f}" for value in actuator.position])
+    name = actuator.name
+    if len(name) > LONGEST_NAME:
+        name = f"{name[:LONGEST_NAME]}…"
+    return f"{name}, {position} m".replace("-", "−")

@@ -22,7 +22,17 @@ from webapp.session.looking import (
     Display,
     SearchRequest,
 )
-from webapp.session.state import LEAST, MAX_SPEED, MAX_TARGET, History, State, Steps, number, one_of
+from webapp.session.state import (
+    LEAST,
+    MAX_SPEED,
+    MAX_TARGET,
+    History,
+    State,
+    Step,
+    Steps,
+    number,
+    one_of,
+)
 from webapp.session.swim_plan import SwimSettings
 from webapp.session.targets import FIRST_TARGET, PRESETS
 
@@ -31,8 +41,8 @@ FAULT_VERBS = {"weak": "Weaken", "torn": "Tear", "stuck": "Jam", "running": "Let
 
 
 class BaseSession:
-    """All of a session but changes of its layout. Undo is of the robot and its damage; wrench,
-    method and policy stay as they are."""
+    """All of a session but changes of its layout. Undo takes back what was done last to the robot,
+    to the question asked of it, or along the null space of the answer."""
 
     def __init__(self, layout: Layout, display: Display | None = None) -> None:
         """Start with a layout, no damage, and a gentle wrench forward and to the left."""
@@ -67,10 +77,10 @@ class BaseSession:
     def _commit(
         self, name: str, state: State, merge_key: str | None = None, timed: bool = True
     ) -> None:
-        """Another state; a step of undo where the robot is another one.
+        """Another state, and a step of undo.
 
         Args:
-            name: what undo calls the step.
+            name: what undo calls the step; empty where the change belongs to the step before.
             state: the other state.
             merge_key: steps with the same one soon after each other are one step of undo.
             timed: whether such steps are apart after a while; without it, after `end_merge`.
@@ -78,10 +88,10 @@ class BaseSession:
         old_state = self.state
         if state == old_state:
             return
-        if state.asking(old_state) == old_state:  # about the same robot
-            self.history.replace(state)
+        if name:
+            self.history.commit(name, state, merge_key, timed, self.shifts)
         else:
-            self.history.commit(name, state, merge_key, timed)
+            self.history.replace(state)
         self.settle(old_state)
 
     def settle(self, old_state: State) -> None:
@@ -117,10 +127,12 @@ class BaseSession:
         if not source:
             raise FinlabError(f"there is nothing to {verb}")
         old_state = self.state
-        name, state = source.pop()
-        sink.append((name, old_state))
-        self.history.replace(state.asking(old_state))
-        self.settle(old_state)
+        name, state, shifts = source.pop()
+        sink.append(Step(name, old_state, self.shifts))
+        self.history.replace(state)
+        if state is not old_state:
+            self.settle(old_state)
+        self._set_shifts(shifts)
         return name
 
     # The selection.
@@ -160,11 +172,22 @@ class BaseSession:
     # The question: wrench, settings, damage.
 
     def set_target(self, axis: int, value: Any) -> None:
-        """One component of the target wrench [N or N m]."""
-        self._commit("", self.state.with_target(axis, value))
+        """One component of the target wrench [N or N m]; a drag of its slider is one step, until
+        `history.end_merge`."""
+        self._ask(f"Ask for {AXES[axis]}", self.state.with_target(axis, value))
 
-    def ask_for(self, values: Sequence[str]) -> None:
-        """All six components, as text that may be anything."""
+    def _ask(self, name: str, state: State) -> None:
+        """Another question by a step of undo: one for all of the same name, until
+        `history.end_merge`."""
+        self._commit(name, state, name, timed=False)
+
+    def ask_for(self, values: Sequence[str], step: str = "") -> None:
+        """All six components, as text that may be anything.
+
+        Args:
+            values: the components.
+            step: what undo calls it; empty where they belong to the robot that was opened before.
+        """
         state = self.state
         try:
             for axis, value in zip(range(len(AXES)), values, strict=True):
@@ -173,20 +196,23 @@ class BaseSession:
             raise FinlabError(
                 f"wrench: expected six numbers, got {','.join(values)!r:.60}"
             ) from None
-        self._commit("", state)
+        self._ask(step, state)
 
     def set_preset(self, name: str) -> None:
         """The target wrench of a preset."""
-        self._commit("", replace(self.state, target=PRESETS[one_of(name, "preset", PRESETS)]))
+        target = PRESETS[one_of(name, "preset", PRESETS)]
+        self._commit(f"Ask for: {name}", replace(self.state, target=target))
 
     def set_speed(self, value: Any) -> None:
         """The speed ahead through the water [m/s]."""
         checked = number(value, "speed through the water [m/s]", 0.0, MAX_SPEED)
-        self._commit("", replace(self.state, speed=checked))
+        self._ask("Speed through the water", replace(self.state, speed=checked))
 
     def set_setting(self, key: str, value: Any) -> None:
         """The temperature, the method, the policy or the network; `key` is the field of `State`."""
-        self._commit("", self.state.with_setting(key, value))
+        state = self.state.with_setting(key, value)
+        step = key.capitalize() if key == "temperature" else f"{key.capitalize()} {value}"
+        self._ask(step, state)
 
     def keep_least(self, word: str) -> None:
         """Watts or effort, by the method that keeps them least."""
@@ -263,11 +289,18 @@ class BaseSession:
         self.mode = max(0, int(index))
 
     def shift(self, direction: int, value: Any) -> None:
-        """Go along a direction of the null space [N]; the robot does what comes of it."""
+        """Go along a direction of the null space [N]; the robot does what comes of it. A drag of a
+        slider is one step, until `history.end_merge`."""
         shifts = list(self.shifts) + [0.0] * (direction + 1 - len(self.shifts))
         shifts[direction] = number(value, "way [N]", -MAX_TARGET, MAX_TARGET)
-        self.shifts = tuple(shifts) if any(shifts) else ()
-        self.mode = min(len(self.shifts), 1)
+        step = f"Null space {direction + 1}"
+        self.history.commit(step, self.state, step, False, self.shifts)
+        self._set_shifts(tuple(shifts) if any(shifts) else ())
+
+    def _set_shifts(self, shifts: tuple[float, ...]) -> None:
+        """Show what comes of a way along the null space."""
+        self.shifts = shifts
+        self.mode = min(len(shifts), 1)
 
     def show_step(self, step: int, steps: int) -> None:
         """Show the network's proposals after some steps of their refinement, of as many as there

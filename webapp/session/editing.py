@@ -37,7 +37,7 @@ class Session(BaseSession):
     def start_over(self) -> None:
         """Everything as at first sight, outside of tour and lessons; the way here can be undone.
         What is looked at, and how, stays."""
-        self.guide.stop = None  # nothing comes back
+        self.guide.end()  # the work before it can be undone to
         self._commit("Start over", self._first)
         self.saved = self._first.layout
         self.selection_order = ()

@@ -15,7 +15,7 @@ from finlab.files.schema import checked
 from webapp.session.base import BaseSession
 from webapp.session.files import shipped
 from webapp.session.looking import Desk
-from webapp.session.state import History, State, least_of, one_of
+from webapp.session.state import History, State, Step, least_of, one_of
 from webapp.session.targets import FIRST_TARGET
 
 ALIGNED = 0.999
@@ -85,7 +85,7 @@ _course = checked(parse_yaml(_FILE.read_text("utf-8"), _FILE.name), _Course)
 TOUR = _course.tour
 LESSONS = _course.lessons
 BY_NAME = {stop.name: stop for stop in (*TOUR, *LESSONS)}
-KEPT = ("history", "saved", "display", "selection_order", "mode", "desk")
+KEPT = ("history", "saved", "display", "selection_order", "shifts", "mode", "desk")
 """What of a session comes back at the end."""
 
 
@@ -102,13 +102,17 @@ class Guide:
         """The work as it was."""
 
     def open(self, name: str) -> None:
-        """Prepare the state of a stop; what was there before comes back at the end. FinlabError:
-        there is no such stop."""
+        """Prepare the state of a stop; what was there before comes back at the end, and a robot
+        that was made at an earlier stop by undo. FinlabError: there is no such stop."""
         stop = BY_NAME[one_of(name, "lesson", BY_NAME)]
         session = self._session
+        history = History(stop.state)  # what can be undone is what is done here
         if self.stop is None:
             self._left = {key: getattr(session, key) for key in KEPT}
-        self._enter(History(stop.state))  # what can be undone is what is done here
+        elif self._has_made:
+            here = Step(f"Open {stop.title}", session.state, session.shifts)
+            history.past = [*session.history.past, here]
+        self._enter(history)
         self.stop = stop
         self.solved = False
         session.saved = stop.state.layout
@@ -140,11 +144,42 @@ class Guide:
         else:
             self.open(TOUR[0].name)
 
+    @property
+    def course(self) -> str:
+        """What the open stop is part of, in a word."""
+        return "tour" if self.stop in TOUR else "lesson"
+
+    @property
+    def reminder(self) -> str:
+        """What becomes of a robot that is opened, made or saved now; nothing outside of tour and
+        lessons."""
+        if self.stop is None:
+            return ""
+        return (
+            f"The {self.course} “{self.stop.title}” is open: Close brings the robot from before "
+            "back, and Undo then this one"
+        )
+
+    @property
+    def _has_made(self) -> bool:
+        """Whether a robot was made here that no stop has prepared."""
+        session = self._session
+        layouts = [step.state.layout for step in session.history.past]
+        prepared = tuple(shipped().values())
+        return any(layout not in prepared for layout in [*layouts, session.state.layout])
+
     def end(self) -> None:
-        """All is as it was left, and what could be undone then can be undone now."""
+        """All is as it was left, and what could be undone then can be undone now; before that, by
+        undo, robots that were made here."""
         if self.stop is not None:
+            session = self._session
+            history = self._left["history"]
+            if self._has_made:
+                close = Step(f"Close the {self.course}", session.state, session.shifts)
+                step = f"Open the {self.course}"
+                history.add_aside(step, self._left["shifts"], session.history.past, close)
             self.stop = None
-            self._enter(self._left["history"])
+            self._enter(history)
             self._session.history.end_merge()
             for key, value in self._left.items():
                 setattr(self._session, key, value)

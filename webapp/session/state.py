@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 from finlab.actuators.fin.fin_model import MAX_AMPLITUDE, MAX_FREQUENCY
 from finlab.allocation.methods import METHODS, method_class
@@ -73,16 +73,6 @@ class State:
     def lost(self) -> tuple[str, ...]:
         """Names of the actuators that are lost."""
         return tuple(self.damage.lost)
-
-    def asking(self, other: "State") -> "State":
-        """The same robot with the question of another state: what is asked for, of whom, and
-        how."""
-        method = other.method
-        if self.layout is not other.layout:
-            method = method_for(self.layout, method)
-        return replace(
-            other, layout=self.layout, damage=self.damage, links=self.links, method=method
-        )
 
     def is_same_but_target(self, other: "State") -> bool:
         """Whether another state asks the same robot in the same way, for this wrench or another."""
@@ -247,10 +237,20 @@ def numbers(
 
 MERGE_WINDOW_S = 1.0
 """Changes of the same kind that follow each other faster than this are one step of undo."""
-MAX_STEPS = 200
+MAX_STEPS = 1000
 """Steps that can be undone; older ones are forgotten, so that a long session stays small."""
-Steps = list[tuple[str, State]]
-"""Names of steps, and a state of each."""
+
+
+class Step(NamedTuple):
+    """One step of undo, and what was there on the other side of it."""
+
+    name: str
+    state: State
+    shifts: tuple[float, ...] = ()
+    """How far along the answer's null space the forces were [N]."""
+
+
+Steps = list[Step]
 
 
 class History:
@@ -261,14 +261,21 @@ class History:
         self.state = state
         self._clock = clock
         self.past: Steps = []
-        """Steps that can be undone, oldest first: names, and the states before them."""
+        """Steps that can be undone, oldest first, with what was there before them."""
         self.future: Steps = []
-        """Steps that can be redone, last one first: names, and the states after them."""
+        """Steps that can be redone, last one first, with what was there after them."""
         self.merge_key: str | None = None
         """Key of the step that is still being merged into, if any."""
         self._merge_time = 0.0
 
-    def commit(self, name: str, state: State, merge_key: str | None, timed: bool) -> None:
+    def commit(
+        self,
+        name: str,
+        state: State,
+        merge_key: str | None,
+        timed: bool,
+        shifts: tuple[float, ...] = (),
+    ) -> None:
         """Make another state the present one by a step.
 
         Args:
@@ -276,12 +283,13 @@ class History:
             state: the other state.
             merge_key: changes with the same one in quick succession share a step.
             timed: without it they share a step however slow they are, until `end_merge`.
+            shifts: where in the null space the forces were before [N].
         """
         now = self._clock()
         is_same_change = merge_key is not None and merge_key == self.merge_key
         is_quick = not timed or now - self._merge_time < MERGE_WINDOW_S
         if not (is_same_change and self.past and is_quick):
-            self.past.append((name, self.state))
+            self.past.append(Step(name, self.state, shifts))
             self.past = self.past[-MAX_STEPS:]
             self.future = []
         self.merge_key = merge_key
@@ -293,6 +301,20 @@ class History:
         self.state = state
         self.merge_key = None
 
+    def add_aside(self, name: str, shifts: tuple[float, ...], steps: Steps, close: Step) -> None:
+        """Take in the steps of other work, which ended where this one goes on.
+
+        Args:
+            name: of the step from the present state to the first one of the others.
+            shifts: where in the null space the present forces are [N].
+            steps: the other steps.
+            close: the step back to the present state.
+        """
+        aside = [Step(name, self.state, shifts), *steps, close]
+        self.past = [*self.past, *aside][-MAX_STEPS:]
+        self.future = []
+        self.merge_key = None
+
     def end_merge(self) -> None:
         """The next change starts a step of its own."""
         self.merge_key = None
@@ -300,9 +322,9 @@ class History:
     @property
     def undo_name(self) -> str | None:
         """Name of the step that undo takes back, if any."""
-        return self.past[-1][0] if self.past else None
+        return self.past[-1].name if self.past else None
 
     @property
     def redo_name(self) -> str | None:
         """Name of the step that redo brings back, if any."""
-        return self.future[-1][0] if self.future else None
+        return self.future[-1].name if self.future else None

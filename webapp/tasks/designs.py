@@ -14,6 +14,7 @@ from finlab.errors import FinlabError
 from finlab.exchange import is_robot_table
 from finlab.exchange.convert import TABLES
 from finlab.files.worker import in_worker
+from finlab.layout import Layout
 from finlab.swim.design_files import Opened
 from finlab.swim.hull import hull_of
 from webapp.handles import Presses
@@ -64,6 +65,18 @@ class Designs:
         """A robot with one hull and one actuator of a type."""
         self._session.new_layout(kind)
         self._session.show_task("Design")
+        self.remind("New design")
+
+    def remind(self, title: str) -> None:
+        """Say that tour or lesson is open, if one is, and what becomes of this robot then."""
+        reminder = self._session.guide.reminder
+        if reminder:
+            self._notify(title, reminder, calm=True)
+
+    def open_shipped(self, layout: Layout) -> None:
+        """A robot that is shipped."""
+        self._session.open_layout(layout)
+        self.remind(f"Opened {layout.name}")
 
     def open(self, name: str, content: bytes) -> None:
         """A design from a file that the browser sent."""
@@ -87,26 +100,29 @@ class Designs:
     def _take(self, wrench: str | None, opened: Opened) -> None:
         """Puts a design on the page, with the wrench of its link, and says what to know of it."""
         self._session.open_layout(opened.layout, lost=opened.lost)
+        reminder = self._session.guide.reminder
+        self.remind(f"Opened {opened.layout.name}")
         if wrench is not None:
             text = f"{opened.layout.name} is a copy; whoever shared it does not see what you change"
-            self._notify("Opened from a link", text, calm=True)
+            self._notify("Opened from a link", _with(text, reminder), calm=True)
         if wrench:
             self._session.ask_for(wrench.split(","))
         if opened.notes:
-            self._notify(f"Opened {opened.layout.name}", " ".join(opened.notes), calm=True)
+            text = _with(" ".join(opened.notes), reminder)
+            self._notify(f"Opened {opened.layout.name}", text, calm=True)
         for file in opened.missing:
             text = (
                 f"{file} did not come along, so a hull that fits is drawn; put both into one ZIP "
                 "archive"
             )
-            self._notify("Without its hull", text)
+            self._notify("Without its hull", _with(text, reminder))
 
     def save(self) -> None:
         """Send the design's file to the browser."""
         layout = self._session.state.layout
 
         def send(file: tuple[str, bytes]) -> None:
-            self._download(*file)
+            self._download(*file, self._session.guide.reminder)
             self._session.saved = layout
 
         self._deferred.make(partial(files.layout_file, layout), send, "save")
@@ -157,10 +173,16 @@ class Designs:
         """Sends a file of a name to the browser, once its content is made on a thread."""
         self._deferred.make(make, partial(self._download, name), name)
 
-    def _download(self, name: str, content: bytes) -> None:
-        """Sends a file to the browser."""
+    def _download(self, name: str, content: bytes, reminder: str = "") -> None:
+        """Sends a file to the browser, and says so."""
         self._client.send_file_download(name, content, save_immediately=True)
-        self._notify("Saved", f"{name}, among the downloads of this browser", calm=True)
+        text = _with(f"{name}, among the downloads of this browser", reminder)
+        self._notify("Saved", text, calm=True)
+
+
+def _with(text: str, reminder: str) -> str:
+    """A text with a reminder, if there is one, as a sentence after it."""
+    return f"{text.removesuffix('.')}. {reminder}" if reminder else text
 
 
 class Opening:

@@ -72,14 +72,17 @@ class LogReading(Slot[LogFile, "Judgement"]):
             raise FinlabError("open a log first")
         nearest = int(np.abs(judgement.timeline.time - time).argmin())
         self.moment = float(judgement.timeline.time[nearest])
-        self.use(judgement.robot, f"Robot of {judgement.source}")
+        is_opened = self.use(judgement.robot, f"Robot of {judgement.source}")
         demand = judgement.timeline.demand[nearest].tolist()
-        self._session.ask_for([repr(value) for value in demand])
+        step = "" if is_opened else f"Moment of {judgement.source}"
+        self._session.ask_for([repr(value) for value in demand], step)
 
-    def use(self, layout: Layout, step: str) -> None:
-        """Open a robot of the log, unless it is there."""
-        if self._session.state.layout != layout:
+    def use(self, layout: Layout, step: str) -> bool:
+        """Open a robot of the log, unless it is there; whether it was opened."""
+        is_new = self._session.state.layout != layout
+        if is_new:
             self._session.open_layout(layout, step)
+        return is_new
 
 
 def judge_upload(file: LogFile, work: Work[LogFile]) -> "Judgement":
