@@ -23,6 +23,7 @@ viser-project/viser:
 - `keep_private`: no message to the other pages about an input of one page; `_gui_api.py`,
   `sync_other_clients`.
 - `assign`: several properties of a node in one message; `_scene_handles.py`, `_queue_update`.
+- `slider_marks`: marks of a slider that can be others later; `_gui_handles.py`, `GuiSliderProps`.
 - `uuid_of`: a public name of a widget's element in the page; `_gui_handles.py`.
 - `run_script`, `run_file`: a public way to run a script, as `add_plotly` does; `_gui_api.py`.
 - `hold_uploads`: sizes and parts of files checked as they come; `_gui_api.py`,
@@ -459,6 +460,11 @@ def write_content(handle: Any, content: str) -> None:
 
 UNKNOWN = object()
 """In place of a property that a handle has elsewhere."""
+
+
+def slider_marks(*marks: tuple[float, str]) -> tuple[_messages.GuiSliderMark, ...]:
+    """Values and texts as the property `_marks` of a slider, which viser sets once alone."""
+    return tuple([_messages.GuiSliderMark(value, text) for value, text in marks])
 
 
 def uuid_of(handle: Any) -> str:

@@ -123,10 +123,11 @@ def test_samples_and_modes_are_drawn_and_listed() -> None:
 def test_figures_keep_their_width() -> None:
     assert {len(small(v)) for v in (0.0, 3.1e-5, 0.099, 2e5)} == {8}
     assert [small(v) for v in (0.1, 1.2345, 16.24, 9999.0)] == ["0.100", "1.23", "16.2", "9999"]
-    assert [three_digits(v) for v in (2.319, 0.041, 0.09996, 0.0)] == [
+    assert [three_digits(v) for v in (2.319, 0.041, 0.09996, 0.0, -5.5e-14)] == [
         "2.32",
         "0.0410",
         "0.100",
+        "0.00",
         "0.00",
     ]
     assert three_digits(float("nan")) == small(float("nan")) == "–"

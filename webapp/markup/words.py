@@ -147,9 +147,9 @@ def degrees(angle: float) -> str:
 
 def three_digits(value: float | None) -> str:
     """Three significant digits, as the library writes them, with a real minus sign; a dash where
-    there is no number, and 0 where it is the computer's rounding."""
+    there is no number, and zero where it is the computer's rounding."""
     if value is not None and abs(value) < ROUNDING:
-        return "0"
+        value = 0.0
     text = finlab.display.three_digits(value)
     return DASH if text == NO_NUMBER else text.replace("-", "−")
 

@@ -13,6 +13,7 @@ from webapp.page import Page
 from webapp.panels.modes_tab import add_saving, mode_table
 from webapp.tasks.null_space_modes import MOST
 from webapp.tasks.solver import Modes
+from webapp.viser_internals import slider_marks
 
 ABOUT = "Each slider changes forces and leaves the wrench as it is. Its dot is the answer."
 ALONE = "Each wrench has one set of forces here: the null space is empty."
@@ -42,6 +43,8 @@ def add_null_space(page: Page) -> None:
             high = math.floor(high / step) * step
             value = shifts[k] if k < len(shifts) else 0.0
             ends = {"max": max(high, value, step), "min": min(low, value, -step)}
+            # The ends say how far; the dot between them is the answer.
+            marks = slider_marks((low, three_digits(low)), (0.0, ""), (high, three_digits(high)))
             ends_words = f"From {three_digits(low)} to {three_digits(high)} N"
             set_properties(
                 slider,
@@ -49,6 +52,7 @@ def add_null_space(page: Page) -> None:
                 hint=f"{ends_words}, as far as every actuator has a command. "
                 f"Shares: {space.about[k]}.",
                 step=step,
+                _marks=marks,
                 **ends,
             )
             set_properties(slider, value=round(value, 6))
