@@ -26,16 +26,24 @@ ENDS = ("Enter", "Tab", "click")
 PLACES: list[tuple[str, str, str]] = [
     ("Allocate", "ucat", ""),
     ("Allocate", "ucat", "Null space"),
-    ("Design", "ucat", "front_left"),
+    ("Allocate", "ucat", "stuck"),
+    ("Allocate", "ucat", "running"),
+    ("Allocate", "bluerov2", "stuck"),
+    ("Design", "ucat", "actuator"),
     ("Design", "ucat", "Improve"),
     ("Design", "ucat", "robot"),
-    ("Design", "bluerov2", "thruster_1"),
+    ("Design", "bluerov2", "actuator"),
+    ("Design", "fish", "actuator"),
     ("Simulate", "ucat", ""),
 ]
 """Task, robot, and what is selected or lies in the drawer: together they show all panels."""
+FOLDED = {"stuck": ("Damage", "Which"), "running": ("Damage", "Which"), "robot": ("Hull", "Shape")}
+"""Panels that are folded at first, and a label in each."""
+FAULTS: dict[str, Any] = {"stuck": 0.1, "running": (0.3, 1.0, 0.2)}
+"""Faults that have boxes of their own."""
 TURNED = ("Axis", "Shaft", "Zero", "Angles", "Stuck at")
 """Boxes of directions: any length, and any turn more, is the same one."""
-EVERY = 9
+EVERY = 41
 """Of so many cases `make test` runs one."""
 
 
@@ -107,10 +115,20 @@ def show(page: Any, task: str, robot: str, what: str) -> None:
     if what in ("Null space", "Improve"):
         page.tab(what)
     elif what:
-        name = None if what == "robot" else page.session.state.layout.names[0]
+        session = page.session
+        name = None if what == "robot" else session.state.layout.names[0]
+
+        def select() -> None:
+            session.select(name)
+            if what in FAULTS and name is not None:
+                session.damage(name, what, FAULTS[what])
+
         loop = page._served.server.get_event_loop()
-        loop.call_soon_threadsafe(page.view.do, lambda: page.session.select(name))
-        page.until(lambda: page.session.selected == name)
+        loop.call_soon_threadsafe(page.view.do, select)
+        page.until(lambda: session.selected == name)
+    if what in FOLDED:
+        page.catch_up()
+        page.unfold(*FOLDED[what])
     page.until(lambda: not page.view.busy)
     page.catch_up()
 
@@ -161,7 +179,7 @@ def test_an_arrow_goes_on_from_what_is_typed(page: Any) -> None:
     page.tab("Design")
     page.choose("Layout", "bluerov2")
     page.until(lambda: page.session.state.layout.name == "bluerov2")
-    show(page, "Design", "bluerov2", "first")
+    show(page, "Design", "bluerov2", "actuator")
     box = page.row("Dead band [N]").last
     box.click()
     page.page.keyboard.press("Control+a")
