@@ -77,10 +77,6 @@
     commit(steps);
     if (isTyped) { event.preventDefault(); event.stopImmediatePropagation(); }
   }
-  listen('pointerdown', (event) => {
-    const arrow = event.target.closest?.('.mantine-NumberInput-control');
-    if (box && arrow?.closest('.mantine-NumberInput-root')?.contains(box)) step(event, arrow.dataset.direction === 'down' ? -1 : 1);
-  });
   listen('keydown', (event) => {
     const { key, target, isTrusted } = event;
     if (target !== box || !isTrusted) return;

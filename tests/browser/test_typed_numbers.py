@@ -176,14 +176,10 @@ def test_a_number_beyond_the_slider_is_asked_however_the_box_is_left(page: Any) 
 
 
 def test_an_arrow_goes_on_from_what_is_typed(page: Any) -> None:
-    page.tab("Design")
-    page.choose("Layout", "bluerov2")
-    page.until(lambda: page.session.state.layout.name == "bluerov2")
     show(page, "Design", "bluerov2", "actuator")
     box = page.row("Dead band [N]").last
     box.click()
     page.page.keyboard.press("Control+a")
     page.page.keyboard.type("0,4")
-    arrow = box.locator("xpath=ancestor::div[contains(@class,'NumberInput-root')][1]")
-    arrow.locator("[data-direction=up]").click(force=True)
+    page.page.keyboard.press("ArrowUp")
     page.until(lambda: page.session.state.layout.actuators[0].dead_band == 0.5)
