@@ -103,5 +103,5 @@ def pair_blocks(pairs: Sequence[SecondLoss], n_working: int) -> list[Block]:
     title = f"Pairs of losses that take an axis away which either alone leaves, {counts}:"
     blocks: list[Block] = [table_of(PAIR_COLUMNS, pairs[:MAX_ROWS], title)]
     if len(pairs) > MAX_ROWS:
-        blocks.append(f"{len(pairs) - MAX_ROWS} more are in --json.")
+        blocks.append(f"{len(pairs) - MAX_ROWS} more; `finlab layout show --json` has all.")
     return blocks

@@ -808,6 +808,10 @@ class Formulas:
         self._lock = Lock()
         """Held during a call: command and figures are the same for all threads."""
 
+    def __reduce__(self) -> tuple[object, ...]:
+        """Copies are prepared anew: what is prepared are addresses."""
+        return type(self), (self._laws, self._effectiveness, self._frames)
+
     def figures(self, command: Array) -> CommandFigures | None:
         """Evaluates a command.
 

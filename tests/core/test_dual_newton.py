@@ -39,14 +39,14 @@ class NewtonSteps(NamedTuple):
 
 
 MOST_STEPS = {
-    "thrusters": NewtonSteps(176, 845, 60),
+    "thrusters": NewtonSteps(119, 718, 80),
     "azimuths": NewtonSteps(82, 543, 34),
     "fins": NewtonSteps(99, 888, 145),
     "fins any shaft": NewtonSteps(69, 838, 66),
     "fins uneven": NewtonSteps(80, 1015, 29),
     "wide arcs": NewtonSteps(257, 1853, 68),
     "holes": NewtonSteps(507, 2549, 37),
-    "rudders": NewtonSteps(1743, 4283, 721),
+    "rudders": NewtonSteps(765, 2775, 351),
     "mixed": NewtonSteps(132, 2118, 77),
     "all": NewtonSteps(123, 1532, 117),
     "pods either way": NewtonSteps(464, 3713, 332),

@@ -14,7 +14,9 @@ import numpy as np
 import pytest
 
 import finlab
-from finlab.analysis import attainable_set, score_card
+from finlab.analysis import attainable_set, score_card, second_losses
+from finlab.analysis.second_losses import pair_blocks
+from finlab.display import text
 from finlab.forces.reach import axis_ranges
 from finlab.swim.simulation import ClosedLoop, make_trajectory
 
@@ -132,8 +134,9 @@ def test_text_is_the_table_of_the_command_line(capsys: pytest.CaptureFixture[str
     from finlab.cli import main
 
     layout = finlab.load_layout("turtle_hybrid")
+    pairs = text(pair_blocks(second_losses(layout), layout.n))
     assert main(["layout", "show", "turtle_hybrid"]) == 0
-    assert capsys.readouterr().out == f"{layout}\n\n{score_card(layout)}\n"
+    assert capsys.readouterr().out == f"{layout}\n\n{score_card(layout)}\n\n{pairs}\n"
 
 
 def test_without_matplotlib_the_tables_are_there(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -82,7 +82,7 @@ def test_the_core_solves_what_allocate_answers() -> None:
         solve(*question)
     *_, memory, records = solve.__kwdefaults__["keep"]
     assert len(records) == 3
-    np.testing.assert_allclose(memory.command[:3, 0], answers, atol=1e-9)
+    np.testing.assert_allclose(memory.command[:3], answers, atol=1e-9)
 
 
 def test_the_core_solves_in_a_flow_what_allocate_answers() -> None:
@@ -95,7 +95,7 @@ def test_the_core_solves_in_a_flow_what_allocate_answers() -> None:
     for question in questions:
         solve(*question)
     *_, memory, _ = solve.__kwdefaults__["keep"]
-    np.testing.assert_allclose(memory.command[:3, 0], answers.command, atol=1e-6)
+    np.testing.assert_allclose(memory.command[:3], answers.command, atol=1e-6)
 
 
 def test_the_unit_is_the_clipped_pseudo_inverse() -> None:

@@ -348,7 +348,8 @@ int fl_dual_newton(const real *block, fl_work *work, const real *target_reduced,
   for (int k = 0;; k++) {
     if (at->residual_size <= work->residual_enough) {
       /* Near the rim multipliers magnify what is left: one step more makes it nothing. */
-      if (is_met || at->residual_size <= SURE_SHARE * work->residual_enough) return FL_MET;
+      const int is_rough = work->residual_enough > TOLERANCE;
+      if (is_met || is_rough || at->residual_size <= SURE_SHARE * TOLERANCE) return FL_MET;
       is_met = 1;
     }
     if (at->dual_value > beyond) return FL_BEYOND;

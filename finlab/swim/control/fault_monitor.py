@@ -69,6 +69,8 @@ STRENGTH_STEP = 0.05
 ticks."""
 NEGLIGIBLE = 0.004
 """Share of its largest force below which a stuck thruster is a lost one."""
+SAME_DIRECTION = 0.9
+"""Cosine from which one that pushes again, while it is tried, pushes where it is asked to."""
 STUCK_STEP = 0.005
 """The same of the force of a stuck one, as a share of its largest, and of an angle [rad]."""
 PERIOD_MAX_S = 0.25
@@ -482,10 +484,24 @@ class FaultMonitor:
         mean = evidence.mean[onset, k, target]
         variance = evidence.variance[onset, k, target]
         hypotheses.adopt(int(onset), k, mean, variance)
+        if kind == STUCK and self._obeys_its_trial(k):
+            kind = WHOLE
+            hypotheses.believe(k, 1.0)
         if kind == STUCK and self._is_negligible(k) and self._is_lost.sum() < self.layout.n - 1:
             kind = LOST
             hypotheses.believe(k, 0.0)
         self._mark(k, kind, since, certainty)
+
+    def _obeys_its_trial(self, k: int) -> bool:
+        """Whether one that was lost pushes where its trial asks it to: a trial asks for one
+        direction alone, in which one that is stuck cannot be told from one that was repaired. If it
+        is stuck after all, that shows as soon as it is asked for another."""
+        if not self._is_lost[k] or not self._model.sticks_at_angle[k]:
+            return False
+        held = self._hypotheses.held[self._model.held_of[k]]
+        asked = float(self._model.motion.direction[k])
+        along = held[0] * math.cos(asked) + held[1] * math.sin(asked)
+        return bool(along >= SAME_DIRECTION * math.hypot(held[0], held[1]))
 
     def _is_negligible(self, k: int) -> bool:
         """Whether what a stuck actuator gives is too little to count."""
