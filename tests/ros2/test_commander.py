@@ -15,7 +15,6 @@ from finlab_allocator.ticks import ACCOUNT_PERIODS
 import finlab
 from finlab.axes import AXES
 from finlab.errors import FinlabError
-from finlab.layout import Damage
 
 PUSH = (20.0, 0.0, 5.0, 0.0, 0.0, 1.0)
 """A wrench within reach of `bluerov2_heavy`."""
@@ -259,19 +258,6 @@ def test_lost_actuators_are_done_without() -> None:
     np.testing.assert_allclose(sent.command, expected, atol=1e-9)
     assert np.isnan(heavy.wait(0.6)[0].command[:, 0]).sum() == 1, "at neutral it has no command"
     assert heavy.values["lost"] == "front_left"
-
-
-def test_what_a_monitor_has_found_is_asked_with() -> None:
-    heavy = Robot("bluerov2_heavy")
-    heavy.commander.damage = Damage(weak={"front_left": 0.5})
-    sent = heavy.ask(PUSH)
-    allocator = finlab.Allocator(finlab.load_layout("bluerov2_heavy"))
-    expected = allocator.allocate(PUSH, damage=heavy.commander.damage).command.copy()
-    expected[heavy.commander.layout.index("front_left")] *= 2.0  # to be told what it is to give
-    assert sent is not None
-    np.testing.assert_allclose(sent.command, expected, atol=1e-9)
-    left = AuthorityLeft.of(heavy.commander.layout, heavy.commander)
-    assert left.largest[0] < left.whole.largest[0]
 
 
 def test_rudders_push_while_a_velocity_is_known() -> None:

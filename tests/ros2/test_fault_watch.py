@@ -9,7 +9,7 @@ import pytest
 from finlab_allocator.commander import Commander
 from finlab_allocator.fault_watch import FaultWatch
 from finlab_allocator.frames import StaticFrames
-from finlab_allocator.input_checks import NO_STAMP, StampedInput
+from finlab_allocator.input_checks import NO_STAMP, ImuSample, StampedInput
 from finlab_allocator.parameters import Parameters
 from finlab_allocator.status_report import WARN, AuthorityLeft, status_report
 from scipy.spatial.transform import Rotation
@@ -22,6 +22,10 @@ from finlab.swim.simulation import ClosedLoop, make_trajectory
 ROBOT = "bluerov2_heavy"
 LOST = "front_left"
 LOST_AT_S = 15.0
+CLOCK_AHEAD_S = 1000.0
+"""The clock of stamps, over that of the loop [s]."""
+AT_REST = np.array([0, 0, 0, 1.0])
+"""Orientation of a robot that lies still."""
 
 
 class NodesLoop(TrackingController):
@@ -32,16 +36,21 @@ class NodesLoop(TrackingController):
         self.commander = commander
         self.layout = commander.layout
         self.found_at: float | None = None
+        self.answered_anew: list[float] = []
 
     def wrench(self, measurement: Measurement, setpoint: Any, delivered: Any) -> Any:
         """Hears first what the sensors say."""
         now = measurement.time
         m = measurement
         turn = Rotation.from_euler("ZYX", [m.yaw, m.pitch, m.roll]).as_quat()
-        self.commander.on_imu(m.rates, turn, "base_link", now)
+        clock = now + CLOCK_AHEAD_S
+        self.commander.on_imu(ImuSample(m.rates, turn, "base_link", clock), now, clock)
         twist = np.concatenate([m.velocity, m.rates])
-        self.commander.on_velocity(StampedInput(twist, "", NO_STAMP), now, now)
-        self.commander.on_watch(now)
+        velocity = StampedInput(twist, "", clock - m.ages[2])
+        self.commander.on_velocity(velocity, now, clock)
+        answered = self.commander.on_watch(now)
+        if answered is not None:
+            self.answered_anew.append(now)
         if self.found_at is None and self.commander.damage is not None:
             self.found_at = now
         self.now = now
@@ -83,7 +92,12 @@ def test_a_lost_thruster_is_named_and_done_without(monkeypatch: pytest.MonkeyPat
     assert commander.command is not None
     assert np.isnan(commander.command[commander.layout.index(LOST)]).all()
     status = status_report(commander)
-    assert status.level == WARN and f"found: {LOST} lost" in status.message
+    assert status.level == WARN and f"found: {LOST} lost for" in status.message
+    values = dict(status.values)
+    assert values[f"{LOST}: kind"] == "lost"
+    assert float(values[f"{LOST}: age [s]"]) == pytest.approx(loop.time - LOST_AT_S, abs=1.0)
+    assert 0.5 < float(values[f"{LOST}: probability"]) <= 1.0
+    assert node.found_at in node.answered_anew, "what was asked for is answered anew at once"
     left = AuthorityLeft.of(commander.layout, commander)
     assert left.largest[0] < 0.9 * left.whole.largest[0]
 
@@ -94,7 +108,7 @@ def test_without_an_imu_nothing_is_believed() -> None:
     assert commander.damage is None
     assert "has no sample of the IMU yet" in status_report(commander).message
     off = Commander(Parameters().changed({"robot": ROBOT}), StaticFrames())
-    off.on_imu(np.zeros(3), np.array([0, 0, 0, 1.0]), "", 0.0)
+    off.on_imu(ImuSample(np.zeros(3), AT_REST, "", NO_STAMP), 0.0, 0.0)
     off.on_watch(0.0)
     assert off.watch is None
 
@@ -111,7 +125,8 @@ def test_a_bad_sample_is_refused(
     rates: list[float], orientation: list[float], frame: str, sentence: str
 ) -> None:
     commander = watching()
-    commander.on_imu(np.array(rates), np.array(orientation), frame, 1.0)
+    sample = ImuSample(np.array(rates), np.array(orientation), frame, NO_STAMP)
+    commander.on_imu(sample, 1.0, 1.0)
     assert commander.last_refusal.startswith(sentence)
     commander.on_watch(1.0)
     assert commander.watch is not None and commander.watch.diagnosis is None
@@ -123,7 +138,8 @@ def test_an_imu_in_another_frame_is_turned() -> None:
     watch = FaultWatch(finlab.load_layout(ROBOT), "base_link", frames)
     robot = Rotation.from_euler("ZYX", [0.4, 0.2, -0.3])
     of_imu = robot * Rotation.from_euler("x", math.pi)
-    watch.on_imu(np.array([0.1, 0.2, 0.3]), of_imu.as_quat(), "imu", 1.0)
+    rates = np.array([0.1, 0.2, 0.3])
+    watch.on_imu(ImuSample(rates, of_imu.as_quat(), "imu", NO_STAMP), 1.0)
     assert watch._attitude == pytest.approx((-0.3, 0.2, 0.4))
     np.testing.assert_allclose(watch._rates, [0.1, -0.2, -0.3], atol=1e-12)
     assert watch.hears(1.2, 0.5) and not watch.hears(1.6, 0.5)
@@ -132,10 +148,9 @@ def test_an_imu_in_another_frame_is_turned() -> None:
 def test_what_somebody_says_is_lost_is_believed_and_taken_back() -> None:
     commander = watching(lost=[LOST])
     assert commander.watch is not None
-    (finding,) = commander.watch.findings()
-    assert finding.startswith(f"{LOST} lost")
+    assert commander.watch.phrases() == [f"{LOST} lost, as was said"]
     commander.change({"lost": []})
-    assert commander.watch.findings() == []
+    assert commander.watch.phrases() == []
     commander.change({"monitor": False})
     assert commander.watch is None
 
@@ -143,7 +158,7 @@ def test_what_somebody_says_is_lost_is_believed_and_taken_back() -> None:
 def test_all_lost_is_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
     commander = watching()
     assert commander.watch is not None
-    commander.on_imu(np.zeros(3), np.array([0, 0, 0, 1.0]), "", 1.0)
+    commander.on_imu(ImuSample(np.zeros(3), AT_REST, "", NO_STAMP), 1.0, 1.0)
     everything = finlab.Damage(lost=commander.layout.names)
     monkeypatch.setattr(commander.watch, "step", lambda *_: everything)
     commander.on_watch(1.0)
@@ -156,3 +171,101 @@ def test_all_lost_is_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
     assert commander.damage is None, "what is said counts more than what was found"
     sent = commander.on_wrench(StampedInput(np.ones(6), "", NO_STAMP), 1.0, 1.0)
     assert sent is not None and sent.answer is not None
+
+
+def imu_at(taken_s: float) -> ImuSample:
+    """A sample at rest, with that stamp."""
+    return ImuSample(np.zeros(3), AT_REST, "", taken_s)
+
+
+def test_samples_are_as_old_as_their_stamps_and_count_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    commander = watching()
+    assert commander.watch is not None
+    seen: list[tuple[Measurement, Any]] = []
+    step = commander.watch._monitor.step
+
+    def noted(measurement: Measurement, command: Any) -> Any:
+        seen.append((measurement, command))
+        return step(measurement, command)
+
+    monkeypatch.setattr(commander.watch._monitor, "step", noted)
+    clock_s = 500.0  # while now is 2.0
+    velocity = StampedInput(np.array([0.1, 0, 0, 0, 0, 0]), "", clock_s - 0.3)
+    commander.on_velocity(velocity, 2.0, clock_s)
+    commander.on_imu(imu_at(clock_s - 0.05), 2.0, clock_s)
+    commander.on_watch(2.01)
+    commander.on_watch(2.11)  # nothing new
+    ((measurement, _),) = seen
+    assert measurement.time == pytest.approx(1.95)
+    assert measurement.ages[2] == pytest.approx(0.25)
+    commander.on_imu(imu_at(clock_s - 1.0), 2.2, clock_s + 0.2)
+    assert commander.last_refusal.startswith("imu: its stamp is 1.2 s old")
+    assert len(seen) == 1
+
+
+def test_the_monitor_is_told_the_command_that_was_in_force() -> None:
+    commander = watching()
+    watch = commander.watch
+    assert watch is not None
+    for number in range(10):
+        watch.on_command(np.full((8, 3), float(number)), 0.1 * number)
+    watch.on_imu(imu_at(NO_STAMP), 0.52)
+    watch.step()
+    watch.on_imu(imu_at(NO_STAMP), 0.61)
+    command = watch._command_until(0.61)
+    assert command is not None and command[0, 0] == 5.0, "0.5 s to 0.6 s, mostly"
+    command = watch._command_until(0.80)
+    assert command is not None and command[0, 0] == 6.0
+
+
+FAULTS = {
+    "lost": (0.0, "front_left lost for"),
+    "weak": (0.4, "front_left weak or fouled, at 40 % for"),
+    "reversed": (-1.0, "front_left reversed for"),
+    "stuck": (math.nan, "front_left stuck at 12 N for"),
+}
+
+
+@pytest.mark.parametrize("kind", FAULTS)
+def test_status_and_authority_tell_of_each_kind(kind: str) -> None:
+    commander = watching()
+    watch = commander.watch
+    assert watch is not None
+    strength, words = FAULTS[kind]
+    wrench = StampedInput(np.array([20.0, 0, 0, 0, 0, 0]), "", NO_STAMP)
+    before = commander.on_wrench(wrench, 1.0, 1.0)
+    assert before is not None
+    if kind == "stuck":  # by the monitor, as if it had found that
+        watch._monitor.tell(LOST, 1.0, stuck=12.0)
+    else:
+        watch._monitor.tell(LOST, strength)
+    commander.on_imu(imu_at(NO_STAMP), 1.05, 1.05)
+    after = commander.on_watch(1.05)
+    assert after is not None and after.answer is not None, "answered anew at once"
+    index = commander.layout.index(LOST)
+    asked = after.command[index, 0]
+    given = {"weak": strength * asked, "stuck": 12.0}.get(kind, 0.0)
+    if kind == "weak":
+        assert given == pytest.approx(after.answer.command[index, 0]), "it is asked for more"
+    elif kind != "stuck":
+        assert math.isnan(asked)
+    status = status_report(commander)
+    values = dict(status.values)
+    assert f"found: {words}" in status.message
+    assert values[f"{LOST}: kind"] == kind and values["unknown"] == "false"
+    left = AuthorityLeft.of(commander.layout, commander)
+    assert left.largest[0] < 0.95 * left.whole.largest[0]
+    assert len(left.reports()) == 6
+
+
+def test_what_no_fault_explains_is_said() -> None:
+    commander = watching()
+    watch = commander.watch
+    assert watch is not None
+    commander.on_imu(imu_at(NO_STAMP), 1.0, 1.0)
+    commander.on_watch(1.0)
+    assert watch.diagnosis is not None
+    watch.diagnosis = watch.diagnosis._replace(unknown=True)
+    status = status_report(commander)
+    assert status.level == WARN and "unknown: the robot moves as no fault" in status.message
+    assert dict(status.values)["unknown"] == "true"

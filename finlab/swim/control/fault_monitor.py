@@ -130,9 +130,19 @@ class FaultMonitor:
     period_s = 0.1
     """Time between calls [s], where the measurements' times do not say it."""
 
-    def __init__(self, layout: Layout, settings: MonitorSettings | None = None) -> None:
-        """Believes that all actuators of a layout are whole."""
+    def __init__(
+        self, layout: Layout, settings: MonitorSettings | None = None, period_s: float | None = None
+    ) -> None:
+        """Believes that all actuators of a layout are whole.
+
+        Args:
+            layout: the robot.
+            settings: what is expected of its sensors and faults.
+            period_s: time between calls of `sent` [s]; that of the class when None.
+        """
         self.layout = layout
+        if period_s is not None:
+            self.period_s = period_s
         self.settings = MonitorSettings() if settings is None else settings
         self._model = MotionModel(layout)
         self._hypotheses = Hypotheses(self._model, self.settings)
@@ -162,7 +172,7 @@ class FaultMonitor:
         self._told_damage = NO_DAMAGE
         self._tables = [fin for fin in layout.fins if fin.model.type == "table"]
         self._time = math.nan
-        self._clock_s = 0.0
+        self._clock_s = 0.0  # time that has been watched, from 0
         self._velocity: Array | None = None
         self._velocity_time = -math.inf
         self._depth = math.nan
@@ -349,13 +359,11 @@ class FaultMonitor:
         value = {LOST: 0.0, REVERSED: -1.0}.get(kind, float(self._reported_strength[k]))
         if kind == STUCK:
             value = self._stuck_value(k)
-        return Finding(
-            self.layout.names[k],
-            KINDS[kind],
-            float(self._since[k]),
-            float(self._certainty[k]),
-            value,
-        )
+        # From the time that has been watched to the clock of the measurements.
+        since_s = float(self._since[k])
+        if not math.isnan(self._time):
+            since_s += self._time - self._clock_s
+        return Finding(self.layout.names[k], KINDS[kind], since_s, float(self._certainty[k]), value)
 
     def _damage(self, strength: Array) -> Damage:
         """What an allocator should know; a table's thrust cannot be scaled."""

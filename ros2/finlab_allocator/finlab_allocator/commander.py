@@ -34,11 +34,17 @@ from finlab.deploy.deployed_robot import DeployedRobot
 from finlab.errors import CommandError
 from finlab.layout import Damage, Layout
 from finlab.layout.damage import NO_DAMAGE
-from finlab.swim.control.contract import asked_of_weak
 from finlab_allocator.answer_times import AnswerTimes
 from finlab_allocator.fault_watch import FaultWatch
 from finlab_allocator.frames import StaticFrames
-from finlab_allocator.input_checks import StampedInput, target_of, velocity_of
+from finlab_allocator.input_checks import (
+    ImuSample,
+    StampedInput,
+    Target,
+    age_of,
+    target_of,
+    velocity_of,
+)
 from finlab_allocator.parameters import Parameters
 from finlab_allocator.robot_source import read_robot
 from finlab_allocator.ticks import Ticks
@@ -97,6 +103,7 @@ class Commander:
         self._flow: Array | None = None
         self._flow_at_s = -math.inf
         self._commanded: Array | None = None  # weak ones are asked for more than they give
+        self._target: Target | None = None  # that of the answer in force
         self._good_at_s = 0.0  # when the last wrench came that was answered
         self._sent_at_s = 0.0
 
@@ -163,9 +170,10 @@ class Commander:
             self.damage = None
             self._flow_at_s = -math.inf
             self._commanded = None
+            self._target = None
             if self.state != "inactive":
                 self.state = "waiting"
-        if is_other or (before.monitor, before.frame) != (parameters.monitor, parameters.frame):
+        if is_other or _of_watch(before) != _of_watch(parameters):
             self._watch_as(parameters)
         elif self.watch is not None and before.lost != parameters.lost:
             self._tell_watch(self.watch, before.lost)
@@ -185,7 +193,7 @@ class Commander:
         self.damage = None
         if not parameters.monitor:
             return
-        self.watch = FaultWatch(self.layout, parameters.frame, self._frames)
+        self.watch = FaultWatch(self.layout, parameters.frame, self._frames, parameters.period_s)
         for name in self.lost:
             self.watch.tell(name, is_lost=True)
 
@@ -206,29 +214,45 @@ class Commander:
         """Whether the robot's forces depend on its velocity through the water."""
         return bool(self.layout.flow_driven) or self.layout.interaction is not None
 
-    def on_imu(self, rates: Array, orientation: Array, frame: str, now_s: float) -> None:
-        """Takes a sample of the IMU; arguments as for `FaultWatch.on_imu`."""
+    def on_imu(self, sample: ImuSample, now_s: float, clock_s: float) -> None:
+        """Takes a sample of the IMU.
+
+        Args:
+            sample: as it came.
+            now_s: now, by a clock that is never set [s].
+            clock_s: now, by the clock of stamps [s].
+        """
         if self.watch is None:
             return
         try:
-            self.watch.on_imu(rates, orientation, frame, now_s)
+            age_s = age_of("imu", sample.stamp_s, clock_s, self.parameters.watchdog_s)
+            self.watch.on_imu(sample, now_s - age_s)
         except CommandError as error:
             self.refuse(str(error))
 
-    def on_watch(self, now_s: float) -> None:
+    def on_watch(self, now_s: float) -> Sent | None:
         """Looks for faults; to be called once in the watch's period.
 
         Args:
             now_s: now, by a clock that is never set [s].
+
+        Returns:
+            Where something else is broken now, and a wrench is in force: a new answer to it.
         """
         if self.watch is None or not self.watch.hears(now_s, self.parameters.watchdog_s):
-            return
-        found = self.watch.step(now_s, self.command)
+            return None
+        found = self.watch.step()
         if found is None or found == (self.damage or NO_DAMAGE):
-            return
+            return None
         if self._is_all_lost(found):
-            return  # then it is the body that moves otherwise, and not its actuators
+            return None  # then it is the body that moves otherwise, and not its actuators
         self.damage = None if found == NO_DAMAGE else found
+        if self.state != "answering" or self._target is None:
+            return None
+        try:
+            return self._answered(self._target, now_s)
+        except Exception as error:  # the node goes on, whatever is wrong
+            return self.fail(unanswered(error), now_s)
 
     def on_velocity(self, given: StampedInput, now_s: float, clock_s: float) -> None:
         """Takes the velocity of the robot relative to the water.
@@ -242,11 +266,12 @@ class Commander:
             return
         try:
             velocity = velocity_of(given, clock_s, self.parameters, self._frames)
+            age_s = age_of("velocity", given.stamp_s, clock_s, self.parameters.watchdog_s)
         except CommandError as error:
             self.refuse(str(error))
             return
         if self.watch is not None:
-            self.watch.on_velocity(velocity)
+            self.watch.on_velocity(velocity, now_s - age_s)
         self._flow = velocity
         self._flow_at_s = now_s
 
@@ -273,15 +298,7 @@ class Commander:
             return None
         try:
             target = target_of(given, clock_s, self.parameters, self._frames)
-            _, self._stream.robot = self.ticks.spend(now_s)
-            answer = self._stream.answer(
-                target.wrench,
-                lost=self.parameters.lost,
-                free=target.free,
-                policy=self.parameters.policy,
-                damage=self.damage,
-                flow=self._flow_of(now_s),
-            )
+            sent = self._answered(target, now_s)
         except REFUSED as error:
             self.refuse(str(error))
             return None
@@ -290,9 +307,36 @@ class Commander:
         self.is_refused = False
         self.state = "answering"
         self._good_at_s = now_s
+        self._target = target
+        return sent
+
+    def _answered(self, target: Target, now_s: float) -> Sent:
+        """The answer to a target with what is known to be broken.
+
+        Args:
+            target: what is asked for.
+            now_s: now, by a clock that is never set [s].
+
+        Raises:
+            FinlabError: one of `REFUSED` where the target is at fault; other exceptions are none
+                of it.
+        """
+        length_s, self._stream.robot = self.ticks.spend(now_s)
+        answer = self._stream.answer(
+            target.wrench,
+            lost=self.parameters.lost,
+            free=target.free,
+            policy=self.parameters.policy,
+            damage=self.damage,
+            flow=self._flow_of(now_s),
+        )
         command = answer.command
-        if self.damage is not None:
-            command = asked_of_weak(self.layout, self.damage, command)
+        if self.watch is not None:
+            asked = self.watch.sent(command)
+            if not np.array_equal(asked, command, equal_nan=True):
+                # More of a weak one, or a lost one that is tried: within the rates, too.
+                asked = self.ticks.towards(asked, self._commanded, length_s)
+            command = asked
         return self._sent(answer, command, now_s)
 
     def refuse(self, sentence: str) -> None:
@@ -359,6 +403,8 @@ class Commander:
         self._stream.note(noted, (*self.parameters.lost, *found))
         self._sent_at_s = now_s
         self._commanded = command
+        if self.watch is not None:
+            self.watch.on_command(command, now_s)
         return Sent(command, noted if isinstance(noted, Allocation) else None)
 
     def _prepared(self, robot: DeployedRobot, parameters: Parameters) -> Ticks:
@@ -382,3 +428,8 @@ class Commander:
             policy=parameters.policy,
             previous=robot.neutral(parameters.lost),
         )
+
+
+def _of_watch(parameters: Parameters) -> tuple[bool, str, float]:
+    """The parameters with which the monitor begins anew."""
+    return parameters.monitor, parameters.frame, parameters.period_s

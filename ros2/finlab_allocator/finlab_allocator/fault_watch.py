@@ -1,59 +1,76 @@
-"""The fault monitor of `finlab.swim.control`, fed by what an IMU and a DVL send."""
+"""The fault monitor of `finlab.swim.control`, fed by what an IMU and a DVL send.
+
+All times are by the node's clock that is never set. A sample is as old as its stamp says: the
+monitor's time is that of the newest sample of the IMU, and each sample is taken once.
+"""
 
 import math
+from collections import deque
 
 import numpy as np
 
 from finlab.arrays import Array
 from finlab.errors import CommandError
 from finlab.layout import Damage, Layout
-from finlab.swim.control import Diagnosis, FaultMonitor, Measurement
+from finlab.swim.control import Diagnosis, FaultMonitor, Finding, Measurement
 from finlab_allocator.frames import UNIT_TOLERANCE, StaticFrames, rotation_of
+from finlab_allocator.input_checks import ImuSample
 
-CERTAIN = 0.5
-"""Probability of a fault from which on it is told of."""
+SUSPECTED = 0.5
+"""Probability of a fault from which on an actuator that is not named yet is told of."""
+COMMANDS_KEPT = 1000
+"""How many commands are kept for the monitor, where no sample of the IMU comes."""
 
 
 class FaultWatch:
-    """Believes of each actuator that it is whole, lost, weak or stuck, by how the robot moves."""
+    """Believes of each actuator that it is whole, lost, weak, reversed or stuck, by how the robot
+    moves."""
 
-    def __init__(self, layout: Layout, frame: str, frames: StaticFrames) -> None:
+    def __init__(
+        self, layout: Layout, frame: str, frames: StaticFrames, period_s: float = 0.1
+    ) -> None:
         """Believes that all are whole.
 
         Args:
             layout: the robot; what its body does not say is U-CAT's.
             frame: the robot's frame.
             frames: static transforms, of the IMU's frame and others.
+            period_s: time from one answer to the next [s].
         """
         self._layout = layout
         self._frame = frame
         self._frames = frames
-        self._monitor = FaultMonitor(layout)
+        self._monitor = FaultMonitor(layout, period_s=period_s)
         self.diagnosis: Diagnosis | None = None
         """What is believed; None before the first step."""
+        self._told: set[str] = set()
         self._attitude: tuple[float, float, float] | None = None  # roll, pitch, yaw
         self._rates = np.zeros(3)
         # The monitor takes a velocity for new where its numbers are others; NaN is none.
         self._velocity = np.full(3, np.nan)
+        self._velocity_at_s = -math.inf
         self._imu_at_s = -math.inf
+        self._stepped_at_s = -math.inf
+        self._commands: deque[tuple[float, Array]] = deque(maxlen=COMMANDS_KEPT)
+        self._now_s = 0.0
 
     @property
     def period_s(self) -> float:
         """Time between steps [s]."""
-        return self._monitor.period_s
+        return FaultMonitor.period_s
 
-    def on_imu(self, rates: Array, orientation: Array, frame: str, now_s: float) -> None:
+    def on_imu(self, sample: ImuSample, taken_s: float) -> None:
         """Takes a sample of the IMU.
 
         Args:
-            rates: angular velocity (3,) in the IMU's frame [rad/s].
-            orientation: quaternion x, y, z, w (4,) of the IMU's frame in one with z up.
-            frame: the IMU's frame; empty for that of the robot.
-            now_s: now [s].
+            sample: as it came.
+            taken_s: when it was taken [s].
 
         Raises:
             CommandError: it holds no numbers or no orientation, or its frame is unknown.
         """
+        rates = sample.rates
+        orientation = sample.orientation
         length = float(np.linalg.norm(orientation))
         if not np.isfinite(rates).all() or not abs(length - 1.0) <= UNIT_TOLERANCE:
             raise CommandError(
@@ -61,18 +78,33 @@ class FaultWatch:
                 f"{rates.tolist()} and {orientation.tolist()}; a filter estimates orientations"
             )
         # Orientation of the robot: R_wb = R_wi R_bi^T.
-        of_imu = self._frames.rotation(self._frame, frame or self._frame)
+        of_imu = self._frames.rotation(self._frame, sample.frame or self._frame)
         rotation = rotation_of(orientation / length) @ of_imu.T
         roll = math.atan2(rotation[2, 1], rotation[2, 2])
         pitch = math.asin(max(-1.0, min(1.0, -rotation[2, 0])))
         yaw = math.atan2(rotation[1, 0], rotation[0, 0])
         self._attitude = (roll, pitch, yaw)
         self._rates = of_imu @ rates
-        self._imu_at_s = now_s
+        self._imu_at_s = taken_s
 
-    def on_velocity(self, twist: Array) -> None:
-        """Takes a velocity of the robot in its own frame (6,) [m/s, rad/s]."""
+    def on_velocity(self, twist: Array, taken_s: float) -> None:
+        """Takes a velocity of the robot in its own frame.
+
+        Args:
+            twist: (6,) [m/s, rad/s].
+            taken_s: when it was measured [s].
+        """
         self._velocity = twist[:3].copy()
+        self._velocity_at_s = taken_s
+
+    def on_command(self, command: Array, now_s: float) -> None:
+        """Takes a command that goes to the drives.
+
+        Args:
+            command: (n, 3), NaN for lost actuators.
+            now_s: now [s].
+        """
+        self._commands.append((now_s, command))
 
     def hears(self, now_s: float, most_s: float) -> bool:
         """Returns whether the IMU has sent something.
@@ -81,50 +113,121 @@ class FaultWatch:
             now_s: now [s].
             most_s: age up to which it counts [s].
         """
+        self._now_s = now_s
         return 0.0 <= now_s - self._imu_at_s <= most_s
 
     def tell(self, name: str, is_lost: bool) -> None:
         """Takes an actuator for lost, or for repaired, since somebody says so."""
+        if is_lost:
+            self._told.add(name)
+        else:
+            self._told.discard(name)
         self.diagnosis = self._monitor.tell(name, 0.0 if is_lost else 1.0)
 
-    def step(self, now_s: float, command: Array | None) -> Damage | None:
+    def step(self) -> Damage | None:
         """Looks at how the robot moves.
 
-        Args:
-            now_s: now [s].
-            command: commands (n, 3) in force since the last step, NaN for lost actuators.
-
         Returns:
-            What is broken; None before the IMU has sent something.
+            What is broken; None where the IMU has sent nothing since the last step.
         """
-        if self._attitude is None:
+        taken_s = self._imu_at_s
+        if self._attitude is None or taken_s == self._stepped_at_s:
             return None
         roll, pitch, yaw = self._attitude
+        # Negative where the velocity is newer than the sample of the IMU.
+        age_of_velocity_s = taken_s - self._velocity_at_s
         measurement = Measurement(
-            time=now_s,
+            time=taken_s,
             position=np.zeros(3),
             yaw=yaw,
             velocity=self._velocity,
-            depth=0.0,
+            depth=math.nan,
             rates=self._rates,
             roll=roll,
             pitch=pitch,
+            ages=(0.0, 0.0, age_of_velocity_s if math.isfinite(age_of_velocity_s) else 0.0, 0.0),
         )
-        self.diagnosis = self._monitor.step(measurement, command)
+        self.diagnosis = self._monitor.step(measurement, self._command_until(taken_s))
+        self._stepped_at_s = taken_s
         return self.diagnosis.damage
 
-    def findings(self) -> list[str]:
-        """Returns a phrase for each actuator that is taken for broken, with how likely it is."""
+    def _command_until(self, taken_s: float) -> Array | None:
+        """The command that was in force in the middle of the time since the last step; None where
+        there was none."""
+        start_s = self._stepped_at_s
+        if not math.isfinite(start_s):
+            start_s = taken_s - self.period_s
+        middle_s = 0.5 * (start_s + taken_s)
+        while len(self._commands) > 1 and self._commands[1][0] <= middle_s:
+            self._commands.popleft()
+        if not self._commands or self._commands[0][0] > middle_s:
+            return None
+        return self._commands[0][1]
+
+    def sent(self, command: Array) -> Array:
+        """Returns what goes to the drives for the commands (n, 3) of an answer: more of weak
+        thrusters, and now and then a trial of a lost one."""
+        return self._monitor.sent(command)
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What is wrong with which actuator."""
+        return () if self.diagnosis is None else self.diagnosis.findings
+
+    @property
+    def is_unknown(self) -> bool:
+        """Whether the robot moves as no fault of an actuator explains."""
+        return self.diagnosis is not None and self.diagnosis.unknown
+
+    def phrases(self) -> list[str]:
+        """Returns a phrase for each actuator that is not whole, or is suspected of it."""
+        phrases = [f"{each.name} {self._said_of(each)}" for each in self.findings]
+        return phrases + [f"{name} in doubt ({share:.2f})" for name, share in self._suspected()]
+
+    def values(self) -> list[tuple[str, str]]:
+        """Returns the evidence: names and values for each actuator that is not whole."""
         if self.diagnosis is None:
             return []
-        damage = self.diagnosis.damage
-        probability = dict(zip(self._layout.names, self.diagnosis.probability, strict=True))
-        words = {name: "lost" for name in damage.lost}
-        words |= {name: f"at {100.0 * share:.0f} %" for name, share in damage.weak.items()}
-        words |= {name: f"at {100.0 * share:.0f} %" for name, share in damage.torn.items()}
-        words |= {name: f"stuck at {value:.3g}" for name, value in damage.stuck.items()}
-        found = [f"{name} {what} ({probability[name]:.2f})" for name, what in words.items()]
-        for name, value in probability.items():
-            if name not in words and value >= CERTAIN:
-                found.append(f"{name} in doubt ({value:.2f})")
-        return found
+        values = [("unknown", str(self.diagnosis.unknown).lower())]
+        for each in self.findings:
+            index = self._layout.index(each.name)
+            strength = self.diagnosis.strength[index]
+            deviation = self.diagnosis.strength_std[index]
+            values.append((f"{each.name}: kind", each.kind))
+            if each.name not in self._told:
+                values.append((f"{each.name}: age [s]", f"{self._now_s - each.since_s:.1f}"))
+            values.append((f"{each.name}: probability", f"{each.probability:.4f}"))
+            if each.kind == "stuck":
+                values.append((f"{each.name}: stuck at", self._stuck_at(each)))
+            else:
+                values.append((f"{each.name}: strength", f"{strength:.3f}"))
+                values.append((f"{each.name}: strength, std", f"{deviation:.3f}"))
+        for name, share in self._suspected():
+            values.append((f"{name}: suspected", f"{share:.4f}"))
+        return values
+
+    def _suspected(self) -> list[tuple[str, float]]:
+        """Actuators that are not named yet, with the probability of a fault."""
+        if self.diagnosis is None:
+            return []
+        named = {each.name for each in self.findings}
+        of_all = zip(self._layout.names, self.diagnosis.probability.tolist(), strict=True)
+        return [(name, share) for name, share in of_all if share >= SUSPECTED and name not in named]
+
+    def _said_of(self, finding: Finding) -> str:
+        """What is wrong with one, since when and how sure."""
+        what = finding.kind
+        if finding.kind == "weak":
+            what = f"weak or fouled, at {100.0 * finding.value:.0f} %"
+        elif finding.kind == "stuck":
+            what = f"stuck at {self._stuck_at(finding)}"
+        if finding.name in self._told:
+            return f"{what}, as was said"
+        age_s = self._now_s - finding.since_s
+        return f"{what} for {age_s:.1f} s ({finding.probability:.3f})"
+
+    def _stuck_at(self, finding: Finding) -> str:
+        """The force or the angle at which one is stuck."""
+        part = self._layout.actuators[self._layout.index(finding.name)]
+        unit = "rad" if part.KIND.sticks_at_angle else "N"
+        return f"{finding.value:.3g} {unit}"

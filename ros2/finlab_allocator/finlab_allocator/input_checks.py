@@ -28,6 +28,19 @@ class StampedInput(NamedTuple):
     """When it was made, by the clock of ROS [s]; `NO_STAMP` where it does not say."""
 
 
+class ImuSample(NamedTuple):
+    """A sample of an IMU, as it came."""
+
+    rates: Array
+    """Angular velocity (3,) in the IMU's frame [rad/s]."""
+    orientation: Array
+    """Quaternion x, y, z, w (4,) of the IMU's frame in one with z up; 0 where there is none."""
+    frame: str
+    """The IMU's frame; empty for that of the robot."""
+    stamp_s: float
+    """When it was taken, by the clock of ROS [s]; `NO_STAMP` where it does not say."""
+
+
 class Target(NamedTuple):
     """A wrench to answer."""
 
@@ -51,7 +64,7 @@ def target_of(
     Raises:
         CommandError: it is stale, of an unknown frame, or holds NaN or infinity.
     """
-    _check_age("wrench", given.stamp_s, now_s, parameters.watchdog_s)
+    age_of("wrench", given.stamp_s, now_s, parameters.watchdog_s)
     wrench = given.numbers
     for axis, value in zip(AXES, wrench.tolist(), strict=True):
         if math.isinf(value):
@@ -78,7 +91,7 @@ def velocity_of(
     Raises:
         CommandError: it is stale, of an unknown frame, or holds NaN or infinity.
     """
-    _check_age("velocity", given.stamp_s, now_s, parameters.watchdog_s)
+    age_of("velocity", given.stamp_s, now_s, parameters.watchdog_s)
     velocity = given.numbers
     if given.frame not in ("", parameters.frame):
         velocity = frames.twist_in(parameters.frame, given.frame, velocity)
@@ -86,10 +99,20 @@ def velocity_of(
     return velocity
 
 
-def _check_age(what: str, stamp_s: float, now_s: float, most_s: float) -> None:
-    """Refuses a stamp that is too old, or lies ahead of the clock as far."""
+def age_of(what: str, stamp_s: float, now_s: float, most_s: float) -> float:
+    """Returns how old a message is by its stamp [s]; 0 without a stamp, or ahead of the clock.
+
+    Args:
+        what: the message, for the sentence.
+        stamp_s: its stamp [s].
+        now_s: now, by the clock of ROS [s].
+        most_s: age up to which it counts [s].
+
+    Raises:
+        CommandError: it is older than that, or lies as far ahead.
+    """
     if stamp_s == NO_STAMP:
-        return
+        return 0.0
     age_s = now_s - stamp_s
     if age_s > most_s:
         raise CommandError(
@@ -101,6 +124,7 @@ def _check_age(what: str, stamp_s: float, now_s: float, most_s: float) -> None:
             f"{what}: its stamp lies {-age_s:.3g} s ahead of this computer's clock, expected at "
             f"most watchdog_s = {most_s:g} s; set the clocks of both computers"
         )
+    return max(age_s, 0.0)
 
 
 def _freed(given: StampedInput, is_nan: Array, parameters: Parameters) -> Target:

@@ -13,7 +13,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from finlab.arrays import Array
 from finlab.layout import Layout
-from finlab_allocator.input_checks import NO_STAMP, StampedInput
+from finlab_allocator.input_checks import NO_STAMP, ImuSample, StampedInput
 from finlab_allocator.status_report import Report
 from finlab_allocator.topics import number_names
 
@@ -35,22 +35,31 @@ def velocity_of(message: TwistStamped) -> StampedInput:
     return _stamped(message.header, message.twist.linear, message.twist.angular)
 
 
-def imu_of(message: Imu) -> tuple[Array, Array]:
-    """Returns the rates (3,) [rad/s] of a sample, and its quaternion x, y, z, w (4,), which is 0
-    where the sensor says that it has none."""
+def imu_of(message: Imu) -> ImuSample:
+    """Returns a sample as the node takes it."""
     rates = message.angular_velocity
     turn = message.orientation
     orientation = np.array([turn.x, turn.y, turn.z, turn.w])
-    if message.orientation_covariance[0] < 0.0:
+    if message.orientation_covariance[0] < 0.0:  # by sensor_msgs: it has none
         orientation[:] = 0.0
-    return np.array([rates.x, rates.y, rates.z]), orientation
+    return ImuSample(
+        np.array([rates.x, rates.y, rates.z]),
+        orientation,
+        message.header.frame_id,
+        _stamp_s(message.header),
+    )
+
+
+def _stamp_s(header: Header) -> float:
+    """The stamp of a message [s]; `NO_STAMP` where it has none."""
+    stamp_s = float(header.stamp.sec) + 1e-9 * float(header.stamp.nanosec)
+    return stamp_s if stamp_s else NO_STAMP
 
 
 def _stamped(header: Header, first: Vector3, second: Vector3) -> StampedInput:
     """Six numbers with their frame and stamp."""
     numbers = np.array([first.x, first.y, first.z, second.x, second.y, second.z])
-    stamp_s = header.stamp.sec + 1e-9 * header.stamp.nanosec
-    return StampedInput(numbers, header.frame_id, stamp_s if stamp_s else NO_STAMP)
+    return StampedInput(numbers, header.frame_id, _stamp_s(header))
 
 
 def wrench_stamped(wrench: Sequence[float], frame: str, stamp: Time) -> WrenchStamped:

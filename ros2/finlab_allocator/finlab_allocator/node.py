@@ -282,10 +282,8 @@ class AllocatorNode(LifecycleNode):
     def _on_imu(self, message: Imu) -> None:
         if self.commander is None:
             return
-        rates, orientation = messages.imu_of(message)
-        frame = message.header.frame_id
-        take = partial(self.commander.on_imu, rates, orientation, frame, self._now_s())
-        self._guarded(take)
+        sample = messages.imu_of(message)
+        self._guarded(partial(self.commander.on_imu, sample, self._now_s(), self._clock_s()))
 
     def _answer(self, message: WrenchStamped) -> None:
         """Answers a wrench."""
@@ -346,7 +344,7 @@ class AllocatorNode(LifecycleNode):
             self._robot_topics = RobotTopics(self, commander)
         if {"period_s", "watchdog_s"} & set(values):
             self._start_watchdog()
-        if {"robot", "monitor"} & set(values):
+        if {"robot", "monitor", "period_s"} & set(values):
             self._start_watch()
         if commander.parameters.power_w is not None and "power_w" in values:
             self.get_logger().warning(NO_POWER_BUDGET)
@@ -457,9 +455,10 @@ class AllocatorNode(LifecycleNode):
         if commander is None or commander.watch is None:
             return
         before = commander.damage
-        commander.on_watch(self._now_s())
+        sent = commander.on_watch(self._now_s())
+        self._send(sent)
         if commander.damage != before:
-            found = ", ".join(commander.watch.findings()) or "all whole"
+            found = "; ".join(commander.watch.phrases()) or "all whole"
             self.get_logger().warning(f"monitor: {found}")
 
     def _guarded(self, work: Callable[[], None]) -> None:

@@ -17,6 +17,11 @@ ERROR = 2
 """Level of one that is wrong."""
 NO_POWER_BUDGET = "power_w has no effect: this finlab has no budget of power yet"
 """What is said where parameter `power_w` is set."""
+MOVES_UNEXPLAINED = (
+    "unknown: the robot moves as no fault of an actuator explains; a tether may pull, or the body "
+    "is not as the layout says"
+)
+"""What is said where the monitor cannot name a fault."""
 MUCH_LEFT = 0.999
 """Share of an axis' wrench from which on it counts as whole."""
 
@@ -66,12 +71,15 @@ def status_report(commander: Commander, warnings: Sequence[str] = ()) -> Report:
             values.append((f"answer time p{percent} [ms]", f"{passed_ms:.3f}"))
             values.append((f"processor time p{percent} [ms]", f"{processor_ms:.3f}"))
     if commander.watch is not None:
-        found = commander.watch.findings()
-        values.append(("found", ", ".join(found)))
+        phrases = commander.watch.phrases()
+        values.append(("found", "; ".join(phrases)))
+        values += commander.watch.values()
         if commander.watch.diagnosis is None:
             warnings = (*warnings, "the monitor has no sample of the IMU yet")
-        if commander.damage is not None:
-            warnings = (*warnings, f"found: {', '.join(found)}")
+        if commander.watch.findings:
+            warnings = (*warnings, f"found: {'; '.join(phrases)}")
+        if commander.watch.is_unknown:
+            warnings = (*warnings, MOVES_UNEXPLAINED)
     if parameters.power_w is not None:
         warnings = (*warnings, NO_POWER_BUDGET)
     if warnings:
