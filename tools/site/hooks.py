@@ -30,6 +30,8 @@ FORMULA = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</\1>',
 NUMBER = re.compile(r"\s*\\tag\{(\d+)\}")
 NUMBERED = re.compile(r"^\$\$(?:(?!\$\$).)*\\tag\{(\d+)\}\$\$$", re.MULTILINE | re.DOTALL)
 PYTHON = "reference/python/"
+LETTERS_OF_LONG_PAGES = 150
+"""Letters of a section by which the search finds pages that are long or of numbers."""
 _shown: dict[str, Any] = {}
 
 
@@ -155,7 +157,7 @@ def on_post_build(config: Any) -> None:
     for each in found["docs"]:
         words = " ".join(re.sub(r"<[^<>]*>", " ", each["text"]).split())
         is_long = each["location"].startswith(("reference/", "report/", "theory/numbers/"))
-        each["text"] = words[:300] if is_long else words
+        each["text"] = words[:LETTERS_OF_LONG_PAGES] if is_long else words
     index.write_text(json.dumps(found, separators=(",", ":")))
     first = (site / "index.html").read_text()
     loaded = {
