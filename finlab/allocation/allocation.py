@@ -557,6 +557,16 @@ class Allocation(Answer[float]):
     def _of_forces(self, figure: Callable[[Plant, Array], Array]) -> Array:
         return read_only(np.asarray(figure(self._plant, self._own_forces)[0]))
 
+    @cached_property
+    def bound(self) -> float | None:
+        asked = self.__dict__.get("_asked")
+        if asked is not None:
+            prepared, row = asked
+            bound: float | None = prepared.bound(row)
+            if bound is not None:
+                return bound
+        return super().bound
+
     def _proved_bound(self, answered: LazyFigures) -> Array | None:
         return answered.bound(self._own_forces if answered.is_of_command else None)
 

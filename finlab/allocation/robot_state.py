@@ -100,6 +100,12 @@ class PreparedQuestion:
         assert self._prepared is not None
         return self._prepared.solved(row, question)
 
+    def bound(self, row: AnswerRow) -> float | None:
+        """Returns the lower bound of the power [W] of what was answered in a row; None where the
+        bound of its solution has to be asked."""
+        assert self._prepared is not None
+        return self._prepared.bound(row)
+
     def _answer_first(self, wrench: object, previous: object, multipliers: Array | None) -> None:
         self.answer = self._answer_second
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from typing_extensions import Self  # Python 3.10 has none of its own
 
     from finlab.allocation.question import MethodQuestion
-    from finlab.core.prepared_call import Answer
+    from finlab.core.prepared_call import Answer, RowBound
 
 CANDIDATE_ARRAYS = ("command", "wrench", "err_norm", "effort", "power")
 """Fields of `Candidates` that are arrays with a row of each."""
@@ -174,6 +174,9 @@ class PreparedAnswers(NamedTuple):
     """Answers a wrench."""
     solved: "Callable[[AnswerRow, MethodQuestion], Solved]"
     """Makes a solution of what that returned to a question."""
+    bound: "RowBound"
+    """Proves the lower bound of the power [W] of what that returned; None where the bound of the
+    solution has to be asked."""
 
 
 class Solution(NamedTuple):

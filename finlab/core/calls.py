@@ -803,7 +803,10 @@ class Formulas:
         self._figures = np.empty(6 * n + 7)
         arrays = (self._effectiveness, self._frames, self._command, self._figures)
         self._addresses = [array.ctypes.data for array in arrays]
-        self._laws_address = laws.ctypes.data
+        self.laws_address = laws.ctypes.data
+        """Of the laws, for the core."""
+        self.effectiveness_address = self._effectiveness.ctypes.data
+        """Of the effectiveness, for the core."""
         self._figures_of_command = library().fl_figures_of_command
         self._lock = Lock()
         """Held during a call: command and figures are the same for all threads."""
@@ -822,7 +825,7 @@ class Formulas:
             return None
         with self._lock:
             self._command[:] = command
-            code = self._figures_of_command(self._laws_address, n, *self._addresses)
+            code = self._figures_of_command(self.laws_address, n, *self._addresses)
             numbers = self._figures.copy()
         if code:
             return None
