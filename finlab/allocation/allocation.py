@@ -103,9 +103,9 @@ class LazyFigures(NamedTuple):
         """Returns sentences about the robot and the method, not about single answers."""
         state = self.state
         asked = self.wrenches
-        if state.free is not None:
+        if state.freed is not None:
             # What was asked of an axis that the layout does not command stays: a note tells of it.
-            asked = np.where(state.free & state.layout.commanded, 0.0, asked)
+            asked = np.where(state.freed, 0.0, asked)
         of_solution = () if self.solution.notes is None else self.solution.notes()
         return answer_notes(state.healthy, state.method, self.question.flow, asked, of_solution)
 
@@ -413,6 +413,7 @@ class Allocation(Answer[float]):
     NOT_COPIED: ClassVar[tuple[str, ...]] = (
         *Answer.NOT_COPIED,
         "_figures",
+        "_missing",
         "_own_forces",
         "_asked",
     )
@@ -516,6 +517,15 @@ class Allocation(Answer[float]):
         return None if self.answered is None else _read_only_candidates(self.answered.samples())
 
     @cached_property
+    def expected_error(self) -> float:
+        return super().expected_error if self._plant.is_uncertain else 0.0
+
+    @cached_property
+    def _plant(self) -> Plant:
+        asked = self.__dict__.get("_asked")
+        return super()._plant if asked is None else asked[0].state.plant  # at rest in the water
+
+    @cached_property
     def _figures(self) -> CommandFigures | None:
         """All that the core judges at once; None where the plant judges each by itself."""
         return self._plant.figures(self.command)
@@ -540,10 +550,22 @@ class Allocation(Answer[float]):
         return effort_of_one(self.layout, self.command) if self.layout.is_of_fins else None
 
     @cached_property
+    def _missing(self) -> list[float]:
+        """Numbers (6) of `unallocated`, one by one: arrays of six take four times as long."""
+        parts = []
+        for asked, given in zip(self.target.tolist(), self.wrench.tolist(), strict=True):
+            part = asked - given
+            parts.append(0.0 if math.isnan(part) else part)
+        return parts
+
+    @cached_property
+    def unallocated(self) -> Array:
+        return read_only(np.array(self._missing))
+
+    @cached_property
     def err_norm(self) -> float:
-        # Numbers one by one: arrays of six take four times as long.
         squares = 0.0
-        for missing, scale in zip(self.unallocated.tolist(), self.scale.tolist(), strict=True):
+        for missing, scale in zip(self._missing, self.scale.tolist(), strict=True):
             share = missing / scale
             squares += share * share
         return math.sqrt(squares)

@@ -194,6 +194,14 @@ class RobotState:
         return np.where(free, 0.0, 1.0)
 
     @cached_property
+    def freed(self) -> NDArray[np.bool_] | None:
+        """Mask (6,) of the free axes that the layout commands; None where there is none."""
+        if self.free is None:
+            return None
+        freed = self.free & self.layout.commanded
+        return freed if freed.any() else None
+
+    @cached_property
     def _not_asked(self) -> Array:
         """0 along the axes (6,) that are commanded, NaN along the free ones."""
         return np.where(self._counts == 0.0, np.nan, 0.0)
