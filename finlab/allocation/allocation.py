@@ -92,12 +92,12 @@ class LazyFigures(NamedTuple):
         """Returns the same of a single answer, with those that follow from the solution."""
         expected = self.solution.wrench
         multipliers = self.solution.multipliers
-        return self.fields() | {
-            "target": read_only(self.state.shown(self.question.targets[0])),
-            "wrench_expected": None if expected is None else read_only(expected[0]),
-            "multipliers": None if multipliers is None else read_only(multipliers[0]),
-            "settings": vars(self.state.method.settings).copy(),
-        }
+        values = self.fields()
+        values["target"] = read_only(self.state.shown(self.question.targets[0]))
+        values["wrench_expected"] = None if expected is None else read_only(expected[0])
+        values["multipliers"] = None if multipliers is None else read_only(multipliers[0])
+        values["settings"] = vars(self.state.method.settings).copy()
+        return values
 
     def notes(self) -> tuple[str, ...]:
         """Returns sentences about the robot and the method, not about single answers."""

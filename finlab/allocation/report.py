@@ -372,9 +372,11 @@ def fin_notes(layout: Layout, flow: Array | None = None) -> tuple[str, ...]:
 
 def _flow_notes(layout: Layout, flow: Array | None) -> tuple[str, ...]:
     """What needs a flow and has none, what a flow leaves unknown, or that no actuator feels it."""
+    if flow is None and not layout.flow_driven:
+        return ()
     foils = [actuator for actuator in layout.actuators if actuator.KIND.driven_by_flow]
     if flow is None:
-        return (_nothing_at_rest(foils),) if foils else ()
+        return (_nothing_at_rest(foils),)
     if layout.interaction is not None:
         guessed = ", ".join(
             actuator.name

@@ -770,17 +770,35 @@ class Core:
         return bound
 
 
-class CommandFigures(NamedTuple):
-    """What one command of n actuators gives and takes."""
+class CommandFigures:
+    """What one command of n actuators gives and takes: read-only views of what the core wrote."""
 
-    own_force: Array
-    """Forces (1, n, 3) [N], own frames, 0 of lost actuators."""
-    force: Array
-    """The same (n, 3) [N] in the body frame."""
-    wrench: Array
-    """Wrench (6,) [N, N m], body frame."""
-    power: float
-    """Power of all actuators [W]."""
+    __slots__ = ("_n", "_numbers")
+
+    def __init__(self, n: int, numbers: Array) -> None:
+        """Takes the figures (6 n + 7,) of `fl_figures_of_command`, read-only."""
+        self._n = n
+        self._numbers = numbers
+
+    @property
+    def own_force(self) -> Array:
+        """Forces (1, n, 3) [N], own frames, 0 of lost actuators."""
+        return self._numbers[: 3 * self._n].reshape(1, self._n, 3)
+
+    @property
+    def force(self) -> Array:
+        """The same (n, 3) [N] in the body frame."""
+        return self._numbers[3 * self._n : 6 * self._n].reshape(self._n, 3)
+
+    @property
+    def wrench(self) -> Array:
+        """Wrench (6,) [N, N m], body frame."""
+        return self._numbers[6 * self._n : -1]
+
+    @property
+    def power(self) -> float:
+        """Power of all actuators [W]."""
+        return self._numbers.item(-1)
 
 
 class Formulas:
@@ -830,13 +848,7 @@ class Formulas:
         if code:
             return None
         numbers.setflags(write=False)
-        begin_of_wrench = 6 * n
-        return CommandFigures(
-            numbers[: 3 * n].reshape(1, n, 3),
-            numbers[3 * n : begin_of_wrench].reshape(n, 3),
-            numbers[begin_of_wrench:-1],
-            numbers.item(-1),
-        )
+        return CommandFigures(n, numbers)
 
 
 def error_text(code: int) -> str:
