@@ -17,7 +17,13 @@ from finlab.actuators.actuator import Command
 from finlab.allocation.policy import Policy
 from finlab.allocation.question import MethodQuestion
 from finlab.allocation.report import allocation_blocks, answer_notes, doubts, next_measurement
-from finlab.allocation.solution import CANDIDATE_ARRAYS, Candidates, PlainData, Solved
+from finlab.allocation.solution import (
+    CANDIDATE_ARRAYS,
+    Candidates,
+    PlainData,
+    Solved,
+    without_locks,
+)
 from finlab.arrays import Array, has_nan
 from finlab.core.calls import AnswerRow, CommandFigures
 from finlab.display import html, text
@@ -146,6 +152,7 @@ class LazyFigures(NamedTuple):
         return replace(candidates, command=self.state.among_all(candidates.command))
 
 
+@without_locks
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Answer(PlainData, Generic[Number]):
     """What answers to one target and to many have, as plain data; many have N rows of each array.
@@ -400,6 +407,7 @@ class BatchAllocation(Answer[Array]):
         )
 
 
+@without_locks
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Allocation(Answer[float]):
     """The answer to one allocation problem, as plain data: it can be compared, copied, pickled and
@@ -481,10 +489,11 @@ class Allocation(Answer[float]):
                 if name == "multipliers":  # which the next tick reads alone
                     values[name] = row.multipliers[0]
                     return values[name]
-                question = prepared.question_of(row)
+                wrench = row.wrench
+                question = prepared.question_of(wrench, row.previous)
                 solution = prepared.solved(row, question)
                 values["previous"] = question.previous
-                values["answered"] = LazyFigures(prepared.state, question, row.wrench, solution)
+                values["answered"] = LazyFigures(prepared.state, question, wrench, solution)
             answered = values.get("answered")
             if answered is not None and "layout" not in values:
                 values.update(answered.fields_of_one())

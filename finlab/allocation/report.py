@@ -142,8 +142,7 @@ def allocation_blocks(result: Allocation) -> list[Block]:
 def _wrench_words(wrench: Array) -> list[str]:
     """The components of a wrench (6,) [N, N m]; NaN is that of a free axis."""
     numbers = _SIX_NUMBERS % tuple(wrench.tolist())  # in half the time of one after the other
-    words = numbers.replace("nan", "free").split()
-    return ["0.000" if word == "-0.000" else word for word in words]
+    return numbers.replace("nan", "free").replace("-0.000", "0.000").split()
 
 
 def doubts(result: Allocation) -> tuple[str, ...]:
@@ -344,7 +343,7 @@ def _asked_axes(target: Array, scale: Array, axes: Sequence[int]) -> list[str]:
     if target.ndim == 1:
         # Numbers one by one: arrays take five times as long.
         return [AXES[k] for k in axes if abs(target.item(k)) > NEARLY * scale.item(k)]
-    is_asked = (np.abs(target) > NEARLY * scale).any(axis=0)
+    is_asked = np.any(np.abs(target) > NEARLY * scale, axis=0).tolist()
     return [AXES[k] for k in axes if is_asked[k]]
 
 

@@ -91,9 +91,10 @@ class PreparedQuestion:
         """Answers a wrench; None where `RobotState.solve` has to be asked."""
         self._prepared: PreparedAnswers | None = None
 
-    def question_of(self, row: AnswerRow) -> MethodQuestion:
-        """Returns the question that was answered in a row."""
-        return self.state.question(row.wrench[None], self.policy, None, 0, row.previous)
+    def question_of(self, wrench: Array, previous: Array | None) -> MethodQuestion:
+        """Returns the question about a wrench (6,) [N, N m], with the command (n, 3) of the tick
+        before; None outside of ticks."""
+        return self.state.question(wrench[None], self.policy, None, 0, previous)
 
     def solved(self, row: AnswerRow, question: MethodQuestion) -> Solved:
         """Returns the solution of a question that was answered in a row."""

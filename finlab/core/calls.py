@@ -64,6 +64,23 @@ class AnswerMemory:
         heads = self._numbers[:, : self._head_length]
         return heads.view(struct("fl_answer_row"))[:, 0]
 
+    # Views of some fields, since every answer would pay for looking them up by name.
+
+    @cached_property
+    def is_tick(self) -> Array:
+        """1 of rows (ROWS,) of ticks, else 0."""
+        return self.head["is_tick"]
+
+    @cached_property
+    def wrench(self) -> Array:
+        """(ROWS, 6) that was asked for [N, N m]."""
+        return self.head["wrench"]
+
+    @cached_property
+    def multipliers(self) -> Array:
+        """(ROWS, 6) [W/N, W/(N m)]."""
+        return self.head["multipliers"]
+
     @cached_property
     def force(self) -> Array:
         """(ROWS, n, 2) [N]."""
@@ -136,18 +153,18 @@ class AnswerRow(NamedTuple):
     @property
     def wrench(self) -> Array:
         """Wrench (6,) that was asked for [N, N m], read-only."""
-        wrench: Array = self._head["wrench"][0]
+        wrench: Array = self.memory.wrench[self.row]
         return wrench
 
     @property
     def previous(self) -> Array | None:
         """Command (n, 3) of the tick before, read-only; None outside of ticks."""
-        return self.memory.previous[self.row] if self._head["is_tick"][0] else None
+        return self.memory.previous[self.row] if self.memory.is_tick.item(self.row) else None
 
     @property
     def multipliers(self) -> Array:
         """(1, 6) [W/N, W/(N m)], read-only."""
-        return self._head["multipliers"]
+        return self.memory.multipliers[self.row : self.row + 1]
 
     @property
     def wrench_served(self) -> Array:

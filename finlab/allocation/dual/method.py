@@ -612,8 +612,9 @@ class Dual(Method):
         if len(command) == 1:
             figures = self.plant.figures(command[0])
             if figures is not None:
-                return np.asarray(figures.wrench[None])
-        return wrench_of_forces(force, self.plant.effectiveness)
+                return figures.wrench[None]
+        wrench: Array = wrench_of_forces(force, self.plant.effectiveness)
+        return wrench
 
     def _bound_below_power(
         self,
