@@ -4,6 +4,7 @@
 """
 
 import math
+import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
@@ -79,19 +80,12 @@ class LazyFigures(NamedTuple):
 
     def fields(self) -> dict[str, Any]:
         """Returns the fields of a result that follow from the question, by name."""
-        state = self.state
-        method = state.method
-        networks = method.networks
+        question = self.question
         return {
-            "layout": state.layout,
-            "damage": state.damage,
-            "scale": method.scale,
-            "method": method.name,
-            "checkpoint": None if networks is None else networks.name,
-            "policy": self.question.policy,
-            "flow": self.question.flow,
-            "seed": self.question.seed,
-            "unknown_fins": method.unknown_fins,
+            **self.state.fields_of_results,
+            "policy": question.policy,
+            "flow": question.flow,
+            "seed": question.seed,
         }
 
     def fields_of_one(self) -> dict[str, Any]:
@@ -504,8 +498,10 @@ class Allocation(Answer[float]):
     @property
     def commands(self) -> dict[str, Command | None]:
         """Command of each actuator by its name, in a type of its own; None for a lost one."""
-        rows = zip(self.layout.actuators, self.command, strict=True)
-        return {actuator.name: actuator.command(row) for actuator, row in rows}
+        commands = {}
+        for actuator, row in zip(self.layout.actuators, self.command, strict=True):
+            commands[actuator.name] = actuator.command(row)
+        return commands
 
     @cached_property
     def calm_power(self) -> float:
@@ -561,11 +557,8 @@ class Allocation(Answer[float]):
     @cached_property
     def _missing(self) -> list[float]:
         """Numbers (6) of `unallocated`, one by one: arrays of six take four times as long."""
-        parts = []
-        for asked, given in zip(self.target.tolist(), self.wrench.tolist(), strict=True):
-            part = asked - given
-            parts.append(0.0 if math.isnan(part) else part)
-        return parts
+        missing = map(operator.sub, self.target.tolist(), self.wrench.tolist())
+        return [part if part == part else 0.0 for part in missing]  # 0 in place of NaN
 
     @cached_property
     def unallocated(self) -> Array:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -173,6 +173,20 @@ class RobotState:
     def healthy(self) -> Layout:
         """The robot of the m actuators that work alone."""
         return without_lost(self.layout, self.damage)
+
+    @cached_property
+    def fields_of_results(self) -> dict[str, Any]:
+        """Fields of a result, by name, that are those of the robot and of the method."""
+        method = self.method
+        networks = method.networks
+        return {
+            "layout": self.layout,
+            "damage": self.damage,
+            "scale": method.scale,
+            "method": method.name,
+            "checkpoint": None if networks is None else networks.name,
+            "unknown_fins": method.unknown_fins,
+        }
 
     @cached_property
     def lost(self) -> NDArray[np.bool_] | None:
