@@ -168,9 +168,8 @@ def test_bound_and_power_are_those_of_a_first_answer(way: str) -> None:
     assert bound is not None
     assert bound == first_answer("fish").bound
     assert 0.0 < bound <= result.power * (1.0 + 1e-9)
-    assert str(result).partition("ms")[0].rpartition("effort")[0] == (
-        str(first_answer("fish")).partition("ms")[0].rpartition("effort")[0]
-    )
+    tables = str(result).partition("effort")[0]  # behind which stands the time
+    assert tables == str(first_answer("fish")).partition("effort")[0]
 
 
 BAD: list[tuple[Any, str]] = [
