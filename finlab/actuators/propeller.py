@@ -138,10 +138,10 @@ class Propeller(Actuator):
 
     def command(self, row: Array) -> Command | None:
         """See `Actuator`: with the input for its force, where it has a table."""
-        if np.isnan(row[0]):
+        numbers = row.tolist()[: len(self.KIND.numbers)]
+        if math.isnan(numbers[0]):
             return None
-        numbers = row[: len(self.KIND.numbers)].tolist()
-        table_input = input_of(self.model, row[len(self.KIND.numbers) - 1])
+        table_input = input_of(self.model, numbers[-1])
         return self.KIND.command(*numbers, None if table_input is None else float(table_input))
 
     def commands(self, rows: Array) -> Command:

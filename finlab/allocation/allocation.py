@@ -4,6 +4,7 @@
 """
 
 import math
+import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
@@ -17,7 +18,13 @@ from finlab.actuators.actuator import Command
 from finlab.allocation.policy import Policy
 from finlab.allocation.question import MethodQuestion
 from finlab.allocation.report import allocation_blocks, answer_notes, doubts, next_measurement
-from finlab.allocation.solution import CANDIDATE_ARRAYS, Candidates, PlainData, Solved
+from finlab.allocation.solution import (
+    CANDIDATE_ARRAYS,
+    Candidates,
+    PlainData,
+    Solved,
+    without_locks,
+)
 from finlab.arrays import Array, has_nan
 from finlab.core.calls import AnswerRow, CommandFigures
 from finlab.display import html, text
@@ -73,39 +80,32 @@ class LazyFigures(NamedTuple):
 
     def fields(self) -> dict[str, Any]:
         """Returns the fields of a result that follow from the question, by name."""
-        state = self.state
-        method = state.method
-        networks = method.networks
+        question = self.question
         return {
-            "layout": state.layout,
-            "damage": state.damage,
-            "scale": method.scale,
-            "method": method.name,
-            "checkpoint": None if networks is None else networks.name,
-            "policy": self.question.policy,
-            "flow": self.question.flow,
-            "seed": self.question.seed,
-            "unknown_fins": method.unknown_fins,
+            **self.state.fields_of_results,
+            "policy": question.policy,
+            "flow": question.flow,
+            "seed": question.seed,
         }
 
     def fields_of_one(self) -> dict[str, Any]:
         """Returns the same of a single answer, with those that follow from the solution."""
         expected = self.solution.wrench
         multipliers = self.solution.multipliers
-        return self.fields() | {
-            "target": read_only(self.state.shown(self.question.targets[0])),
-            "wrench_expected": None if expected is None else read_only(expected[0]),
-            "multipliers": None if multipliers is None else read_only(multipliers[0]),
-            "settings": vars(self.state.method.settings).copy(),
-        }
+        values = self.fields()
+        values["target"] = read_only(self.state.shown(self.question.targets[0]))
+        values["wrench_expected"] = None if expected is None else read_only(expected[0])
+        values["multipliers"] = None if multipliers is None else read_only(multipliers[0])
+        values["settings"] = vars(self.state.method.settings).copy()
+        return values
 
     def notes(self) -> tuple[str, ...]:
         """Returns sentences about the robot and the method, not about single answers."""
         state = self.state
         asked = self.wrenches
-        if state.free is not None:
+        if state.freed is not None:
             # What was asked of an axis that the layout does not command stays: a note tells of it.
-            asked = np.where(state.free & state.layout.commanded, 0.0, asked)
+            asked = np.where(state.freed, 0.0, asked)
         of_solution = () if self.solution.notes is None else self.solution.notes()
         return answer_notes(state.healthy, state.method, self.question.flow, asked, of_solution)
 
@@ -146,6 +146,7 @@ class LazyFigures(NamedTuple):
         return replace(candidates, command=self.state.among_all(candidates.command))
 
 
+@without_locks
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Answer(PlainData, Generic[Number]):
     """What answers to one target and to many have, as plain data; many have N rows of each array.
@@ -400,6 +401,7 @@ class BatchAllocation(Answer[Array]):
         )
 
 
+@without_locks
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Allocation(Answer[float]):
     """The answer to one allocation problem, as plain data: it can be compared, copied, pickled and
@@ -413,6 +415,7 @@ class Allocation(Answer[float]):
     NOT_COPIED: ClassVar[tuple[str, ...]] = (
         *Answer.NOT_COPIED,
         "_figures",
+        "_missing",
         "_own_forces",
         "_asked",
     )
@@ -480,10 +483,11 @@ class Allocation(Answer[float]):
                 if name == "multipliers":  # which the next tick reads alone
                     values[name] = row.multipliers[0]
                     return values[name]
-                question = prepared.question_of(row)
+                wrench = row.wrench
+                question = prepared.question_of(wrench, row.previous)
                 solution = prepared.solved(row, question)
                 values["previous"] = question.previous
-                values["answered"] = LazyFigures(prepared.state, question, row.wrench, solution)
+                values["answered"] = LazyFigures(prepared.state, question, wrench, solution)
             answered = values.get("answered")
             if answered is not None and "layout" not in values:
                 values.update(answered.fields_of_one())
@@ -494,8 +498,10 @@ class Allocation(Answer[float]):
     @property
     def commands(self) -> dict[str, Command | None]:
         """Command of each actuator by its name, in a type of its own; None for a lost one."""
-        rows = zip(self.layout.actuators, self.command, strict=True)
-        return {actuator.name: actuator.command(row) for actuator, row in rows}
+        commands = {}
+        for actuator, row in zip(self.layout.actuators, self.command, strict=True):
+            commands[actuator.name] = actuator.command(row)
+        return commands
 
     @cached_property
     def calm_power(self) -> float:
@@ -514,6 +520,15 @@ class Allocation(Answer[float]):
     def samples(self) -> Candidates | None:
         """Raw candidates before refinement, best first; None for methods that draw none."""
         return None if self.answered is None else _read_only_candidates(self.answered.samples())
+
+    @cached_property
+    def expected_error(self) -> float:
+        return super().expected_error if self._plant.is_uncertain else 0.0
+
+    @cached_property
+    def _plant(self) -> Plant:
+        asked = self.__dict__.get("_asked")
+        return super()._plant if asked is None else asked[0].state.plant  # at rest in the water
 
     @cached_property
     def _figures(self) -> CommandFigures | None:
@@ -540,10 +555,19 @@ class Allocation(Answer[float]):
         return effort_of_one(self.layout, self.command) if self.layout.is_of_fins else None
 
     @cached_property
+    def _missing(self) -> list[float]:
+        """Numbers (6) of `unallocated`, one by one: arrays of six take four times as long."""
+        missing = map(operator.sub, self.target.tolist(), self.wrench.tolist())
+        return [part if part == part else 0.0 for part in missing]  # 0 in place of NaN
+
+    @cached_property
+    def unallocated(self) -> Array:
+        return read_only(np.array(self._missing))
+
+    @cached_property
     def err_norm(self) -> float:
-        # Numbers one by one: arrays of six take four times as long.
         squares = 0.0
-        for missing, scale in zip(self.unallocated.tolist(), self.scale.tolist(), strict=True):
+        for missing, scale in zip(self._missing, self.scale.tolist(), strict=True):
             share = missing / scale
             squares += share * share
         return math.sqrt(squares)
@@ -556,6 +580,16 @@ class Allocation(Answer[float]):
 
     def _of_forces(self, figure: Callable[[Plant, Array], Array]) -> Array:
         return read_only(np.asarray(figure(self._plant, self._own_forces)[0]))
+
+    @cached_property
+    def bound(self) -> float | None:
+        asked = self.__dict__.get("_asked")
+        if asked is not None:
+            prepared, row = asked
+            bound: float | None = prepared.bound(row)
+            if bound is not None:
+                return bound
+        return super().bound
 
     def _proved_bound(self, answered: LazyFigures) -> Array | None:
         return answered.bound(self._own_forces if answered.is_of_command else None)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,14 +91,21 @@ class PreparedQuestion:
         """Answers a wrench; None where `RobotState.solve` has to be asked."""
         self._prepared: PreparedAnswers | None = None
 
-    def question_of(self, row: AnswerRow) -> MethodQuestion:
-        """Returns the question that was answered in a row."""
-        return self.state.question(row.wrench[None], self.policy, None, 0, row.previous)
+    def question_of(self, wrench: Array, previous: Array | None) -> MethodQuestion:
+        """Returns the question about a wrench (6,) [N, N m], with the command (n, 3) of the tick
+        before; None outside of ticks."""
+        return self.state.question(wrench[None], self.policy, None, 0, previous)
 
     def solved(self, row: AnswerRow, question: MethodQuestion) -> Solved:
         """Returns the solution of a question that was answered in a row."""
         assert self._prepared is not None
         return self._prepared.solved(row, question)
+
+    def bound(self, row: AnswerRow) -> float | None:
+        """Returns the lower bound of the power [W] of what was answered in a row; None where the
+        bound of its solution has to be asked."""
+        assert self._prepared is not None
+        return self._prepared.bound(row)
 
     def _answer_first(self, wrench: object, previous: object, multipliers: Array | None) -> None:
         self.answer = self._answer_second
@@ -168,6 +175,20 @@ class RobotState:
         return without_lost(self.layout, self.damage)
 
     @cached_property
+    def fields_of_results(self) -> dict[str, Any]:
+        """Fields of a result, by name, that are those of the robot and of the method."""
+        method = self.method
+        networks = method.networks
+        return {
+            "layout": self.layout,
+            "damage": self.damage,
+            "scale": method.scale,
+            "method": method.name,
+            "checkpoint": None if networks is None else networks.name,
+            "unknown_fins": method.unknown_fins,
+        }
+
+    @cached_property
     def lost(self) -> NDArray[np.bool_] | None:
         """Mask (n,) of the actuators that are lost; None where none is."""
         return ~self.works if self.damage.lost else None
@@ -186,6 +207,14 @@ class RobotState:
         """1 along the axes (6,) that are commanded, 0 along the free ones."""
         free = np.zeros(6, bool) if self.free is None else self.free
         return np.where(free, 0.0, 1.0)
+
+    @cached_property
+    def freed(self) -> NDArray[np.bool_] | None:
+        """Mask (6,) of the free axes that the layout commands; None where there is none."""
+        if self.free is None:
+            return None
+        freed = self.free & self.layout.commanded
+        return freed if freed.any() else None
 
     @cached_property
     def _not_asked(self) -> Array:

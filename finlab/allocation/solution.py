@@ -3,9 +3,11 @@
 `Method.solve` returns a `Solution`; `robot_state.py` and `allocation.py` make results of it.
 """
 
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +19,39 @@ if TYPE_CHECKING:
     from typing_extensions import Self  # Python 3.10 has none of its own
 
     from finlab.allocation.question import MethodQuestion
-    from finlab.core.prepared_call import Answer
+    from finlab.core.prepared_call import Answer, RowBound
+
+Kind = TypeVar("Kind")
+"""A class."""
 
 CANDIDATE_ARRAYS = ("command", "wrench", "err_norm", "effort", "power")
 """Fields of `Candidates` that are arrays with a row of each."""
+
+
+class _UnlockedProperty(cached_property):  # type: ignore[type-arg]
+    """A cached property that takes no lock, as all are from Python 3.12 on."""
+
+    def __get__(self, instance: Any, owner: type[Any] | None = None) -> Any:
+        """Computes the value; once it is cached, Python does not ask here."""
+        if instance is None:
+            return self
+        assert self.attrname is not None
+        value = self.func(instance)
+        instance.__dict__[self.attrname] = value
+        return value
+
+
+def without_locks(kind: type[Kind]) -> type[Kind]:
+    """Has the cached properties of a class take no lock: it takes longer than most of them, and two
+    threads that read one at the same time find the same value."""
+    if sys.version_info >= (3, 12):
+        return kind
+    for name, value in list(vars(kind).items()):
+        if isinstance(value, cached_property):
+            unlocked = _UnlockedProperty(value.func)
+            unlocked.__set_name__(kind, name)
+            setattr(kind, name, unlocked)
+    return kind
 
 
 class PlainData:
@@ -174,6 +205,9 @@ class PreparedAnswers(NamedTuple):
     """Answers a wrench."""
     solved: "Callable[[AnswerRow, MethodQuestion], Solved]"
     """Makes a solution of what that returned to a question."""
+    bound: "RowBound"
+    """Proves the lower bound of the power [W] of what that returned; None where the bound of the
+    solution has to be asked."""
 
 
 class Solution(NamedTuple):

@@ -9,7 +9,7 @@ from typing import TypeVar
 
 from finlab.errors import FinlabError
 
-VERSION = 18
+VERSION = 19
 """What `fl_version()` of the C files returns; both rise together where a signature or a struct
 changes."""
 SIGNATURES = {
@@ -31,6 +31,7 @@ SIGNATURES = {
     "fl_figures_of_command": "ipipppp",
     "fl_conjugates": "ippppipp",
     "fl_power_bounds": "ipppppipp",
+    "fl_power_bound_of_row": "rppppp",
     "fl_reach": "vpppppirppp",
     "fl_jets": "vppipppp",
     "fl_message_rows": "vppipppp",

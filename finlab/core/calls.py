@@ -64,6 +64,23 @@ class AnswerMemory:
         heads = self._numbers[:, : self._head_length]
         return heads.view(struct("fl_answer_row"))[:, 0]
 
+    # Views of some fields, since every answer would pay for looking them up by name.
+
+    @cached_property
+    def is_tick(self) -> Array:
+        """1 of rows (ROWS,) of ticks, else 0."""
+        return self.head["is_tick"]
+
+    @cached_property
+    def wrench(self) -> Array:
+        """(ROWS, 6) that was asked for [N, N m]."""
+        return self.head["wrench"]
+
+    @cached_property
+    def multipliers(self) -> Array:
+        """(ROWS, 6) [W/N, W/(N m)]."""
+        return self.head["multipliers"]
+
     @cached_property
     def force(self) -> Array:
         """(ROWS, n, 2) [N]."""
@@ -136,18 +153,18 @@ class AnswerRow(NamedTuple):
     @property
     def wrench(self) -> Array:
         """Wrench (6,) that was asked for [N, N m], read-only."""
-        wrench: Array = self._head["wrench"][0]
+        wrench: Array = self.memory.wrench[self.row]
         return wrench
 
     @property
     def previous(self) -> Array | None:
         """Command (n, 3) of the tick before, read-only; None outside of ticks."""
-        return self.memory.previous[self.row] if self._head["is_tick"][0] else None
+        return self.memory.previous[self.row] if self.memory.is_tick.item(self.row) else None
 
     @property
     def multipliers(self) -> Array:
         """(1, 6) [W/N, W/(N m)], read-only."""
-        return self._head["multipliers"]
+        return self.memory.multipliers[self.row : self.row + 1]
 
     @property
     def wrench_served(self) -> Array:
@@ -770,17 +787,35 @@ class Core:
         return bound
 
 
-class CommandFigures(NamedTuple):
-    """What one command of n actuators gives and takes."""
+class CommandFigures:
+    """What one command of n actuators gives and takes: read-only views of what the core wrote."""
 
-    own_force: Array
-    """Forces (1, n, 3) [N], own frames, 0 of lost actuators."""
-    force: Array
-    """The same (n, 3) [N] in the body frame."""
-    wrench: Array
-    """Wrench (6,) [N, N m], body frame."""
-    power: float
-    """Power of all actuators [W]."""
+    __slots__ = ("_n", "_numbers")
+
+    def __init__(self, n: int, numbers: Array) -> None:
+        """Takes the figures (6 n + 7,) of `fl_figures_of_command`, read-only."""
+        self._n = n
+        self._numbers = numbers
+
+    @property
+    def own_force(self) -> Array:
+        """Forces (1, n, 3) [N], own frames, 0 of lost actuators."""
+        return self._numbers[: 3 * self._n].reshape(1, self._n, 3)
+
+    @property
+    def force(self) -> Array:
+        """The same (n, 3) [N] in the body frame."""
+        return self._numbers[3 * self._n : 6 * self._n].reshape(self._n, 3)
+
+    @property
+    def wrench(self) -> Array:
+        """Wrench (6,) [N, N m], body frame."""
+        return self._numbers[6 * self._n : -1]
+
+    @property
+    def power(self) -> float:
+        """Power of all actuators [W]."""
+        return self._numbers.item(-1)
 
 
 class Formulas:
@@ -803,7 +838,10 @@ class Formulas:
         self._figures = np.empty(6 * n + 7)
         arrays = (self._effectiveness, self._frames, self._command, self._figures)
         self._addresses = [array.ctypes.data for array in arrays]
-        self._laws_address = laws.ctypes.data
+        self.laws_address = laws.ctypes.data
+        """Of the laws, for the core."""
+        self.effectiveness_address = self._effectiveness.ctypes.data
+        """Of the effectiveness, for the core."""
         self._figures_of_command = library().fl_figures_of_command
         self._lock = Lock()
         """Held during a call: command and figures are the same for all threads."""
@@ -826,18 +864,12 @@ class Formulas:
             return None
         with self._lock:
             self._command[:] = command
-            code = self._figures_of_command(self._laws_address, n, *self._addresses)
+            code = self._figures_of_command(self.laws_address, n, *self._addresses)
             numbers = self._figures.copy()
         if code:
             return None
         numbers.setflags(write=False)
-        begin_of_wrench = 6 * n
-        return CommandFigures(
-            numbers[: 3 * n].reshape(1, n, 3),
-            numbers[3 * n : begin_of_wrench].reshape(n, 3),
-            numbers[begin_of_wrench:-1],
-            numbers.item(-1),
-        )
+        return CommandFigures(n, numbers)
 
 
 def error_text(code: int) -> str:

@@ -71,7 +71,7 @@ typedef double fl_wide; /* where differences of large numbers matter, in single 
 #define FL_FOILS (FL_FOILS_CHEAPER + 2 * FL_LATTICE_STARTS * FL_STEPS_AT_KINK)
 #define FL_BOUND (2 * (FL_FORCES + FL_FOILS))
 
-#define FL_VERSION 18  /* of all structs and functions here */
+#define FL_VERSION 19  /* of all structs and functions here */
 #define FL_MAGIC 41721 /* first number of a block */
 
 /* The structs that cross the border of the library. */
@@ -318,6 +318,20 @@ int fl_conjugates(const fl_real *block, fl_work *work, const fl_question *questi
 int fl_power_bounds(const fl_real *block, fl_work *work, const fl_question *question,
                     const fl_real *multipliers, const fl_real *wrench, int count,
                     const fl_real *const *margins, fl_real *bound);
+
+/* Does the same for one answer, at its own multipliers and for the wrench of its command.
+
+   @param call          with which it was asked
+   @param laws          (n,) of the actuators, as in fl_figures_of_command
+   @param effectiveness (n, 3, 6) wrench per newton along own axes [1, m], 0 along axes that do not
+                        count
+   @param margins       as in fl_power_bounds
+   @param row           of fl_answer_into_row
+   @return              the bound [W]; -1 where it is not found here: gaps need power, too, or the
+                        work area is busy */
+fl_real fl_power_bound_of_row(const fl_prepared_call *call, const fl_formula *laws,
+                              const fl_real *effectiveness, const fl_real *const *margins,
+                              const fl_real *row);
 
 /* Says how far rays go in the wrenches that robots of planes give.
 

@@ -9,20 +9,31 @@ import ctypes
 import sys
 from collections.abc import Callable
 from functools import cache
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
 from finlab.arrays import Array
 from finlab.core import library
-from finlab.core.calls import ROWS, AnswerMemory, AnswerRow, Conditions, Core, QuestionRecord
+from finlab.core.calls import (
+    ROWS,
+    AnswerMemory,
+    AnswerRow,
+    Conditions,
+    ConjugateMargins,
+    Core,
+    Formulas,
+    QuestionRecord,
+)
 from finlab.core.fields import Record
 
 Answer: TypeAlias = Callable[[object, object, Array | None], AnswerRow | None]
 """Answers a wrench, with the command (n, 3) of the tick before and multipliers (6,) to begin with,
 each None for none. Returns a finished answer; None where `Core.answer_row` has to be asked: it says
 what is wrong with a question, and gives answers that are not finished, too."""
-
+RowBound: TypeAlias = Callable[[AnswerRow], float | None]
+"""Finds the lower bound of the power [W] of an answer; None where it has to be found by
+`Core.power_bounds`."""
 
 _MEMORY = 2
 """Index of the memory of the rows in what C reads."""
@@ -30,14 +41,45 @@ _COMMANDS = 3
 """Index of the commands of these rows."""
 
 
-def prepared_answer(
+class PreparedCall(NamedTuple):
+    """A question of which all is known but the wrench, and what is found of its answers later."""
+
+    answer: Answer
+    """Answers as `Core.answer_row` does, in a fraction of the time around C."""
+    record: Record
+    """The `fl_prepared_call` (1,)."""
+
+    def power_bounds(self, formulas: Formulas, margins: ConjugateMargins) -> RowBound:
+        """Prepares lower bounds of the power of the answers, see `Core.power_bounds`.
+
+        Args:
+            formulas: laws of the actuators; their effectiveness is 0 along axes that do not count.
+            margins: of all actuators.
+        """
+        addresses = (
+            self.record.ctypes.data,
+            formulas.laws_address,
+            formulas.effectiveness_address,
+            margins.address,
+        )
+        power_bound_of_row = library().fl_power_bound_of_row
+        pointed_at = (self, formulas, margins)
+
+        def power_bound(row: AnswerRow, _pointed_at: object = pointed_at) -> float | None:
+            bound: float = power_bound_of_row(*addresses, row.memory.address_of(row.row))
+            return None if bound < 0.0 else bound
+
+        return power_bound
+
+
+def prepared_call(
     core: Core,
     policy: Record | None,
     conditions: Conditions,
     calm: float,
     most_wrench: float,
     most_error: float,
-) -> Answer | None:
+) -> PreparedCall | None:
     """Prepares a question of which all is known but the wrench, and in a tick the command before.
 
     Args:
@@ -49,8 +91,7 @@ def prepared_answer(
         most_error: error up to which commands are exact [1].
 
     Returns:
-        A function that answers as `Core.answer_row` does, in a fraction of the time around C;
-        None where this interpreter has none.
+        The call; None where this interpreter has no such functions.
     """
     if not has_builtin_functions():
         return None
@@ -63,7 +104,7 @@ def prepared_answer(
     record["calm"] = calm
     rows = _Rows(record, core.n, (core, question))
     answer: Answer = _functions_of_python()(library().fl_python_method(), rows.bound, None)
-    return answer
+    return PreparedCall(answer, record)
 
 
 class _Rows:

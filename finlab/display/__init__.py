@@ -11,6 +11,7 @@ import math
 from base64 import b64encode
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from html import escape
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -138,12 +139,18 @@ def aligned(head: Sequence[str], rows: Sequence[Sequence[str]], words: Sequence[
         words: whether each column is aligned to the left.
     """
     widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
+    line = _line_format(tuple(widths), tuple(words))
+    return "\n".join([(line % tuple(cells)).rstrip() for cells in (head, *rows)])
+
+
+@lru_cache(maxsize=256)
+def _line_format(widths: Sequence[int], words: Sequence[bool]) -> str:
+    """The format of a line, cached: tables that are printed again mostly have the same widths."""
     columns = []
     for width, is_words in zip(widths, words, strict=True):
-        side = "<" if is_words else ">"
-        columns.append(f"{{:{side}{width}}}")
-    line = "  ".join(columns)
-    return "\n".join([line.format(*cells).rstrip() for cells in (head, *rows)])
+        side = "-" if is_words else ""
+        columns.append(f"%{side}{width}s")
+    return "  ".join(columns)
 
 
 def html(blocks: Iterable[Block], picture: Callable[[], Figure]) -> str:

@@ -128,7 +128,8 @@ class Layout(Checked):
     def stamps(self) -> tuple[tuple[int, int] | None, ...]:
         """Time and size of each file that a law or the interaction reads; a cache is valid until
         one of them changes."""
-        return tuple(reader.stamp for reader in self._readers)
+        readers = self._readers
+        return tuple([reader.stamp for reader in readers]) if readers else ()
 
     @cached_property
     def _readers(self) -> "tuple[Actuator | InteractionModel, ...]":

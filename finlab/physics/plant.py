@@ -95,7 +95,7 @@ class Plant:
         plant = copy(self)
         plant.effectiveness = np.where(axes, self.effectiveness, 0.0)
         plant.counts = axes
-        plant.__dict__.pop("_formulas", None)  # they have the effectiveness
+        plant.__dict__.pop("formulas", None)  # they have the effectiveness
         return plant
 
     def inflow(self, flow: Array | None) -> Array | None:
@@ -324,11 +324,11 @@ class Plant:
             Its figures, which are those of the laws to rounding; None where a law is no formula,
             actuators act on each other, or the command is none of this robot.
         """
-        formulas = self._formulas
+        formulas = self.formulas
         return None if formulas is None else formulas.figures(command)
 
     @cached_property
-    def _formulas(self) -> Formulas | None:
+    def formulas(self) -> Formulas | None:
         """The laws of all actuators as the core evaluates them; None where one is no formula there,
         feels the flow, or actuators act on each other."""
         if self.feels_flow:

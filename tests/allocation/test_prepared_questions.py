@@ -148,6 +148,30 @@ def test_copies_and_other_commands_of_a_result(way: str) -> None:
     assert str(copy) == str(result)
 
 
+def test_figures_are_found_once(way: str) -> None:
+    allocator = Allocator(finlab.load_layout("fish"))
+    for _ in range(3):
+        result = allocator.allocate(target_of("fish"))
+    for name in ("forces", "wrench", "unallocated", "bound", "notes"):
+        assert name not in vars(result)
+        found = getattr(result, name)
+        assert vars(result)[name] is found
+        assert getattr(result, name) is found
+
+
+def test_bound_and_power_are_those_of_a_first_answer(way: str) -> None:
+    allocator = Allocator(finlab.load_layout("fish"))
+    target = target_of("fish")
+    for _ in range(3):
+        result = allocator.allocate(target)
+    bound = result.bound  # before anything else is known of the answer
+    assert bound is not None
+    assert bound == first_answer("fish").bound
+    assert 0.0 < bound <= result.power * (1.0 + 1e-9)
+    tables = str(result).partition("effort")[0]  # behind which stands the time
+    assert tables == str(first_answer("fish")).partition("effort")[0]
+
+
 BAD: list[tuple[Any, str]] = [
     ([1.0, 2.0], "six numbers"),
     ([float("nan"), 0, 0, 0, 0, 0], "free="),

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from finlab.allocation.dual.compiled import Compiled, core_policy
-from finlab.allocation.policy import POLICY_NAMES, as_policy
+from finlab.allocation.policy import CLOSEST, POLICY_NAMES, as_policy
 from finlab.arrays import Array
 from finlab.core.calls import NOMINAL, ROWS, AnswerMemory, AnswerRow, Conditions, Core
-from finlab.core.prepared_call import Answer, has_builtin_functions, prepared_answer
+from finlab.core.prepared_call import Answer, has_builtin_functions, prepared_call
 from finlab.layout import load_layout
+from finlab.physics.plant import plant_of
 
 ROBOTS = ("bluerov2_heavy", "bluerov2", "A", "turtle_hybrid", "catamaran", "fish")
 """Shipped robots of every kind of command but foils."""
@@ -33,9 +34,9 @@ def core_of(robot: str) -> Core:
 def prepared(core: Core, policy: str = "closest", conditions: Conditions = NOMINAL) -> Answer:
     """A question to it, of which all but the wrench is known."""
     record = core_policy(as_policy(policy))  # type: ignore[arg-type]
-    answer = prepared_answer(core, record, conditions, 2.0, MOST_WRENCH, MOST_ERROR)
-    assert answer is not None
-    return answer
+    call = prepared_call(core, record, conditions, 2.0, MOST_WRENCH, MOST_ERROR)
+    assert call is not None
+    return call.answer
 
 
 def wrenches_of(core: Core, count: int, size: float = 1.0) -> Array:
@@ -99,6 +100,58 @@ def test_losses_and_free_axes_are_those_that_are_prepared() -> None:
         for wrench in wrenches_of(core, 6):
             expected = core.answer_row(wrench, record, None, conditions, MOST_ERROR)
             assert_same(answer(wrench, None, None), expected)
+
+
+@pytest.mark.parametrize("robot", ["bluerov2_heavy", "A", "fish"])
+def test_bounds_are_those_of_power_bounds(robot: str) -> None:
+    layout = load_layout(robot)
+    compiled = Compiled.of(layout)
+    core = compiled.core
+    margins = compiled.conjugate_margins
+    formulas = plant_of(layout).counting(layout.commanded).formulas
+    assert formulas is not None
+    lost = np.arange(core.n) == 1
+    free = np.arange(6) == 0
+    previous = core.answer_row(wrenches_of(core, 1)[0], None, None, NOMINAL, -1.0).command
+    for conditions in (NOMINAL, Conditions(lost=lost), Conditions(free=free)):
+        call = prepared_call(core, core_policy(CLOSEST), conditions, 2.0, MOST_WRENCH, MOST_ERROR)
+        assert call is not None
+        power_bound = call.power_bounds(formulas, margins)
+        found = 0
+        for wrench in wrenches_of(core, 12):
+            for before in (None, previous):
+                row = call.answer(wrench, before, None)
+                if row is None:
+                    continue
+                figures = formulas.figures(row.command)
+                assert figures is not None
+                given = figures.wrench[None]
+                if conditions.free is not None:
+                    given = np.where(free, 0.0, given)
+                asked = conditions._replace(previous=before)
+                expected = core.power_bounds(row.multipliers, given, margins, asked)
+                assert power_bound(row) == (None if row.gap_power_bound[0] else expected[0])
+                found += expected[0] > 0.0
+        assert found
+
+
+def test_a_busy_work_area_is_left_alone_by_bounds() -> None:
+    layout = load_layout("A")
+    compiled = Compiled.of(layout)
+    core = compiled.core
+    formulas = plant_of(layout).formulas
+    assert formulas is not None
+    call = prepared_call(core, core_policy(CLOSEST), NOMINAL, 2.0, MOST_WRENCH, MOST_ERROR)
+    assert call is not None
+    row = call.answer([0.5, 0.0, 0.0, 0.0, 0.0, 0.0], None, None)
+    assert row is not None
+    power_bound = call.power_bounds(formulas, compiled.conjugate_margins)
+    bound = power_bound(row)
+    assert bound is not None
+    core._is_busy[0] = 1
+    assert power_bound(row) is None
+    core._is_busy[0] = 0
+    assert power_bound(row) == bound
 
 
 def test_a_wrench_may_be_any_six_plain_numbers() -> None:

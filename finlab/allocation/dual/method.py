@@ -8,7 +8,7 @@ commands, within the same limits.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cache, cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -234,10 +234,10 @@ class Dual(Method):
         """Prepares questions about single wrenches; see `Method.prepared_answers`."""
         if self.plant.interaction is not None or not self._most_core_error >= 0.0:
             return None
-        from finlab.core.prepared_call import prepared_answer
+        from finlab.core.prepared_call import RowBound, prepared_call
 
         conditions = Conditions(None, lost, free)
-        answer = prepared_answer(
+        call = prepared_call(
             self.compiled.core,
             core_policy(policy),
             conditions,
@@ -245,7 +245,7 @@ class Dual(Method):
             MAX_WRENCH,
             self._most_core_error,
         )
-        if answer is None:
+        if call is None:
             return None
 
         def solved(row: AnswerRow, question: MethodQuestion) -> FinishedSolution:
@@ -254,7 +254,19 @@ class Dual(Method):
                 asked = Conditions(question.previous, lost, free, self.settings.calm)
             return FinishedSolution(self, asked, question.targets, row)
 
-        return PreparedAnswers(answer, solved)
+        @cache
+        def bounds() -> RowBound | None:
+            formulas = self.plant.formulas
+            if self.has_no_bound or formulas is None or not self.compiled.is_certified:
+                return None
+            return call.power_bounds(formulas, self.compiled.conjugate_margins)
+
+        def bound(row: AnswerRow) -> float | None:
+            bound_of_row = bounds()
+            by_core = None if bound_of_row is None else bound_of_row(row)
+            return None if by_core is None else by_core * (1.0 - ROUNDING)
+
+        return PreparedAnswers(call.answer, solved, bound)
 
     @cached_property
     def turn_rates(self) -> Array:
@@ -577,7 +589,7 @@ class Dual(Method):
             Power (N,) [W] that no answer undercuts which gives these wrenches under the conditions;
             never above theirs.
         """
-        wrench = wrench_of_forces(force, self.plant.effectiveness)
+        wrench = self._wrench_of(command, force)
         if conditions.free is not None:  # its multiplier is 0
             wrench = np.where(conditions.free, 0.0, wrench)
         compiled = self.compiled
@@ -593,6 +605,16 @@ class Dual(Method):
         return self._bound_below_power(
             bound, wrench_served, multipliers, gap_power_bound, conditions, command, wrench
         )
+
+    def _wrench_of(self, command: Array, force: Array) -> Array:
+        """Wrenches (N, 6) [N, N m] of commands (N, n, 3) with these forces (N, n, 3) [N]; of one
+        command with the bits that `PreparedCall.power_bounds` has."""
+        if len(command) == 1:
+            figures = self.plant.figures(command[0])
+            if figures is not None:
+                return figures.wrench[None]
+        wrench: Array = wrench_of_forces(force, self.plant.effectiveness)
+        return wrench
 
     def _bound_below_power(
         self,

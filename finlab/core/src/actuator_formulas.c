@@ -94,6 +94,27 @@ static int is_lost(const real *command) {
   return command[0] != command[0] && command[1] != command[1] && command[2] != command[2];
 }
 
+/* Adds the wrench of a force (3,) of one actuator, with its effectiveness B (3, 6). */
+static void add_wrench_of_force(const real *force, const real *B, real *wrench) {
+  for (int a = 0; a < 3; a++) {
+    for (int k = 0; k < 6; k++) wrench[k] += force[a] * B[6 * a + k];
+  }
+}
+
+int fl_wrench_of_command(const fl_formula *laws, int n, const real *effectiveness,
+                         const real *command, real *wrench) {
+  memset(wrench, 0, 6 * sizeof *wrench);
+  for (int i = 0; i < n; i++) {
+    const real *own_command = command + 3 * i;
+    if (is_lost(own_command)) continue;
+    if (!fl_are_within(own_command, 3, LARGEST_NUMBER)) return FL_BAD_ARGUMENT;
+    real force[3] = {0};
+    force_and_power(laws + i, own_command, force);
+    add_wrench_of_force(force, effectiveness + 18 * i, wrench);
+  }
+  return FL_OK;
+}
+
 int fl_figures_of_command(const fl_formula *laws, int n, const real *effectiveness,
                           const real *frames, const real *command, real *figures) {
   real *own_force = figures;
@@ -109,10 +130,9 @@ int fl_figures_of_command(const fl_formula *laws, int n, const real *effectivene
     *power += force_and_power(laws + i, own_command, force);
     for (int a = 0; a < 3; a++) {
       const real *axis = frames + 9 * i + 3 * a;
-      const real *B = effectiveness + 18 * i + 6 * a; /* wrench per newton along the axis */
       for (int k = 0; k < 3; k++) body_force[3 * i + k] += force[a] * axis[k];
-      for (int k = 0; k < 6; k++) wrench[k] += force[a] * B[k];
     }
+    add_wrench_of_force(force, effectiveness + 18 * i, wrench);
   }
   return FL_OK;
 }

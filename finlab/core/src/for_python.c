@@ -371,6 +371,30 @@ int fl_power_bounds(const real *block, fl_work *work, const fl_question *questio
   return FL_OK;
 }
 
+real fl_power_bound_of_row(const fl_prepared_call *call, const fl_formula *laws,
+                           const real *effectiveness, const real *const *margins,
+                           const real *row) {
+  const real not_here = -1;
+  fl_answer_row head;
+  memcpy(&head, row, sizeof head);
+  if (*call->is_busy || head.gap_power_bound != 0) return not_here;
+  const int n = COUNT(call->block);
+  const real *command = row + sizeof head / sizeof *row;
+  real wrench[6];
+  if (fl_wrench_of_command(laws, n, effectiveness, command, wrench) != FL_OK) return not_here;
+
+  fl_question question = *call->question;
+  if (head.is_tick != 0) question.previous = command + 5 * (size_t)n;
+  for (int k = 0; question.free && k < 6; k++) {
+    if (question.free[k]) wrench[k] = 0; /* its multiplier is 0 */
+  }
+  real bound;
+  const int code = fl_power_bounds(call->block, call->work, &question, head.multipliers, wrench, 1,
+                                   margins, &bound);
+  if (code != FL_OK) return not_here;
+  return bound;
+}
+
 void fl_commands(const real *block, fl_work *work, const real *force, int count,
                  const real *previous, real *command) {
   const int n = COUNT(block);

@@ -107,6 +107,10 @@ int fl_factor(real A[6][6]);
 void fl_solve(real factor[6][6], const real *right, real *x);
 int fl_are_within(const real *values, int count, real most);
 
+/* The wrench of a command (n, 3), by the laws of fl_figures_of_command; returns what that does. */
+int fl_wrench_of_command(const fl_formula *laws, int n, const real *effectiveness,
+                         const real *command, real *wrench);
+
 /* What sort of forces an actuator has, and the price of them: what files of the core ask often. */
 
 /* Whether an actuator is a foil: a rudder in a flow that it feels, whose drag costs power. */
