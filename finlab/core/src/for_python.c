@@ -372,8 +372,7 @@ int fl_power_bounds(const real *block, fl_work *work, const fl_question *questio
 }
 
 real fl_power_bound_of_row(const fl_prepared_call *call, const fl_formula *laws,
-                           const real *effectiveness, const real *const *margins,
-                           const real *row) {
+                           const real *effectiveness, const real *const *margins, const real *row) {
   const real not_here = -1;
   fl_answer_row head;
   memcpy(&head, row, sizeof head);

@@ -6,8 +6,8 @@
    A lane whose target is met, or is left to fl_answer_one, takes up the next one: so targets that
    take few steps wait for none that takes many. No number goes from one lane to another. */
 
-#define CHUNK 64                /* targets that are on the stack at once */
-#define PRICE_STEPS 5           /* of Newton's method to a price of first multipliers */
+#define CHUNK 64      /* targets that are on the stack at once */
+#define PRICE_STEPS 5 /* of Newton's method to a price of first multipliers */
 /* Scaled wrench that may be left: near the rim multipliers magnify it, and a single question, which
    takes other steps, has to come to the same ones. */
 #define LANES_ENOUGH (TOLERANCE / 10)
