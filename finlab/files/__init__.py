@@ -8,6 +8,7 @@ a date or a yes is text here.
 import json
 import math
 import re
+import sys
 from typing import Any
 
 from finlab.errors import DataError, FinlabError
@@ -110,13 +111,12 @@ def parse_toml(content: str, source: str, error: type[FinlabError] = DataError) 
 
     Raises:
         FinlabError: of the class `error`: it is no TOML, is too large or too deep, holds a number
-            that is not finite, or this Python cannot read it.
+            that is not finite.
     """
-    try:
+    if sys.version_info >= (3, 11):
         import tomllib
-    except ModuleNotFoundError:  # Python 3.10
-        reason = "is TOML, which Python reads from 3.11 on; write it as YAML or JSON"
-        raise error.in_file(source, reason) from None
+    else:
+        import tomli as tomllib
     if len(content) > MAX_TOML:
         raise error.in_file(source, f"is TOML of more than {MAX_TOML:,} characters, too large")
     try:
