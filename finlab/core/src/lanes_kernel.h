@@ -418,7 +418,7 @@ static mask newton_step_lanes(const lanes_robot *robot, const lanes_state *at, v
   return is_singular;
 }
 
-/* d'(S + c max(tr G_mu, tau) M) d of a step d: damping_along of dual_newton.c. */
+/* d'(S + c max(tr G_mu, tau) M) d of a step d, the damping along it. */
 static vector damping_along_lanes(const lanes_robot *robot, const lanes_state *at, vector trace,
                                   const vector *step) {
   const fl_work *work = robot->work;
@@ -617,7 +617,8 @@ static inline vector mu_after_kept_lanes(vector mu, vector slope_left) {
   return larger_of(mu * factor, lanes_of(ROUNDING));
 }
 
-/* mu after steps that are refused: mu_after_refused of dual_newton.c. */
+/* mu after steps that are refused. A single question ends such a step at its top instead, see
+   is_kept_at_top of dual_newton.c: a search would hold up all lanes. */
 static inline vector mu_after_refused_lanes(vector mu, vector nu, vector slope_begin,
                                             vector slope_end, vector rise, vector damping) {
   const vector a = 3 * (slope_begin + slope_end - 2 * rise);
