@@ -9,11 +9,13 @@ import pytest
 from finlab.allocation.solution import Candidates
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
+from finlab.research.mdn.method import TRACE_STEPS
 from tests.webapp.stand_in import Direct, context_of, load_stand_in
 from webapp.markup.mode_plot import AXIS_LEFT, LABEL_SIZE, mode_plot
 from webapp.markup.plot import WIDTH
+from webapp.markup.refinement import is_in_vain, step_words, vain_sentence
 from webapp.markup.words import error_digits, small, three_digits
-from webapp.panels.modes_tab import mode_table, step_words
+from webapp.panels.modes_tab import mode_table
 from webapp.session import Session
 from webapp.session.state import State
 from webapp.session.targets import PRESETS
@@ -118,6 +120,50 @@ def test_samples_and_modes_are_drawn_and_listed() -> None:
     assert "samples of the network" in step_words(modes, 0) and "median error" in step_words(
         modes, None
     )
+
+
+def refined_to(modes: Modes, errors: list[float]) -> Modes:
+    """Modes whose samples end with errors, one after the other."""
+    *ways, end = modes.refinement
+    repeated = np.resize(errors, len(end.err_norm))
+    # Of the stand-in's two steps neither is as late as the one in which samples become exact.
+    late = [replace(end, err_norm=repeated)] * TRACE_STEPS.steps
+    return replace(modes, refinement=(*ways[:1], *late))
+
+
+def test_samples_are_called_exact_where_they_are() -> None:
+    modes = modes_of_turn()
+    answer = Solver(load=load_stand_in).reply(
+        State(load_layout("ucat"), target=(12.0, 0.0, 0.0, 0.0, 0.0, -0.25))
+    )
+    n_samples = len(modes.refinement[-1].err_norm)
+    vain = refined_to(modes, [2.66e-2, 3e-2])
+    words = step_words(vain, None)
+    assert f"none of {n_samples} made exact" in words and "2.66e−02" not in words.split("·")[0]
+    assert is_in_vain(vain)
+    sentence = vain_sentence(vain, answer.answer)
+    asked = f"Fx 12 N and Tz −0.25 N m: none of {n_samples} samples was refined to it."
+    assert asked in sentence and "The nearest misses it by 2.66e−02" in sentence
+    some = refined_to(modes, [1e-6, 3e-2])
+    assert f"{n_samples // 2} of {n_samples} made exact" in step_words(some, None)
+    assert not is_in_vain(some) and vain_sentence(some, answer.answer) == ""
+    assert "made exact" in step_words(refined_to(modes, [1e-6]), None)
+    assert vain_sentence(NO_MODES, answer.answer) == vain_sentence(vain, None) == ""
+
+
+def test_samples_that_end_at_a_limit_are_counted() -> None:
+    modes = modes_of_turn()
+    layout = load_layout("ucat")
+    answer = Solver(load=load_stand_in).reply(State(layout, target=PRESETS["Turn"])).answer
+    vain = refined_to(modes, [1.0])
+    end = vain.refinement[-1]
+    command = np.broadcast_to(0.5 * (layout.lower + layout.upper), end.command.shape).copy()
+    command[:3, 1, 0] = layout.upper[1, 0]
+    command[:, 0] = np.nan
+    limited = replace(vain, refinement=(*vain.refinement[:-1], replace(end, command=command)))
+    assert "In 3 of them a fin" in vain_sentence(limited, answer)
+    command[:, 2, 1] = layout.upper[2, 1]
+    assert "In each of them a fin" in vain_sentence(limited, answer)
 
 
 def test_figures_keep_their_width() -> None:

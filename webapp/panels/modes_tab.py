@@ -12,6 +12,7 @@ from finlab.physics.objective import REACHED
 from finlab.research.mdn.method import TRACE_STEPS
 from webapp.handles import add_html, placed, press
 from webapp.markup.mode_plot import mode_plot
+from webapp.markup.refinement import is_in_vain, step_words, vain_sentence
 from webapp.markup.verdict import Verdict, verdict_of
 from webapp.markup.words import (
     error_digits,
@@ -38,6 +39,10 @@ LEARNED = (
 PROPOSED = (
     "The network proposes ways to share the wrench, drawn from its mixture; each is refined to "
     "the least effort near it and made exact by the fins' own laws."
+)
+IN_VAIN = (
+    "The network proposes ways to share the wrench, drawn from its mixture. Each was refined, and "
+    "none became exact, so only the answer is listed."
 )
 BESIDE = {
     "dual": " The answer, number 1, keeps watts least, and needs no network.",
@@ -72,6 +77,7 @@ def add_candidates(page: Page) -> None:
     page.presses.on("play", lambda _key, _modifier: jobs.refining.toggle())
     page.presses.on("loop", lambda _key, _modifier: session.set_loop(not session.loops))
     page.add_html(_player)
+    page.add_html(lambda modes, best, searching: "" if searching else vain_sentence(modes, best))
     hint = "How many steps of refinement the samples have had, in the plot and on the robot."
     slider = gui.add_slider("Step", 0, TRACE_STEPS.steps, 1, TRACE_STEPS.steps, hint=hint)
     page.bind(slider, jobs.refining.hold, lambda step, modes: modes.steps if step is None else step)
@@ -145,22 +151,12 @@ def _player(modes: Modes, step: int | None, playing: bool, loops: bool) -> str:
     )
 
 
-def step_words(modes: Modes, step: int | None) -> str:
-    """What is done in a step of the refinement, and the error that is left then, half of the
-    samples having less."""
-    step_shown = modes.steps if step is None else step
-    words = "descent in forces" if step_shown <= TRACE_STEPS.descent else "made exact"
-    words = "samples of the network" if step_shown == 0 else words
-    remaining = float(np.median(modes.refinement[step_shown].err_norm))
-    return html("{} <span class='dim'>· median error</span> {}", words, error_digits(remaining))
-
-
-def _origin_words(method: str, best: Allocation | None, in_reach: bool) -> str:
+def _origin_words(method: str, best: Allocation | None, in_reach: bool, modes: Modes) -> str:
     """Where the answer and its modes come from, or why there is but one."""
     sentence = LEARNED
     if method != "paper":
         aside = BESIDE.get(method, f" The answer, number 1, is that of method {method}.")
-        sentence = PROPOSED + aside
+        sentence = IN_VAIN if is_in_vain(modes) else PROPOSED + aside
         if best is not None and not in_reach:
             sentence = BEYOND.format(best.policy.kind)
         elif best is not None and not np.nan_to_num(best.target).any():
