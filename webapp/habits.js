@@ -38,9 +38,13 @@
     Object.defineProperty(box, 'value', { configurable: true, get, set: (text) => { before = text; } });
   }
   // A number box is told by its label's input, and of several by its place.
-  function owner(box) {
+  function rowOf(box) {
     let row = box.parentElement;
     while (!row.querySelector('label[for]')) row = row.parentElement;
+    return row;
+  }
+  function owner(box) {
+    const row = rowOf(box);
     return `${row.querySelector('label[for]').htmlFor} ${[...row.querySelectorAll(NUMBER)].indexOf(box)}`;
   }
   function end(text, steps = 0) {
@@ -95,6 +99,24 @@
     if (!/^(Arrow|Page|Home|End)/.test(key) || !target.matches?.(`[role=slider], ${NUMBER}`)) return;
     if (timeStamp - lastKey > QUICK_MS) begins();
     lastKey = timeStamp;
+  });
+
+  // Page keys go ten steps, Home and End to the ends of a slider: the server knows both (`number_boxes.py`). While one
+  // types, Home and End belong to the text.
+  listen('keydown', (event) => {
+    const { key, target } = event;
+    if (!/^(PageUp|PageDown|Home|End)$/.test(key) || event.ctrlKey || event.metaKey || event.altKey || event.shiftKey) return;
+    const isThumb = target.matches?.('[role=slider]');
+    if (!isThumb && !target.matches?.(NUMBER)) return;
+    const row = rowOf(target);
+    const number = isThumb ? row.querySelector(NUMBER) : target;
+    if (!number || number.disabled) return;
+    const toEnd = key === 'Home' || key === 'End';
+    if (toEnd && (box || !row.querySelector('[role=slider]'))) return;
+    event.preventDefault();
+    event.stopImmediatePropagation();
+    if (box) commit();
+    window.finlabPresses?.tell('jump', owner(number), key);
   });
 
   // What is typed into a list takes the place of what is chosen there, and Enter takes the first that is left.

@@ -25,6 +25,8 @@ KINDS = (
 """Handles with number boxes."""
 STEP_DIGITS = 9
 """Decimals to which a number is rounded after a step: 0.1 + 0.2 is 0.3."""
+JUMPS = {"PageUp": (10, 0), "PageDown": (-10, 0), "Home": (0, -1), "End": (0, 1)}
+"""Key -> steps of the handle that it goes, or to which end of its slider."""
 
 Act = Callable[[Any], object]
 """Carries out what a value of a handle means, or raises a `FinlabError`."""
@@ -80,6 +82,7 @@ class NumberBoxes:
         self.taken = 0
         """How many texts have been read."""
         presses.on("number", self._take)
+        presses.on("jump", self._jump)
 
     def add(self, handle: Any, act: Act, may_be_empty: bool = False, widens: bool = False) -> None:
         """Let what is typed into the boxes of a handle do `act(value)`; arguments as in `Owner`.
@@ -102,6 +105,19 @@ class NumberBoxes:
         self._do(partial(self._ask, owner, int(place), int(steps), text), owner.handle)
         self.taken += 1
 
+    def _jump(self, key: str, text: str) -> None:
+        """A key that moves a number by more than a step: ten steps, or to an end of its slider.
+
+        Args:
+            key: uuid of the handle, and place of the box among its boxes.
+            text: name of the key, one of `JUMPS`.
+        """
+        uuid, place = (*key.split(" "), "")[:2]
+        owner = self._owners.get(uuid)
+        if owner is None or not re.fullmatch(r"\d", place) or text not in JUMPS:
+            return  # not from our page
+        self._do(partial(_jump_to, owner, int(place), text), owner.handle)
+
     def _ask(self, owner: Owner, place: int, steps: int, text: str) -> None:
         """Asks for what a text says."""
         handle = owner.handle
@@ -122,6 +138,49 @@ class NumberBoxes:
         self._end(None)
 
 
+def _jump_to(owner: Owner, place: int, key: str) -> None:
+    """Asks for the number that a key of `JUMPS` leads to from what is asked."""
+    handle = owner.handle
+    old = handle.value
+    if not isinstance(old, (tuple, list)):
+        value = _jumped(handle, old, key, None)
+        new: Any = int(value) if isinstance(old, int) else value
+    elif place < len(old):
+        values = list(old)
+        values[place] = _jumped(handle, old[place], key, place)
+        new = tuple(values)
+    else:
+        return
+    owner.act(new)
+    handle.value = new  # a key that repeats goes on from here, before the page is written
+
+
+def _jumped(handle: Any, old: float, key: str, place: int | None) -> float:
+    """The number that a key leads to from another one, within the limits of its box."""
+    low, high = _limits(handle, place)
+    steps, end = JUMPS[key]
+    value = old
+    if end < 0 and low is not None:
+        value = low
+    elif end > 0 and high is not None:
+        value = high
+    elif steps:
+        value = round(old + steps * (handle.step or 0.0), STEP_DIGITS)
+    if low is not None:
+        value = max(value, min(low, old))
+    if high is not None:
+        value = min(value, max(high, old))
+    return float(value)
+
+
+def _limits(handle: Any, place: int | None) -> tuple[Any, Any]:
+    """Least and largest number of a handle, of several numbers that of a place; None for none."""
+    low, high = (getattr(handle, name, None) for name in ("min", "max"))
+    if place is not None:
+        low, high = (None if end is None else end[place] for end in (low, high))
+    return low, high
+
+
 def _checked(owner: Owner, text: str, label: str, steps: int, place: int | None) -> float:
     """The number of a text, within the limits of its box, of several that of a place."""
     handle = owner.handle
@@ -130,9 +189,7 @@ def _checked(owner: Owner, text: str, label: str, steps: int, place: int | None)
         value = round(value + steps * (handle.step or 0.0), STEP_DIGITS)
     if isinstance(handle.value, int) and value != round(value):
         raise FinlabError(f"{label}: expected a whole number, got {text!r:.60}")
-    low, high = (getattr(handle, name, None) for name in ("min", "max"))
-    if place is not None:
-        low, high = (None if end is None else end[place] for end in (low, high))
+    low, high = _limits(handle, place)
     is_low = low is not None and value < low
     is_high = high is not None and value > high
     if (is_low or is_high) and not owner.widens:

@@ -46,6 +46,7 @@ DRAWN = (
     "webapp.panels.status.verdict_sentence",
     "webapp.panels.status.corner",
     "webapp.panels.wrench_tab.axis_reach",
+    "webapp.panels.wrench_tab.lone_reach",
     "webapp.panels.wrench_tab.slider_end",
     "webapp.markup.answer.wrench_bars",
     "webapp.panels.wrench_tab.full_thrust",

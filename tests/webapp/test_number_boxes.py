@@ -71,7 +71,7 @@ def test_a_wrench_beyond_its_slider_is_asked_with_all_its_digits(opened: Tab) ->
     assert opened.view.session.state.target[0] == 100.123456
     assert slider.value == 100.1235 and slider.max >= slider.value
     opened.type(slider, "0,5", steps=1)
-    assert opened.view.session.state.target[0] == pytest.approx(0.51)
+    assert opened.view.session.state.target[0] == pytest.approx(0.5 + slider.step)
     assert opened.client.notes == []
 
 
@@ -108,5 +108,65 @@ def test_words_that_are_not_of_our_page_do_nothing(opened: Tab, key: str) -> Non
     before = opened.view.session.state
     uuid = box(opened, "Fx [N]")._impl.uuid
     opened.on_loop(lambda: opened.view.page.number_boxes._take(key.format(uuid=uuid), "3"))
+    opened.settle()
+    assert opened.view.session.state is before and opened.client.notes == []
+
+
+def jump(tab: Tab, handle: Any, key: str, place: int = 0) -> None:
+    """Press a key in a number box, and wait for what comes of it."""
+    word = f"{handle._impl.uuid} {place}"
+    tab.on_loop(lambda: tab.view.page.number_boxes._jump(word, key))
+    tab.settle()
+
+
+def test_page_keys_go_ten_steps_and_end_goes_to_the_end(opened: Tab) -> None:
+    session = opened.view.session
+    slider = box(opened, "Fx [N]")
+    start = session.state.target[0]
+    jump(opened, slider, "PageUp")
+    assert session.state.target[0] == pytest.approx(start + 10.0 * slider.step)
+    jump(opened, slider, "PageDown")
+    assert session.state.target[0] == pytest.approx(start)
+    jump(opened, slider, "End")
+    assert session.state.target[0] == slider.max == slider.value
+    jump(opened, slider, "PageUp")
+    assert session.state.target[0] == slider.max, "a key does not leave the track"
+    jump(opened, slider, "Home")
+    assert session.state.target[0] == slider.min
+    assert opened.client.notes == []
+
+
+def test_page_keys_that_repeat_are_all_heard(opened: Tab) -> None:
+    slider = box(opened, "Fx [N]")
+    start = opened.view.session.state.target[0]
+    word = f"{slider._impl.uuid} 0"
+
+    def hold() -> None:  # before the page is written once
+        for _ in range(3):
+            opened.view.page.number_boxes._jump(word, "PageUp")
+
+    opened.on_loop(hold)
+    opened.settle()
+    assert opened.view.session.state.target[0] == pytest.approx(start + 30.0 * slider.step)
+
+
+def test_page_keys_move_one_number_of_several(opened: Tab) -> None:
+    session = opened.view.session
+    opened.on_loop(lambda: opened.view.do(lambda: session.select("front_left")))
+    opened.on_loop(lambda: opened.view.do(lambda: session.show_task("Design")))
+    opened.settle()
+    handle = box(opened, "Position [m]")
+    x, y, z = session.state.layout.actuator("front_left").position
+    jump(opened, handle, "PageUp", place=2)
+    moved = session.state.layout.actuator("front_left").position
+    assert moved == pytest.approx((x, y, z + 10.0 * handle.step))
+
+
+@pytest.mark.parametrize("word", [("", "PageUp"), ("{uuid} 0", "Insert"), ("{uuid} x", "End")])
+def test_keys_that_are_not_of_our_page_do_nothing(opened: Tab, word: tuple[str, str]) -> None:
+    before = opened.view.session.state
+    place, key = word
+    uuid = box(opened, "Fx [N]")._impl.uuid
+    opened.on_loop(lambda: opened.view.page.number_boxes._jump(place.format(uuid=uuid), key))
     opened.settle()
     assert opened.view.session.state is before and opened.client.notes == []

@@ -70,7 +70,8 @@ def reach_style(ranges: Ranges | None, able: Layout, *slider_ends: float) -> Mar
         properties = ""
         # A single mark is the last one.
         for name, (value, text) in zip(("last", "first"), reversed(marks), strict=False):
-            position = 50.0 + 50.0 * value / slider_end
+            share = min(max(value / slider_end, -1.0), 1.0)
+            position = 50.0 + 50.0 * share
             properties += f"--{name}: {position:.1f}%; --{name}-words: '{text}'; "
         rules.append(f"[data-fl~=axis-{k}] + div {{ {properties}}}")
     return Markup(f"<style>{' '.join(rules)}</style>")

@@ -2,7 +2,7 @@
 change."""
 
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -25,7 +25,15 @@ from webapp.markup.words import ROUNDING, SPEED, error_digits, html, marker, row
 from webapp.page import Page
 from webapp.panels.damage import add_fin_buttons
 from webapp.session.state import MAX_SPEED, Flow, State
-from webapp.session.targets import PRESETS, axis_reach, full_thrust, slider_end
+from webapp.session.targets import (
+    PRESETS,
+    axis_reach,
+    full_thrust,
+    lone_reach,
+    nudge,
+    slider_end,
+    widened_end,
+)
 from webapp.tasks.solver import JetComparison
 
 DIGITS = 4
@@ -68,6 +76,41 @@ def add_commands(page: Page) -> None:
     )
 
 
+class Tracks:
+    """The tracks of the six sliders: how far they go, and in which steps."""
+
+    def __init__(self, sliders: Sequence[Any]) -> None:
+        """`sliders` are those of the six axes, in order."""
+        self._sliders = sliders
+        self._ends = [1.0] * 6
+        """Where the tracks end by the robot's reach [N, N m]."""
+        self.limits = [0.0] * 6
+        """Where they end [N, N m]."""
+
+    def follow_robot(self, able: Layout, lost: tuple[str, ...], flow: Flow | None) -> None:
+        """Let the tracks be as long as the robot reaches, and their steps fit that."""
+        sizes = lone_reach(able, lost, flow).tolist()
+        self._ends = [slider_end(size) for size in sizes]
+        for slider, size in zip(self._sliders, sizes, strict=True):
+            step = nudge(size)
+            if slider.step != step:
+                slider.step = step
+
+    def show_target(
+        self, target: tuple[float, ...], able: Layout, lost: tuple[str, ...], flow: Flow | None
+    ) -> None:
+        """Show the target; first the ends: a value beyond them would not be shown."""
+        for axis, slider in enumerate(self._sliders):
+            rounded = round(target[axis], DIGITS) + 0.0
+            limit = widened_end(self._ends[axis], rounded)
+            if limit != self.limits[axis]:
+                self.limits[axis] = slider.max = limit
+                slider.min = -limit
+            # What the page has sent may have more digits, of which it shows no other ones.
+            if round(slider.value, DIGITS) != rounded:
+                slider.value = rounded
+
+
 def add_target(page: Page) -> None:
     """Buttons and sliders."""
     session = page.session
@@ -78,35 +121,16 @@ def add_target(page: Page) -> None:
     add_html(gui, marker("fl-reach"))
     page.presses.on("axis", lambda key, _modifier: session.toggle_axis(placed(key, 6)))
     sliders: list[Any] = [_add_slider(page, k) for k in range(6)]
-    ends = [1.0] * 6
-    limits = [0.0] * 6
-
-    def reach(able: Layout, lost: tuple[str, ...], flow: Flow | None) -> None:
-        ends[:] = [slider_end(size) for size in axis_reach(able, lost, flow).tolist()]
-
-    def ask(
-        target: tuple[float, ...], able: Layout, lost: tuple[str, ...], flow: Flow | None
-    ) -> None:
-        """Show the target; first the ends: a value beyond them would not be shown."""
-        for axis, slider in enumerate(sliders):
-            rounded = round(target[axis], DIGITS) + 0.0
-            limit = max(ends[axis], abs(rounded))
-            if limit != limits[axis]:
-                limits[axis] = slider.max = limit
-                slider.min = -limit
-            # What the page has sent may have more digits, of which it shows no other ones.
-            if round(slider.value, DIGITS) != rounded:
-                slider.value = rounded
-
-    board.act(reach)
-    board.act(ask, *sliders)
+    tracks = Tracks(sliders)
+    board.act(tracks.follow_robot)
+    board.act(tracks.show_target, *sliders)
     style = Memoized(reach_style)
     hinted: Any = None
 
     def mark(ranges: Ranges | None, able: Layout, target: Any) -> Markup:
         """Show what is within reach on the sliders: the marks of all are one message."""
         del target  # it may have moved the ends
-        markup: Markup = style(ranges, able, *limits)
+        markup: Markup = style(ranges, able, *tracks.limits)
         return markup
 
     def hint(ranges: Ranges | None, able: Layout, lost: tuple[str, ...], flow: Flow | None) -> None:

@@ -1,9 +1,11 @@
 """Target wrenches to start from, and how much of each axis a layout can give."""
 
+import math
 from functools import lru_cache
 
 import numpy as np
 
+from finlab.analysis.authority import authority
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.physics import plant_of
@@ -55,7 +57,58 @@ def _extents(layout: Layout, flow: Flow | None) -> tuple[Array, Array]:
     return largest_force, np.maximum(extents, 0.0)
 
 
+@lru_cache(maxsize=64)
+def lone_reach(layout: Layout, lost: tuple[str, ...] = (), flow: Flow | None = None) -> Array:
+    """How far a robot goes along each axis (6,) [N, N m] with the other five at zero, the farther
+    of both ways; where it pushes an axis only along with others, as far as `axis_reach` has it.
+
+    Args:
+        layout: the robot, with the limits that damage has left.
+        lost: names of its lost actuators.
+        flow: velocity (6,) relative to the water [m/s, rad/s]; None at rest.
+    """
+    with_others = axis_reach(layout, lost, flow)
+    if len(lost) == layout.n:
+        return with_others
+    sizes = authority(layout, lost, flow)
+    alone = np.maximum(sizes.largest, sizes.most_negative)
+    reach: Array = np.where(alone > 0.0, alone, with_others)
+    reach.setflags(write=False)
+    return reach
+
+
+NO_REACH = 1e-6
+"""Reach below which nothing pushes along an axis [N, N m]."""
+MARGIN = 1.25
+"""How far a slider goes, in reaches of the robot: what is out of reach can be asked as well."""
+NUDGES = 100.0
+"""Nudges by the arrow keys from zero to the end of what is within reach."""
+LEAST_STEP = 1e-4
+"""Least step of a slider [N, N m]: it shows no further digit."""
+
+
 def slider_end(reach: float) -> float:
     """Where a slider ends: a quarter beyond the reach, to two digits; 1 where there is no reach at
     all."""
-    return float(f"{1.25 * reach:.1e}") if reach > 1e-6 else 1.0
+    return float(f"{MARGIN * reach:.1e}") if reach > NO_REACH else 1.0
+
+
+def widened_end(end: float, value: float) -> float:
+    """Where a slider ends that has to show a value beyond its end: the value, rounded up to two
+    digits, so that zero stays a whole number of steps away."""
+    size = abs(value)
+    if size <= end:
+        return end
+    unit = 10.0 ** (math.floor(math.log10(size)) - 1)
+    n_units = math.ceil(round(size / unit, 6))
+    return float(f"{n_units * unit:.6g}")
+
+
+def nudge(reach: float) -> float:
+    """Step of a slider by an arrow key: about a hundredth of the reach, as 1, 2 or 5 of a decimal
+    place [N, N m]."""
+    size = (reach if reach > NO_REACH else 1.0) / NUDGES
+    unit = 10.0 ** math.floor(math.log10(size))
+    steps = [unit, 2.0 * unit, 5.0 * unit, 10.0 * unit]
+    nearest = min(steps, key=lambda step: abs(math.log(step / size)))
+    return float(f"{max(nearest, LEAST_STEP):.6g}")
