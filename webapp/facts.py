@@ -2,6 +2,7 @@
 
 from webapp.board import Facts
 from webapp.markup.outcomes import pace_words
+from webapp.scene.wrench_handle import Grip
 from webapp.scene.wrench_nodes import Scale
 from webapp.session import Session
 from webapp.tasks.answering import ShownAnswer
@@ -9,7 +10,12 @@ from webapp.tasks.jobs import Jobs
 
 
 def facts_of(
-    session: Session, jobs: Jobs, answer: ShownAnswer, dragged: int | None, scale: Scale
+    session: Session,
+    jobs: Jobs,
+    answer: ShownAnswer,
+    dragged: int | None,
+    pulled: Grip | None,
+    scale: Scale,
 ) -> Facts:
     """The facts of a session, of what has been worked out for it, and of the view.
 
@@ -18,6 +24,7 @@ def facts_of(
         jobs: questions of the page, and their answers.
         answer: what is seen of the newest answer.
         dragged: index of the actuator that is dragged; None for none.
+        pulled: what of the wrench is in the user's hand; None for nothing.
         scale: what lengths in the view stand for.
     """
     state = session.state
@@ -77,5 +84,6 @@ def facts_of(
         "paused": swimming.active and not swimming.running and not swimming.done,
         "pace": pace_words(swimming) if swimming.active else "",
         "dragged": dragged,
+        "pulled": pulled,
         "scale": scale,
     }

@@ -198,7 +198,8 @@ class View:
                 guide.take(answer.shown_allocation)
             self.scenery.follow_guide()
             scale = self.scenery.fit(session.state.target, answer.shown_allocation)
-            facts = facts_of(session, self.jobs, answer, self.scenery.robot.dragged, scale)
+            robot = self.scenery.robot
+            facts = facts_of(session, self.jobs, answer, robot.dragged, robot.pulled, scale)
         except Exception as error:
             board.fail(error)
         else:

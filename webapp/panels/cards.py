@@ -25,6 +25,7 @@ from webapp.tasks.designs import KINDS
 
 SWITCHES = {
     "frozen": ("Freeze", "Fins hold still at their zero direction, propellers stand (P)."),
+    "handle": ("Handle", "Drag the tip of the wrench in the view, or turn its rings (Allocate)."),
     "shadows": ("Shadows", "Slow without a graphics card."),
     "dark": ("Dark", "Dark theme."),
 }

@@ -33,6 +33,7 @@ from webapp.panels.arrangement import (
 )
 from webapp.panels.commands import add_page_commands
 from webapp.panels.log_tab import plot_rows
+from webapp.panels.nudging import add_nudging
 from webapp.panels.status import add_corner
 from webapp.session.lessons import Stop
 from webapp.session.looking import CANDIDATES, DRAWERS, Desk
@@ -139,6 +140,7 @@ class Frame:
         page.board.act(self._arrange)
         page.board.act(self._guard_reload)
         page.board.act(self._set_title)
+        add_nudging(page)
         self._listen()
         self.sections: list[Section] = []
         add_corner(page)

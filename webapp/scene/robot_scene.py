@@ -23,11 +23,13 @@ from webapp.scene.actuator_node import ActuatorNode, Motion, motion, offered_mes
 from webapp.scene.force_nodes import ForceNodes
 from webapp.scene.jet_nodes import JetNodes
 from webapp.scene.stage import Shape, Stage, aim_camera, arrow_size, hull_top, part_size, view_size
+from webapp.scene.wrench_handle import Grip, WrenchHandle, pulled_force, turned_torque
 from webapp.scene.wrench_nodes import LENGTH, AttainableNodes, DirectionHandle, Scale, WrenchNodes
 from webapp.session import Session
 from webapp.session.looking import DRAWN, Display
 from webapp.session.state import one_of
 from webapp.session.swim_plan import SwimSettings
+from webapp.session.targets import lone_reach
 from webapp.tasks.analysing import Analysis
 from webapp.tasks.swimmer import Moment, Swimmer
 from webapp.theme import LIGHT, fin_color
@@ -68,6 +70,10 @@ class RobotScene:
         self._jets = JetNodes(scene)
         self._attainable = AttainableNodes(scene)
         self._direction = DirectionHandle(self._client, self._turn)
+        self._handle = WrenchHandle(scene, "/robot/wrench", self._pull)
+        self.pulled_newtons = 1.0
+        """Force of an arrow of 0.1 m and size 1 while the wrench is in the user's hand [N]."""
+        self._newtons_before = 1.0
         self._fins: list[ActuatorNode] = []
         self.dragged: int | None = None
         self._moves: list[Motion] = []
@@ -82,6 +88,7 @@ class RobotScene:
             self._push,
             self._flap,
             self._show_wrench,
+            self._show_handle,
             self._show_sets,
         )
         for show in (*shows, self._offer):
@@ -279,6 +286,50 @@ class RobotScene:
             missing = missing_part(shown_allocation)
         lengths = LENGTH / scale.newtons, LENGTH / scale.torque
         self._wrench.refresh(demanded, delivered, missing, self._top, *lengths, self._arrow_size)
+
+    @property
+    def pulled(self) -> Grip | None:
+        """What of the wrench is in the user's hand; None for nothing."""
+        return self._handle.grip
+
+    def _show_handle(
+        self,
+        visible_layout: Layout,
+        target: tuple[float, ...],
+        scale: Scale,
+        task: str,
+        display: Display,
+        swims: bool,
+        pulled: Grip | None,
+    ) -> None:
+        size = arrow_size(visible_layout)
+        if pulled is None:
+            self._newtons_before = self.pulled_newtons = scale.newtons
+        # The foot of the arrow is that of the wrench's nodes.
+        tip = np.array(target[:3]) * (size * LENGTH / scale.newtons)
+        is_visible = display.handle and task == "Allocate" and not swims
+        commanded = visible_layout.commanded.tolist()
+        self._handle.show(target, tip, size, commanded, is_visible)
+
+    def _pull(self, phase: str, grip: Grip, tip: Array, angle: float) -> None:
+        session = self._session
+        if phase == "start":
+            session.history.end_merge()
+            return
+        state = session.state
+        reach = lone_reach(state.able, state.lost, state.flow).tolist()
+        target = list(state.target)
+        if grip.ring is None:
+            size = arrow_size(state.layout)
+            pull = pulled_force(tip, grip, self._newtons_before, size, reach[:3], LENGTH)
+            target[:3] = pull.force
+            self.pulled_newtons = pull.newtons
+        else:
+            axis = 3 + grip.ring
+            target[axis] = turned_torque(angle, grip.target[axis], reach[axis])
+        self._do(partial(session.pull, target))
+        if phase == "end":
+            session.history.end_merge()
 
     def _show_sets(
         self,

@@ -84,6 +84,9 @@ class Scenery:
             except Exception as error:
                 self._scale = INITIAL_SCALE
                 self._fault(error)
+        if self.robot.pulled is not None:  # the arrow ends in the hand
+            self._fitted = None
+            self._scale = self._scale._replace(newtons=self.robot.pulled_newtons)
         return self._scale
 
     def _fail(self, error: Exception | None) -> None:

@@ -220,6 +220,27 @@ class Session(BaseSession):
 
         self._for_each("Move", names, placed, f"move {names}")
 
+    def nudge(self, offset: Vector3, held: bool = False) -> None:
+        """The selected actuators go by an offset [m], each from where it is.
+
+        Args:
+            offset: in the body frame (3,) [m].
+            held: whether the key is held: the step of undo is that of the nudge before.
+        """
+        names = self._chosen()
+        if not held:
+            self.history.end_merge()
+
+        def shifted(layout: Layout, name: str) -> Layout:
+            x, y, z = layout.actuator(name).position
+            dx, dy, dz = offset
+            # To a tenth of a micrometre: 0.1 + 0.2 is 0.3.
+            return layout_edits.moved(
+                layout, name, (round(x + dx, 7), round(y + dy, 7), round(z + dz, 7))
+            )
+
+        self._for_each("Move", names, shifted, f"nudge {names}", timed=False)
+
     def turn_selected(self, angle: float) -> None:
         """All selected fins with one mounting angle [rad]; actuators without one stay."""
         layout = self.state.layout
@@ -295,6 +316,7 @@ class Session(BaseSession):
         names: tuple[str, ...],
         change: Callable[[Layout, str], Layout],
         merge_key: str | None = None,
+        timed: bool = True,
     ) -> None:
         """One step for several actuators; twins follow unless they are among them already.
 
@@ -303,6 +325,7 @@ class Session(BaseSession):
             names: of the actuators, the one that was chosen last at the end: it leads its twin.
             change: makes the layout with one of them changed.
             merge_key: steps with the same one soon after each other are one step of undo.
+            timed: whether such steps are apart after a while; without it, after `end_merge`.
         """
         old_layout = self.state.layout
         links = self.state.links
@@ -312,7 +335,7 @@ class Session(BaseSession):
             if partner(links, name) not in done:
                 layout = with_twin(old_layout, change(layout, name), links, name)
                 done.add(name)
-        self._edit(f"{verb} {_words(names)}", layout, merge_key)
+        self._edit(f"{verb} {_words(names)}", layout, merge_key, timed)
 
 
 def _words(names: Sequence[str]) -> str:

@@ -58,6 +58,8 @@ class Display:
     shadows: bool = True
     """Cast shadows; slow without a graphics card."""
     dark: bool = False
+    handle: bool = True
+    """Whether the wrench can be pulled in the view."""
     drawn: str = "none"
     """Key of `DRAWN`: the attainable set that is shown."""
 
