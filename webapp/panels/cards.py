@@ -26,7 +26,7 @@ from webapp.tasks.designs import KINDS
 SWITCHES = {
     "frozen": ("Freeze", "Fins hold still at their zero direction, propellers stand (P)."),
     "shadows": ("Shadows", "Slow without a graphics card."),
-    "dark": ("Dark", "Dark theme."),
+    "dark": ("Dark", "Dark theme; at first that of the system."),
 }
 """Field of `Display`, label and hint of each switch."""
 
