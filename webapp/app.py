@@ -13,6 +13,7 @@ import viser
 
 from finlab.layout import Layout
 from webapp.session import Display, Session
+from webapp.session.looking import DARK
 from webapp.tasks.slot import Pools
 from webapp.tasks.solver import Solver
 from webapp.view import View
@@ -23,6 +24,8 @@ FRAME_S = 1 / 25
 LOOK_S = 0.25
 """Time between two looks whether a robot has begun to swim [s]."""
 STORAGE_KEY = "finlab-sessions"
+SCHEME_KEY = "finlab-scheme"
+"""Where a page keeps the colour scheme of its system, `dark` or `light`."""
 PATIENCE_S = (0.5, 1.0, 1.5, 2.0, 4.0, 8.0, 16.0, 30.0, 30.0)
 """How long a page may take to say which sessions it knows [s], try by try."""
 REST_S = 3.0
@@ -123,11 +126,15 @@ class App:
         """Wait for the page to say which sessions it knows; one that says nothing is dropped in
         time."""
         try:
-            remembered = _session_keys(await stored(client, STORAGE_KEY, PATIENCE_S))
+            keys, scheme = await asyncio.gather(
+                stored(client, STORAGE_KEY, PATIENCE_S), stored(client, SCHEME_KEY, PATIENCE_S)
+            )
+            remembered = _session_keys(keys)
         except TimeoutError:
             return
         except RuntimeError:  # a browser that forbids storage
             remembered = []
+            scheme = None
         # A connection that broke may still count as open; its tab is perhaps the one that is coming
         # back.
         rivals = [known for known, key in self._keys.items() if key in remembered]
@@ -136,11 +143,12 @@ class App:
             self._door
         ):  # one at a time: a page takes its time, and all others are heard in between
             if client.client_id in self._server.get_clients():
-                self._open(client, remembered)
+                self._open(client, remembered, scheme == DARK)
             await asyncio.sleep(0.0)
 
-    def _open(self, client: viser.ClientHandle, remembered: list[str]) -> None:
+    def _open(self, client: viser.ClientHandle, remembered: list[str], is_dark: bool) -> None:
         key, session = self._store.enter(remembered)
+        session.follow_system(is_dark)
         self._keys[client.client_id] = key
         if key not in remembered:
             remembered = [key, *remembered]

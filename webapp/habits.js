@@ -128,6 +128,10 @@
     if (left && !left.querySelector('[data-combobox-selected]')) left.querySelector('[role=option]')?.click();
   });
 
+  // The theme follows the system, until the user chooses one.
+  matchMedia('(prefers-color-scheme: dark)').addEventListener('change', ({ matches }) =>
+    window.finlabPresses?.tell('scheme', matches ? 'dark' : 'light', ''));
+
   // Commands listen on the root of the document, the camera on the document, which comes after.
   page.addEventListener('keydown', (event) => {
     const others = event.ctrlKey || event.metaKey || event.altKey || event.target.closest?.('[role=slider]');

@@ -14,6 +14,7 @@ from webapp.app import App
 from webapp.guard import Guard
 from webapp.session.state import State
 from webapp.session.targets import FIRST_TARGET
+from webapp.start_page import start_page
 from webapp.tasks.solver import Solver
 from webapp.viser_internals import start_server, stop_server
 
@@ -37,7 +38,8 @@ def serve(
     # solver.
     solver.solve(State(first, target=FIRST_TARGET))
     guard = Guard.of(host)
-    server = start_server(guard, port)
+    # Whoever names a robot has come for that one.
+    server = start_server(guard, port, start_page() if layout is None else b"")
     app = App(server, solver, first)
     try:
         if port not in (0, server.get_port()):

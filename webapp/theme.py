@@ -41,9 +41,35 @@ FIN_COLORS: tuple[Rgb, ...] = (
     (160, 52, 104),  # wine
     (186, 206, 70),  # lime
     (122, 62, 140),  # plum
+    (52, 46, 16),
+    (46, 22, 112),
+    (106, 16, 250),
+    (226, 58, 172),
+    (82, 88, 16),
+    (106, 16, 70),
+    (172, 16, 202),
+    (220, 214, 184),
+    (172, 166, 118),
+    (76, 22, 178),
+    (142, 112, 124),
+    (214, 130, 250),
+    (136, 166, 16),
+    (250, 208, 250),
+    (148, 70, 250),
+    (76, 52, 106),
+    (190, 130, 148),
+    (238, 178, 190),
+    (112, 106, 70),
+    (106, 16, 142),
+    (232, 34, 112),
+    (106, 58, 70),
+    (226, 76, 250),
+    (208, 190, 124),
 )
 """One colour per fin, in order. None is near blue, green or vermillion: those hues are reserved for
-what is asked, delivered and missing."""
+what is asked, delivered and missing. From the ninth on each is the one farthest from those before
+it in Oklab (B. Ottosson, 2020), for common and for dichromatic sight (Viénot, Brettel and Mollon,
+1999): so hues come back lighter and darker."""
 
 MODE_COLORS: tuple[Rgb, ...] = (
     (

@@ -20,6 +20,7 @@ from webapp.intents import Intents
 from webapp.page import Page
 from webapp.panels.frame import Frame
 from webapp.session import Session
+from webapp.start_page import connect_start_page
 from webapp.tasks.context import Context
 from webapp.tasks.slot import Attended, Bell, Pools, Slot
 from webapp.tasks.solver import Solver
@@ -62,6 +63,7 @@ class View:
         self.deferred = page.deferred
         self.frame = Frame(page)
         page.presses.start()
+        connect_start_page(page)
         self._revision: int | None = None
         self._is_due = True
         self._held_for: Slots = NO_SLOTS

@@ -82,19 +82,21 @@ LOCAL = Guard("127.0.0.1")
 """Lets only pages of this machine in."""
 
 
-def start_server(guard: Guard = LOCAL, port: int = 0) -> viser.ViserServer:
+def start_server(
+    guard: Guard = LOCAL, port: int = 0, start_page: bytes = b""
+) -> viser.ViserServer:
     """A server behind a guard, without a banner of viser's own; `verbose=False` alone would leave
-    it."""
+    it. Its page begins with the markup of `start_page`."""
     _keep_property_types()
     _serve_quickly()
-    with _STARTING, _guarded(guard), contextlib.redirect_stdout(io.StringIO()):
+    with _STARTING, _guarded(guard, start_page), contextlib.redirect_stdout(io.StringIO()):
         server = viser.ViserServer(host=guard.host, port=port, label="finlab", verbose=False)
     _stay_awake(server.get_event_loop())
     return server
 
 
 @contextlib.contextmanager
-def _guarded(guard: Guard) -> Iterator[None]:
+def _guarded(guard: Guard, start_page: bytes) -> Iterator[None]:
     """Servers that start within this context ask the guard first. Viser has no hook for that."""
     serve = websockets_server.serve
 
@@ -106,7 +108,9 @@ def _guarded(guard: Guard) -> Iterator[None]:
                 answer: Response | None = verdict or process_request(connection, request)
             except OSError:  # viser looks for a file of that name, which may be too long for one
                 answer = status_page(HTTPStatus.NOT_FOUND, "There is no such page.\n")
-            return answer if verdict is not None or answer is None else _name_page(answer)
+            if verdict is not None or answer is None:
+                return answer
+            return _name_page(answer, start_page)
 
         def secured(connection: Any, request: Request, response: Response) -> None:
             for name, value in SECURE.items():
@@ -125,23 +129,26 @@ def _guarded(guard: Guard) -> Iterator[None]:
         yield
 
 
-def _name_page(answer: Response) -> Response:
-    """Let an answer of viser's bring our first page: with our name and icon, and without its
-    panel."""
+def _name_page(answer: Response, start_page: bytes) -> Response:
+    """Let an answer of viser's bring our first page: with our name and icon, without its panel,
+    and with the start page before its script."""
     if answer.headers.get("Content-Type", "").startswith("text/html"):
-        answer.body = _named(bytes(answer.body), answer.headers.get("Content-Encoding") == "gzip")
+        is_zipped = answer.headers.get("Content-Encoding") == "gzip"
+        answer.body = _named(bytes(answer.body), is_zipped, start_page)
         del answer.headers["Content-Length"]
         answer.headers["Content-Length"] = str(len(answer.body))
     return answer
 
 
 @cache
-def _named(body: bytes, zipped: bool) -> bytes:
+def _named(body: bytes, zipped: bool, start_page: bytes) -> bytes:
     ours = files("webapp.markup").joinpath("first_page.html").read_bytes()
     plain = gzip.decompress(body) if zipped else body
     plain = plain.replace(b'rel="icon"', b'rel="alternate"', 1).replace(
         b"<title>Viser</title>", ours, 1
     )
+    if start_page:  # it opens the body, before the script of a megabyte has come
+        plain = plain.replace(b"<script", b"</head><body>" + start_page + b"<script", 1)
     return gzip.compress(plain) if zipped else plain
 
 

@@ -276,6 +276,30 @@ def test_fins_differ_and_their_numbers_can_be_read() -> None:
         assert bright / dim > 3.9, f"the number on {fin}"
 
 
+LIGHT_TO_CONES = np.array(
+    [[17.8824, 43.5161, 4.11935], [3.45565, 27.1554, 3.86714], [0.0299566, 0.184309, 1.46709]]
+)
+"""Matrix from linear red, green and blue to the answers of the three kinds of cones."""
+WITHOUT_CONES = {
+    "long": np.array([[0.0, 2.02344, -2.52581], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
+    "middle": np.array([[1.0, 0.0, 0.0], [0.494207, 0.0, 1.24827], [0.0, 0.0, 1.0]]),
+}
+"""What is left of the cones' answers without one kind (Viénot, Brettel and Mollon, 1999)."""
+
+
+@pytest.mark.parametrize("missing", WITHOUT_CONES)
+def test_thirty_fins_differ_for_eyes_without_one_kind_of_cones(missing: str) -> None:
+    to_light = np.linalg.inv(LIGHT_TO_CONES)
+    seen = []
+    for fin in FIN_COLORS:
+        light = np.clip(to_light @ WITHOUT_CONES[missing] @ LIGHT_TO_CONES @ linear(fin), 0.0, 1.0)
+        seen.append(LMS_TO_OKLAB @ np.cbrt(LINEAR_RGB_TO_LMS @ light))
+    assert len(seen) >= 30
+    for k, fin in enumerate(seen):
+        for other in seen[:k]:
+            assert np.linalg.norm(fin - other) > 0.05
+
+
 def _rgb(color: str) -> Rgb:
     """Red, green and blue of a grey such as "#ccc"."""
     digit = int(color[1], 16) * 17

@@ -27,7 +27,7 @@ SWITCHES = {
     "frozen": ("Freeze", "Fins hold still at their zero direction, propellers stand (P)."),
     "handle": ("Handle", "Drag the tip of the wrench in the view, or turn its rings (Allocate)."),
     "shadows": ("Shadows", "Slow without a graphics card."),
-    "dark": ("Dark", "Dark theme."),
+    "dark": ("Dark", "Dark theme; at first that of the system."),
 }
 """Field of `Display`, label and hint of each switch."""
 

@@ -36,7 +36,7 @@ from webapp.panels.log_tab import plot_rows
 from webapp.panels.nudging import add_nudging
 from webapp.panels.status import add_corner
 from webapp.session.lessons import Stop
-from webapp.session.looking import CANDIDATES, DRAWERS, Desk
+from webapp.session.looking import CANDIDATES, DARK, DRAWERS, Desk
 from webapp.tasks.swimmer import Swimmer
 from webapp.theme import ASKED, DELIVERED, MISSING, NEARLY, REACH, REACH_DARK, css
 from webapp.viser_internals import run_file, run_script
@@ -223,6 +223,7 @@ class Frame:
             "look": lambda view, _: robot.look_from(view),
             "frame": lambda *_: robot.frame(),
             "picture": lambda *_: self._page.scenery.save(),
+            "scheme": lambda scheme, _: session.follow_system(scheme == DARK),
             "typed": lambda *_: session.history.end_merge(),
         }
         for kind, act in acts.items():

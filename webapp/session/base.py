@@ -66,6 +66,8 @@ class BaseSession:
         """How far along the first directions of the answer's null space the forces are [N]."""
         self.loops = False
         """Whether the refinement begins anew at its end."""
+        self.has_started = False
+        """Whether something was chosen on the start page."""
         self.revision = 0
         """Grows with every change of the state; an answer carries the revision it was made for."""
 
@@ -323,6 +325,11 @@ class BaseSession:
     def set_display(self, key: str, value: Any) -> None:
         """One field of `Display`."""
         self.display = self.display.with_value(key, value)
+
+    def follow_system(self, is_dark: bool) -> None:
+        """The system's colour scheme, unless the user has chosen one."""
+        if not self.display.has_own_theme:
+            self.display = replace(self.display, dark=is_dark)
 
     def toggle(self, key: str) -> None:
         """Turn one switch of `Display` on or off."""

@@ -21,7 +21,7 @@ from webapp.session.key_words import key_words
 from webapp.session.layout_edits import partner, unlinked, with_twin
 from webapp.session.lessons import Guide
 from webapp.session.looking import Display
-from webapp.session.state import method_for
+from webapp.session.state import State, method_for
 
 UNITS = ("kg", "kgm2", "m", "n")
 """Ends of the names of a body's fields that say a unit, and are no part of what undo calls them."""
@@ -56,6 +56,17 @@ class Session(BaseSession):
         method = method_for(layout, self.state.method)
         state = replace(self.state, layout=layout, damage=Damage(lost), links=(), method=method)
         self._commit(step or f"Open {layout.name}", state)
+        self.saved = layout
+
+    def open_example(
+        self,
+        layout: Layout,
+        target: tuple[float, float, float, float, float, float],
+        speed: float,
+    ) -> None:
+        """A robot with a wrench (6,) [N, N m] and a speed ahead [m/s] that suit it."""
+        state = State(layout, target=target, speed=speed)
+        self._commit(f"Open {layout.name}", state)
         self.saved = layout
 
     def new_layout(self, kind: str) -> None:

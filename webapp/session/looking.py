@@ -30,6 +30,9 @@ MODE_DRAWERS = (CANDIDATES, NULL_SPACE)
 DRAWN: dict[str, WrenchHalf | None] = {"none": None, "forces": "force", "torques": "torque"}
 """What set can be drawn, by the word on its button."""
 
+DARK = "dark"
+"""What a page calls the dark colour scheme of its system."""
+
 
 @dataclass(frozen=True)
 class Desk:
@@ -60,6 +63,8 @@ class Display:
     dark: bool = False
     handle: bool = True
     """Whether the wrench can be pulled in the view."""
+    has_own_theme: bool = False
+    """Whether the user has chosen light or dark; until then it is the system's."""
     drawn: str = "none"
     """Key of `DRAWN`: the attainable set that is shown."""
 
@@ -72,7 +77,10 @@ class Display:
             one_of(value, key, DRAWN)
         if isinstance(value_now, bool) and not isinstance(value, bool):
             raise FinlabError(f"{key}: expected on or off, got {value!r:.40}")
-        return replace(self, **{key: value})
+        changes = {key: value}
+        if key == "dark":
+            changes["has_own_theme"] = True
+        return replace(self, **changes)
 
 
 GOALS_BY_WORDS = {words: name for name, words in GOAL_WORDS.items()}
