@@ -160,6 +160,11 @@ class TwoRobots:
         self.guests = (*self.guests, guest)[-MOST_GUESTS:]
         self.show(place, guest)
 
+    def show_pair(self, title: str, layout: Layout, lost: tuple[str, ...]) -> None:
+        """Look at this robot, at the left, and another one; arguments as for `welcome`."""
+        self._chosen = [THIS_ROBOT, THIS_ROBOT]
+        self.welcome("right", title, layout, lost)
+
     def swap(self) -> None:
         """Each goes where the other one was."""
         left, right = self._both()
