@@ -1,12 +1,48 @@
 """The facts of one page: all that its panels and its view are functions of, by name."""
 
+from typing import NamedTuple
+
+from finlab.allocation.allocation import Allocation
 from webapp.board import Facts
 from webapp.markup.outcomes import pace_words
 from webapp.scene.wrench_handle import Grip
 from webapp.scene.wrench_nodes import Scale
 from webapp.session import Session
+from webapp.session.two_robots import Pair
 from webapp.tasks.answering import ShownAnswer
 from webapp.tasks.jobs import Jobs
+from webapp.tasks.solver import Reply
+
+
+class PairFacts(NamedTuple):
+    """Two robots that stand beside each other, and what is known of them."""
+
+    pair: Pair | None
+    """None where they are not looked at."""
+    left_reply: Reply | None
+    """The newest answer of the left one, perhaps to an earlier question."""
+    right_reply: Reply | None
+    """The same of the right one."""
+
+    @property
+    def has_this_robot(self) -> bool:
+        """Whether the robot that the page works on can be seen."""
+        return self.pair is None or any(standing.is_this for standing in self.pair.both)
+
+    @property
+    def allocations(self) -> tuple[Allocation | None, ...]:
+        """Answers of both; none where they are not looked at."""
+        if self.pair is None:
+            return ()
+        replies = (self.left_reply, self.right_reply)
+        return tuple([None if reply is None else reply.answer for reply in replies])
+
+
+def pair_facts(session: Session, jobs: Jobs) -> PairFacts:
+    """The two robots of a session, unless one swims."""
+    pair = None if jobs.swimming.swimmer is not None else session.two_robots.pair
+    pairing = jobs.pairing
+    return PairFacts(pair, pairing.reply(0, pair), pairing.reply(1, pair))
 
 
 def facts_of(
@@ -16,6 +52,7 @@ def facts_of(
     dragged: int | None,
     pulled: Grip | None,
     scale: Scale,
+    pair: PairFacts,
 ) -> Facts:
     """The facts of a session, of what has been worked out for it, and of the view.
 
@@ -26,6 +63,7 @@ def facts_of(
         dragged: index of the actuator that is dragged; None for none.
         pulled: what of the wrench is in the user's hand; None for nothing.
         scale: what lengths in the view stand for.
+        pair: what is known of two robots beside each other.
     """
     state = session.state
     swimming = jobs.swimming
@@ -57,8 +95,16 @@ def facts_of(
         "playing": jobs.refining.running,
         "jet_comparison": jet_comparison,
         "run": jobs.comparison.run,
+        # Two robots beside each other.
+        **pair._asdict(),
+        "pair_sources": session.two_robots.sources(jobs.improver.proposal) if pair.pair else (),
+        "pair_busy": any(slot.busy for slot in jobs.pairing.slots),
+        "cards": jobs.pairing.cards.answer,
+        "cards_error": jobs.pairing.cards.error,
+        "cards_progress": jobs.pairing.cards.progress,
+        "cards_busy": jobs.pairing.cards.busy,
         # What takes longer.
-        "ranges": jobs.ranging.answer,
+        "ranges": jobs.ranging.answer if pair.has_this_robot else None,
         "ranges_error": jobs.ranging.error,
         "analysis": jobs.analyst.answer,
         "analysis_error": jobs.analyst.error,

@@ -32,7 +32,7 @@
   const PICTURE = 2; // pixels of a saved picture per pixel of the page
   const APART = 1.9; // between the phases of fins, which look alive so
 
-  let parts = [], speed = 1, frozen = true, phases = [], turns = [];
+  let parts = [], blades = [], robots = [], speed = 1, frozen = true, phases = [], turns = [];
   let touched = performance.now(), due = 0, drawnAt = -Infinity, drawn = [], timer = 0, stepped = 0, cost = 0, worked = -Infinity, over = false;
   const viewer = () => window.__viserMutable;
   const root = () => viewer()?.scene?.__r3f?.root.getState();
@@ -118,7 +118,7 @@
   // axis of that.
 
   const alive = () => !frozen && speed > 0 && parts.some(([amplitude, frequency, , spin]) => amplitude * frequency > 0 || spin)
-    && viewer()?.nodeRefFromName['/robot']?.visible !== false;
+    && robots.some((name) => viewer()?.nodeRefFromName[name]?.visible !== false);
 
   function turn(name, axis, angle) {
     const node = viewer().nodePoseData[name] ??= { position: [0, 0, 0] };
@@ -129,7 +129,7 @@
 
   function pose() {
     parts.forEach(([amplitude, , angle, spin, axis], k) => {
-      const blade = `/robot/fins/${k}/turn/blade`;
+      const blade = blades[k];
       turn(blade, 0, frozen ? angle : angle + amplitude * Math.sin(phases[k]));
       if (spin) turn(`${blade}/propeller`, axis, turns[k]);
     });
@@ -178,11 +178,14 @@
     count: 0, // frames that were drawn
     picture,
     follow(start) { stood = start; },
-    flap(commands, rate, still) {
+    // Counts: how many of the commands are for each robot, by the name of its node.
+    flap(commands, rate, still, counts = { '/robot': commands.length }) {
       patch();
       listenToRequests();
       if (commands.length !== parts.length) [phases, turns] = [commands.map((_, k) => APART * k), commands.map(() => 0)];
       [parts, speed, frozen] = [commands, rate, still];
+      robots = Object.keys(counts);
+      blades = robots.flatMap((name) => [...Array(counts[name]).keys()].map((k) => `${name}/fins/${k}/turn/blade`));
       stepped = performance.now();
       pose();
       touch();

@@ -46,7 +46,9 @@ ROBOTS = {
     "catamaran": Example(
         "Catamaran", "two pods, a bow thruster", (60.0, 15.0, 0.0, 0.0, 0.0, 12.0)
     ),
-    "torpedo": Example("Torpedo", "a propeller, four rudders", (20.0, 0.0, 0.0, 0.0, 2.0, 2.0), 1.5),
+    "torpedo": Example(
+        "Torpedo", "a propeller, four rudders", (20.0, 0.0, 0.0, 0.0, 2.0, 2.0), 1.5
+    ),
 }
 """Shipped layouts of the start page by name, in its order."""
 
@@ -70,12 +72,7 @@ class _Door(NamedTuple):
 DOORS = (
     _Door("design", "Design mine", "Begin with one actuator, add others", "M12 5v14M5 12h14"),
     _Door("tour", "Show me", f"A tour in {len(TOUR)} stops", "M8 5l11 7-11 7z"),
-    _Door(
-        "file",
-        "Open a file or log",
-        "A design, or what a robot logged",
-        "M3 19V6h6l2 3h10v10z",
-    ),
+    _Door("file", "Open a file or log", "A design, or what a robot logged", "M3 19V6h6l2 3h10v10z"),
 )
 
 

@@ -15,7 +15,7 @@ import viser
 
 from finlab.allocation.allocation import Allocation
 from finlab.errors import FinlabError
-from webapp.facts import facts_of
+from webapp.facts import facts_of, pair_facts
 from webapp.intents import Intents
 from webapp.page import Page
 from webapp.panels.frame import Frame
@@ -199,9 +199,12 @@ class View:
             if guide.stop is not None and answer.shown_allocation is not None and not answer.busy:
                 guide.take(answer.shown_allocation)
             self.scenery.follow_guide()
-            scale = self.scenery.fit(session.state.target, answer.shown_allocation)
+            pair = pair_facts(session, self.jobs)
+            scale = self.scenery.fit(
+                session.state.target, answer.shown_allocation, pair.allocations
+            )
             robot = self.scenery.robot
-            facts = facts_of(session, self.jobs, answer, robot.dragged, robot.pulled, scale)
+            facts = facts_of(session, self.jobs, answer, robot.dragged, robot.pulled, scale, pair)
         except Exception as error:
             board.fail(error)
         else:

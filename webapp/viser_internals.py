@@ -82,9 +82,7 @@ LOCAL = Guard("127.0.0.1")
 """Lets only pages of this machine in."""
 
 
-def start_server(
-    guard: Guard = LOCAL, port: int = 0, start_page: bytes = b""
-) -> viser.ViserServer:
+def start_server(guard: Guard = LOCAL, port: int = 0, start_page: bytes = b"") -> viser.ViserServer:
     """A server behind a guard, without a banner of viser's own; `verbose=False` alone would leave
     it. Its page begins with the markup of `start_page`."""
     _keep_property_types()

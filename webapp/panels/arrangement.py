@@ -31,8 +31,9 @@ from webapp.panels.log_tab import add_log, add_losses, log_plots, replays_table
 from webapp.panels.modes_tab import add_candidates, add_comparison
 from webapp.panels.null_space import add_null_space
 from webapp.panels.swim_tab import add_figures, add_run, add_scenario, add_timeline
+from webapp.panels.two_robots import add_figures_of_both, add_two_robots
 from webapp.panels.wrench_tab import add_answer, add_commands, add_jets, add_speed, add_target
-from webapp.session.looking import CANDIDATES, NULL_SPACE, TASKS
+from webapp.session.looking import CANDIDATES, NULL_SPACE, TASKS, TWO_ROBOTS
 
 TOP = "top"
 """The bar above all."""
@@ -54,6 +55,10 @@ NEEDS_ROBOT = "robot"
 """Need of a panel about the robot as a whole, which is there while no actuator is selected."""
 NEEDS_GUIDE = "guide"
 """Need of a panel that is there during a tour or a lesson."""
+NEEDS_ONE = "one"
+"""Need of a panel about one robot, which is not there while two stand beside each other."""
+NEEDS_TWO = "two"
+"""Need of a panel that is there while two robots stand beside each other."""
 NEEDS_FLOW = "flow"
 """Need of a panel that is there where an actuator feels the flow of the water."""
 
@@ -91,18 +96,20 @@ PANELS = (
     Panel(RIGHT, (DESIGN,), "Check", card(check)),
     Panel(DRAWER, (DESIGN,), "Reach", add_reach),
     Panel(DRAWER, (DESIGN,), "Improve", add_improving),
-    Panel(LEFT, (ALLOCATE,), "Actuators", add_commands),
-    Panel(LEFT, (ALLOCATE,), "Damage", add_damage, is_folded=True),
+    Panel(LEFT, (ALLOCATE,), TWO_ROBOTS, add_two_robots, need=NEEDS_TWO),
+    Panel(LEFT, (ALLOCATE,), "Actuators", add_commands, need=NEEDS_ONE),
+    Panel(LEFT, (ALLOCATE,), "Damage", add_damage, is_folded=True, need=NEEDS_ONE),
     Panel(RIGHT, (ALLOCATE,), "Wrench", add_target),
     Panel(LEFT, (LOG,), "Log", add_log),
     Panel(RIGHT, (LOG,), "Lost", add_losses),
-    Panel(RIGHT, (ALLOCATE, LOG), "Asked and delivered", add_answer),
+    Panel(RIGHT, (ALLOCATE, LOG), "Asked and delivered", add_answer, need=NEEDS_ONE),
     Panel(DRAWER, (LOG,), "Log over time", card(log_plots)),
     Panel(DRAWER, (LOG,), "Replays", card(replays_table)),
-    Panel(RIGHT, (DESIGN, ALLOCATE), "Jets", add_jets),
+    Panel(RIGHT, (DESIGN, ALLOCATE), "Jets", add_jets, need=NEEDS_ONE),
     Panel(DRAWER, (ALLOCATE,), CANDIDATES, add_candidates),
     Panel(DRAWER, (ALLOCATE,), NULL_SPACE, add_null_space),
     Panel(DRAWER, (ALLOCATE,), "Comparison", add_comparison),
+    Panel(DRAWER, (ALLOCATE,), TWO_ROBOTS, add_figures_of_both),
     Panel(LEFT, (SIMULATE,), "Scenario", add_scenario),
     Panel(RIGHT, (SIMULATE,), "Run", add_run),
     Panel(RIGHT, (SIMULATE,), "Figures", add_figures),

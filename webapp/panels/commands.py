@@ -41,7 +41,7 @@ def add_page_commands(page: Page) -> None:
 def page_commands(page: Page) -> list[Command]:
     """All commands of one page, in the order of the list."""
     session = page.session
-    robot = page.scenery.robot
+    scenery = page.scenery
     swimming = page.jobs.swimming
 
     def toggle_loss_of_selected() -> None:
@@ -76,12 +76,12 @@ def page_commands(page: Page) -> list[Command]:
         commands.append(Command(f"Keep {word} least", partial(session.keep_least, word)))
     commands += [
         Command("Swim: pause or go on", pause_or_go_on, "B"),
-        Command("Swim: back to the design", page.scenery.end_swim),
-        Command("Frame what is selected", robot.frame, "F"),
-        Command("Save the view as a picture", page.scenery.save),
+        Command("Swim: back to the design", scenery.end_swim),
+        Command("Frame what is selected", scenery.frame, "F"),
+        Command("Save the view as a picture", scenery.save),
     ]
     for view, key in CAMERA_KEYS.items():
-        commands.append(Command(f"Camera: {view}", partial(robot.look_from, view), key))
+        commands.append(Command(f"Camera: {view}", partial(scenery.look_from, view), key))
     commands += [
         Command("Freeze or move the fins", partial(session.toggle, "frozen"), "P"),
         Command("Dark or light theme", partial(session.toggle, "dark")),

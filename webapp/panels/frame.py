@@ -24,7 +24,9 @@ from webapp.panels.arrangement import (
     NEEDS_ACTUATORS,
     NEEDS_FLOW,
     NEEDS_GUIDE,
+    NEEDS_ONE,
     NEEDS_ROBOT,
+    NEEDS_TWO,
     PANELS,
     REGIONS,
     RIGHT,
@@ -37,6 +39,7 @@ from webapp.panels.nudging import add_nudging
 from webapp.panels.status import add_corner
 from webapp.session.lessons import Stop
 from webapp.session.looking import CANDIDATES, DARK, DRAWERS, Desk
+from webapp.session.two_robots import Pair
 from webapp.tasks.swimmer import Swimmer
 from webapp.theme import ASKED, DELIVERED, MISSING, NEARLY, REACH, REACH_DARK, css
 from webapp.viser_internals import run_file, run_script
@@ -50,7 +53,7 @@ VARIABLES = (
     f"[data-mantine-color-scheme=dark] {{ --fl-reach: {css(REACH_DARK)}; }}"
 )
 """The colours of the theme as variables of CSS."""
-STYLE_SHEETS = ("style.css", "frame.css")
+STYLE_SHEETS = ("style.css", "frame.css", "two_robots.css")
 """Files of `webapp/markup` that style the page."""
 STYLE = html(
     "<style>{}{}</style>",
@@ -164,9 +167,11 @@ class Frame:
         swimmer: Swimmer | None,
         layout: Layout,
         judgement: "Judgement | None",
+        pair: Pair | None,
     ) -> None:
         """Writes the style that says which regions and sections are visible."""
         needs = ["", NEEDS_ROBOT if selected is None else NEEDS_ACTUATORS]
+        needs.append(NEEDS_ONE if pair is None else NEEDS_TWO)
         if stop is not None:
             needs.append(NEEDS_GUIDE)
         if plant_of(layout).feels_flow:
@@ -211,7 +216,7 @@ class Frame:
     def _listen(self) -> None:
         """Connects the buttons of the page's own markup, by their kinds, with what they do."""
         session = self._page.session
-        robot = self._page.scenery.robot
+        scenery = self._page.scenery
         acts: dict[str, Callable[[str, str], object]] = {
             "task": lambda name, _: session.show_task(name),
             "drawer": lambda name, _: session.show_drawer(name),
@@ -220,9 +225,9 @@ class Frame:
             "on": lambda *_: session.guide.go(1),
             "back": lambda *_: session.guide.go(-1),
             "end": lambda *_: session.guide.end(),
-            "look": lambda view, _: robot.look_from(view),
-            "frame": lambda *_: robot.frame(),
-            "picture": lambda *_: self._page.scenery.save(),
+            "look": lambda view, _: scenery.look_from(view),
+            "frame": lambda *_: scenery.frame(),
+            "picture": lambda *_: scenery.save(),
             "scheme": lambda scheme, _: session.follow_system(scheme == DARK),
             "typed": lambda *_: session.history.end_merge(),
         }

@@ -12,15 +12,18 @@ from finlab.axes import AXES, UNITS
 from finlab.layout import Layout
 from finlab.physics.objective import REACHED
 from webapp.handles import set_properties
+from webapp.markup.two_robots import status_of_both
 from webapp.markup.verdict import COLORS, WORKING, verdict_of, verdict_sentence
 from webapp.markup.words import ROUNDING, error_digits, html, parts_word, three_digits
 from webapp.page import Page
 from webapp.scene.stage import arrow_size
+from webapp.scene.two_robots import pair_arrow_size
 from webapp.scene.wrench_nodes import Scale, set_scale
 from webapp.session.looking import Display
 from webapp.session.state import LEAST, State
+from webapp.session.two_robots import Pair
 from webapp.tasks.analysing import Analysis
-from webapp.tasks.solver import Modes
+from webapp.tasks.solver import Modes, Reply
 from webapp.tasks.swimmer import ERROR, Moment, Swimmer
 from webapp.theme import ASKED, DEAD, DELIVERED, REACH, TAKEN, WATER, css
 
@@ -62,10 +65,17 @@ def _corner_of_facts(
     modes: Modes,
     mode: int,
     task: str,
+    pair: Pair | None,
+    left_reply: Reply | None,
+    right_reply: Reply | None,
+    pair_busy: bool,
 ) -> str:
     """The corner as the facts of a page have it, which are the arguments by name."""
     if swimmer is not None and moment is not None:
         return swim_corner(swimmer, moment, pace, scale.newtons)
+    if pair is not None:
+        keys = legend(*scale, pair_arrow_size(pair), "")
+        return _cards(keys, status_of_both(pair, (left_reply, right_reply), pair_busy))
     size = arrow_size(state.layout)
     has_sets = display.drawn != "none" and task == "Design"
     keys = legend(*scale, size, set_rows(analysis if has_sets else None, size))

@@ -4,7 +4,7 @@ A fin beats, a foil is deflected, a propeller spins, a pod turns as well; `frame
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,7 +12,7 @@ import viser
 from viser.transforms import SO3
 
 from finlab.arrays import Array
-from finlab.layout import Actuator
+from finlab.layout import Actuator, Layout
 from finlab.swim.hull import Surface
 from finlab.swim.hull.mesh_file import Mesh
 from webapp.handles import set_properties
@@ -70,6 +70,26 @@ def motion(actuator: Actuator, command: Sequence[float] | None) -> Motion:
     return Motion(angle=angle, turns=turns, along=along)
 
 
+def motions(
+    layout: Layout, commands: Array, idle: Collection[str]
+) -> tuple[list[bool], list[Motion]]:
+    """Which actuators of a layout work, and how each of them moves.
+
+    Args:
+        layout: the robot.
+        commands: of its actuators (n, 3); NaN where there is none.
+        idle: names of those that are lost.
+    """
+    # Lists: a robot has few actuators, and an operation on an array takes as long as on ten.
+    works: list[bool] = []
+    moves: list[Motion] = []
+    for actuator, row in zip(layout.actuators, commands.tolist(), strict=True):
+        alive = actuator.name not in idle and math.isfinite(row[0])
+        works.append(alive)
+        moves.append(motion(actuator, row if alive else None))
+    return works, moves
+
+
 def _moving(looks: str, slenderness: float) -> Mesh:
     """What of an actuator turns about its first axis, in its own frame."""
     if looks == "foil":
@@ -114,10 +134,12 @@ class ActuatorNode:
         index: int,
         on_click: Callable[[int, bool], None],
         on_drag: Callable[[int, str, tuple[float, float, float]], None],
+        robot: str = "/robot",
     ) -> None:
         """Build the nodes. `on_click` gets the index and whether Ctrl or Shift was held, `on_drag`
-        the index, phase (`start`, `update`, `end`) and the position [m]."""
-        name = f"/robot/fins/{index}"
+        the index, phase (`start`, `update`, `end`) and the position [m]; `robot` is the node of the
+        robot."""
+        name = f"{robot}/fins/{index}"
         # The arrows stay along the body's axes, like the numbers beside them.
         idle: dict[str, Any] = {"depth_test": False, "active_axes": (False,) * 3, "line_width": 3.5}
         self._move = scene.add_transform_controls(
@@ -133,7 +155,7 @@ class ActuatorNode:
         self._label = scene.add_label(
             f"{name}/label", str(index + 1), anchor="center-center", font_screen_scale=LABEL
         )
-        self._strut = Shape(scene, f"/robot/struts/{index}", LIGHT.metal)
+        self._strut = Shape(scene, f"{robot}/struts/{index}", LIGHT.metal)
 
         @self._move.on_update
         async def _dragged(event: Any) -> None:

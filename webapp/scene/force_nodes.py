@@ -106,12 +106,12 @@ class Arrows:
 class ForceNodes:
     """Arrows at the roots of actuators, and the fans of their blades."""
 
-    def __init__(self, scene: viser.SceneApi) -> None:
-        """Nothing is shown yet."""
-        self._arrows = Arrows(scene, "/robot/forces", THICKNESS)
+    def __init__(self, scene: viser.SceneApi, robot: str = "/robot") -> None:
+        """Nothing is shown yet; `robot` is the node of the robot."""
+        self._arrows = Arrows(scene, f"{robot}/forces", THICKNESS)
         wedge = unit_wedge()
         self._fans = scene.add_batched_meshes_simple(
-            "/robot/fans",
+            f"{robot}/fans",
             wedge.vertices,
             wedge.faces,
             np.array([[1.0, 0.0, 0.0, 0.0]]),

@@ -1,6 +1,5 @@
 """The whole 3D view of one browser."""
 
-import math
 from collections.abc import Sequence
 from functools import partial
 from typing import Any
@@ -19,7 +18,7 @@ from webapp.board import Board
 from webapp.handles import set_properties
 from webapp.intents import Intents
 from webapp.markup.words import damage_words, missing_part
-from webapp.scene.actuator_node import ActuatorNode, Motion, motion, offered_mesh
+from webapp.scene.actuator_node import ActuatorNode, Motion, motions, offered_mesh
 from webapp.scene.force_nodes import ForceNodes
 from webapp.scene.jet_nodes import JetNodes
 from webapp.scene.stage import Shape, Stage, aim_camera, arrow_size, hull_top, part_size, view_size
@@ -30,6 +29,7 @@ from webapp.session.looking import DRAWN, Display
 from webapp.session.state import one_of
 from webapp.session.swim_plan import SwimSettings
 from webapp.session.targets import lone_reach
+from webapp.session.two_robots import Pair
 from webapp.tasks.analysing import Analysis
 from webapp.tasks.swimmer import Moment, Swimmer
 from webapp.theme import LIGHT, fin_color
@@ -99,10 +99,11 @@ class RobotScene:
         """What stands there may be another robot's."""
         set_properties(self.root, visible=False)
 
-    def show(self, swimmer: Swimmer | None) -> None:
-        """A robot that does not swim stands on a floor of its own."""
-        set_properties(self.root, visible=True)
-        set_properties(self._stage.floor, visible=swimmer is None)
+    def show(self, swimmer: Swimmer | None, pair: Pair | None = None) -> None:
+        """A robot that does not swim stands on a floor of its own; it is hidden where two others
+        stand beside each other."""
+        set_properties(self.root, visible=pair is None)
+        set_properties(self._stage.floor, visible=swimmer is None and pair is None)
         if swimmer is None:
             set_properties(self.root, position=np.zeros(3), wxyz=np.array([1.0, 0.0, 0.0, 0.0]))
 
@@ -139,7 +140,13 @@ class RobotScene:
         self.aim(center + way / max(float(np.linalg.norm(way)), 1e-6) * size, center)
 
     def _show_stage(
-        self, visible_layout: Layout, display: Display, dragged: int | None, task: str, swims: bool
+        self,
+        visible_layout: Layout,
+        display: Display,
+        dragged: int | None,
+        task: str,
+        swims: bool,
+        pair: Pair | None,
     ) -> None:
         if dragged is not None:  # a hull that breathes with the fin one drags is hard to aim at
             return
@@ -154,6 +161,8 @@ class RobotScene:
             has_inside(visible_layout),
             size,
         )
+        if pair is not None:  # the camera sees both
+            return
         if not swims and not 0.75 < view_size(visible_layout) / self._size < 1.34:  # another robot
             self.look_from("3D")
 
@@ -211,7 +220,10 @@ class RobotScene:
         shown_allocation: Allocation | None,
         scale: Scale,
         moment: Moment | None,
+        pair: Pair | None,
     ) -> None:
+        if pair is not None:  # this robot is hidden
+            return
         idle = lost if moment is None else moment.lost
         if moment is not None:
             commands = moment.motion
@@ -223,13 +235,7 @@ class RobotScene:
             commands = np.full((visible_layout.n, 3), np.nan)
             forces = np.zeros((visible_layout.n, 3))
         scaled = LENGTH / scale.newtons
-        # Lists: a robot has few actuators, and an operation on an array takes as long as on ten.
-        works: list[bool] = []
-        moves: list[Motion] = []
-        for actuator, row in zip(visible_layout.actuators, commands.tolist(), strict=True):
-            alive = actuator.name not in idle and math.isfinite(row[0])
-            works.append(alive)
-            moves.append(motion(actuator, row if alive else None))
+        works, moves = motions(visible_layout, commands, idle)
         self._moves = moves
         if works != self._works:
             self._works = works
@@ -258,8 +264,12 @@ class RobotScene:
         display: Display,
         swim: SwimSettings,
         paused: bool,
+        pair: Pair | None,
     ) -> None:
         """The page moves the fins (`frames.js`): it is told the commands of all, and how fast."""
+        if pair is not None:
+            self._flaps = ""
+            return
         speed, still = (
             (SPEED, display.frozen) if moment is None else (swim.speed, paused or moment.done)
         )
@@ -275,7 +285,10 @@ class RobotScene:
         shown_allocation: Allocation | None,
         scale: Scale,
         moment: Moment | None,
+        pair: Pair | None,
     ) -> None:
+        if pair is not None:
+            return
         demanded: Sequence[float] = target
         delivered = missing = NO_WRENCH
         if moment is not None:

@@ -16,12 +16,14 @@ from webapp.intents import Intents
 from webapp.scene.actuator_shapes import NOTHING, force_arrow, joined, tube
 from webapp.scene.robot_scene import RobotScene
 from webapp.scene.stage import Shape, add_floor, aim_camera, paint_floor, view_size
+from webapp.scene.two_robots import PairScene, pair_scale
 from webapp.scene.wrench_nodes import Scale, fitting_scale, swim_scale
 from webapp.session import Session
 from webapp.session.files import file_stem
 from webapp.session.lessons import Stop
 from webapp.session.looking import Display
 from webapp.session.swim_plan import SwimSettings
+from webapp.session.two_robots import Pair
 from webapp.tasks.swimmer import PLACE, Moment, Swimmer
 from webapp.tasks.swimming import Swimming
 from webapp.theme import ASKED, BRAND, DELIVERED, WATER
@@ -56,10 +58,13 @@ class Scenery:
         self.robot = RobotScene(client, session, board, intents)
         self.swim = SwimScene(self._client, swimming, self.robot.root)
         board.act(self.swim.refresh)
+        self.two_robots = PairScene(client, board)
+        board.act(self._leave_pair)
 
-    def _show(self, display: Display, swimmer: Swimmer | None) -> None:
-        """The theme, and the robot that is designed unless one swims."""
-        self.robot.show(swimmer)
+    def _show(self, display: Display, swimmer: Swimmer | None, pair: Pair | None) -> None:
+        """The theme, and the robot that is designed unless one swims, or two stand beside each
+        other."""
+        self.robot.show(swimmer, pair)
         if display.dark != self._dark:
             self._dark = display.dark
             self._client.gui.configure_theme(
@@ -68,14 +73,49 @@ class Scenery:
 
     _dark: bool | None = None
 
-    def fit(self, target: Sequence[float], shown_allocation: Allocation | None) -> Scale:
-        """What arrows and rings stand for, given a target (6,) and what is shown of it, or in a
-        swim."""
+    def _leave_pair(self, pair: Pair | None) -> None:
+        """Where two robots have been looked at, the camera goes back to the one."""
+        if pair is not None:
+            self._was_pair = True
+        elif self._was_pair:
+            self._was_pair = False
+            self.robot.look_from("3D")
+
+    _was_pair = False
+
+    def look_from(self, view: str) -> None:
+        """Move the camera to one of `CAMERAS`, where it sees the robot, or both that stand beside
+        each other."""
+        if self.two_robots.is_open:
+            self.two_robots.look_from(view)
+        else:
+            self.robot.look_from(view)
+
+    def frame(self) -> None:
+        """Bring what is selected, or the whole robot, into the middle of the view; of two robots
+        both."""
+        if self.two_robots.is_open:
+            self.two_robots.look_from("3D")
+        else:
+            self.robot.frame()
+
+    def fit(
+        self,
+        target: Sequence[float],
+        shown_allocation: Allocation | None,
+        pair_allocations: Sequence[Allocation | None] = (),
+    ) -> Scale:
+        """What arrows and rings stand for, given a target (6,) and what is shown of it, in a swim,
+        or of two robots beside each other, whose answers are given."""
         swimmer = self._swimming.swimmer
         if swimmer is not None:
             self._swam = swim_scale(swimmer, self._swam)
             return self._swam
         self._swam = INITIAL_SCALE
+        if pair_allocations:
+            self._fitted = None
+            self._scale = pair_scale(target, pair_allocations, self._scale)
+            return self._scale
         fitted = self._fitted
         if fitted is None or fitted[0] != target or fitted[1] is not shown_allocation:
             try:
@@ -91,9 +131,11 @@ class Scenery:
 
     def _fail(self, error: Exception | None) -> None:
         if error is None:
-            self.robot.show(self._swimming.swimmer)
+            pair = None if self._swimming.active else self._session.two_robots.pair
+            self.robot.show(self._swimming.swimmer, pair)
         else:
             self.robot.hide()
+            self.two_robots.hide()
 
     def animate(self, elapsed: float) -> None:
         """Let time pass [s]: robots that swim move on."""

@@ -67,7 +67,7 @@ class Stage:
         scene.configure_environment_map(None)
         scene.add_light_hemisphere("/light", sky_color=SKY, ground_color=DEEP, intensity=BRIGHT)
         mesh = hull.mesh
-        bow = _bow(hull)
+        bow = bow_of(hull)
         self._body = Shape(scene, "/robot/hull", LIGHT.hull, mesh, side="double")
         self._bow = Shape(
             scene, "/robot/hull/bow", LIGHT.glass, bow, side="double", cast_shadow=False
@@ -93,7 +93,7 @@ class Stage:
         if hull != self._hull:
             self._hull = hull
             self._body.become(hull.mesh)
-            self._bow.become(_bow(hull))
+            self._bow.become(bow_of(hull))
         for node in (self._axes, self.floor):
             set_properties(node, scale=size)
         set_properties(
@@ -139,7 +139,7 @@ class Shape:
             self.node.faces = mesh.faces.astype(np.uint32)
 
 
-def _bow(hull: Surface) -> Mesh:
+def bow_of(hull: Surface) -> Mesh:
     """A dark window over the foremost part of a shape; a mesh from a file shows its bow by
     itself."""
     if hull.file is not None:

@@ -96,23 +96,23 @@ def swim_scale(swimmer: Swimmer, previous: Scale) -> Scale:
 class WrenchNodes:
     """Arrows and rings over a stalk that stands on the centre of gravity."""
 
-    def __init__(self, scene: viser.SceneApi) -> None:
-        self._root = scene.add_frame("/robot/wrench", show_axes=False)
+    def __init__(self, scene: viser.SceneApi, robot: str = "/robot") -> None:
+        """Nothing is shown yet; `robot` is the node of the robot."""
+        name = f"{robot}/wrench"
+        self._root = scene.add_frame(name, show_axes=False)
         stalk = tube(np.array([[0, 0, -HEIGHT - 0.2], [0, 0, 0.0]]), 0.0025, 10)
         self._nodes: list[viser.MeshHandle | viser.IcosphereHandle] = [
-            Shape(scene, "/robot/wrench/stalk", LIGHT.line, stalk, cast_shadow=False).node,
-            scene.add_icosphere("/robot/wrench/hub", 0.012, color=(70, 78, 86), cast_shadow=False),
+            Shape(scene, f"{name}/stalk", LIGHT.line, stalk, cast_shadow=False).node,
+            scene.add_icosphere(f"{name}/hub", 0.012, color=(70, 78, 86), cast_shadow=False),
         ]
 
         def part(
-            name: str, color: Rgb, mesh: Mesh, opacity: float | None = None
+            word: str, color: Rgb, mesh: Mesh, opacity: float | None = None
         ) -> viser.MeshHandle:
-            shape = Shape(
-                scene, f"/robot/wrench/{name}", color, mesh, opacity=opacity, cast_shadow=False
-            )
+            shape = Shape(scene, f"{name}/{word}", color, mesh, opacity=opacity, cast_shadow=False)
             return shape.node
 
-        self._forces = Arrows(scene, "/robot/wrench/forces", 0.0065)
+        self._forces = Arrows(scene, f"{name}/forces", 0.0065)
         self._asked_force = UnitMesh(part("asked_force", ASKED, unit_arrow(0.011), 0.4), along_x)
         rings = (
             part("asked_torque", ASKED, unit_ring(0.07), 0.4),

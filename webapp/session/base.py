@@ -30,6 +30,7 @@ from webapp.session.state import (
     State,
     Step,
     Steps,
+    is_same_robot,
     number,
     one_of,
 )
@@ -116,6 +117,27 @@ class BaseSession:
             if new_name is not None:
                 selection.append(new_name)
         self.selection_order = tuple(selection)
+
+    def accept_state(self, step: str, state: State) -> bool:
+        """Another robot with its damage, and what is asked of it; whether that is a change.
+
+        Args:
+            step: what undo calls it.
+            state: the robot and its question.
+        """
+        revision = self.revision
+        self._commit(step, state)
+        return self.revision != revision
+
+    @property
+    def before(self) -> State | None:
+        """The state before the last change of this robot or of its damage; None where there was
+        another robot, or none."""
+        state = self.state
+        for step in reversed(self.history.past):
+            if not is_same_robot(step.state, state):
+                return step.state if step.state.layout.name == state.layout.name else None
+        return None
 
     def undo(self) -> str:
         """Take back the last step; returns its name."""

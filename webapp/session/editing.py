@@ -22,6 +22,7 @@ from webapp.session.layout_edits import partner, unlinked, with_twin
 from webapp.session.lessons import Guide
 from webapp.session.looking import Display
 from webapp.session.state import State, method_for
+from webapp.session.two_robots import TwoRobots
 
 UNITS = ("kg", "kgm2", "m", "n")
 """Ends of the names of a body's fields that say a unit, and are no part of what undo calls them."""
@@ -33,6 +34,7 @@ class Session(BaseSession):
     def __init__(self, layout: Layout, display: Display | None = None) -> None:
         super().__init__(layout, display)
         self.guide = Guide(self)
+        self.two_robots = TwoRobots(self)
 
     def start_over(self) -> None:
         """Everything as at first sight, outside of tour and lessons; the way here can be undone.
@@ -59,10 +61,7 @@ class Session(BaseSession):
         self.saved = layout
 
     def open_example(
-        self,
-        layout: Layout,
-        target: tuple[float, float, float, float, float, float],
-        speed: float,
+        self, layout: Layout, target: tuple[float, float, float, float, float, float], speed: float
     ) -> None:
         """A robot with a wrench (6,) [N, N m] and a speed ahead [m/s] that suit it."""
         state = State(layout, target=target, speed=speed)

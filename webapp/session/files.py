@@ -33,6 +33,8 @@ FRAGMENT = "design="
 """What the part behind the # begins with."""
 WRENCH = "&wrench="
 """What stands before the six components of the wrench, after the design."""
+BESIDE = "&beside="
+"""What stands before the design of a second robot, after the wrench."""
 MAX_LINK = 16_000
 """Most characters of a design in a link; chats and mail programs cut longer ones."""
 PLAIN, ARCHIVE = "y", "a"
@@ -134,6 +136,21 @@ def reshaped_hull(hull: Hull, change: Callable[[Mesh], Mesh]) -> Hull:
     return replace(
         hull, mesh=design_files.stored_mesh("hull.stl", content, 1.0, cache_folder()), scale=1.0
     )
+
+
+def parts_of_link(text: str) -> tuple[str, str, str]:
+    """What a link carries behind its #.
+
+    Args:
+        text: that part of the address; it may be anything.
+
+    Returns:
+        The design, the six components of the wrench, and the design of a second robot that stands
+        beside it; each empty where there is none.
+    """
+    question, _, other = text.strip().removeprefix(FRAGMENT).partition(BESIDE)
+    design, _, wrench = question.partition(WRENCH)
+    return design, wrench, other
 
 
 def packed(layout: Layout, most: int = MAX_LINK) -> str:

@@ -18,9 +18,11 @@ CANDIDATES = "Candidates"
 """Tab of the drawer that shows the modes of a network's candidates, of robots of fins alone."""
 NULL_SPACE = "Null space"
 """Tab of the drawer that shows commands along the null space of an answer."""
+TWO_ROBOTS = "Two robots"
+"""Tab of the drawer that compares two robots; the view shows both."""
 DRAWERS: dict[str, tuple[str, ...]] = {
     "Design": ("Reach", "Improve"),
-    "Allocate": (CANDIDATES, NULL_SPACE, "Comparison"),
+    "Allocate": (CANDIDATES, NULL_SPACE, "Comparison", TWO_ROBOTS),
     "Simulate": ("Swim over time",),
     "Export": (),
     "Log": ("Log over time", "Replays"),

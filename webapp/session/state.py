@@ -169,6 +169,12 @@ def _angle(value: Any, name: str, low: float, high: float) -> float:
     return number(value, name, -math.inf, math.inf)
 
 
+def is_same_robot(one: State, other: State) -> bool:
+    """Whether two states have the same robot with the same damage."""
+    is_same_layout = one.layout is other.layout or one.layout == other.layout
+    return is_same_layout and one.damage == other.damage
+
+
 def compared(layout: Layout) -> tuple[str, ...]:
     """Methods that are compared on a robot, the quick ones first."""
     return COMPARED if layout.is_of_fins else ("dual", "analytic", "px4", "ardusub", "ipopt")

@@ -19,12 +19,15 @@ class AnalysisQuestion:
     """The layout as it is edited, with the limits that damage has left."""
     lost: tuple[str, ...]
     """Names of its lost actuators."""
-    saved: Layout
-    """The layout to compare with: as it was opened or saved last."""
+    before: Layout | None
+    """What it was just before its last change, with the limits that damage had left; None where
+    there is nothing to compare with."""
     drawn: str
     """Key of `DRAWN`: which attainable set is drawn."""
     flow: Flow | None = None
     """Velocity (6,) relative to the water [m/s, rad/s]; None at rest."""
+    lost_before: tuple[str, ...] = ()
+    """Names of actuators that were lost just before."""
 
 
 @dataclass(frozen=True)
@@ -35,11 +38,11 @@ class Analysis:
     card: ScoreCard
     """What the working fins can do."""
     before: ScoreCard | None
-    """The same for the layout to compare with, where it is another one."""
+    """What they could do just before, where that was another layout or damage."""
     now: AttainableSet | None
     """What the working fins attain, where a set is drawn."""
     whole: AttainableSet | None
-    """The same with all fins, where one is lost; else that of the layout to compare with."""
+    """The same with all fins, where one is lost; else that just before."""
 
 
 @lru_cache(maxsize=32)
@@ -47,22 +50,24 @@ def analyse(question: AnalysisQuestion) -> Analysis:
     """Answer a question; takes about a second, but all first pages ask the same."""
     layout = question.layout
     lost = question.lost
-    saved = question.saved
     flow = question.flow
-    other = saved != layout
-    # An actuator that the other layout does not have cannot be lost there.
-    lost_in_saved = tuple(name for name in lost if name in saved.names)
+    before = question.before
+    lost_before = question.lost_before
+    if (before, lost_before) == (layout, lost):
+        before = None
     kind = DRAWN[question.drawn]
     now = reference = None
     if kind is not None:
         now = attainable_set(layout, kind, lost=lost, flow=flow)
-        if lost or other:
-            reference = attainable_set(layout if lost else saved, kind, flow=flow)
+        if lost:
+            reference = attainable_set(layout, kind, flow=flow)
+        elif before is not None:
+            reference = attainable_set(before, kind, lost=lost_before, flow=flow)
     card = score_card(layout, lost, flow)
-    before = None
-    if other and len(lost_in_saved) < saved.n:
-        before = score_card(saved, lost_in_saved, flow)
-    return Analysis(question, card, before, now, reference)
+    card_before = None
+    if before is not None and len(lost_before) < before.n:
+        card_before = score_card(before, lost_before, flow)
+    return Analysis(question, card, card_before, now, reference)
 
 
 @lru_cache(maxsize=32)

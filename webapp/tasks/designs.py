@@ -15,11 +15,13 @@ from finlab.exchange import is_robot_table
 from finlab.exchange.convert import TABLES
 from finlab.files.worker import in_worker
 from finlab.layout import Layout
+from finlab.layout.damage import NO_DAMAGE
 from finlab.swim.design_files import Opened
 from finlab.swim.hull import hull_of
 from webapp.handles import Presses
 from webapp.session import Session, files
-from webapp.session.files import FRAGMENT, WRENCH, file_stem, packed, unpacked
+from webapp.session.files import BESIDE, FRAGMENT, WRENCH, file_stem, packed, unpacked
+from webapp.session.looking import TWO_ROBOTS
 from webapp.session.state import State
 from webapp.tasks.modes_csv import modes_csv
 from webapp.tasks.slot import Deferred
@@ -38,6 +40,12 @@ SHARED = (
     "copy, on a finlab of their own."
 )
 """What is said beside a link."""
+
+SHARED_PAIR = (
+    "The link carries both designs and the wrench that is asked for. Whoever opens it sees copies "
+    "of both beside each other, on a finlab of their own."
+)
+"""What is said beside the link of two robots."""
 
 Take = Callable[[str, bytes], object]
 """Takes a file that was opened: its name and its content."""
@@ -84,8 +92,53 @@ class Designs:
 
     def open_link(self, text: str) -> None:
         """A design from the part of an address behind the #; it may be anything."""
-        design, _, wrench = text.removeprefix(FRAGMENT).partition(WRENCH)
-        self._read(partial(in_worker, unpacked, design), wrench)
+        design, wrench, other = files.parts_of_link(text)
+        if not other:
+            self._read(partial(in_worker, unpacked, design), wrench)
+            return
+
+        def both() -> tuple[Opened, Opened]:
+            pair = in_worker(unpacked, design), in_worker(unpacked, other)
+            for opened in pair:
+                hull_of(opened.layout)  # what is drawn of it takes its time
+            return pair
+
+        self._deferred.make(both, partial(self._take_pair, wrench), "open")
+
+    def open_beside(self, name: str, content: bytes) -> None:
+        """A design from a file that the browser sent, to stand beside this robot."""
+        self._read_beside(partial(in_worker, files.read_layout, name, content), f"File: {name}")
+
+    def open_link_beside(self, text: str) -> None:
+        """The design in a link that a user has pasted, to stand beside this robot; the wrench
+        stays."""
+        design, _, _ = files.parts_of_link(text.rpartition("#")[2])
+        self._read_beside(partial(in_worker, unpacked, design), "")
+
+    def _read_beside(self, read: Callable[[], Opened], title: str) -> None:
+        """A robot that stands at the right of this one, under a title; by its name where that is
+        empty."""
+
+        def ready() -> Opened:
+            opened = read()
+            hull_of(opened.layout)
+            return opened
+
+        def take(opened: Opened) -> None:
+            layout = opened.layout
+            own_title = title or f"Link: {layout.name}"
+            self._session.two_robots.welcome("right", own_title, layout, opened.lost)
+            if opened.notes:
+                self._notify(f"Opened {layout.name}", " ".join(opened.notes), calm=True)
+
+        self._deferred.make(ready, take, "beside")
+
+    def _take_pair(self, wrench: str, both: tuple[Opened, Opened]) -> None:
+        """Puts the two robots of a link beside each other."""
+        left, right = both
+        self._take(wrench, left)
+        title = f"Link: {right.layout.name}"
+        self._session.two_robots.show_pair(title, right.layout, right.lost)
 
     def _read(self, read: Callable[[], Opened], wrench: str | None = None) -> None:
         """`wrench` is that of a link; there is none with a file."""
@@ -139,6 +192,27 @@ class Designs:
             run_script(self._client.gui, f"finlabCards.share(...{card});")
 
         self._deferred.make(partial(packed, layout), show, "share")
+
+    def share_pair(self) -> None:
+        """Show the link that carries both robots that stand beside each other. FinlabError: they
+        are not looked at."""
+        pair = self._session.two_robots.pair
+        if pair is None:
+            raise FinlabError(f"two robots stand beside each other at {TWO_ROBOTS}; open it first")
+        left, right = [standing.state for standing in pair.both]
+        is_damaged = any(state.damage != NO_DAMAGE for state in (left, right))
+
+        def text_of_both() -> str:
+            wrench = WRENCH + ",".join(f"{value:.6g}" for value in left.target)
+            return FRAGMENT + packed(left.layout) + wrench + BESIDE + packed(right.layout)
+
+        def show(text: str) -> None:
+            said = SHARED_PAIR + (" What is damaged does not travel." if is_damaged else "")
+            title = f"Share {left.layout.name} and {right.layout.name}"
+            card = json.dumps([title, said, text])
+            run_script(self._client.gui, f"finlabCards.share(...{card});")
+
+        self._deferred.make(text_of_both, show, "share")
 
     def bundle(self) -> None:
         """Send the bundle for the robot: the same bytes as `finlab export --zip`. What was tried

@@ -113,6 +113,12 @@ class Improver(Slot[Search, Improvement]):
         progress: Progress | None = self.progress
         return None if progress is None else progress.layout
 
+    @property
+    def proposal(self) -> Layout | None:
+        """The layout that is offered, with what is lost; None where none is better."""
+        answer = self.answer
+        return answer.layout if answer is not None and answer.improved else None
+
     def start(self, state: State, request: SearchRequest) -> None:
         """Starts a search that moves the working actuators of a state; mirror pairs stay so.
 

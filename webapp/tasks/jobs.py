@@ -23,6 +23,7 @@ from webapp.tasks.log_reading import LogReading
 from webapp.tasks.slot import Slot
 from webapp.tasks.solver import JetComparison
 from webapp.tasks.swimming import Swimming
+from webapp.tasks.two_robots import Pairing
 
 REST_S = 0.12
 """How long the target may not change before the marks are worked out again [s]."""
@@ -58,8 +59,9 @@ class Jobs:
         self.fitting = Fitting(context)
         self.log = LogReading(context)
         self.comparison = Comparison(context)
+        self.pairing = Pairing(context)
         self.swimming = Swimming(context)
-        self.first = frozenset[Slot[Any, Any]]([self.answering.slot])
+        self.first = frozenset[Slot[Any, Any]]([self.answering.slot, *self.pairing.slots])
         """What a change of the state waits for before the page is written."""
         self.beside = frozenset[Slot[Any, Any]](
             [self.answering.search, self.ranging, self.jet_comparison]
@@ -78,13 +80,22 @@ class Jobs:
                 of_robot.forget()
         task = session.desk.task
         self.answering.ask()
+        self.pairing.ask(session.two_robots.pair)
         if task == "Allocate":
             self.ranging.ask(
                 State(state.able, state.damage, target=state.target, speed=state.speed)
             )
         drawn = session.display.drawn
         if task == "Design" and (session.drawer == "Reach" or drawn != "none"):
-            question = AnalysisQuestion(state.able, state.lost, session.saved, drawn, state.flow)
+            before = session.before
+            question = AnalysisQuestion(
+                state.able,
+                state.lost,
+                None if before is None else before.able,
+                drawn,
+                state.flow,
+                () if before is None else before.lost,
+            )
             self.analyst.ask(question)
         kind = DRAWN[drawn]
         if task == "Design" and kind is not None:
@@ -99,7 +110,10 @@ class Jobs:
     @property
     def busy(self) -> bool:
         """Whether anything about the present state is still to come."""
-        return self.answering.searching or any(slot.busy for slot in (*self.beside, self.analyst))
+        return self.answering.searching or any(
+            slot.busy
+            for slot in (*self.beside, self.analyst, *self.pairing.slots, self.pairing.cards)
+        )
 
     def stop(self) -> None:
         """The page has gone."""
@@ -107,5 +121,6 @@ class Jobs:
         self.refining.stop()
         for slot in (self.comparison, self.improver, self.growing, self.fitting, self.log):
             slot.forget()
+        self.pairing.forget()
         for of_robot in (self.answering, self.analyst, self.ranging, self.jet_comparison):
             of_robot.forget()

@@ -1,0 +1,242 @@
+"""Two robots beside each other, asked for the same wrench: which they are, and what becomes of
+them."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+from finlab.errors import FinlabError
+from finlab.layout import Layout
+from finlab.layout.damage import NO_DAMAGE, Damage
+from webapp.session.base import BaseSession
+from webapp.session.files import shipped
+from webapp.session.looking import TWO_ROBOTS
+from webapp.session.state import Links, State, is_same_robot, method_for, one_of
+
+PLACES = ("left", "right")
+"""Where the two stand, as seen from the camera."""
+THIS = "This robot"
+"""Title of the robot that the page works on, which changes with it."""
+SAVED = "As opened or saved last"
+"""Title of that robot as it was opened or saved."""
+PROPOSAL = "Proposal of Improve"
+"""Title of the layout that a search has found."""
+MOST_EARLIER = 20
+"""Steps of undo that are offered, the newest ones."""
+MOST_GUESTS = 8
+"""Robots of files and links that are kept; older ones are forgotten."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """A robot that may stand on either side."""
+
+    title: str
+    """Where it comes from, as the list has it."""
+    layout: Layout | None
+    """None for the one that the page works on."""
+    damage: Damage = NO_DAMAGE
+    links: Links = ()
+
+    @staticmethod
+    def of_state(title: str, state: State) -> "Source":
+        """The robot of a state, with what is damaged of it."""
+        return Source(title, state.layout, state.damage, state.links)
+
+    def state_for(self, question: State) -> State:
+        """The robot with the question of another state: wrench, speed, policy, and the method where
+        it takes all its actuators."""
+        if self.layout is None:
+            return question
+        return replace(
+            question,
+            layout=self.layout,
+            damage=self.damage,
+            links=self.links,
+            method=method_for(self.layout, question.method),
+        )
+
+
+@dataclass(frozen=True)
+class Standing:
+    """A robot of a pair, with what is asked of it."""
+
+    title: str
+    """Where it comes from."""
+    state: State
+    is_this: bool
+    """Whether it is the robot that the page works on."""
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two robots that stand beside each other."""
+
+    left: Standing
+    right: Standing
+
+    @property
+    def both(self) -> tuple[Standing, Standing]:
+        """In the order of `PLACES`."""
+        return self.left, self.right
+
+
+THIS_ROBOT = Source(THIS, None)
+"""The robot that the page works on."""
+
+
+class TwoRobots:
+    """Which two robots of one session stand beside each other. Only `accept` is a step of undo."""
+
+    def __init__(self, session: BaseSession) -> None:
+        """Nothing has been chosen yet: this robot, and the one before its last change."""
+        self._session = session
+        self._chosen: list[Source] | None = None
+        self.guests: tuple[Source, ...] = ()
+        """Robots of files and links, which stand in the list."""
+        self._pair: Pair | None = None
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the pair is looked at."""
+        desk = self._session.desk
+        return desk.opened[desk.task] == TWO_ROBOTS
+
+    @property
+    def pair(self) -> Pair | None:
+        """The two while they are looked at; the same object as long as they are the same."""
+        if not self.is_open:
+            return None
+        left, right = self._standing()
+        old = self._pair
+        if old is None or old.left != left or old.right != right:
+            self._pair = Pair(left, right)
+        return self._pair
+
+    def sources(self, proposal: Layout | None = None) -> tuple[Source, ...]:
+        """All robots that may be chosen, each with a title of its own.
+
+        Args:
+            proposal: what a search has found for this robot; None where there is nothing.
+        """
+        session = self._session
+        sources = [THIS_ROBOT]
+        if proposal is not None:
+            sources.append(replace(Source.of_state(PROPOSAL, session.state), layout=proposal))
+        if session.saved != session.state.layout:
+            sources.append(Source(SAVED, session.saved))
+        sources += self._earlier()
+        sources += self.guests
+        for name, layout in shipped().items():
+            sources.append(Source(f"Shipped: {name}", layout))
+        # A step of undo that is shown stays in the list when newer ones come.
+        titles = {source.title for source in sources}
+        for source in self._both():
+            if source.title not in titles:
+                sources.append(source)
+                titles.add(source.title)
+        return tuple(sources)
+
+    def choose(self, place: str, title: str, proposal: Layout | None = None) -> None:
+        """Another robot on one of `PLACES`, by its title. FinlabError: there is none of that."""
+        by_title = {source.title: source for source in self.sources(proposal)}
+        self._put(place, by_title[one_of(title, "robot", by_title)])
+
+    def show(self, place: str, source: Source) -> None:
+        """Put a robot on one of `PLACES`, and look at both."""
+        self._put(place, source)
+        self._session.show_drawer(TWO_ROBOTS)
+
+    def welcome(self, place: str, title: str, layout: Layout, lost: tuple[str, ...]) -> None:
+        """Take in a robot of a file or a link, put it on one of `PLACES`, and look at both.
+
+        Args:
+            place: where it stands.
+            title: what it is called in the list; a number follows where that is taken.
+            layout: the robot.
+            lost: names of its lost actuators.
+        """
+        taken = {source.title for source in self.sources()}
+        guest = Source(_own_title(title, taken), layout, Damage(lost))
+        self.guests = (*self.guests, guest)[-MOST_GUESTS:]
+        self.show(place, guest)
+
+    def show_pair(self, title: str, layout: Layout, lost: tuple[str, ...]) -> None:
+        """Look at this robot, at the left, and another one; arguments as for `welcome`."""
+        self._chosen = [THIS_ROBOT, THIS_ROBOT]
+        self.welcome("right", title, layout, lost)
+
+    def swap(self) -> None:
+        """Each goes where the other one was."""
+        left, right = self._both()
+        self._chosen = [right, left]
+
+    def accept(self, place: str) -> None:
+        """One of the two becomes the robot of the page, a step of undo; what that was before stays
+        beside it. FinlabError: it is that already."""
+        index = PLACES.index(one_of(place, "place", PLACES))
+        both = self._both()
+        source = both[index]
+        if source.layout is None:
+            raise FinlabError(f"the {place} one is this robot already; accept the other one")
+        session = self._session
+        state = source.state_for(session.state)
+        before = Source.of_state(f"Before: Accept {state.layout.name}", session.state)
+        if not session.accept_state(f"Accept {state.layout.name}", state):
+            raise FinlabError(f"the {place} one is the same as this robot; nothing changes")
+        self._chosen = [before if each.layout is None else each for each in both]
+        self._chosen[index] = THIS_ROBOT
+
+    def _standing(self) -> tuple[Standing, Standing]:
+        """Both, with the question of this moment."""
+        question = self._session.state
+        left, right = [
+            Standing(source.title, source.state_for(question), source.layout is None)
+            for source in self._both()
+        ]
+        return left, right
+
+    def _both(self) -> list[Source]:
+        """What stands on `PLACES`. Until something is chosen the right one is what the robot was
+        before, or another one that is shipped."""
+        if self._chosen is not None:
+            return self._chosen
+        earlier = self._earlier()
+        if earlier:
+            return [THIS_ROBOT, earlier[0]]
+        name = next(
+            name for name, known in shipped().items() if known != self._session.state.layout
+        )
+        return [THIS_ROBOT, Source(f"Shipped: {name}", shipped()[name])]
+
+    def _put(self, place: str, source: Source) -> None:
+        index = PLACES.index(one_of(place, "place", PLACES))
+        chosen = list(self._both())
+        chosen[index] = source
+        self._chosen = chosen
+
+    def _earlier(self) -> list[Source]:
+        """The robot before each of the newest steps of undo that have changed it."""
+        session = self._session
+        later = session.state
+        sources: list[Source] = []
+        titles: set[str] = set()
+        for step in reversed(session.history.past):
+            state = step.state
+            if not is_same_robot(state, later):
+                title = _own_title(f"Before: {step.name}", titles)
+                titles.add(title)
+                sources.append(Source.of_state(title, state))
+            later = state
+            if len(sources) == MOST_EARLIER:
+                break
+        return sources
+
+
+def _own_title(title: str, taken: Iterable[str]) -> str:
+    """A title, with a number where there is one like it."""
+    own = title
+    number = 2
+    while own in taken:
+        own = f"{title} ({number})"
+        number += 1
+    return own
