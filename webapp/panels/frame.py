@@ -22,6 +22,7 @@ from webapp.panels.arrangement import (
     LEFT,
     LOG,
     NEEDS_ACTUATORS,
+    NEEDS_FILE,
     NEEDS_FLOW,
     NEEDS_GUIDE,
     NEEDS_ROBOT,
@@ -34,6 +35,7 @@ from webapp.panels.arrangement import (
 from webapp.panels.commands import add_page_commands
 from webapp.panels.log_tab import plot_rows
 from webapp.panels.status import add_corner
+from webapp.session.granted import SourceFile
 from webapp.session.lessons import Stop
 from webapp.session.looking import CANDIDATES, DRAWERS, Desk
 from webapp.tasks.swimmer import Swimmer
@@ -49,7 +51,7 @@ VARIABLES = (
     f"[data-mantine-color-scheme=dark] {{ --fl-reach: {css(REACH_DARK)}; }}"
 )
 """The colours of the theme as variables of CSS."""
-STYLE_SHEETS = ("style.css", "frame.css")
+STYLE_SHEETS = ("style.css", "frame.css", "inquiry.css")
 """Files of `webapp/markup` that style the page."""
 STYLE = html(
     "<style>{}{}</style>",
@@ -162,11 +164,14 @@ class Frame:
         swimmer: Swimmer | None,
         layout: Layout,
         judgement: "Judgement | None",
+        source: SourceFile | None,
     ) -> None:
         """Writes the style that says which regions and sections are visible."""
         needs = ["", NEEDS_ROBOT if selected is None else NEEDS_ACTUATORS]
         if stop is not None:
             needs.append(NEEDS_GUIDE)
+        if source is not None:
+            needs.append(NEEDS_FILE)
         if plant_of(layout).feels_flow:
             needs.append(NEEDS_FLOW)
         visible_regions = set()
