@@ -7,6 +7,7 @@ from typing import Any
 import viser
 
 from finlab.errors import FinlabError
+from webapp.box_labels import in_boxes
 from webapp.markup.words import in_app
 from webapp.tasks.slot import Bell
 from webapp.theme import BLUE, VERMILLION
@@ -40,7 +41,7 @@ class Intents:
         try:
             act()
         except FinlabError as error:
-            self.notify("Not possible", str(error))
+            self.notify("Not possible", in_boxes(error))
         except Exception as error:  # the page must go on, whatever we have got wrong
             self.fault(error)
         if handle is not None:

@@ -15,11 +15,13 @@ from finlab.allocation.allocation import Allocation
 from finlab.bundle_files import MAX_BUNDLE_BYTES
 from webapp.board import Board
 from webapp.handles import Asking, Presses, on_user_change
+from webapp.inquiry import Inquiry
 from webapp.intents import Intents
 from webapp.number_boxes import NumberBoxes
 from webapp.scene.scenery import Scenery
 from webapp.tasks.context import Context
 from webapp.tasks.designs import Designs, Opening
+from webapp.tasks.importing import Importing
 from webapp.tasks.jobs import Jobs
 from webapp.tasks.slot import Deferred
 from webapp.viser_internals import hold_uploads, run_script, uuid_of
@@ -52,6 +54,10 @@ class Page:
         )
         self.ask = Asking(client.gui, self.presses).ask
         self.designs = Designs(client, session, solver, self.deferred, intents.notify)
+        self.importing = Importing(
+            session, Inquiry(client.gui, self.presses), self.deferred, self.designs.take
+        )
+        """Asks what a file of another program leaves open."""
         self.presses.on("design-link", lambda _, text: self.designs.open_link(text))
         self.opening = Opening(self.presses)
         self.new = partial(

@@ -109,7 +109,16 @@ def convert_layout(
     from finlab.exchange import Exchange, convert
     from finlab.files.worker import in_worker
 
-    exchange = Exchange(fins, thrusters, origin, force, frame, rows, length, model=model)
+    exchange = Exchange(
+        fins=fins,
+        thrusters=thrusters,
+        origin=origin,
+        force=force,
+        frame=frame,
+        rows=rows,
+        length=length,
+        model=model,
+    )
     layout, notes = in_worker(convert, file, output, to, exchange)
     lines = [
         f"{output}: {layout.name} with {layout.counts_in_words}",

@@ -356,6 +356,8 @@ def _masses(
     if without_mass and total.mass > 0.0:
         exchange.note(
             f"No mass stands at link {listed(without_mass)}: 0 is taken, where SDF takes 1 kg and "
-            "1 kg m^2, which moves the centre of gravity; give it an <inertial>."
+            "1 kg m^2, which moves the centre of gravity",
+            "give it an <inertial>",
+            field="body.mass_kg",
         )
     return _Masses(total, is_inertia_known, added_mass)

@@ -63,11 +63,15 @@ def body_of(description: Description, exchange: Exchange) -> Body:
     _note_several(uuv_models, "hydrodynamic_model", exchange)
     if hydrodynamics or uuv_objects:
         exchange.note(
-            "Its buoyancy is not read: it is taken for the weight, at the centre of gravity."
+            "Its buoyancy is not read: it is taken for the weight, at the centre of gravity.",
+            field="body.buoyancy_n",
         )
     moments = None
     if description.inertia is None:
-        exchange.note("A link with a mass has no inertia, so that of the body is unknown.")
+        exchange.note(
+            "A link with a mass has no inertia, so that of the body is unknown.",
+            field="body.inertia_kgm2",
+        )
     else:
         moments = vector(np.diag(description.inertia))
         products = np.abs(description.inertia - np.diag(moments))
@@ -103,7 +107,7 @@ def _read_field(fields: Fields, field: str, values: dict[str, str], exchange: Ex
     else:
         words = ", ".join(f"{tag} {value:.20}" for tag, value in values.items())
         why = "is not six numbers" if len(values) == 6 else "says these alone of six"
-        exchange.note(f"{field} is left out: the file {why}: {words}.")
+        exchange.note(f"{field} is left out: the file {why}: {words}.", field=f"body.{field}")
 
 
 def _read_gz(plugin: Element, fields: Fields, exchange: Exchange) -> None:
@@ -119,7 +123,8 @@ def _read_gz(plugin: Element, fields: Fields, exchange: Exchange) -> None:
         tags_read |= set(values)
     if tags_read == no_derivatives:
         exchange.note(
-            "Hydrodynamics holds no derivatives by known tags: added mass and damping are unknown."
+            "Hydrodynamics holds no derivatives by known tags: added mass and damping are unknown.",
+            field="body.added_mass",
         )
     unread = dict.fromkeys(child.tag for child in plugin if child.tag not in tags_read)
     if unread:
@@ -145,7 +150,8 @@ def _read_uuv(model: Element, fields: Fields, exchange: Exchange) -> None:
             _read_field(fields, field, values, exchange)
     else:
         exchange.note(
-            f"hydrodynamic_model of type {kind!r:.40} is not read: the water's forces are unknown."
+            f"hydrodynamic_model of type {kind!r:.40} is not read: the water's forces are unknown.",
+            field="body.added_mass",
         )
     if text_at(model, "linear_damping_forward_speed"):
         exchange.note("linear_damping_forward_speed is not read.")

@@ -5,7 +5,6 @@ azimuth. A fin's joint sits where its force acts, and its axis is the shaft. Thr
 joints that plugins drive, and the links that the user names; fins are named by the user alone.
 """
 
-import re
 from dataclasses import replace
 from xml.etree.ElementTree import Element
 
@@ -17,8 +16,15 @@ from finlab.exchange.description import Description, number, parse_description
 from finlab.exchange.description_body import UUV_OBJECT, body_of
 from finlab.exchange.exchange import Exchange
 from finlab.exchange.labels import listed
-from finlab.exchange.links import TURNING, Joint
+from finlab.exchange.link_names import (
+    is_thruster_name,
+    questions_of_links,
+    turning_first,
+    which_idle,
+)
+from finlab.exchange.links import Joint
 from finlab.exchange.mounts import fin_on, on_mount
+from finlab.exchange.questions import QuestionError, which_origin
 from finlab.exchange.thruster_plugins import (
     driven_joint,
     drives_thruster,
@@ -26,9 +32,6 @@ from finlab.exchange.thruster_plugins import (
     is_gz_plugin,
 )
 from finlab.layout import MAX_ACTUATORS, Actuator, Layout
-
-_THRUSTER_NAME = re.compile(r"thruster|propell|(?:^|[_\W])prop(?:[_\W\d]|$)|rotor", re.IGNORECASE)
-"""A name by which people call a thruster or its propeller."""
 
 
 def read_description(root: Element, name: str, exchange: Exchange) -> Layout:
@@ -50,18 +53,20 @@ def read_description(root: Element, name: str, exchange: Exchange) -> Layout:
     actuators = _actuators(description, origin, exchange)
     unread = _unread_plugins(description)
     if not actuators:
-        raise LayoutError(
+        raise QuestionError(
             "has no thruster's plugin of gz-sim or uuv; name the links that are fins (--fins "
             "LINK...) or thrusters (--thrusters LINK...); a joint moves "
-            f"{_moving_links(description)}; its plugins: {listed(unread)}"
+            f"{_moving_links(description)}; its plugins: {listed(unread)}",
+            questions=questions_of_links(description.joint_of_link),
         )
     if unread:
         exchange.note(f"Plugins that are not read: {listed(unread)}.")
     idle = _idle_thrusters(description, {actuator.name for actuator in actuators})
     if idle:
         exchange.note(
-            f"Left out, since no plugin drives them: {listed(idle)}; --thrusters names the links "
-            "among them that push."
+            f"Left out, since no plugin drives them: {listed(idle)}",
+            "--thrusters names the links among them that push",
+            question=which_idle(idle),
         )
     exchange.note(f"Model {description.name} was read, x forward, y left, z up, in m, kg and N.")
     body = body_of(description, exchange) if at_gravity else None
@@ -76,8 +81,9 @@ def _no_mass(description: Description) -> LayoutError:
         return LayoutError(
             f"has no masses but in <include> {included}, which is not opened: give its model.sdf"
         )
-    return LayoutError(
-        "has no masses, so no centre of gravity; use --origin base if its origin is there"
+    return QuestionError(
+        "has no masses, so no centre of gravity; use --origin base if its origin is there",
+        questions=(which_origin("The file has no masses."),),
     )
 
 
@@ -111,7 +117,7 @@ def _idle_thrusters(description: Description, names: set[str]) -> list[str]:
     return [
         link
         for link, joint in joint_of_link.items()
-        if link not in touching and _THRUSTER_NAME.search(f"{link} {joint.name}")
+        if link not in touching and is_thruster_name(f"{link} {joint.name}")
     ]
 
 
@@ -138,8 +144,7 @@ def _joint_of_link(description: Description, link: str) -> Joint:
 def _moving_links(description: Description) -> str:
     """The links that a joint moves, for an error: those on joints that turn come first."""
     joint_of_link = description.joint_of_link
-    links = sorted(joint_of_link, key=lambda link: (joint_of_link[link].kind not in TURNING, link))
-    return listed(links)
+    return listed(turning_first(joint_of_link))
 
 
 def _thruster_or_azimuth(

@@ -5,7 +5,7 @@ have the same defaults, and leaves a sentence in it for each value that was assu
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
@@ -15,12 +15,32 @@ from finlab.actuators.thrust_model import PowerLaw
 from finlab.arrays import Array
 from finlab.axes import Vector3
 from finlab.errors import LayoutError
+from finlab.exchange.notes import Note
+from finlab.exchange.questions import Choice, Question
 from finlab.layout import Layout, Thruster
 
 T200_FORCE = (-39.91, 51.44)
 """Least and most force of a Blue Robotics T200 at 16 V [N], by the maker's table."""
+KNOWN_THRUSTERS: dict[str, tuple[float, float]] = {
+    "T200 at 12 V": (-28.48, 36.42),
+    "T200 at 16 V": T200_FORCE,
+    "T200 at 20 V": (-49.38, 65.92),
+}
+"""Least and most force of thrusters by their makers' tables [N]; the T200 is Blue Robotics'."""
 T200_POWER = PowerLaw(0.997, 1.449)
 """A fit of that table's electric power over force: 0.997 F^1.5 ahead, 1.449 |F|^1.5 astern [W]."""
+WHICH_FORCE = Question(
+    "missing_force",
+    "How strong are the thrusters?",
+    "The file has no limits of their forces, or not of all: these are for those without.",
+    tuple(
+        Choice(name, f"Blue Robotics {name}", f"{low:g} to {high:g} N")
+        for name, (low, high) in KNOWN_THRUSTERS.items()
+    ),
+    ("T200 at 16 V",),
+    takes_numbers=True,
+)
+"""The question for the force of thrusters."""
 NO_TORQUE = 1e-12
 """Reaction torque over the force up to which it is a rounding error [m]."""
 TO_FRD = np.array([[1.0], [-1.0], [-1.0], [1.0], [-1.0], [-1.0]])
@@ -41,6 +61,9 @@ class Exchange:
     own."""
     force: tuple[float, float] | None = None
     """Least and most force of every thruster [N]; the file's, else those of a T200, when None."""
+    missing_force: tuple[float, float] | None = None
+    """Least and most force [N] of a thruster whose force the file does not say; of a T200 when
+    None."""
     frame: Literal["FLU", "FRD"] | None = None
     """Frame of a matrix or of places; the file's, else FLU, when None."""
     rows: Literal["axes", "thrusters"] | None = None
@@ -54,13 +77,39 @@ class Exchange:
     None."""
     path: Path | None = None
     """The file; None for one from a browser, which may open no other."""
-    notes: list[str] = field(default_factory=list)
-    """Sentences for the user, in the order in which they arose."""
+    taken: list[Note] = field(default_factory=list)
+    """Notes for the user, in the order in which they arose."""
 
-    def note(self, sentence: str) -> None:
-        """Adds a sentence once."""
-        if sentence not in self.notes:
-            self.notes.append(sentence)
+    @property
+    def notes(self) -> list[str]:
+        """The same as sentences, by the options of the command line and keys of layout files."""
+        return [str(note) for note in self.taken]
+
+    def note(
+        self,
+        sentence: str,
+        remedy: str = "",
+        *,
+        field: str = "",
+        actuators: Sequence[str] = (),
+        question: Question | None = None,
+    ) -> None:
+        """Adds a note once; one that differs by its actuators alone gets these.
+
+        Args:
+            sentence: it, with or without a full stop.
+            remedy: what the command line's user can do about it.
+            field: as `Note` has it, like the others.
+            actuators: names of those that the field is of; all of them when empty.
+            question: the question whose default was taken.
+        """
+        made = Note(sentence.removesuffix("."), remedy, field, tuple(actuators), question)
+        for place, known in enumerate(self.taken):
+            if (known.sentence, known.remedy) == (made.sentence, made.remedy):
+                names = dict.fromkeys((*known.actuators, *made.actuators))
+                self.taken[place] = replace(known, actuators=tuple(names))
+                return
+        self.taken.append(made)
 
     def thruster(
         self,
@@ -82,16 +131,25 @@ class Exchange:
         Raises:
             LayoutError: a value is out of bounds.
         """
-        if self.force is None and force is None:
+        if self.force is None and self.missing_force is None and force is None:
             self.note(
-                "It has no limits of force: those of a T200 at 16 V are taken; correct `force_n`."
+                "It has no limits of force: those of a T200 at 16 V are taken",
+                "correct `force_n`",
+                field="force",
+                actuators=(name,),
+                question=WHICH_FORCE,
             )
-        self.note("It has no power: that of a T200 at 16 V is taken; write your own as `model`.")
+        self.note(
+            "It has no power: that of a T200 at 16 V is taken",
+            "write your own as `model`",
+            field="model",
+            actuators=(name,),
+        )
         return Thruster(
             name,
             vector(position),
             vector(axis),
-            self.force or force or T200_FORCE,
+            self.force or force or self.missing_force or T200_FORCE,
             T200_POWER,
             torque_per_newton=torque_per_newton if abs(torque_per_newton) > NO_TORQUE else 0.0,
         )
@@ -119,7 +177,9 @@ class Exchange:
                 f"{name!r:.60} has no force; no actuator of finlab gives torque alone"
             )
         self.note(
-            "It has no places: thrusters sit where lines of their forces are nearest to the origin."
+            "It has no places: thrusters sit where lines of their forces are nearest to the origin",
+            field="position",
+            actuators=(name,),
         )
         axis = column[:3] / force_per_command
         torque = column[3:] / force_per_command

@@ -15,6 +15,7 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.axes import AXES, Axis
 from finlab.errors import LayoutError
+from finlab.exchange.questions import QuestionError, which_frame
 from finlab.files.csv_table import FORCES, LENGTHS, TURNS
 
 Frame = Literal["FLU", "FRD"]
@@ -226,8 +227,10 @@ def stated_frame(
             return frame, f"{key} {text}"
         if key and plain(key) != "frameid":  # ROS's frame_id names a link more often than a frame
             words = "FLU, ENU or REP-103 (y left, z up), or FRD, NED or SNAME (y right, z down)"
-            raise LayoutError(
-                f"is {text!r:.60}, expected {words}; or leave it out, and say --frame", key
+            raise QuestionError(
+                f"is {text!r:.60}, expected {words}; or leave it out, and say --frame",
+                key,
+                questions=(which_frame(f"{key} of the file is {text!r:.60}, which names none."),),
             )
     for comment in comments:
         if _FRAME_IN_COMMENT.search(comment):

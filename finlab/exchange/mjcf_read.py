@@ -20,10 +20,12 @@ from finlab.exchange.description import Description, numbers
 from finlab.exchange.description_body import body_of
 from finlab.exchange.exchange import Exchange
 from finlab.exchange.labels import listed
+from finlab.exchange.link_names import questions_of_links
 from finlab.exchange.links import TURNING, Joint, LinkMass, combined
 from finlab.exchange.mjcf_file import ACTUATOR_TAGS, Attributes, MjcfFile
 from finlab.exchange.mjcf_mass import geom_mass
 from finlab.exchange.mounts import fin_on, on_mount
+from finlab.exchange.questions import QuestionError, which_origin, which_robot
 from finlab.layout import MAX_ACTUATORS, Actuator, Layout, Thruster
 
 MAX_PARTS = 20_000
@@ -101,9 +103,10 @@ def read_mjcf(root: Element, name: str, exchange: Exchange) -> Layout:
     at_gravity = exchange.origin == "gravity"
     if at_gravity and (robot.without_mass or total.mass <= 0.0):
         geoms = f": that of a mesh is not computed ({listed(robot.without_mass)})"
-        raise LayoutError(
+        raise QuestionError(
             f"has no mass of body {robot.name!r:.60}{geoms if robot.without_mass else ''}; give it "
-            "an <inertial>, or take --origin base if its origin is the centre of gravity"
+            "an <inertial>, or take --origin base if its origin is the centre of gravity",
+            questions=(which_origin(f"The file has no mass of body {robot.name}."),),
         )
     origin = total.center if at_gravity else np.zeros(3)
     description = Description(
@@ -120,10 +123,11 @@ def read_mjcf(root: Element, name: str, exchange: Exchange) -> Layout:
     actuators, turned = _layout_actuators(robot, pushes, origin, others, exchange)
     left_out = {key: why for key, why in others.items() if key not in turned}
     if not actuators:
-        raise LayoutError(
+        raise QuestionError(
             "has no motor or general that pushes at a site of a body; it has "
             f"{listed(_shown(left_out))}; bodies on joints may be named --fins or --thrusters: "
-            f"{listed(robot.joint_of_link)}"
+            f"{listed(robot.joint_of_link)}",
+            questions=questions_of_links(robot.joint_of_link),
         )
     if left_out:
         exchange.note(f"Left out, since they are no thrusters: {listed(_shown(left_out))}.")
@@ -158,7 +162,8 @@ def _note_model(
     if fluid:
         exchange.note(
             f"The water of MuJoCo ({', '.join(fluid)}) is not read: added mass and damping are "
-            "unknown."
+            "unknown.",
+            field="body.added_mass",
         )
     for key in ("settotalmass", "boundmass", "boundinertia", "balanceinertia"):
         if file.compiler.get(key, "false") not in ("false", "0", "-1"):
@@ -286,7 +291,12 @@ def _robot(file: MjcfFile, pushes: list[_Push], exchange: Exchange) -> _Robot:
     if unread:
         kind = "robots" if likely else "bodies"
         unread_names = listed([body.get("name", "") for body, _ in unread])
-        exchange.note(f"It holds other {kind}: {unread_names} (--model NAME).")
+        names = [body.get("name", "") for body, _ in (robot, *unread)]
+        exchange.note(
+            f"It holds other {kind}: {unread_names}",
+            "--model NAME for one of them",
+            question=which_robot(names, kind),
+        )
     return _parts(file, *robot)
 
 

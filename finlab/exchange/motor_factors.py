@@ -161,7 +161,9 @@ def layout_of_motors(name: str, motors: Sequence[Motor], exchange: Exchange) -> 
         if motor_name in names[:i]:
             raise LayoutError(f"adds a motor twice, {motor_name}; keep the lines of one frame")
     exchange.note(
-        f"Factors hold no lengths: one of 1 is taken for an arm of {ARM} m; correct `position_m`."
+        f"Factors hold no lengths: one of 1 is taken for an arm of {ARM} m",
+        "correct `position_m`",
+        field="position",
     )
     factors = np.array([motor.factors for motor in motors])
     columns = (factors * SIGNS)[:, ORDER]  # (n, 6) in the order of a wrench, FLU

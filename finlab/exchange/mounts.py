@@ -90,7 +90,8 @@ def fin_on(joint: Joint, origin: Array, exchange: Exchange) -> Fin:
         outward = axis if axis[:2] @ position[:2] >= 0 else -axis
         return Fin(joint.child, vector(position), math.atan2(outward[1], outward[0]))
     exchange.note(
-        "Thrust of fins whose shaft is not horizontal is taken to point forward at direction 0."
+        "Thrust of fins whose shaft is not horizontal is taken to point forward at direction 0.",
+        field="zero",
     )
     forward = np.array([1.0, 0.0, 0.0])
     up = np.array([0.0, 0.0, 1.0])

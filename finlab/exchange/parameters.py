@@ -37,6 +37,8 @@ ROTOR_DEFAULTS = {
     "KM": 0.05,
 }
 """Keys of a rotor and PX4's defaults: position [m], axis, CT [N] and KM [m]."""
+ROTOR_FIELDS = {"P": "position", "A": "axis", "C": "force", "K": "torque_per_newton"}
+"""First letter of a rotor's key -> the thruster's field that it fills."""
 MAV_PARAM_TYPE_INT32 = 6
 """MAVLink's type of a parameter that is an integer of 32 bits."""
 MAV_PARAM_TYPE_REAL32 = 9
@@ -90,7 +92,7 @@ def read_px4(text: str, name: str, exchange: Exchange) -> Layout:
     if not 0 < count <= MAX_ROTORS:
         raise LayoutError(f"expected 1 to {MAX_ROTORS} rotors, got {count}", "CA_ROTOR_COUNT")
     if "CA_R_REV" not in values:
-        exchange.note("CA_R_REV is not in it: all rotors are taken to reverse.")
+        exchange.note("CA_R_REV is not in it: all rotors are taken to reverse.", field="force")
     reversing = int(values.get("CA_R_REV", 2**count - 1))
     if values.get("CA_SV_CS_COUNT", 0.0) or values.get("CA_SV_TL_COUNT", 0.0):
         exchange.note(
@@ -101,14 +103,18 @@ def read_px4(text: str, name: str, exchange: Exchange) -> Layout:
         if without:
             rotors = ", ".join(without) if len(without) < count else "all"
             exchange.note(
-                f"No CA_ROTORi_{key} of rotors {rotors}: {default:g} is taken, the default of PX4."
+                f"No CA_ROTORi_{key} of rotors {rotors}: {default:g} is taken, the default of PX4.",
+                field=ROTOR_FIELDS[key[0]],
+                actuators=[f"rotor{int(i) + 1}" for i in without],
             )
     unread = _values_beyond(values, count)
     if unread:
         exchange.note(f"CA_ROTOR_COUNT is {count}; not read: {', '.join(unread[:12])}.")
     if exchange.force is None:
         exchange.note(
-            "CA_ROTORi_CT is taken for the newtons at full output; correct `force_n` if not."
+            "CA_ROTORi_CT is taken for the newtons at full output",
+            "correct `force_n` if not",
+            field="force",
         )
     thrusters = []
     for i in range(count):

@@ -4,6 +4,7 @@
 """
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -24,11 +25,14 @@ from finlab.exchange.labels import (
     unread,
 )
 from finlab.exchange.poses import Record
+from finlab.exchange.questions import which_frame
 from finlab.exchange.records import ThrusterRecords, find_thrusters, is_unit
 from finlab.files import yaml_text
 from finlab.files.csv_table import FORCES, LENGTHS, TURNS
 from finlab.layout import MAX_ACTUATORS, Layout, Thruster, own_effectiveness
 
+VISIBLE = 1e-3
+"""Distance from the middle [m], and part of a direction, from which on sides differ."""
 LimitPair = tuple[float, float]
 """Least and most [N], or least and most command."""
 
@@ -54,10 +58,16 @@ def read_plain(
     if n > MAX_ACTUATORS:
         what = "columns" if thrusters.axes else "thrusters"
         raise LayoutError(f"expected up to {MAX_ACTUATORS} {what}, got {n}", thrusters.node.words)
-    is_frd = _is_frd(thrusters, exchange, comments)
+    frame = _frame(thrusters, exchange, comments)
     used = {thrusters.node.path}
     build = _of_columns if thrusters.axes else _of_positions
-    actuators = build(thrusters, data, is_frd, used, exchange)
+    actuators = build(thrusters, data, frame == "FRD", used, exchange)
+    if frame is None:
+        exchange.note(
+            f"It names no frame: {FRAMES['FLU']} (FLU) is taken",
+            "--frame FRD for the other",
+            question=which_frame("The file names none.", _meanings(actuators)),
+        )
     for depth, (path, scope) in enumerate(thrusters.node.scopes):
         # Limits count where they stand with the thrusters, or right around them.
         limit_keys = labels.LIMIT_KEYS if depth < 2 else ""
@@ -75,19 +85,45 @@ def read_plain(
     return Layout(name, actuators, axes=axes)
 
 
-def _is_frd(thrusters: ThrusterRecords, exchange: Exchange, comments: Sequence[str]) -> bool:
-    """Whether the file is in x forward, y right, z down; a note says by which words."""
-    scopes = [scope for _, scope in thrusters.node.scopes]
-    frame, where = stated_frame(scopes, comments)
-    if exchange.frame and frame and exchange.frame != frame:
-        exchange.note(f"It says {where}; --frame {exchange.frame} was taken in its stead.")
-    elif exchange.frame is None and frame:
-        exchange.note(f"Its frame is {FRAMES[frame]} ({where}).")
-    elif exchange.frame is None:
-        exchange.note(
-            f"It names no frame: {FRAMES['FLU']} (FLU) is taken; --frame FRD for the other."
-        )
-    return (exchange.frame or frame) == "FRD"
+def _frame(
+    thrusters: ThrusterRecords, exchange: Exchange, comments: Sequence[str]
+) -> labels.Frame | None:
+    """The frame that the user or the file names, by which words a note says; None where neither
+    does."""
+    if exchange.frame is None:
+        frame, where = stated_frame(_scopes(thrusters), comments)
+        if frame:
+            exchange.note(f"Its frame is {FRAMES[frame]} ({where}).")
+        return frame
+    with suppress(LayoutError):  # a word for it that is not known does not count
+        frame, where = stated_frame(_scopes(thrusters), comments)
+        if frame and frame != exchange.frame:
+            exchange.note(f"It says {where}; {exchange.frame} was taken in its stead.")
+    return exchange.frame
+
+
+def _scopes(thrusters: ThrusterRecords) -> list[Mapping[str, Any]]:
+    """The mappings around the thrusters, the innermost first."""
+    return [scope for _, scope in thrusters.node.scopes]
+
+
+def _meanings(actuators: Sequence[Thruster]) -> tuple[str, str]:
+    """What y left and z up, and what y right and z down would make of thrusters that were read in
+    the former."""
+    aside = max(actuators, key=lambda thruster: abs(thruster.position[1]))
+    upright = max(actuators, key=lambda thruster: abs(thruster.axis[2]))
+    y = aside.position[1]
+    z = upright.axis[2]
+    meanings = []
+    for sign in (1.0, -1.0):
+        words = []
+        if abs(y) > VISIBLE:
+            words.append(f"{aside.name} sits at the {'left' if sign * y > 0.0 else 'right'}")
+        if abs(z) > VISIBLE:
+            words.append(f"{upright.name} pushes {'up' if sign * z > 0.0 else 'down'}")
+        meanings.append(", ".join(words))
+    flu, frd = meanings
+    return flu, frd
 
 
 def _of_positions(
@@ -188,7 +224,9 @@ def _of_columns(
     limits = _limits(thrusters, data, used, exchange)
     if not any(limits) and not per_newton:
         exchange.note(
-            "It has no limits: commands are taken to go from -1 to 1 (--force LEAST MOST)."
+            "It has no limits: commands are taken to go from -1 to 1",
+            "--force LEAST MOST for others",
+            field="force",
         )
         limits = [(-1.0, 1.0)] * len(limits)
     columns = columns * (TO_FRD if is_frd else 1.0)
@@ -255,7 +293,9 @@ def _limits_in(values: Mapping[str, Any], n: int, exchange: Exchange) -> list[Li
             f"expected a number, or one for each of {n} thrusters", f"{low_key} {high_key}"
         )
     if low_value is None:
-        exchange.note(f"{high_key} says nothing of reverse: as much is taken for it.")
+        exchange.note(
+            f"{high_key} says nothing of reverse: as much is taken for it.", field="force"
+        )
         low = -low
         low_newtons = high_newtons
     lows = np.broadcast_to(low.ravel() * low_newtons, n)

@@ -16,6 +16,7 @@ from finlab.errors import LayoutError
 from finlab.exchange import labels
 from finlab.exchange.exchange import Exchange
 from finlab.exchange.labels import axis_of, lookup, numbers_in, plain
+from finlab.exchange.questions import QuestionError, which_length
 from finlab.files.csv_table import LENGTHS, TURNS
 
 UNIT_TOLERANCE = 0.05
@@ -216,10 +217,12 @@ def position_of(key: str, record: Record, meters: float | None) -> Array:
     if names_unit or meters is not None:
         return position * (unit if names_unit else meters or 1.0)
     if np.abs(position).max() > MAX_PLACE:
-        raise LayoutError(
-            f"reaches {np.abs(position).max():g}: which unit is that? name it in the key "
-            "(position_mm, position_m), or say --length mm, cm or m",
+        reach = float(np.abs(position).max())
+        raise QuestionError(
+            f"reaches {reach:g}: which unit is that? name it in the key (position_mm, position_m), "
+            "or say --length mm, cm or m",
             f"{key}.{position_key}",
+            questions=(which_length(reach),),
         )
     return position
 
@@ -329,8 +332,11 @@ def note_reversed(records: Mapping[str, Record], exchange: Exchange) -> None:
     if names:
         exchange.note(
             f"{', '.join(keys)} of {labels.listed(names)} is not applied: the direction is as "
-            "drawn. Where it says that a positive command pushes the other way, and not that the "
-            "motor is wired so, turn the sign of `axis`."
+            "drawn",
+            "where it says that a positive command pushes the other way, and not that the motor "
+            "is wired so, turn the sign of `axis`",
+            field="axis",
+            actuators=[*names],
         )
 
 

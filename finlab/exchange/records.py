@@ -17,6 +17,7 @@ from finlab.exchange import labels, poses
 from finlab.exchange.exchange import Exchange
 from finlab.exchange.labels import Node, axis_of, listed, lookup, nodes, numbers_in, plain
 from finlab.exchange.poses import UNIT_TOLERANCE, Record
+from finlab.exchange.questions import QuestionError, which_rows
 from finlab.files.csv_table import LENGTHS
 
 ALLOCATION_WORDS = {
@@ -204,10 +205,11 @@ def _from_lists(node: Node, exchange: Exchange) -> dict[str, Record]:
         unit_by_thruster = is_unit(axes.reshape(n, 3).T)
         unit_by_axis = is_unit(axes.reshape(3, n))
         if unit_by_thruster == unit_by_axis and not exchange.rows:
-            raise LayoutError(
-                "may stand thruster by thruster, or all x before all y; say --rows thrusters or "
-                "--rows axes",
+            why = "may stand thruster by thruster, or all x before all y"
+            raise QuestionError(
+                f"{why}; say --rows thrusters or --rows axes",
                 where,
+                questions=(which_rows(f"Numbers of {where} {why}."),),
             )
         by_thruster = exchange.rows == "thrusters" if exchange.rows else unit_by_thruster
         order = "thruster by thruster" if by_thruster else "all x, all y, all z"
@@ -385,11 +387,14 @@ def _of_matrix(
         unit_columns = may_be_axes and (is_unit(array[:3]) or not is_table)
         unit_rows = is_unit(array[:, :3].T)
         if unit_columns == unit_rows and (is_table or not may_be_axes):
-            raise LayoutError(
+            why = f"{len(array)} rows of 6 numbers have no labels, and may be either or an inverse."
+            questions = (which_rows(why, may_be_axes),)
+            raise QuestionError(
                 f"is {len(array)} rows of 6 numbers without labels, which may be axes, a row per "
                 "thruster (--rows axes, --rows thrusters), or the inverse; label them Fx, Fy, Fz, "
                 "Tx, Ty, Tz",
                 node.words,
+                questions=questions,
             )
         by_thruster = unit_rows and not unit_columns
     else:

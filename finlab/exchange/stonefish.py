@@ -26,6 +26,7 @@ from finlab.exchange.expressions import evaluate
 from finlab.exchange.labels import listed
 from finlab.exchange.links import TURNING, Joint, LinkMass, combined
 from finlab.exchange.mounts import on_mount
+from finlab.exchange.questions import which_robot
 from finlab.layout import MAX_ACTUATORS, Actuator, Body, Layout
 
 SIMPLE = "simple_thruster"
@@ -131,7 +132,9 @@ def read_stonefish(root: Element, name: str, exchange: Exchange) -> Layout:
     if exchange.origin == "gravity":
         exchange.note(
             "Masses are those of materials and meshes, which are not computed: the origin is that "
-            "of the base link; where the centre of gravity lies elsewhere, correct `position_m`."
+            "of the base link",
+            "where the centre of gravity lies elsewhere, correct `position_m`",
+            field="position",
         )
     return Layout(robot_name, tuple(actuators), "Origin at the frame of its base link.")
 
@@ -229,7 +232,12 @@ def _robot_in(root: Element, exchange: Exchange) -> Element:
     robot, *unread = able or robots
     if unread:
         others = listed([other.get("name", "") for other in unread])
-        exchange.note(f"It holds other robots: {others} (--model NAME).")
+        names = [element.get("name", "") for element in (robot, *unread)]
+        exchange.note(
+            f"It holds other robots: {others}",
+            "--model NAME for one of them",
+            question=which_robot(names),
+        )
     return robot
 
 

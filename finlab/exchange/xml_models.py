@@ -8,6 +8,7 @@ from xml.parsers import expat
 from finlab.errors import LayoutError
 from finlab.exchange.exchange import Exchange
 from finlab.exchange.labels import listed
+from finlab.exchange.questions import which_robot
 
 MAX_DEPTH = 100
 """Deepest nesting of elements."""
@@ -131,8 +132,11 @@ def robot_model(root: Element, drives_thruster: DrivesThruster, exchange: Exchan
     if unread:
         kind = "robots" if robots else "models"
         unread_names = listed([model.get("name", "") for model in unread])
+        names = [model.get("name", "") for model in (robot, *unread)]
         exchange.note(
-            f"{robot.get('name')} was read; it holds other {kind}: {unread_names} (--model NAME)."
+            f"{robot.get('name')} was read; it holds other {kind}: {unread_names}",
+            "--model NAME for one of them",
+            question=which_robot(names, kind),
         )
     return robot
 

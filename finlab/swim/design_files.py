@@ -22,7 +22,7 @@ from finlab.bundle_files import (
 )
 from finlab.deploy.bundle import renamed
 from finlab.errors import DataError, LayoutError, layout_errors_at
-from finlab.exchange import Exchange, read_robot
+from finlab.exchange import Answers, Note, Question, read_asking
 from finlab.files.guarded import decoded, read_file, unpacked
 from finlab.interaction.learned import NETWORK_SUFFIX
 from finlab.layout import FinModelSpec, Layout
@@ -36,6 +36,8 @@ LAYOUTS = (".yaml", ".yml", ".json")
 # where files are kept, inside a folder
 TABLE_FOLDER = "tables"
 HULL_FOLDER = "hulls"
+NO_ANSWERS: Answers = {}
+"""Of somebody who was not asked yet."""
 A_DESIGN = "a layout, a robot description, parameters, a matrix"
 
 
@@ -75,8 +77,17 @@ class Opened(NamedTuple):
     """Files that it named and that did not come with it, though the layout makes sense without."""
     lost: tuple[str, ...] = ()
     """Actuators that a bundle says are lost."""
-    notes: tuple[str, ...] = ()
+    notes: tuple[Note, ...] = ()
     """What was taken where a robot description is silent."""
+
+
+class Unanswered(NamedTuple):
+    """A file that somebody can be asked about."""
+
+    questions: tuple[Question, ...]
+    """What it leaves open."""
+    notes: tuple[Note, ...]
+    """What was taken by the defaults."""
 
 
 def read_archive(source: str, content: bytes, folder: Path) -> Opened:
@@ -109,14 +120,18 @@ def read_archive(source: str, content: bytes, folder: Path) -> Opened:
     return adopted(layout, by_path, folder, source)._replace(lost=lost)
 
 
-def read_design(source: str, content: bytes, folder: Path) -> Opened:
+def read_design(
+    source: str, content: bytes, folder: Path, answers: Answers = NO_ANSWERS
+) -> Opened | Unanswered:
     """The layout in a file of any form that `finlab layout convert` reads, which opens no other
-    file. Raises LayoutError: it is none of these, or something in it is wrong."""
-    exchange = Exchange()
+    file; or the questions that the answers leave open. Raises LayoutError: it is none of these, or
+    something in it is wrong."""
     text = decoded(content, source, A_DESIGN, LayoutError)
     with layout_errors_at(source=source):
-        layout = read_robot(text, source, exchange)
-    return adopted(layout, {}, folder, source)._replace(notes=tuple(exchange.notes))
+        reading = read_asking(text, source, answers)
+    if reading.questions or reading.layout is None:
+        return Unanswered(reading.questions, reading.notes)
+    return adopted(reading.layout, {}, folder, source)._replace(notes=reading.notes)
 
 
 def layout_of(source: str, content: bytes, folder: Path | None = None) -> Layout:

@@ -87,22 +87,19 @@ DASH = "–"
 """What stands in place of a number that there is none of."""
 SPEED = "Speed through the water [m/s]"
 """Label of the control that tells how the robot moves."""
-CONVERT = "finlab layout convert"
-"""The command line's verb that has options without a control on the page."""
 CONTROLS = {
     "(--flow)": f"({SPEED[:-6]})",
     "(flow)": f"({SPEED[:-6]})",
     "(--force LEAST MOST)": "(Force, at Limits of each)",
     "--robot LAYOUT": "This robot, at Log",
     "leave it out of the layout's axes, or name it in free": "switch it off beside its slider",
-    "correct `force_n`": "correct Force at Limits of each",
-    "as `model`": "at Model of each",
-    "--scale": "finlab log --scale",
-    "--voltage": "finlab fit thruster --voltage",
-    **{
-        f"--{word}": f"{CONVERT} --{word}"
-        for word in ("origin", "frame", "fins", "thrusters", "rows", "length", "model")
-    },
+    "`finlab layout convert` expands it": "open the URDF that xacro makes of it",
+    "`finlab fit` reads them": "select the thruster that was measured, and open them again",
+    "; finlab layout convert reads": "; also read are",
+    ", or take `finlab layout convert`, which opens it": "",
+    "--scale": "which the page does not ask for",
+    "; --whole judges it nevertheless": "",
+    "; `finlab fit fin` takes": "; those of fins are",
 }
 """Words of the command line that reach the page, and what is said there."""
 SMALL = 3e-4

@@ -25,6 +25,7 @@ from webapp.panels.cards import (
 )
 from webapp.panels.damage import add_damage
 from webapp.panels.files_tab import add_designs, add_files
+from webapp.panels.granted_card import add_granted
 from webapp.panels.hull_panel import add_hull
 from webapp.panels.limits_tab import add_improving, add_reach
 from webapp.panels.log_tab import add_log, add_losses, log_plots, replays_table
@@ -59,6 +60,8 @@ NEEDS_ONE = "one"
 """Need of a panel about one robot, which is not there while two stand beside each other."""
 NEEDS_TWO = "two"
 """Need of a panel that is there while two robots stand beside each other."""
+NEEDS_FILE = "file"
+"""Need of a panel about the file of another program that the robot was read from."""
 NEEDS_FLOW = "flow"
 """Need of a panel that is there where an actuator feels the flow of the water."""
 
@@ -88,6 +91,7 @@ PANELS = (
     Panel(TOP, TASKS, "Answers", add_answering),
     Panel(LEFT, TASKS, "Guide", card(guide_card), need=NEEDS_GUIDE),
     Panel(LEFT, (DESIGN,), "Actuators", add_actuator_list),
+    Panel(LEFT, (DESIGN,), "Taken for granted", add_granted, need=NEEDS_FILE),
     Panel(LEFT, (DESIGN,), "Designs", add_designs),
     Panel(RIGHT, (DESIGN, ALLOCATE), "Water", add_speed, need=NEEDS_FLOW),
     Panel(RIGHT, (DESIGN,), "Actuator", add_actuator, need=NEEDS_ACTUATORS),

@@ -159,7 +159,7 @@ def add_file(page: Page) -> None:
     page.add_button(
         "New", page.new, icon=viser.Icon.FILE_PLUS, hint="One hull, and an actuator of your choice."
     )
-    page.opening.add(DESIGNS, designs.open)
+    page.opening.add(DESIGNS, page.importing.open)
     hint = f"{KINDS[0].upper()}{KINDS[1:]}. Files can be dropped on the page as well."
     upload = page.add_upload("Open", page.opening.open, icon=viser.Icon.FOLDER_OPEN, hint=hint)
     # When this is called, the other panels have added the suffixes that they open.

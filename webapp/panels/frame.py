@@ -22,6 +22,7 @@ from webapp.panels.arrangement import (
     LEFT,
     LOG,
     NEEDS_ACTUATORS,
+    NEEDS_FILE,
     NEEDS_FLOW,
     NEEDS_GUIDE,
     NEEDS_ONE,
@@ -37,6 +38,7 @@ from webapp.panels.commands import add_page_commands
 from webapp.panels.log_tab import plot_rows
 from webapp.panels.nudging import add_nudging
 from webapp.panels.status import add_corner
+from webapp.session.granted import SourceFile
 from webapp.session.lessons import Stop
 from webapp.session.looking import CANDIDATES, DARK, DRAWERS, Desk
 from webapp.session.two_robots import Pair
@@ -53,7 +55,7 @@ VARIABLES = (
     f"[data-mantine-color-scheme=dark] {{ --fl-reach: {css(REACH_DARK)}; }}"
 )
 """The colours of the theme as variables of CSS."""
-STYLE_SHEETS = ("style.css", "frame.css", "two_robots.css")
+STYLE_SHEETS = ("style.css", "frame.css", "inquiry.css", "two_robots.css")
 """Files of `webapp/markup` that style the page."""
 STYLE = html(
     "<style>{}{}</style>",
@@ -168,12 +170,15 @@ class Frame:
         layout: Layout,
         judgement: "Judgement | None",
         pair: Pair | None,
+        source: SourceFile | None,
     ) -> None:
         """Writes the style that says which regions and sections are visible."""
         needs = ["", NEEDS_ROBOT if selected is None else NEEDS_ACTUATORS]
         needs.append(NEEDS_ONE if pair is None else NEEDS_TWO)
         if stop is not None:
             needs.append(NEEDS_GUIDE)
+        if source is not None:
+            needs.append(NEEDS_FILE)
         if plant_of(layout).feels_flow:
             needs.append(NEEDS_FLOW)
         visible_regions = set()

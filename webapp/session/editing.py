@@ -17,6 +17,7 @@ from finlab.layout.damage import Damage
 from finlab.swim.hull import estimated
 from webapp.session import layout_edits
 from webapp.session.base import BaseSession
+from webapp.session.granted import Granted, SourceFile
 from webapp.session.key_words import key_words
 from webapp.session.layout_edits import partner, unlinked, with_twin
 from webapp.session.lessons import Guide
@@ -47,16 +48,33 @@ class Session(BaseSession):
 
     # Robots.
 
-    def open_layout(self, layout: Layout, step: str = "", lost: tuple[str, ...] = ()) -> None:
+    def open_layout(
+        self,
+        layout: Layout,
+        step: str = "",
+        lost: tuple[str, ...] = (),
+        granted: tuple[Granted, ...] = (),
+        source: SourceFile | None = None,
+    ) -> None:
         """Another layout; the target stays, damage and links are forgotten.
 
         Args:
             layout: the robot.
             step: what undo calls it; "Open" and its name where there is none.
             lost: names of its lost actuators.
+            granted: what was taken for granted of its file.
+            source: that file; None where it says all.
         """
         method = method_for(layout, self.state.method)
-        state = replace(self.state, layout=layout, damage=Damage(lost), links=(), method=method)
+        state = replace(
+            self.state,
+            layout=layout,
+            damage=Damage(lost),
+            links=(),
+            method=method,
+            granted=granted,
+            source=source,
+        )
         self._commit(step or f"Open {layout.name}", state)
         self.saved = layout
 
@@ -76,6 +94,15 @@ class Session(BaseSession):
     def accept_layout(self, layout: Layout) -> None:
         """A better layout that was found for this one."""
         self._edit("Improve the layout", layout)
+
+    def confirm(self, row: Granted) -> None:
+        """A row of what was taken for granted is right, or not sure after all."""
+        rows = []
+        for other in self.state.granted:
+            is_confirmed = other.is_confirmed != (other is row)
+            rows.append(replace(other, is_confirmed=is_confirmed))
+        word = "Doubt" if row.is_confirmed else "Confirm"
+        self._commit(f"{word}: {row.sentence:.40}", replace(self.state, granted=tuple(rows)))
 
     def rename_robot(self, new_name: str) -> None:
         """Another name of the robot."""

@@ -19,6 +19,7 @@ from pathlib import Path
 from finlab.assets import shipped_layouts
 from finlab.deploy.bundle import with_tables_inside
 from finlab.errors import FinlabError, LayoutError
+from finlab.exchange import Answers
 from finlab.files import yaml_text
 from finlab.files.guarded import packed as pack
 from finlab.layout import Layout, layout_to_dict, load_layout
@@ -72,20 +73,25 @@ def design_name(layout: Layout) -> str:
     return f"{file_stem(layout.name)}.{'zip' if has_files(layout) else 'yaml'}"
 
 
-def read_layout(name: str, content: bytes) -> design_files.Opened:
-    """The layout in an uploaded layout, bundle, archive or description. LayoutError, with file and
-    key: too large, no text, no layout, or a force table is missing. DataError: a table cannot be
-    read."""
+def read_layout(
+    name: str, content: bytes, answers: Answers = design_files.NO_ANSWERS
+) -> design_files.Opened | design_files.Unanswered:
+    """The layout in an uploaded layout, bundle, archive or description; or the questions that the
+    answers leave open. LayoutError, with file and key: too large, no text, no layout, or a force
+    table is missing. DataError: a table cannot be read."""
     source = Path(str(name)).name[:80] or "upload"
     if source.lower().endswith(".zip"):
-        opened = design_files.read_archive(source, content, cache_folder())
+        opened: design_files.Opened | design_files.Unanswered = design_files.read_archive(
+            source, content, cache_folder()
+        )
     elif len(content) > MAX_BYTES:
         raise LayoutError(
             f"is larger than {MAX_BYTES:,} bytes, a layout has a few thousand", source=source
         )
     else:
-        opened = design_files.read_design(source, content, cache_folder())
-    plant_of(opened.layout)  # reads the tables of its fins
+        opened = design_files.read_design(source, content, cache_folder(), answers)
+    if isinstance(opened, design_files.Opened):
+        plant_of(opened.layout)  # reads the tables of its fins
     return opened
 
 
@@ -187,4 +193,7 @@ def unpacked(text: str) -> design_files.Opened:
         kind = ""
     if kind not in (PLAIN, ARCHIVE) or not kind:
         raise FinlabError(NO_DESIGN)
-    return read_layout("link.yaml" if kind == PLAIN else "link.zip", data)
+    opened = read_layout("link.yaml" if kind == PLAIN else "link.zip", data)
+    if not isinstance(opened, design_files.Opened):
+        raise FinlabError(NO_DESIGN)
+    return opened

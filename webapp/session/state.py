@@ -18,6 +18,7 @@ from finlab.layout.damage import NO_DAMAGE, Damage
 from finlab.physics import plant_of
 from finlab.research.mdn.method import MdnSettings
 from finlab.research.paper.pipeline import PaperSettings
+from webapp.session.granted import Granted, SourceFile
 
 Links = tuple[tuple[str, str], ...]
 """Mirror pairs by name; an actuator is in at most one of them."""
@@ -56,6 +57,10 @@ class State:
     links: Links = ()
     speed: float = 0.0
     """Speed ahead through the water [m/s]."""
+    granted: tuple[Granted, ...] = ()
+    """What was taken for granted of the robot's file."""
+    source: SourceFile | None = None
+    """The file of another program that the robot was read from; None for others."""
 
     @cached_property
     def flow(self) -> Flow | None:
@@ -125,7 +130,9 @@ class State:
         )
         links = tuple((now[a], now[b]) for a, b in self.links if a in now and b in now)
         method = method_for(layout, self.method)
-        return replace(self, layout=layout, links=links, method=method)._with_damage(damage)
+        granted = tuple([row.renamed(now) for row in self.granted])
+        state = replace(self, layout=layout, links=links, method=method, granted=granted)
+        return state._with_damage(damage)
 
     def with_setting(self, key: str, value: Any) -> "State":
         """The temperature, the method, the policy or the network changed."""

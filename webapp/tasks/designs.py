@@ -16,13 +16,15 @@ from finlab.exchange.convert import TABLES
 from finlab.files.worker import in_worker
 from finlab.layout import Layout
 from finlab.layout.damage import NO_DAMAGE
-from finlab.swim.design_files import Opened
+from finlab.swim.design_files import Opened, Unanswered
 from finlab.swim.hull import hull_of
 from webapp.handles import Presses
 from webapp.session import Session, files
 from webapp.session.files import BESIDE, FRAGMENT, WRENCH, file_stem, packed, unpacked
+from webapp.session.granted import SourceFile
 from webapp.session.looking import TWO_ROBOTS
 from webapp.session.state import State
+from webapp.tasks.importing import rows_of
 from webapp.tasks.modes_csv import modes_csv
 from webapp.tasks.slot import Deferred
 from webapp.tasks.solver import Modes, Solver
@@ -86,15 +88,11 @@ class Designs:
         self._session.open_layout(layout)
         self.remind(f"Opened {layout.name}")
 
-    def open(self, name: str, content: bytes) -> None:
-        """A design from a file that the browser sent."""
-        self._read(partial(in_worker, files.read_layout, name, content))
-
     def open_link(self, text: str) -> None:
         """A design from the part of an address behind the #; it may be anything."""
         design, wrench, other = files.parts_of_link(text)
         if not other:
-            self._read(partial(in_worker, unpacked, design), wrench)
+            self._open_one_of_link(design, wrench)
             return
 
         def both() -> tuple[Opened, Opened]:
@@ -105,9 +103,30 @@ class Designs:
 
         self._deferred.make(both, partial(self._take_pair, wrench), "open")
 
+    def _open_one_of_link(self, design: str, wrench: str) -> None:
+        """The robot of a link that carries one."""
+
+        def ready() -> Opened:
+            opened = in_worker(unpacked, design)
+            hull_of(opened.layout)  # what is drawn of it takes its time
+            return opened
+
+        self._deferred.make(ready, partial(self._take_link, wrench), "open")
+
     def open_beside(self, name: str, content: bytes) -> None:
         """A design from a file that the browser sent, to stand beside this robot."""
-        self._read_beside(partial(in_worker, files.read_layout, name, content), f"File: {name}")
+
+        def read() -> Opened:
+            opened = in_worker(files.read_layout, name, content)
+            if isinstance(opened, Unanswered):
+                asked = "; ".join(question.why for question in opened.questions)
+                raise FinlabError(
+                    f"{name} leaves something open ({asked}); open it by itself first, save it, "
+                    "then put the saved file beside"
+                )
+            return opened
+
+        self._read_beside(read, f"File: {name}")
 
     def open_link_beside(self, text: str) -> None:
         """The design in a link that a user has pasted, to stand beside this robot; the wrench
@@ -129,40 +148,47 @@ class Designs:
             own_title = title or f"Link: {layout.name}"
             self._session.two_robots.welcome("right", own_title, layout, opened.lost)
             if opened.notes:
-                self._notify(f"Opened {layout.name}", " ".join(opened.notes), calm=True)
+                self._notify(
+                    f"Opened {layout.name}",
+                    ". ".join(note.sentence for note in opened.notes),
+                    calm=True,
+                )
 
         self._deferred.make(ready, take, "beside")
 
     def _take_pair(self, wrench: str, both: tuple[Opened, Opened]) -> None:
         """Puts the two robots of a link beside each other."""
         left, right = both
-        self._take(wrench, left)
+        self._take_link(wrench, left)
         title = f"Link: {right.layout.name}"
         self._session.two_robots.show_pair(title, right.layout, right.lost)
 
-    def _read(self, read: Callable[[], Opened], wrench: str | None = None) -> None:
-        """`wrench` is that of a link; there is none with a file."""
-
-        def ready() -> Opened:
-            opened = read()
-            hull_of(opened.layout)  # what is drawn of it takes its time
-            return opened
-
-        self._deferred.make(ready, partial(self._take, wrench), "open")
-
-    def _take(self, wrench: str | None, opened: Opened) -> None:
-        """Puts a design on the page, with the wrench of its link, and says what to know of it."""
+    def _take_link(self, wrench: str, opened: Opened) -> None:
+        """Puts the design of a link on the page, with the wrench that comes with it."""
         self._session.open_layout(opened.layout, lost=opened.lost)
-        reminder = self._session.guide.reminder
-        self.remind(f"Opened {opened.layout.name}")
-        if wrench is not None:
-            text = f"{opened.layout.name} is a copy; whoever shared it does not see what you change"
-            self._notify("Opened from a link", _with(text, reminder), calm=True)
+        text = f"{opened.layout.name} is a copy; whoever shared it does not see what you change"
+        self._notify("Opened from a link", _with(text, self._session.guide.reminder), calm=True)
         if wrench:
             self._session.ask_for(wrench.split(","))
-        if opened.notes:
-            text = _with(" ".join(opened.notes), reminder)
-            self._notify(f"Opened {opened.layout.name}", text, calm=True)
+        self._tell_missing(opened)
+
+    def take(self, opened: Opened, source: SourceFile) -> None:
+        """Puts the design of a file on the page, and says what to know of it."""
+        session = self._session
+        session.open_layout(opened.layout, lost=opened.lost, **rows_of(opened, source))
+        reminder = session.guide.reminder
+        self.remind(f"Opened {opened.layout.name}")
+        open_rows = [row for row in session.state.granted if not row.is_settled(opened.layout)]
+        if open_rows:
+            session.show_task("Design")
+            count = f"{len(open_rows)} things were" if len(open_rows) > 1 else "One thing was"
+            text = f"{count} taken for granted; the list stands at the left, in Design"
+            self._notify(f"Opened {opened.layout.name}", _with(text, reminder), calm=True)
+        self._tell_missing(opened)
+
+    def _tell_missing(self, opened: Opened) -> None:
+        """Says which files of a design did not come along."""
+        reminder = self._session.guide.reminder
         for file in opened.missing:
             text = (
                 f"{file} did not come along, so a hull that fits is drawn; put both into one ZIP "
