@@ -96,7 +96,8 @@ class Judgement:
     """Pairs of losses that take an axis away which either alone leaves; where one actuator was
     stopped, those with it."""
     improved: Layout | None
-    """Layout on which the hardest demands cost least; None where none was found, or asked for."""
+    """Layout on which the hardest demands cost least, with a name of its own; None where none was
+    found, or asked for."""
     timeline: Timeline
     events: tuple[tuple[float, str], ...]
     """What the log says of the robot's health: time [s] and words."""
@@ -137,7 +138,14 @@ class Judgement:
 
     @property
     def sentence(self) -> str:
-        """The judgement in one sentence."""
+        """The judgement in one sentence: what was lost, and what would have held it."""
+        if self.axis is None or not self.replays:
+            return self.loss
+        return f"{self.loss.removesuffix('.')}; {self._remedy(AXES.index(self.axis))}."
+
+    @property
+    def loss(self) -> str:
+        """What was lost, in one sentence."""
         seconds = three_digits(self.seconds)
         if self.axis is None:
             return f"No axis was lost in {seconds} s: no actuator at a limit cut a demand."
@@ -151,7 +159,7 @@ class Judgement:
             f"{MOTIONS[i].capitalize()} ({self.axis}) was lost for {lost_seconds} s of {seconds} "
             f"s, in {self.n_spells} spell{plural}, the longest from {longest.start:.1f} to "
             f"{longest.end:.1f} s: {amount(self.missing, i)} of {amount(self.asked, i)} were "
-            f"missing{why}; {self._remedy(i)}."
+            f"missing{why}."
         )
 
     def _remedy(self, i: int) -> str:

@@ -1,13 +1,16 @@
 """Judges a log: when axes were lost, at which limits, and which method or policy would have held
 them."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation import Allocator
 from finlab.allocation.binding import at_limits, limit_words
+from finlab.allocation.methods import MethodName
 from finlab.allocation.policy import CLOSEST, Policy, check_order
 from finlab.analysis.optimize import optimize_layout
 from finlab.analysis.second_losses import SecondLoss, second_losses
@@ -18,8 +21,8 @@ from finlab.layout import Layout
 from finlab.log.demand_answers import answers_to
 from finlab.log.judgement import Judgement, Spell, Timeline
 from finlab.log.read import Log, rest_command
-from finlab.log.recorded import Event
-from finlab.log.replay import demands_of, replay, six
+from finlab.log.recorded import Event, Form
+from finlab.log.replay import demands_of, n_replays, replay, six
 from finlab.physics.objective import judged_power, wrench_scale_of
 from finlab.physics.plant import plant_of
 
@@ -42,13 +45,50 @@ MISSION_DEMANDS = 8
 """Demands that an improved layout is to meet: the hardest ones."""
 SEARCH_ROUNDS = 8
 """Rounds of the search for it."""
+METHODS: dict[Form, MethodName] = {
+    "px4": "px4",
+    "ardusub": "ardusub",
+    "ros": "dual",
+    "finlab": "dual",
+}
+"""Program that wrote a log -> the method that stands for its outputs where the log has none."""
+REPLAYING = "asking other methods and policies the same"
+"""Stage of a judgement, in words."""
+SEARCHING = "searching for a better layout"
+"""The same of the search."""
+STOPPED = "It was stopped before all methods were asked."
+"""Note on a judgement that was cancelled."""
+IMPROVED = " improved"
+"""End of the name of the layout that a search proposes."""
+MAX_STEM = 64 - len(IMPROVED)
+"""Most characters of the robot's name before that."""
 DEFAULT_ORDER = Policy("priority").order
 """Order of the axes of policy `priority` where none is given."""
 Flags = NDArray[np.bool_]
 """Truth values, by samples and actuators."""
 
 
-def judge(log: Log, *, priority: Sequence[Sequence[Axis]] = (), improve: bool = True) -> Judgement:
+class Progress(NamedTuple):
+    """How far a judgement is."""
+
+    stage: str
+    """What is done just now, in words."""
+    n_done: int
+    """Parts that are done, of the replays and the rounds of the search."""
+    n_parts: int
+    """Parts that there are, as far as that is known."""
+    judgement: Judgement
+    """What is known by now: all but the replays and the improved layout that are still to come."""
+
+
+def judge(
+    log: Log,
+    *,
+    priority: Sequence[Sequence[Axis]] = (),
+    improve: bool = True,
+    report: Callable[[Progress], object] | None = None,
+    cancelled: Callable[[], bool] | None = None,
+) -> Judgement:
     """Returns the judgement of a log: which axes its robot lost, and what would have held them.
 
     The demands are replayed by other methods and policies, with each actuator lost, and on an
@@ -59,56 +99,54 @@ def judge(log: Log, *, priority: Sequence[Sequence[Axis]] = (), improve: bool = 
         priority: groups of axes for policy `priority`, most important first; the axis that lost
             most comes first when empty.
         improve: whether to search for a better layout.
+        report: called before the first replay, and after each part of the work.
+        cancelled: called between the parts; when it returns True, the judgement ends with what is
+            known by then, and says so.
 
     Raises:
         CommandError: `priority` names no axes.
         DataError: a table of forces cannot be read.
     """
     account = Account(log)
-    scale = account.scale
-    span = log.span
-    impulse = account.impulse
-    notes = [*log.notes]
-    asked = span @ np.abs(account.demand)
-    axis = AXES[int(np.argmax(impulse / scale))] if account.lost.any() else None
-    if ((span @ np.abs(account.deviation) - impulse) / scale).max() > UNEXPLAINED_SHARE * (
-        asked / scale
-    ).max():
-        notes.append(
-            "With no actuator at a limit the outputs gave another wrench than was asked for: "
-            "forces of the robot, or what a setpoint stands for (--scale), differ from those of "
-            "the log."
-        )
-    policies = [CLOSEST, Policy("direction"), _priority(priority, axis)]
-    replays = [*replay(log.robot, log.demand, span, policies)]
-    improved = _improved(log, scale, notes) if improve else None
-    if improved is not None:
-        replays += replay(improved, log.demand, span, policies, improved=True)
-    spells = account.spells()
-    stopped = account.names(account.dead | account.gone[-1])
-    worst = sorted(spells, key=lambda spell: -float((spell.missing / scale).sum()))[:MAX_SPELLS]
-    return Judgement(
-        source=log.source,
-        robot=log.robot,
-        scale=scale,
-        seconds=float(span.sum()),
-        asked=six(asked, scale),
-        missing=six(impulse, scale),
-        lost_s=six(span @ account.lost, np.zeros(6)),
-        saturated_s=float(span @ account.lost.any(axis=1)),
-        watts=account.watts,
-        axis=axis,
-        stopped=stopped,
-        spells=tuple(sorted(worst, key=lambda spell: spell.start)),
-        n_spells=len(spells),
-        replays=tuple(replays),
-        second_losses=_second_losses(log.robot, stopped),
-        improved=improved,
-        timeline=account.timeline(),
-        events=tuple((event.time, _event_words(log, event)) for event in log.events),
-        notes=tuple(notes),
-        asks=log.asks,
-    )
+    judgement = account.judgement()
+    policies = [CLOSEST, Policy("direction"), _priority(priority, account.axis)]
+    rounds = SEARCH_ROUNDS if improve else 0
+    n_parts = n_replays(log.robot, policies) + rounds
+    n_parts += n_replays(log.robot, policies, improved=True) if improve else 0
+    n_done = 0
+
+    def tell(stage: str, parts: int = 0) -> bool:
+        """Whether to go on; so many more parts are done."""
+        nonlocal n_done
+        n_done += parts
+        if report is not None:
+            report(Progress(stage, min(n_done, n_parts), n_parts, judgement))
+        return cancelled is None or not cancelled()
+
+    goes_on = tell(REPLAYING)
+    if goes_on:
+        for answered in replay(log.robot, log.demand, log.span, policies):
+            judgement = replace(judgement, replays=(*judgement.replays, answered))
+            goes_on = tell(REPLAYING, 1)
+            if not goes_on:
+                break
+    if goes_on:
+        pairs = _second_losses(log.robot, judgement.stopped)
+        judgement = replace(judgement, second_losses=pairs)
+    if goes_on and improve:
+        notes = [*judgement.notes]
+        improved = _improved(log, account.scale, notes, lambda: tell(SEARCHING, 1))
+        judgement = replace(judgement, notes=tuple(notes), improved=improved)
+        goes_on = tell(SEARCHING)
+        if goes_on and improved is not None:
+            for answered in replay(improved, log.demand, log.span, policies, improved=True):
+                judgement = replace(judgement, replays=(*judgement.replays, answered))
+                goes_on = tell(REPLAYING, 1)
+                if not goes_on:
+                    break
+    if not goes_on:
+        judgement = replace(judgement, notes=(*judgement.notes, STOPPED))
+    return judgement
 
 
 class Account:
@@ -149,8 +187,7 @@ class Account:
         if command is None:
             if log.unmet is not None:
                 return self.demand - log.unmet
-            method = "dual" if log.form == "ros" else log.form
-            command = answers_to(Allocator(log.robot, method), log.demand).command
+            command = answers_to(Allocator(log.robot, METHODS[log.form]), log.demand).command
         self.is_full, self.is_at_arc_end = at_limits(log.robot, command)
         plant = plant_of(log.robot)
         delivered = np.empty((len(log), 6))
@@ -201,6 +238,53 @@ class Account:
         share = np.square(force).sum(axis=0) * np.square(columns).sum(axis=1) / size
         explained = np.square(deviation - force @ columns).sum() < DEAD_SHARE * size
         return np.asarray(is_resting & (share > DEAD_SHARE) & explained)
+
+    @property
+    def axis(self) -> Axis | None:
+        """The axis that lost most, as a share of the wrench scale; None where none was lost."""
+        return AXES[int(np.argmax(self.impulse / self.scale))] if self.lost.any() else None
+
+    def judgement(self) -> Judgement:
+        """What can be said without another question: the judgement without replays, pairs of losses
+        and an improved layout."""
+        log = self.log
+        scale = self.scale
+        span = log.span
+        impulse = self.impulse
+        asked = span @ np.abs(self.demand)
+        notes = [*log.notes]
+        unexplained = ((span @ np.abs(self.deviation) - impulse) / scale).max()
+        if unexplained > UNEXPLAINED_SHARE * (asked / scale).max():
+            notes.append(
+                "With no actuator at a limit the outputs gave another wrench than was asked for: "
+                "forces of the robot, or what a setpoint stands for (--scale), differ from those "
+                "of the log."
+            )
+        spells = self.spells()
+        by_loss = sorted(spells, key=lambda spell: -float((spell.missing / scale).sum()))
+        worst = by_loss[:MAX_SPELLS]
+        return Judgement(
+            source=log.source,
+            robot=log.robot,
+            scale=scale,
+            seconds=float(span.sum()),
+            asked=six(asked, scale),
+            missing=six(impulse, scale),
+            lost_s=six(span @ self.lost, np.zeros(6)),
+            saturated_s=float(span @ self.lost.any(axis=1)),
+            watts=self.watts,
+            axis=self.axis,
+            stopped=self.names(self.dead | self.gone[-1]),
+            spells=tuple(sorted(worst, key=lambda spell: spell.start)),
+            n_spells=len(spells),
+            replays=(),
+            second_losses=(),
+            improved=None,
+            timeline=self.timeline(),
+            events=tuple((event.time, _event_words(log, event)) for event in log.events),
+            notes=tuple(notes),
+            asks=log.asks,
+        )
 
     def names(self, flags: Flags) -> tuple[str, ...]:
         """Names of the actuators with a flag (n,)."""
@@ -271,23 +355,45 @@ def _priority(groups: Sequence[Sequence[Axis]], axis: Axis | None) -> Policy:
     return Policy("priority", order=tuple(order))
 
 
-def _improved(log: Log, scale: Array, notes: list[str]) -> Layout | None:
-    """The layout that a search proposes for the demands that miss most, or else are largest."""
+def _improved(
+    log: Log, scale: Array, notes: list[str], goes_on: Callable[[], bool]
+) -> Layout | None:
+    """The layout that a search proposes for the demands that miss most, or else are largest.
+
+    Args:
+        log: the log.
+        scale: the robot's wrench scale (6,) [N, N m].
+        notes: gets a sentence where there is none.
+        goes_on: called after each round; the search ends when it returns False.
+    """
     demands = demands_of(log.demand, log.span, scale, 10 * MISSION_DEMANDS)
     answer = answers_to(Allocator(log.robot), demands.wrench)
     size = np.linalg.norm(np.nan_to_num(demands.wrench) / scale, axis=1)
     order = np.lexsort((-size * demands.span, -np.round(answer.err_norm, 3) * demands.span))
     mission = np.nan_to_num(demands.wrench[order[:MISSION_DEMANDS]])
+    is_stopped = False
+
+    def after_round(_: object) -> None:
+        nonlocal is_stopped
+        is_stopped = not goes_on()
+
     try:
         search = optimize_layout(
-            log.robot, log.robot.names, goal="mission_power", mission=mission, rounds=SEARCH_ROUNDS
+            log.robot,
+            log.robot.names,
+            goal="mission_power",
+            mission=mission,
+            rounds=SEARCH_ROUNDS,
+            progress=after_round,
+            cancelled=lambda: is_stopped,
         )
     except FinlabError as error:
         notes.append(f"No better layout was searched for: {error}.")
         return None
     if not search.improved:
         notes.append("The search found no layout that meets the hardest demands better.")
-    return search.layout if search.improved else None
+        return None
+    return replace(search.layout, name=f"{log.robot.name[:MAX_STEM]}{IMPROVED}")
 
 
 def _second_losses(robot: Layout, stopped: Sequence[str]) -> tuple[SecondLoss, ...]:

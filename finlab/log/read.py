@@ -125,7 +125,7 @@ def read_log(
         record.notes, record.asks = record.notes + record.taken, record.lacking + record.asks
     if whole:
         record.armed = record.in_water = None
-    return _log_of_record(file.name, record, layout, scale)
+    return log_of_record(file.name, record, layout, scale)
 
 
 def _read_record(path: Path, demand: str | None, outputs: str | None) -> LogRecord:
@@ -202,13 +202,13 @@ def _unit(source_program: Form, robot: Layout, scale: ArrayLike | None) -> Array
         raise DataError(
             f"scale: expected six numbers above 0, newtons and newton metres, got {scale!s:.80}"
         )
-    if source_program == "ros":
+    if source_program in ("ros", "finlab"):
         return np.ones(6)
     kind = Px4 if source_program == "px4" else ArduSub
     return np.abs(kind(robot, kind.settings_class(), wrench_scale_of(robot)).setpoint_unit)
 
 
-def _log_of_record(source: str, record: LogRecord, robot: Layout, scale: ArrayLike | None) -> Log:
+def log_of_record(source: str, record: LogRecord, robot: Layout, scale: ArrayLike | None) -> Log:
     """The log in the robot's newtons, at the times of its outputs, else of the unallocated
     wrenches, else of the demands.
 
@@ -385,7 +385,7 @@ def commands_of(record: LogRecord, outputs: Array, robot: Layout, signs: Array) 
     k = outputs.shape[1]
     if not record.of_shares and k == 3 * n:
         return np.asarray(outputs.reshape(-1, n, 3))
-    if k < n or (k != n and record.form == "ros"):
+    if k < n or (k != n and record.form in ("ros", "finlab")):
         or_commands = "" if record.of_shares else f" or {3 * n}"
         raise LayoutError(
             f"layout {robot.name!r:.60} has {robot.counts_in_words}, and the log {k} outputs, not "

@@ -15,8 +15,8 @@ from finlab.errors import LayoutError
 from finlab.exchange import Exchange
 from finlab.layout import Layout
 
-Form = Literal["px4", "ardusub", "ros"]
-"""The program that wrote a log."""
+Form = Literal["px4", "ardusub", "ros", "finlab"]
+"""The program that wrote a log; of ROS and of finlab itself wrenches are in newtons."""
 FLU = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
 """Turns a wrench of x forward, y right, z down into x forward, y left, z up."""
 

@@ -112,14 +112,11 @@ def replay(
     scale = wrench_scale_of(robot)
     intact = demands_of(wrench, span, scale, MAX_DEMANDS)
     merged = demands_of(intact.wrench, intact.span, scale, MAX_DEMANDS_LOST)
-    autopilots: tuple[MethodName, ...] = ("px4", "ardusub")
-    questions: list[tuple[MethodName, Policy]] = [("dual", policy) for policy in policies]
-    questions += [(name, CLOSEST) for name in autopilots if method_class(name).fits(robot)]
+    questions = _questions(robot, policies)
     allocators = {
         name: Allocator(robot, name) for name in dict.fromkeys(name for name, _ in questions)
     }
-    lost_names = [] if improved or robot.n == 1 else robot.names
-    for lost in (None, *lost_names):
+    for lost in (None, *_lost_names(robot, improved)):
         demands = intact if lost is None else merged
         for name, policy in questions:
             lost_now = () if lost is None else (lost,)
@@ -135,6 +132,24 @@ def replay(
                 watts=float(demands.span @ answer.power / demands.span.sum()),
                 saturated_s=float(demands.span[answer.err_norm > REACHED].sum()),
             )
+
+
+def n_replays(robot: Layout, policies: list[Policy], *, improved: bool = False) -> int:
+    """Returns how many replays `replay` makes; arguments as it has them."""
+    return len(_questions(robot, policies)) * (1 + len(_lost_names(robot, improved)))
+
+
+def _questions(robot: Layout, policies: list[Policy]) -> list[tuple[MethodName, Policy]]:
+    """Methods and policies that are asked."""
+    autopilots: tuple[MethodName, ...] = ("px4", "ardusub")
+    questions: list[tuple[MethodName, Policy]] = [("dual", policy) for policy in policies]
+    questions += [(name, CLOSEST) for name in autopilots if method_class(name).fits(robot)]
+    return questions
+
+
+def _lost_names(robot: Layout, improved: bool) -> tuple[str, ...]:
+    """Actuators that are lost in turn."""
+    return () if improved or robot.n == 1 else robot.names
 
 
 def six(values: Array, scale: Array) -> tuple[float, ...]:

@@ -20,6 +20,7 @@ from finlab.exchange.convert import WRITERS
 from finlab.files import yaml_text
 from finlab.layout import FinModelSpec, layout_to_dict, load_layout
 from finlab.physics import make_law
+from finlab.swim.design_files import Opened, Unanswered
 from finlab.swim.hull import hull_of
 from webapp.session import files
 
@@ -219,14 +220,20 @@ def test_descriptions_of_others_are_opened_and_what_they_lack_is_said() -> None:
     text = (Path(__file__).parents[1] / "exchange" / "bluerov2_heavy.urdf").read_bytes()
     opened = files.read_layout("bluerov2_heavy.urdf", text)
     known = load_layout("bluerov2_heavy")
-    assert opened.layout.name == "bluerov2_heavy" and "power" in " ".join(opened.notes)
+    assert isinstance(opened, Opened)
+    assert opened.layout.name == "bluerov2_heavy" and "power" in " ".join(map(str, opened.notes))
     assert np.allclose(opened.layout.position[:4], known.position[:4], atol=1e-9)
     rotors = WRITERS["px4"](known, Exchange(), ".params").encode()
     assert files.read_layout("rov.params", rotors).layout.n == 8
     model = WRITERS["mjcf"](known, Exchange(), ".xml").encode()
     assert files.read_layout("rov.xml", model).layout.names == known.names
     team = b'[[thrusters]]\nname = "bow"\npos_mm = [100, 0, 0]\nheading_pitch_deg = [0, 0]'
-    assert files.read_layout("rov.toml", team).layout.position[0, 0] == 0.1
+    asked = files.read_layout("rov.toml", team)
+    assert isinstance(asked, Unanswered)
+    assert [question.option for question in asked.questions] == ["frame", "missing_force"]
+    answers = {question.option: question.default for question in asked.questions}
+    answered = files.read_layout("rov.toml", team, answers)
+    assert isinstance(answered, Opened) and answered.layout.position[0, 0] == 0.1
     with pytest.raises(FinlabError, match=r"rov\.xml: includes '/etc/passwd', which did not come"):
         files.read_layout("rov.xml", b'<mujoco><include file="/etc/passwd"/></mujoco>')
     for bad in (
