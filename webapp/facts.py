@@ -117,9 +117,9 @@ def facts_of(
         "fit_result": jobs.fitting.answer,
         "fit_error": jobs.fitting.error,
         "fit_progress": jobs.fitting.progress,
-        "judgement": jobs.log.answer,
+        "judgement": jobs.log.shown,
         "judgement_error": jobs.log.error,
-        "judgement_progress": jobs.log.progress,
+        "judgement_stage": jobs.log.stage,
         "by_page": jobs.log.by_page,
         "log_moment": jobs.log.moment,
         # A swim, and the view.

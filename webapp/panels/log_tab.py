@@ -11,6 +11,8 @@ import viser
 from markupsafe import Markup
 
 from finlab.axes import MOTIONS, UNITS
+from finlab.errors import FinlabError
+from finlab.layout import Layout
 from finlab.log.judgement_text import (
     IMPULSE_COLUMNS,
     REPLAY_COSTS,
@@ -21,25 +23,32 @@ from finlab.log.judgement_text import (
     judged_axis,
     missing_column,
 )
-from webapp.handles import add_html, placed, press, set_properties
+from webapp.handles import add_html, button, placed, press, set_properties
 from webapp.markup.plot import cost_axis, exact_axis, over_time
 from webapp.markup.tables import cell_text, cells, head_row
 from webapp.markup.words import html, in_app, marker
 from webapp.page import Page
-from webapp.tasks.log_reading import SUFFIXES
+from webapp.tasks.log_reading import SUFFIXES, worst_moment
+from webapp.tasks.log_samples import SAMPLES
 from webapp.theme import ASKED, DELIVERED, fin_color
 
 if TYPE_CHECKING:
     from finlab.log import Judgement
     from finlab.log.judgement import Spell
+    from finlab.log.judging import Progress
 
 PLOTS_A_ROW = 4
 """Plots that stand beside each other in a window of usual width."""
 INVITATION = (
-    "Drop a log on the page: PX4 (.ulg), ArduSub (.bin, .tlog), or a bag of ROS (.mcap, .db3, "
-    ".bag). It is told when and on which axis the robot could not, and what would have held it."
+    "Drop a log on the page: PX4 (.ulg), ArduSub (.bin, .tlog), a bag of ROS (.mcap, .db3, .bag), "
+    "or a swim that was saved here (.npz). It is told when and on which axis the robot could not, "
+    "and what would have held it."
 )
 """What the tab says while there is no log."""
+SAMPLE_WORDS = "None at hand? Open a sample, a dive of half a minute:"
+"""What stands above the buttons of the samples."""
+MIN_MOVE = 5e-4
+"""Least distance [m], and least turn [rad], that counts as moved."""
 
 
 def add_log(page: Page) -> None:
@@ -55,51 +64,156 @@ def add_log(page: Page) -> None:
         "Judge it by the robot of this page; else by the one that the log's own parameters "
         "describe."
     )
-    by_page = gui.add_checkbox("This robot", False, hint=hint)
+    by_page = gui.add_checkbox("By this page's robot", False, hint=hint)
     page.bind(by_page, log.choose_robot, lambda by_page: by_page)
+    page.presses.on("sample", lambda key, _: log.open_sample(SAMPLES[placed(key, len(SAMPLES))]))
+    page.presses.on("log-robot", lambda *_: log.jump(_moment_of(page)))
+    page.presses.on("log-stop", lambda *_: log.stop())
     page.add_html(_summary)
-    button = page.add_button(
+    page.add_html(_whose_robot)
+    page.add_html(moved_markup)
+    improved = page.add_button(
         "Open the improved robot", partial(_open_improved, page), icon=viser.Icon.SPARKLES
     )
     page.board.show(
-        button, visible=lambda judgement: judgement is not None and judgement.improved is not None
+        improved, visible=lambda judgement: judgement is not None and judgement.improved is not None
     )
+
+
+def _moment_of(page: Page) -> float:
+    """The moment that was on the robot last, or else the worst one [s]."""
+    log = page.jobs.log
+    if log.moment is not None:
+        return log.moment
+    if log.shown is None:
+        raise FinlabError("open a log first")
+    return worst_moment(log.shown)
 
 
 def _open_improved(page: Page) -> None:
     """The robot that would have held what the log's could not."""
-    judgement = page.jobs.log.answer
+    judgement = page.jobs.log.shown
     if judgement is not None and judgement.improved is not None:
-        page.jobs.log.use(judgement.improved, f"Robot for {judgement.source}")
+        page.jobs.log.use(judgement.improved, f"Improved robot for {judgement.source}")
 
 
 def _summary(
-    judgement: "Judgement | None", judgement_progress: str | None, judgement_error: str | None
+    judgement: "Judgement | None",
+    judgement_stage: "Progress | str | None",
+    judgement_error: str | None,
 ) -> str:
     """The judgement in a sentence, with its notes; why there is none, or how far it is."""
-    if judgement_progress is not None:
-        return html("<div class='fl dim'>{} …</div>", judgement_progress.capitalize())
+    progress = _progress_bar(judgement_stage)
     if judgement is None:
-        sentence = INVITATION
+        if progress:
+            return html("<div class='fl'>{}</div>", progress)
+        sentence = html("<div>{}</div>", INVITATION)
         if judgement_error:
             sentence = html("<div class='missing'>{}</div>", in_app(judgement_error))
-        return html("<div class='fl'>{}</div>", sentence)
+        return html("<div class='fl'>{}{}</div>", sentence, _sample_buttons())
     notes = []
     for note in (*judgement.asks, *judgement.notes):
         notes.append(html("<div class='said dim'>{}</div>", in_app(note)))
+    # While methods are being asked nobody knows yet which of them would have held it.
+    sentence = judgement.loss if progress else judgement.sentence
     return html(
-        "<div class='fl'><b>{}</b><div class='said'>{}</div>{}</div>",
+        "<div class='fl'><b>{}</b><div class='said'>{}</div>{}{}</div>",
         judgement.source,
-        judgement.sentence,
+        sentence,
+        progress,
         notes,
     )
+
+
+def _sample_buttons() -> str:
+    """A button for each sample."""
+    buttons = []
+    for k, sample in enumerate(SAMPLES):
+        buttons.append(button(sample.words, "sample", str(k)))
+    return html(
+        "<div class='said dim'>{}</div><div class='fl-samples'>{}</div>", SAMPLE_WORDS, buttons
+    )
+
+
+def _progress_bar(stage: "Progress | str | None") -> str:
+    """How far a judgement is, with a button that ends it; nothing while none is under way."""
+    if stage is None:
+        return ""
+    if isinstance(stage, str):
+        return html("<div class='dim'>{} …</div>", stage.capitalize())
+    words = f"{stage.stage.capitalize()}: {stage.n_done} of {stage.n_parts}"
+    bar = "<progress max='{}' value='{}' aria-label='{}'></progress>"
+    return html(
+        "<div class='fl-progress'><div class='dim'>{}</div>{}{}</div>",
+        words,
+        html(bar, stage.n_parts, stage.n_done, words),
+        button("Stop here", "log-stop"),
+    )
+
+
+def _whose_robot(judgement: "Judgement | None", layout: Layout) -> str:
+    """Whose robot is in the view, with a button that puts the log's there."""
+    if judgement is None:
+        return ""
+    name = layout.name
+    if layout == judgement.robot:
+        sentence = html("The view shows the robot of the log, {}; Undo brings back yours.", name)
+        return html("<div class='fl said dim'>{}</div>", sentence)
+    if judgement.improved is not None and layout == judgement.improved:
+        sentence = html("The view shows the improved robot, {}.", name)
+    else:
+        sentence = html("The view shows {}, not the robot of the log.", name)
+    return html(
+        "<div class='fl said'>{} <div class='fl-samples'>{}</div></div>",
+        sentence,
+        button("Show the log's robot", "log-robot"),
+    )
+
+
+def moved_markup(judgement: "Judgement | None") -> str:
+    """Where the actuators of the improved robot stand, as seen from where they were.
+
+    Args:
+        judgement: of the log; None while there is none.
+    """
+    if judgement is None or judgement.improved is None:
+        return ""
+    rows = []
+    for before in judgement.robot.actuators:
+        after = judgement.improved.actuator(before.name)
+        step = np.subtract(after.position, before.position)
+        turn = angle_between(before.direction, after.direction)
+        if float(np.linalg.norm(step)) < MIN_MOVE and turn < MIN_MOVE:
+            continue
+        cells_of_row = [f"{way:+.3f}".replace("-", "−") for way in step]
+        cells_of_row.append(f"{np.degrees(turn):.0f}°")
+        figures = html("{}", [html("<td>{}</td>", cell) for cell in cells_of_row])
+        rows.append(html("<tr><td><span class='name'>{}</span></td>{}</tr>", before.name, figures))
+    head = "<tr><th>moved</th><th>x [m]</th><th>y</th><th>z</th><th>turned</th></tr>"
+    n_kept = judgement.robot.n - len(rows)
+    kept = f" {n_kept} stay as they are." if n_kept else ""
+    return html(
+        "<div class='fl'><div class='said'>The improved robot is {}.{}</div><table "
+        "class='fins'>{}{}</table></div>",
+        judgement.improved.name,
+        kept,
+        Markup(head),
+        rows,
+    )
+
+
+def angle_between(one: Sequence[float], other: Sequence[float]) -> float:
+    """Returns the angle between two directions (3,) [rad]."""
+    across = float(np.linalg.norm(np.cross(one, other)))
+    along = float(np.dot(one, other))
+    return float(np.arctan2(across, along))
 
 
 def add_losses(page: Page) -> None:
     """What was lost on each axis, and when; a spell that is pressed is put on the robot."""
 
     def jump(key: str, _modifier: str) -> None:
-        judgement = page.jobs.log.answer
+        judgement = page.jobs.log.shown
         spells = () if judgement is None else judgement.spells
         page.jobs.log.jump(spells[placed(key, len(spells))].start)
 

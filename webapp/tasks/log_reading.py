@@ -1,6 +1,8 @@
-"""A log of an autopilot or of ROS that one page judges, and its moments on the robot."""
+"""A log of an autopilot, of ROS or of a swim that one page judges, and its moments on the robot."""
 
+import time
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,15 +11,22 @@ from finlab.assets import install_command
 from finlab.errors import FinlabError
 from finlab.files.worker import in_worker
 from finlab.layout import Layout
+from webapp.session.files import shipped
 from webapp.tasks.context import Context
 from webapp.tasks.fitting import as_file, short_name
+from webapp.tasks.log_samples import Sample
 from webapp.tasks.slot import Slot, Work
 
 if TYPE_CHECKING:  # who opens no log needs none of it
-    from finlab.log import Judgement
+    from finlab.log import Judgement, Log
+    from finlab.log.judging import Progress
 
-SUFFIXES = ".ulg,.bin,.tlog,.mcap,.db3,.bag"
+SUFFIXES = ".ulg,.bin,.tlog,.mcap,.db3,.bag,.npz"
 """Suffixes of logs, as a browser expects them."""
+REPORT_PERIOD_S = 0.4
+"""Least time between two reports of how far a judgement is [s]."""
+READING = "reading the log"
+"""What is done before there is a judgement."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +38,8 @@ class LogFile:
     content: bytes
     robot: Layout | None
     """By whose laws it is judged; None for what its own parameters say."""
+    page_robot: Layout
+    """The robot of the page, which a swim may be of."""
 
 
 class LogReading(Slot[LogFile, "Judgement"]):
@@ -40,7 +51,7 @@ class LogReading(Slot[LogFile, "Judgement"]):
             context.bell,
             judge_upload,
             watched=True,
-            stage="reading the log",
+            stage=READING,
             title="Not judged",
         )
         self._session = context.session
@@ -48,6 +59,21 @@ class LogReading(Slot[LogFile, "Judgement"]):
         """Whether the page's robot counts, not that of the log's parameters."""
         self.moment: float | None = None
         """Which moment of the log is on the robot [s]."""
+        self._is_on_page = False
+        """Whether the robot of the log was put on the page."""
+
+    @property
+    def shown(self) -> "Judgement | None":
+        """The judgement, or what is known of it by now."""
+        progress: Progress | str | None = self.progress
+        if self.busy and progress is not None and not isinstance(progress, str):
+            return progress.judgement
+        return self.answer
+
+    @property
+    def stage(self) -> "Progress | str | None":
+        """How far the judgement is; None while there is none under way."""
+        return self.progress if self.busy else None
 
     def choose_robot(self, by_page: object) -> None:
         """Judge by the page's robot, or by the one that the log tells; a log that is there is
@@ -58,16 +84,32 @@ class LogReading(Slot[LogFile, "Judgement"]):
 
     def open(self, name: str, content: bytes) -> None:
         """Judge a log in place of the one before."""
+        self._open(name, content, self._session.state.layout if self.by_page else None)
+
+    def open_sample(self, sample: Sample) -> None:
+        """Judge a sample."""
+        self._open(sample.file, sample.content(), sample.layout())
+
+    def _open(self, name: str, content: bytes, robot: Layout | None) -> None:
+        """Judge a log by the laws of a robot, or by its own parameters."""
         self.forget()
         self.moment = None
+        self._is_on_page = False
         self._session.show_task("Log")
-        self.ask(
-            LogFile(short_name(name), content, self._session.state.layout if self.by_page else None)
-        )
+        self.ask(LogFile(short_name(name), content, robot, self._session.state.layout))
+
+    def attend(self) -> bool:
+        """Take what has come; the log's robot and its worst moment are put on the page once."""
+        came = super().attend()
+        judgement = self.shown
+        if judgement is not None and not self._is_on_page:
+            self._is_on_page = True
+            self.jump(worst_moment(judgement))
+        return came
 
     def jump(self, time: float) -> None:
         """Put the robot of the log, and the wrench that it asked for at a time [s], on the page."""
-        judgement = self.answer
+        judgement = self.shown
         if judgement is None:
             raise FinlabError("open a log first")
         nearest = int(np.abs(judgement.timeline.time - time).argmin())
@@ -85,14 +127,48 @@ class LogReading(Slot[LogFile, "Judgement"]):
         return is_new
 
 
+def worst_moment(judgement: "Judgement") -> float:
+    """Returns the middle of the spell in which most was missing [s].
+
+    Where nothing was lost, it is the time of the largest demand.
+    """
+    if judgement.spells:
+        scale = judgement.scale
+        worst = max(judgement.spells, key=lambda spell: float((spell.missing / scale).sum()))
+        return 0.5 * (worst.start + worst.end)
+    timeline = judgement.timeline
+    sizes = np.linalg.norm(timeline.demand / judgement.scale, axis=1)
+    return float(timeline.time[int(sizes.argmax())])
+
+
 def judge_upload(file: LogFile, work: Work[LogFile]) -> "Judgement":
-    """What is said of a log. FinlabError: it cannot be read."""
+    """What is said of a log; reports what is known on the way, and ends with it where it is
+    cancelled. FinlabError: it cannot be read."""
     try:
-        from finlab.log import judge, read_log
+        from finlab.log import judge
 
         with as_file(file.name, file.content) as path:
-            log = in_worker(read_log, path, file.robot)
+            log = in_worker(read_any_log, path, file.robot, file.page_robot)
     except ModuleNotFoundError as error:
         raise FinlabError(f"{file.name} needs {error.name}; {install_command('logs')}") from None
-    work.report("asking other methods and policies the same")
-    return judge(log)
+    next_report_s = 0.0
+
+    def report(progress: "Progress") -> None:
+        nonlocal next_report_s
+        if time.monotonic() >= next_report_s:
+            work.report(progress)
+            next_report_s = time.monotonic() + REPORT_PERIOD_S
+
+    return judge(log, report=report, cancelled=work.cancelled.is_set)
+
+
+def read_any_log(path: Path, robot: Layout | None, page_robot: Layout) -> "Log":
+    """Returns a log of a program, or of a swim, which may be of the page's robot or a shipped
+    one."""
+    from finlab.log import read_log
+    from webapp.tasks.swim_logs import SUFFIX, read_swim
+
+    if Path(path).suffix.lower() == SUFFIX:
+        robots = [robot] if robot is not None else [page_robot, *shipped().values()]
+        return read_swim(Path(path), robots)
+    return read_log(path, robot)

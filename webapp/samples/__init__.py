@@ -1,0 +1,1 @@
+"""Sample logs, written by `python -m tests.sample_logs`."""
