@@ -14,13 +14,20 @@ from finlab.errors import DataError
 from finlab.layout import FinModelSpec
 from finlab.research.networks.checkpoint import (
     read_checkpoint,
+    read_normalization,
     resolve_checkpoint,
     write_checkpoint,
 )
 from finlab.research.networks.trained import ArraysByName, TrainedWeights, sizes_for_file
 from finlab.research.paper.surrogate import SurrogateConfig
 from finlab.research.paper.training import modules
-from finlab.research.paper.training.recipes import PaperLoop, PaperRecipe, recipe, write_card
+from finlab.research.paper.training.recipes import (
+    PaperLoop,
+    PaperRecipe,
+    recipe,
+    recipe_hash,
+    write_card,
+)
 from finlab.research.paper.training.samples import (
     N_FINS,
     DataSettings,
@@ -227,9 +234,13 @@ def _train(
             generate(output / "data", recipe(options.preset).data)
         place.wait()
         samples = SampleSet(options.data or output / "data", place.device)
+        made_by = recipe(options.preset)
+        if made_by.normalization is not None:
+            samples.normalization = read_normalization(resolve_checkpoint(made_by.normalization))
         weights = begin(options.seed, place.device)
         identity = {"preset": options.preset, "seed": options.seed, "training": asdict(settings)}
         identity |= {"data": samples.settings, "surrogate_sha256": surrogate}
+        identity |= {"data_sha256": samples.sha256, "recipe_sha256": recipe_hash(made_by, verb)}
 
         def save(state: ArraysByName, progress: dict[str, Any]) -> None:
             made = checkpoint(samples, state)
