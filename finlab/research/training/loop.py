@@ -1,5 +1,5 @@
-"""The loop of every training: Adam or SOAP, a rate that may fall, a log, and a state from which a run goes
-on.
+"""The loop of every training: Adam or SOAP, a rate that may fall, a log, and a state from which a
+run goes on.
 
 All that a step depends on is a function of its number: the batch, the noise, the rate. So a run
 that was killed and goes on from its last state ends with the weights of one that was not.
