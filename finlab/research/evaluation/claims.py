@@ -63,7 +63,7 @@ def quotient(
 
 
 def sentences(rows: Rows) -> list[str]:
-    """Returns what the rows say of the paper's conclusions, in words, with the figures of the tables.
+    """Returns what the rows say of the paper's conclusions, with their figures.
 
     Args:
         rows: of a report.
@@ -112,8 +112,8 @@ def _temperature_words(rows: Rows) -> str:
     if max(means) > NEAR * min(means):
         return f"The temperature of the draw matters: the mean J goes {ends} {span}."
     return (
-        f"The temperature of the draw is flat: the mean J goes {ends} {span}, where the paper draws "
-        "an optimum between."
+        f"The temperature of the draw is flat: the mean J goes {ends} {span}, where the paper "
+        "draws an optimum between."
     )
 
 

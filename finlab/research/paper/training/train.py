@@ -148,7 +148,7 @@ def surrogate_terms(config: SurrogateConfig, weights: Weights, source: BatchSour
 
     def terms(step: int) -> dict[str, Tensor]:
         batch = source.batch(step)
-        with source.place.autocast(max(config.hidden)):
+        with source.place.autocast(max(config.hidden), source.settings.is_float32(step)):
             return {"loss": modules.physics(wrench, batch, std).mean()}
 
     return terms
@@ -204,10 +204,11 @@ def allocator_terms(
     def terms(step: int) -> dict[str, Tensor]:
         batch = source.batch(step)
         target = (batch.wrench - mean) / std
-        with source.place.autocast(network_width):
+        in_float32 = source.settings.is_float32(step)
+        with source.place.autocast(network_width, in_float32):
             hidden = network.encoded(weights, batch.features, target, batch.mask)
         mixture = network.mixture(weights, hidden.float())
-        with source.place.autocast(surrogate_width):
+        with source.place.autocast(surrogate_width, in_float32):
             guide = modules.guidance(mixture, frozen, batch, std, source.noise(step)).mean()
         imitate = modules.imitation(mixture, batch).mean()
         entropy = modules.negative_entropy(mixture, batch.mask).mean()
