@@ -15,7 +15,7 @@ from finlab.cli.shared_options import STDOUT, Cluster, Count, JsonFile, check_js
 from finlab.errors import DataError
 
 if TYPE_CHECKING:
-    from finlab.research.evaluation.experiment import Experiment
+    from finlab.research.evaluation.experiment import Experiment, Size
 
 
 def verbs(argv: Sequence[str]) -> SubcommandApp:
@@ -50,15 +50,23 @@ def verb_of(experiment: Experiment) -> Callable[..., None]:
         check_figure_file(plot)
         begin(experiment.name)
         chosen = {name: _parsed_option(name, options[name], value) for name, value in typed.items()}
+        hidden = None
         if plot is not None:
-            chosen |= experiment.for_picture
+            needed = experiment.for_picture
+            # What the picture needs beside the table stays out of it, unless it was asked for.
+            if any(chosen[name] != value for name, value in needed.items()):
+                hidden = experiment.only_for_picture
+            chosen |= needed
         rows = []
+        shown = []
         with on_cluster(cluster):
             for row in experiment.each_row(**chosen):
                 rows.append(row)
+                if hidden is None or not hidden(row):
+                    shown.append(row)
                 if json != STDOUT:  # so that they are there if it is stopped
-                    put_json({"rows": rows}, json)
-        put_json({"rows": rows}, json, to_text(*experiment.words(), *experiment.results(rows)))
+                    put_json({"rows": shown}, json)
+        put_json({"rows": shown}, json, to_text(*experiment.words(), *experiment.results(shown)))
         picture = experiment.picture
         if plot is not None and picture is not None:
             write_figure(lambda: picture(rows), plot)
@@ -135,25 +143,32 @@ def _parsed_option(name: str, option: inspect.Parameter, value: Any) -> Any:
 def report(
     output: Annotated[Path, arg(metavar="DIR", aliases=["-o"])],
     quick: bool = False,
+    full: bool = False,
     sections: Annotated[str, arg(metavar="A,B,...")] = "all",
     seed: Count = 6143,
 ) -> None:
     """Run every experiment and make one page of them in Markdown, and a file of their rows.
 
-    What is done is in DIR if it is stopped.
+    Beside each figure that the paper prints the page says whether it is reproduced, and why. What
+    is done is kept in DIR: a report that was stopped goes on when it is asked for again, and what
+    has not changed since is not run again.
 
     Args:
         output: folder for the report.
-        quick: a look on few cases, in minutes; the whole takes a quarter of an hour.
+        quick: a look on few cases, in minutes; the usual one takes an hour of one core.
+        full: the paper's own sizes, in a day.
         sections: run only these experiments.
         seed: of all draws.
     """
     if output.exists() and not output.is_dir():
         raise DataError(f"output: expected a folder, got the file {output}")
+    if quick and full:
+        raise DataError("quick, full: expected at most one of them, got both")
     from finlab.research.evaluation.report_page import make_report
 
     names = [name.strip() for name in sections.split(",") if name.strip()]
-    print(make_report(output, size="quick" if quick else "full", seed=seed, names=names))
+    size: Size = "quick" if quick else "full" if full else "usual"
+    print(make_report(output, size=size, seed=seed, names=names))
 
 
 QUICK_SPLITS = ("id", "ood", "limits", "failure")
@@ -182,7 +197,8 @@ def bench(
     """
     check_json_file(json)
     from finlab.research.evaluation.document import to_text
-    from finlab.research.evaluation.experiments.wrench import HARD, experiment
+    from finlab.research.evaluation.experiments.robots import HARD
+    from finlab.research.evaluation.experiments.wrench import experiment
     from finlab.research.executor import on_cluster
 
     names = tuple(splits.split(",")) if splits else QUICK_SPLITS if quick else HARD

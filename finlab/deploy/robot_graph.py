@@ -11,6 +11,8 @@ from pathlib import Path
 
 from msgspec import to_builtins
 
+from finlab.arrays import Array
+from finlab.assets import checkpoint_path
 from finlab.axes import AXES
 from finlab.errors import LayoutError
 from finlab.layout import Actuator, Fin, Layout
@@ -21,11 +23,13 @@ from finlab.layout.graph_file import (
     Graph,
     GraphAttributes,
     Normalization,
+    PaperNormalization,
     edges_of,
 )
 from finlab.layout.load import FORMAT as LAYOUT_FORMAT
 from finlab.layout.save import layout_to_dict, plain
 from finlab.physics.objective import wrench_scale_of
+from finlab.research.networks.checkpoint import read_normalization
 from finlab.whole_file import write_whole
 
 
@@ -62,17 +66,24 @@ def graph_of(layout: Layout) -> Graph:
     for scale in COMMAND_SCALES:
         scales += [scale, scale]
     names = features_of(Fin("fin", (0.0, 0.0, 0.0), 0.0))
-    wrench = dict(zip(AXES, wrench_scale_of(layout).tolist(), strict=True))
+    wrench = by_axis(wrench_scale_of(layout))
+    learned = read_normalization(checkpoint_path("paper"))
+    paper = PaperNormalization(mean=by_axis(learned.mean), std=by_axis(learned.std))
     return Graph(
         directed=False,
         multigraph=False,
         graph=GraphAttributes(
             layout={**head, "format": LAYOUT_FORMAT, "version": 2},
-            normalization=Normalization(dict(zip(names, scales, strict=True)), wrench),
+            normalization=Normalization(dict(zip(names, scales, strict=True)), wrench, paper),
         ),
         nodes=nodes,
         edges=[Edge(*pair) for pair in edges_of(list(layout.names))],
     )
+
+
+def by_axis(values: Array) -> dict[str, float]:
+    """Returns the numbers of a wrench (6,) by the names of its axes."""
+    return dict(zip(AXES, values.tolist(), strict=True))
 
 
 def graph_text(layout: Layout) -> str:

@@ -28,14 +28,26 @@ class Edge(Struct, forbid_unknown_fields=True):
     """Name of another one after it, or of the same."""
 
 
+class PaperNormalization(Struct, forbid_unknown_fields=True):
+    """What method `paper` makes of a wrench before its network sees it: (wrench - mean) / std."""
+
+    mean: dict[str, float]
+    """Of each axis of a wrench [N, N m], over the wrenches that its networks were trained on."""
+    std: dict[str, float]
+    """Their standard deviation; the squared norm of the missing wrench over it is its J_norm."""
+
+
 class Normalization(Struct, forbid_unknown_fields=True):
     """Divisors that make numbers of order one."""
 
     features: dict[str, float]
     """Of the features of fins with horizontal shafts, by name, as the paper's network has them."""
     wrench: dict[str, float]
-    """Of each axis of a wrench [N, N m]: the robot's wrench scale, by which errors are
-    normalized."""
+    """Of each axis of a wrench [N, N m]: the robot's wrench scale, by which an allocator's errors
+    are normalized, with any method."""
+    paper: PaperNormalization | None = None
+    """What the networks of method `paper` divide by, the same for all robots; files of version 4
+    do not say it."""
 
 
 class GraphAttributes(Struct, forbid_unknown_fields=True):
@@ -45,7 +57,7 @@ class GraphAttributes(Struct, forbid_unknown_fields=True):
     """A layout file of version 2 without its actuators, which are the nodes."""
     normalization: Normalization
     format: Literal["finlab-graph"] = "finlab-graph"
-    version: Literal[4] = 4
+    version: Literal[4, 5] = 5
 
 
 class Graph(Struct, forbid_unknown_fields=True):

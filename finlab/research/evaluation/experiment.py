@@ -15,15 +15,17 @@ from functools import cache
 from importlib import import_module
 from importlib.resources import files
 from types import NoneType
-from typing import Any, TypeVar, get_args, get_origin, get_type_hints
+from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 from tqdm import tqdm
 
 from finlab.errors import DataError
 from finlab.research.evaluation.document import Column, ReportBlock, ReportTable, Row
+from finlab.research.evaluation.verdict import COLUMNS, Comparison
 
 EXPERIMENTS = (
     "wrench",
+    "robots",
     "thrusters",
     "latency",
     "ablation",
@@ -40,6 +42,8 @@ MAX_NUMBER = 1_000_000
 """Largest whole number of an option that is no seed."""
 MAX_SEED = 2**63 - 1
 """Largest seed."""
+Size = Literal["quick", "usual", "full"]
+"""Sizes of a report: minutes, an hour, and the paper's own."""
 Item = TypeVar("Item")
 
 
@@ -69,14 +73,31 @@ class Experiment:
     page, for figures that depend on it."""
     quick: Mapping[str, Any] = field(default_factory=dict)
     """Options of the quick report where they differ from the defaults."""
+    usual: Mapping[str, Any] = field(default_factory=dict)
+    """Options of the report where they differ from the defaults."""
     full: Mapping[str, Any] = field(default_factory=dict)
-    """Options of the whole report where they differ from the defaults."""
+    """Options of the report of the printed sizes, where they differ from the usual ones."""
+    pieces: tuple[str, ...] = ()
+    """Options of tuples whose values a report runs one by one, so that it can be stopped between
+    them."""
+    measures: tuple[str, ...] = ()
+    """Paths in the source tree of what decides the rows, beside the methods: a stored section is
+    out of date when these change."""
+    probe: Mapping[str, Any] = field(default_factory=dict)
+    """Options that make a piece a matter of seconds, by which a stored one is checked where sources
+    have changed; empty where it is run again."""
+    order: Callable[[Row], Any] | None = None
+    """Key by which the rows of several pieces are sorted; None leaves them as they come."""
+    compared: Callable[[Sequence[Row]], list[Comparison]] | None = None
+    """From the rows to each figure that the paper prints of this experiment, beside ours."""
     printed: Callable[[Sequence[Row]], list[Row]] | None = None
     """Figures that the paper prints beside our rows, as rows that stand below them."""
     picture: Callable[[Sequence[Row]], Any] | None = None
     """From the rows to the figure of `--plot FILE`; no such option without one."""
     for_picture: Mapping[str, Any] = field(default_factory=dict)
     """Options that give the picture its rows."""
+    only_for_picture: Callable[[Row], bool] | None = None
+    """Whether a row that these options bring is no row of the table; None where they bring none."""
 
     def options(self) -> dict[str, inspect.Parameter]:
         """Returns the parameters of `run` by name, with their types resolved."""
@@ -152,6 +173,20 @@ class Experiment:
         if self.printed is not None:
             table_rows += self.printed(rows)
         return ReportTable(self.columns, table_rows)
+
+    def size(self, name: Size) -> dict[str, Any]:
+        """Returns the options of a size of the report, where they differ from the defaults."""
+        if name == "quick":
+            return dict(self.quick)
+        return {**self.usual, **self.full} if name == "full" else dict(self.usual)
+
+    def beside_the_paper(self, rows: Sequence[Row]) -> list[ReportBlock]:
+        """Returns a table of all figures that the paper prints, each with ours and a verdict; no
+        block where it prints none."""
+        if self.compared is None:
+            return []
+        compared = [comparison.row for comparison in self.compared(rows)]
+        return [f"### {self.name.capitalize()}: beside the paper", ReportTable(COLUMNS, compared)]
 
     def words(self) -> list[ReportBlock]:
         """Returns heading and question as blocks, which stand before the results."""

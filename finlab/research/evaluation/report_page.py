@@ -1,26 +1,24 @@
-"""`finlab eval report`: run experiments and write one page and all rows."""
+"""`finlab eval report`: runs experiments section by section, and writes one page and all rows."""
 
 import json
-import platform
-import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Literal
 
-import numpy as np
-import scipy
 from threadpoolctl import threadpool_limits
 
-import finlab
 from finlab.errors import DataError
-from finlab.research.evaluation.document import ReportBlock, Row, to_markdown
+from finlab.research.evaluation.claims import claims, sentences
+from finlab.research.evaluation.document import ReportBlock, ReportTable, Row, to_markdown
 from finlab.research.evaluation.experiment import (
     EXPERIMENTS,
+    Size,
     check_names,
     load_experiment,
     progress,
 )
-from finlab.research.evaluation.origin import commit_words
+from finlab.research.evaluation.origin import version_words
+from finlab.research.evaluation.section import made_section, origin_words, rows_of
+from finlab.research.evaluation.verdict import COLUMNS
 from finlab.whole_file import make_folder, write_whole
 
 PAGE_FILE = "report.md"
@@ -36,20 +34,31 @@ INTRODUCTION = (
     "measured for this report: fin laws are means over a cycle in still water, bodies, water and "
     f"sensors are simulated. Methods and controllers were developed on other seeds than {SEED}."
 )
-Size = Literal["quick", "full"]
+CLAIMS_INTRODUCTION = (
+    "What the paper concludes, each from its printed figures and from the rows of the tables "
+    "below. A figure is reproduced where the printed one lies in the interval of ours, or within "
+    "a quarter of it; it cannot be decided where something else differs between the two runs."
+)
+SIZE_WORDS: Mapping[Size, str] = {
+    "quick": " A quick look on few cases: intervals are wide.",
+    "usual": "",
+    "full": " At the printed sizes.",
+}
+"""What the page says of its size."""
 
 
 def make_report(
-    out: Path, *, size: Size = "full", seed: int = SEED, names: Sequence[str] = ("all",)
+    out: Path, *, size: Size = "usual", seed: int = SEED, names: Sequence[str] = ("all",)
 ) -> Path:
     """Runs experiments, and writes a page and all rows.
 
-    Both are written after each experiment, so that they are there if it is stopped. Each experiment
-    runs on one thread, so that times are of one core.
+    What is done is kept in the folder piece by piece: a report that was stopped goes on when it is
+    asked for again, and what has not changed since is not run again. Each experiment runs on one
+    thread, so that times are of one core.
 
     Args:
         out: folder of the report, which is made if need be.
-        size: whether experiments have their options of the quick or of the full report.
+        size: whether experiments have their options of the quick, the usual or the full report.
         seed: of the experiments that have one.
         names: names of experiments, or `all`.
 
@@ -62,47 +71,55 @@ def make_report(
     check_names("sections", names, ("all", *EXPERIMENTS))
     make_folder(out)
     chosen = [name for name in EXPERIMENTS if "all" in names or name in names]
-    start = time.process_time()
     rows = dict[str, list[Row]]()
     blocks = list[ReportBlock]()
-    commit = commit_words()
-    command = f"finlab eval report -o {out}"
-    if size == "quick":
-        command += " --quick"
+    command = "finlab eval report -o DIR"
+    if size != "usual":
+        command += f" --{size}"
     if "all" not in names:
         command += f" --sections {','.join(chosen)}"
     if seed != SEED:
         command += f" --seed {seed}"
-    note = "" if size == "full" else " A quick look on few cases: intervals are wide."
-    head = [
-        "# finlab evaluation",
-        f"Allocation methods and simulated swims, side by side.{note}",
-        INTRODUCTION,
-    ]
     for name in progress(chosen, "experiment", "report"):
         experiment = load_experiment(name)
-        options = dict(experiment.quick if size == "quick" else experiment.full)
+        options = experiment.size(size)
         if "seed" in experiment.options():
             options["seed"] = seed
         with threadpool_limits(1):
-            rows[name] = experiment.rows(**options)
+            pieces = made_section(experiment, options, out)
+        rows[name] = rows_of(experiment, pieces)
         blocks += [*experiment.words(), *experiment.results(rows[name])]
-        blocks.append(f"Made by `{experiment.command(options)}` at {commit}.")
-        minutes = (time.process_time() - start) / 60.0
-        origin = f"Command `{command}` at {commit}, {minutes:.0f} minutes of one core"
-        page = to_markdown(*head, *blocks, *_origin_blocks(origin))
+        blocks += experiment.beside_the_paper(rows[name])
+        made_by = f"The command `{experiment.command(options)}` prints the table."
+        blocks.append(" ".join([made_by, *origin_words(pieces)]))
+        page = to_markdown(*_head_blocks(size, rows), *blocks, *_origin_blocks(command))
         write_whole(out / PAGE_FILE, page, DataError)
         write_whole(out / ROWS_FILE, json.dumps(rows, indent=1) + "\n", DataError)
     return out / PAGE_FILE
 
 
-def _origin_blocks(origin: str) -> list[str]:
-    """The last section of the page: the command and commit that made it, machine and versions."""
-    modules = {"finlab": finlab, "numpy": np, "scipy": scipy}
-    versions = ", ".join(f"{name} {module.__version__}" for name, module in modules.items())
+def _head_blocks(size: Size, rows: Mapping[str, Sequence[Row]]) -> list[ReportBlock]:
+    """The first blocks of the page, with the paper's conclusions that the rows can judge."""
+    head: list[ReportBlock] = [
+        "# finlab evaluation",
+        f"Allocation methods and simulated swims, side by side.{SIZE_WORDS[size]}",
+        INTRODUCTION,
+    ]
+    judged = claims(rows)
+    if judged:
+        head += ["## What is reproduced", CLAIMS_INTRODUCTION]
+        said = sentences(rows)
+        if said:
+            head.append("\n".join(f"- {sentence}" for sentence in said))
+        head.append(ReportTable(COLUMNS, [each.row for each in judged]))
+    return head
+
+
+def _origin_blocks(command: str) -> list[ReportBlock]:
+    """The last section of the page: the command that makes it, and versions."""
     lines = [
-        origin,
-        f"On {platform.machine()}, python {platform.python_version()}, {versions}",
+        f"Command `{command}`; each section says at which commit and on which machine it was made",
+        version_words(("finlab-marine", "numpy", "scipy")),
         "Printed figures are those of Y. Hamamatsu, M. Kruusmaa, A. Ristolainen, "
         "Layout-independent actuation allocator for fin-actuated marine robots",
     ]

@@ -26,6 +26,8 @@ CONFIDENCE_LEVEL = 0.994426
 """Share of a normal variable within sqrt(2) times 1.96 standard deviations."""
 BOOTSTRAP_SAMPLES = 2000
 """How often the bootstrap draws all layouts again."""
+QUANTILE_SAMPLES = 1000
+"""How often it draws them for a quantile."""
 Interval = tuple[float, float]
 """Low and high end of a confidence interval."""
 
@@ -102,6 +104,28 @@ def mean_interval(values: Array, group: NDArray[np.int64]) -> Interval:
         group: number of the layout of each (N,).
     """
     return ratio_interval(values, np.ones(len(values)), group)
+
+
+def quantile_interval(values: Array, group: NDArray[np.int64], share: float) -> Interval:
+    """Returns the confidence interval of a quantile.
+
+    Args:
+        values: values (N,).
+        group: number of the layout of each (N,). A lone layout is split into its entries.
+        share: of the values below the quantile.
+    """
+    names = np.unique(group)
+    parts = [values[group == name] for name in names]
+    if len(parts) <= 1:
+        parts = [np.array([value]) for value in values]
+    rng = np.random.default_rng(0)
+    quantiles = []
+    for _ in range(QUANTILE_SAMPLES):
+        drawn = rng.integers(len(parts), size=len(parts))
+        quantiles.append(np.quantile(np.concatenate([parts[k] for k in drawn]), share))
+    tail = 0.5 * (1.0 - CONFIDENCE_LEVEL)
+    low, high = np.quantile(quantiles, [tail, 1.0 - tail])
+    return float(low), float(high)
 
 
 def ratio_interval(numerator: Array, denominator: Array, group: NDArray[np.int64]) -> Interval:

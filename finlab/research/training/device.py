@@ -45,7 +45,7 @@ class Workplace:
         if self.world > 1:
             distributed.barrier()
 
-    def autocast(self, width: int) -> torch.autocast:
+    def autocast(self, width: int, in_float32: bool = False) -> torch.autocast:
         """Matrix products in bfloat16 where the device multiplies it faster than float32.
 
         The processor is asked, not timed: a resumed run would go on in another precision.
@@ -53,12 +53,13 @@ class Workplace:
         Args:
             width: of the widest layer. On a processor narrow products gain less than rounding
                 their factors costs.
+            in_float32: whether they stay in float32 all the same.
         """
         kind = self.device.type
         fast = kind == "cuda"
         if kind == "cpu" and width >= CPU_BFLOAT16_WIDTH:
             fast = torch.cpu._is_avx512_bf16_supported()
-        return torch.autocast(kind, torch.bfloat16, enabled=fast)
+        return torch.autocast(kind, torch.bfloat16, enabled=fast and not in_float32)
 
 
 @contextmanager

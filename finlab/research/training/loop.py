@@ -1,5 +1,5 @@
-"""The loop of every training: Adam, a rate that may fall, a log, and a state from which a run goes
-on.
+"""The loop of every training: Adam or SOAP, a rate that may fall, a log, and a state from which a
+run goes on.
 
 All that a step depends on is a function of its number: the batch, the noise, the rate. So a run
 that was killed and goes on from its last state ends with the weights of one that was not.
@@ -15,7 +15,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import torch
@@ -26,6 +26,7 @@ from finlab.display.figures import figure_bytes, panels
 from finlab.errors import DataError
 from finlab.research.networks.trained import ArraysByName, Shapes
 from finlab.research.training.device import Workplace
+from finlab.research.training.soap import Soap
 from finlab.whole_file import make_folder, remove_temporary_files, write_whole
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ NO_CURVES = ("step", "samples", "seconds")
 """Columns of the log that are no curves."""
 LOG_EVERY = 20
 """Steps after which a row is logged."""
-SAVE_EVERY_S = 15.0
+SAVE_EVERY_S = 60.0
 """Time after which state, log and checkpoint are written [s]."""
 GRADIENT_MAX = 1.0
 """Norm to which a longer gradient is clipped."""
@@ -64,6 +65,8 @@ class LoopSettings:
     """Whether it falls to a hundredth along a cosine, or stays."""
     ema: float = 0.0
     """Decay of the running average of the weights that is shipped; 0 ships the last weights."""
+    optimizer: Literal["adam", "soap"] = "adam"
+    """What takes the steps: Adam, or Adam in the eigenbasis of `soap.py`."""
     seconds: float | None = None
     """Time after which the run ends whatever step it has come to, and by which the rate falls if
     that is sooner."""
@@ -141,12 +144,20 @@ class Training:
         self.identity = identity
         self.vector = joined(weights)
         self.average = self.vector.clone() if settings.ema else None
-        self.optimizer = torch.optim.Adam([self.vector], lr=settings.learning_rate, fused=True)
+        self.optimizer = self._first_optimizer()
         self.done, self.seconds = 0, 0.0
         """Steps, and the time that they took, with all that went before them."""
         self.rows = list[dict[str, float]]()
         if place.rank == 0:
             remove_temporary_files(folder)
+
+    def _first_optimizer(self) -> torch.optim.Optimizer:
+        """The optimizer of the settings, before its first step."""
+        rate = self.settings.learning_rate
+        if self.settings.optimizer == "soap":
+            shapes = [weight.shape for weight in self.weights.values()]
+            return Soap(self.vector, shapes, rate)
+        return torch.optim.Adam([self.vector], lr=rate, fused=True)
 
     @property
     def shipped(self) -> ArraysByName:

@@ -3,18 +3,25 @@ plant."""
 
 from collections.abc import Sequence
 from itertools import cycle, islice
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from finlab.allocation.methods import choose_method
 from finlab.research.evaluation.document import Column, Row
 from finlab.research.evaluation.experiment import Experiment, check_names, paper_figures, progress
+from finlab.research.evaluation.experiments.wrench import MEASURES
 from finlab.research.evaluation.method_specs import MethodSpec
 from finlab.research.evaluation.plots import candidates_picture
 from finlab.research.evaluation.scoring import joined, mean_interval, paper_sigma, score
 from finlab.research.evaluation.splits import SplitCase, make_split
+from finlab.research.evaluation.verdict import Comparison
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+PAPER = ("finlab/research/paper", "finlab/research/networks", "checkpoints/paper")
+"""What decides the answers of method `paper`."""
 VARIANTS: dict[str, dict[str, Any]] = {
     "mean_only": {"mean_only": True},
     "without_refinement": {"refinement": "none"},
@@ -24,6 +31,8 @@ VARIANTS: dict[str, dict[str, Any]] = {
 }
 """The paper's rows as options of method `paper`. Its mean-only row takes a tenth of the time of the
 refined ones, so no refinement follows the mean."""
+SCORES = (("surrogate", "believed", "believed_phys"), ("plant", "err_norm", "err_phys"))
+"""What scores a command, and the columns of its errors: normalized, and in N and N m."""
 TIMED_CALLS = 5
 """Single calls whose mean time a row shows, after one that is not counted."""
 
@@ -68,10 +77,14 @@ def run(
             part = score(case, case.targets, answer.command, answer.solve_ms, number=k)
             assert answer.wrench_expected is not None
             missing = answer.wrench_expected - case.targets
-            parts.append(part | {"believed": np.linalg.norm(missing / sigma, axis=-1)})
+            believed = {
+                "believed": np.linalg.norm(missing / sigma, axis=-1),
+                "believed_phys": np.linalg.norm(missing, axis=-1),
+            }
+            parts.append(part | believed)
         points = [candidate_points(method, case, seed) for case in cases[:shown]]
         scores = joined(parts)
-        for scored_by, key in (("surrogate", "believed"), ("plant", "err_norm")):
+        for scored_by, key, physical in SCORES:
             error = scores[key]
             square = scores[key] ** 2
             rows.append(
@@ -84,6 +97,10 @@ def run(
                     "j_norm_std": float(square.std()),
                     "err_norm_mean": float(error.mean()),
                     "err_norm_median": float(np.median(error)),
+                    "err_phys_mean": float(scores[physical].mean()),
+                    "err_phys_mean_interval": list(
+                        mean_interval(scores[physical], scores["layout"])
+                    ),
                     "call_ms": float(np.mean(times[1:])),
                     **({"points": points} if points and scored_by == "surrogate" else {}),
                 }
@@ -106,6 +123,12 @@ def candidate_points(
     return points
 
 
+def _picture(rows: Sequence[Row]) -> "Figure":
+    """The candidates of the whole pipeline; those of the variants that were run without it."""
+    whole = [row for row in rows if row["variant"] == "ours"]
+    return candidates_picture(whole or rows)
+
+
 def _printed(rows: Sequence[Row]) -> list[Row]:
     """The figures that the paper prints for the variants of `rows`."""
     return [
@@ -114,11 +137,45 @@ def _printed(rows: Sequence[Row]) -> list[Row]:
             "scored_by": "printed in the paper",
             "j_norm_mean": row["err_norm_mean"],
             "j_norm_std": row["err_norm_std"],
+            "err_phys_mean": row["err_phys_mean"],
             "call_ms": 1e3 * row["time_s"],
         }
         for variant, row in paper_figures()["ablation"].items()
         if variant in {row["variant"] for row in rows}
     ]
+
+
+def _compared(rows: Sequence[Row]) -> list[Comparison]:
+    """Each figure of the paper's table beside ours, scored by the surrogate and by the plant."""
+    compared = []
+    for variant, figures in paper_figures()["ablation"].items():
+        for scored_by, _, _ in SCORES:
+            about = (variant, scored_by)
+            row = next((r for r in rows if (r["variant"], r["scored_by"]) == about), {})
+            for key, printed_key, words in (
+                ("j_norm_mean", "err_norm_mean", "mean J_norm"),
+                ("j_norm_std", "err_norm_std", "spread of J_norm"),
+                ("err_phys_mean", "err_phys_mean", "wrench error"),
+            ):
+                compared.append(
+                    Comparison(
+                        f"{variant}, by the {scored_by}: {words}",
+                        figures[printed_key],
+                        row.get(key),
+                        row.get(f"{key}_interval"),
+                    )
+                )
+        row = next((r for r in rows if r["variant"] == variant), {})
+        call_ms = row.get("call_ms")
+        compared.append(
+            Comparison(
+                f"{variant}: time of a call in s",
+                figures["time_s"],
+                None if call_ms is None else 1e-3 * call_ms,
+                obstacle="The paper timed another computer.",
+            )
+        )
+    return compared
 
 
 experiment = Experiment(
@@ -131,6 +188,7 @@ experiment = Experiment(
         Column("j_norm_mean", "mean J_norm", "error", "j_norm_mean_interval"),
         Column("j_norm_std", "spread", "error"),
         Column("err_norm_mean", "mean of its root", "error"),
+        Column("err_phys_mean", "wrench error in N and N m", "error", "err_phys_mean_interval"),
         Column("call_ms", "one call", "three", unit="ms"),
     ),
     run=run,
@@ -141,8 +199,13 @@ experiment = Experiment(
         "warm start is the best four of as many uniform draws."
     ),
     quick={"layouts": 5, "targets": 4},
-    full={"layouts": 40, "targets": 5},
+    usual={"layouts": 100, "targets": 5},
+    full={"targets": 100},
+    pieces=("variants",),
+    measures=(*MEASURES, *PAPER, "finlab/research/evaluation/experiments/ablation.py"),
+    probe={"layouts": 2, "targets": 2},
+    compared=_compared,
     printed=_printed,
-    picture=candidates_picture,
-    for_picture={"variants": ("ours",), "shown": 20},
+    picture=_picture,
+    for_picture={"shown": 20},
 )

@@ -6,12 +6,14 @@ is aligned and samples are paired by time. Only positions count: the reference p
 attitude.
 """
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from itertools import islice
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.stats import t as student_t
 
 from finlab.arrays import Array
 from finlab.errors import DataError
@@ -126,13 +128,29 @@ def power_row(log: RunLog) -> Row:
 
 
 def over_seeds(rows: Sequence[Row]) -> Row:
-    """Mean of each number over runs, and under `<name>_std` its spread (0 for a single run)."""
+    """Mean of each number over runs, under `<name>_std` its spread (0 for a single run), and under
+    `<name>_interval` where the mean of as many other runs lands; of a single run none."""
     means: Row = {}
     for key in [key for key, value in rows[0].items() if isinstance(value, float)]:
         values = np.array([row[key] for row in rows])
         means[key] = float(values.mean())
         means[f"{key}_std"] = float(values.std(ddof=min(1, len(rows) - 1)))
+        if len(rows) > 1:
+            means[f"{key}_interval"] = list(_seed_interval(values))
     return means
+
+
+def _seed_interval(values: Array) -> tuple[float, float]:
+    """Where the mean of as many runs with other seeds lands, 95 times of 100, of values (N,).
+
+    The difference of two such means has sqrt(2/N) times the standard deviation of a run, which is
+    estimated from N - 1 degrees of freedom (Student's t).
+    """
+    count = len(values)
+    spread = float(values.std(ddof=1)) * math.sqrt(2.0 / count)
+    half_width = float(student_t.ppf(0.975, count - 1)) * spread
+    mean = float(values.mean())
+    return mean - half_width, mean + half_width
 
 
 def mean_rows(keys: Sequence[str], done: Iterable[tuple[SwimKey, Sequence[Row]]]) -> list[Row]:
@@ -157,20 +175,36 @@ def with_losses(
     return able, [(each, n) for each, n, lost in cases if lost is None]
 
 
+MEASURES = (
+    "finlab/actuators/fin/fin_laws.py",
+    "finlab/physics/plant.py",
+    "finlab/swim/control/body_frame.py",
+    "finlab/swim/control/tracking_controller.py",
+    "finlab/swim/simulation/closed_loop.py",
+    "finlab/swim/simulation/task.py",
+    "finlab/swim/simulation/truth.py",
+    "finlab/swim/vehicle",
+    "finlab/research/evaluation/experiments/closed_loop.py",
+)
+"""What decides the rows of swims, beside the methods."""
+OTHER_SIMULATOR = "The paper's runs took place in another simulator, on a path that is not printed."
+"""Why figures of paths cannot be compared."""
+POOL = "The paper's robot swam in a pool."
+"""Why figures of the paper's own robot cannot be compared."""
 POWER = (
     Column("inertial_w", "inertial power", "three", unit="W"),
     Column("driving_w", "with motor losses", "three", unit="W"),
 )
 """Columns of `power_row`."""
 ERRORS = (
-    Column("ate", "ATE", "metres", unit="m"),
-    Column("ate_std", "spread", "error", unit="m"),
+    Column("ate", "ATE", "metres", "ate_interval", unit="m"),
     Column("rte", "RTE", "metres", unit="m"),
     Column("depth_rmse", "depth RMSE", "metres", unit="m"),
 )
 """Columns of `follow_row`."""
 ABOUT_ERRORS = (
     "ATE: root mean square distance to the reference, nothing aligned; RTE: of displacements over "
-    f"{RTE_DELTA_S:g} s; spread: standard deviation over runs. Inertial power is the paper's sum "
+    f"{RTE_DELTA_S:g} s. Intervals: where as many runs with other noise land, 95 times of 100. "
+    "Inertial power is the paper's sum "
     "of I alpha omega, of its magnitudes."
 )

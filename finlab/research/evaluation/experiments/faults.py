@@ -12,6 +12,8 @@ from finlab.research.evaluation.experiments.closed_loop import (
     ABOUT_ERRORS,
     ERRORS,
     LOST_M,
+    MEASURES,
+    POOL,
     POWER,
     SwimCase,
     follow_row,
@@ -19,6 +21,7 @@ from finlab.research.evaluation.experiments.closed_loop import (
     repeated,
 )
 from finlab.research.evaluation.method_specs import load_method_specs
+from finlab.research.evaluation.verdict import Comparison
 from finlab.swim.control import steers
 from finlab.swim.simulation import make_trajectory
 
@@ -110,6 +113,22 @@ def _printed(_: Sequence[Row]) -> list[Row]:
     return printed
 
 
+def _compared(rows: Sequence[Row]) -> list[Comparison]:
+    """Each figure that the paper prints of its baseline, whole and with one fin lost, which it does
+    not name: beside the first that can be lost. Those of its method stand in `trajectory`."""
+    ours = [row for row in rows if row.get("method") == "fixed_frequency"]
+    healthy = [row for row in ours if row["fault"] == HEALTHY]
+    damaged = [row for row in ours if row["fault"] != HEALTHY]
+    compared = []
+    for fault, some in (("healthy", healthy), ("one_fin", damaged)):
+        row = some[0] if some else {}
+        for key, printed in paper_figures()["fault_tolerance"][fault]["baseline"].items():
+            what = f"baseline, {fault.replace('_', ' ')}: {key} in m"
+            interval = row.get(f"{key}_interval")
+            compared.append(Comparison(what, printed, row.get(key), interval, POOL))
+    return compared
+
+
 experiment = Experiment(
     name="faults",
     question="How closely does a robot follow a path when fins are lost, from the start or "
@@ -128,6 +147,11 @@ experiment = Experiment(
     f"than {LOST_M:g} m away; not swum: the fins that are left cannot give surge, heave and yaw "
     f"independently. Aimed at: one lost fin lets the error grow to at most {ALLOWED} times. The "
     "paper's runs took place in a pool.",
-    quick={"runs": 1, "methods": ("dual",)},
+    quick={"runs": 1, "methods": ("dual",), "controller": "waypoint"},
+    usual={"runs": 5, "methods": ("dual", "fixed_frequency", "analytic"), "controller": "waypoint"},
+    pieces=("methods",),
+    measures=(*MEASURES, "finlab/research/evaluation/experiments/faults.py"),
+    probe={"runs": 1},
+    compared=_compared,
     printed=_printed,
 )

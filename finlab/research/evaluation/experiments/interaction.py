@@ -267,6 +267,11 @@ experiment = Experiment(
         "Targets are wrenches of random commands by the plant. The oracle goes on from the "
         "network's answer by the plant itself."
     ),
+    measures=(
+        "finlab/interaction",
+        "finlab/research/interaction",
+        "finlab/research/evaluation/experiments/interaction.py",
+    ),
     quick={"robots": 3, "targets": 2, "layouts": 60, "steps": 100, "own": (100,)},
-    full={"robots": 5, "targets": 3, "layouts": 500, "steps": 600, "own": (100, 1000)},
+    usual={"robots": 5, "targets": 3, "layouts": 500, "steps": 600, "own": (100, 1000)},
 )

@@ -215,8 +215,14 @@ experiment = Experiment(
         f"wrench. Next tick: targets wander at {REACH_SHARE:g} of reach, and the command before is "
         "known, whose rates `dual` and `mdn` alone keep to. Power: where both deliver."
     ),
+    pieces=("robots",),
+    measures=(
+        "finlab/allocation/dual",
+        "finlab/core/src",
+        "finlab/research/evaluation/experiments/latency.py",
+    ),
     quick={"robots": ("fins-4", "thrusters-8"), "calls": 20, "budget": 0.5},
-    full={
+    usual={
         "methods": (REFERENCE, "mdn", "paper", "analytic", "qp", "sqp", "px4", "ipopt"),
         "budget": 1.0,
     },

@@ -11,7 +11,12 @@ from finlab.axes import command_change
 from finlab.layout import load_layout
 from finlab.research.evaluation.document import Column, Row
 from finlab.research.evaluation.experiment import Experiment, check_names
-from finlab.research.evaluation.experiments.closed_loop import ABOUT_ERRORS, LOST_M, follow_row
+from finlab.research.evaluation.experiments.closed_loop import (
+    ABOUT_ERRORS,
+    LOST_M,
+    MEASURES,
+    follow_row,
+)
 from finlab.research.evaluation.experiments.hard_days import HARD_DAYS, HardDay, HardDaySwim
 from finlab.research.evaluation.method_specs import MethodSpec, load_method_specs
 from finlab.research.executor import map_parts
@@ -155,10 +160,16 @@ experiment = Experiment(
     f"than {LOST_M:g} m away. Out of reach: ticks at which commands miss more than {GAP_N:g} N of "
     f"what is asked, torques at {LEVER_M:g} m. Processor's time with the simulation's. What the "
     "days are: `finlab/research/evaluation/experiments/hard_days.py`.",
+    pieces=("scenarios", "methods"),
+    measures=(
+        *MEASURES,
+        "finlab/research/evaluation/experiments/hard_days.py",
+        "finlab/research/evaluation/experiments/swims.py",
+    ),
     quick={
         "scenarios": ("nominal", "current", "lost-one"),
         "methods": ("dual", "analytic"),
         "seeds": 1,
     },
-    full={"scenarios": REPORTED, "seeds": 1, "methods": ("dual", "analytic")},
+    usual={"scenarios": REPORTED, "seeds": 1, "methods": ("dual", "analytic")},
 )

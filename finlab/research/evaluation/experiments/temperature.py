@@ -9,6 +9,8 @@ from finlab.errors import DataError
 from finlab.layout import Layout
 from finlab.research.evaluation.document import Column, Row
 from finlab.research.evaluation.experiment import Experiment, progress
+from finlab.research.evaluation.experiments.ablation import PAPER
+from finlab.research.evaluation.experiments.wrench import MEASURES
 from finlab.research.evaluation.method_specs import MethodSpec
 from finlab.research.evaluation.plots import temperature_picture
 from finlab.research.evaluation.scoring import mean_interval, paper_sigma
@@ -104,6 +106,10 @@ experiment = Experiment(
         "before refinement."
     ),
     quick={"layouts": 10, "targets": 1},
-    full={"layouts": 60},
+    usual={"targets": 5},
+    full={"targets": 20},
+    pieces=("temperatures",),
+    measures=(*MEASURES, *PAPER, "finlab/research/evaluation/experiments/temperature.py"),
+    probe={"layouts": 2, "targets": 1},
     picture=temperature_picture,
 )

@@ -203,5 +203,14 @@ experiment = Experiment(
         "to 5 mm out of place."
     ),
     quick={"robots": ("bluerov2_heavy",), "lost": (0, 1), "reach": (0.8, 2.0)},
-    full={"layouts": 8},
+    pieces=("robots",),
+    measures=(
+        "finlab/allocation/baselines",
+        "finlab/allocation/dual",
+        "finlab/core/src",
+        "finlab/research/random_layouts.py",
+        "finlab/research/evaluation/experiments/thrusters.py",
+    ),
+    probe={"layouts": 1, "targets": 2},
+    usual={"layouts": 8},
 )

@@ -14,6 +14,9 @@ from finlab.research.evaluation.experiment import Experiment, check_names, paper
 from finlab.research.evaluation.experiments.closed_loop import (
     ABOUT_ERRORS,
     ERRORS,
+    MEASURES,
+    OTHER_SIMULATOR,
+    POOL,
     POWER,
     SwimCase,
     SwimKey,
@@ -23,6 +26,7 @@ from finlab.research.evaluation.experiments.closed_loop import (
     with_losses,
 )
 from finlab.research.evaluation.method_specs import load_method_specs
+from finlab.research.evaluation.verdict import Comparison
 from finlab.swim.control import CONTROLLERS
 from finlab.swim.simulation import RunLog, make_trajectory
 from finlab.swim.simulation.swim_pictures import paths_picture
@@ -117,6 +121,25 @@ def _printed(rows: Sequence[Row]) -> list[Row]:
     return [row for row in healthy if row["layout"] in layouts] + pool
 
 
+def _compared(rows: Sequence[Row]) -> list[Comparison]:
+    """Each figure of the paper's tables of paths, whole and with fins lost, beside ours by its
+    method and controller."""
+    figures = paper_figures()
+    wanted = [(layout, 0, row, OTHER_SIMULATOR) for layout, row in figures["trajectory"].items()]
+    for count, table in enumerate(figures["fault_tolerance"].values()):
+        wanted.append(("all", count, table["ours"], POOL))
+    compared = []
+    for layout, count, printed, obstacle in wanted:
+        about = {"layout": layout, "lost": count, "controller": "waypoint", "method": "paper"}
+        row = next((r for r in rows if about.items() <= r.items()), {})
+        place = "in the pool" if obstacle == POOL else f"layout {layout}"
+        for key in ("ate", "rte", "depth_rmse"):
+            what = f"{place}, {count} lost: {key} in m"
+            interval = row.get(f"{key}_interval")
+            compared.append(Comparison(what, printed[key], row.get(key), interval, obstacle))
+    return compared
+
+
 experiment = Experiment(
     name="trajectory",
     question="How closely do the paper's layouts follow a path, whole and with fins lost, by its "
@@ -134,7 +157,32 @@ experiment = Experiment(
     note=f"{ABOUT_ERRORS} The paper's runs on A to D took place in another simulator, those with "
     "lost fins in a pool, on paths that it does not print. Lost are the first fins without which "
     "a robot can be steered.",
-    quick={"layouts": ("A", "C"), "methods": ("dual",), "lost": (0, 1)},
+    quick={
+        "layouts": ("A", "C"),
+        "trajectory": "circle",
+        "methods": ("dual", "fixed_frequency"),
+        "controllers": ("waypoint",),
+        "lost": (0, 1),
+        "runs": 2,
+    },
+    usual={
+        "trajectory": "circle",
+        "methods": ("paper", "fixed_frequency", "dual"),
+        "controllers": ("waypoint",),
+        "runs": 5,
+    },
+    full={"trajectory": "lissajous", "controllers": ("waypoint", "tracking")},
+    pieces=("methods", "controllers", "lost"),
+    measures=(*MEASURES, "finlab/research/evaluation/experiments/trajectory.py"),
+    probe={"layouts": ("A",), "runs": 1},
+    order=lambda row: (
+        row["layout"] == "all",
+        row["layout"],
+        row["lost"],
+        row.get("controller", ""),
+        row["method"],
+    ),
+    compared=_compared,
     printed=_printed,
     picture=_picture,
     for_picture={"paths": True},

@@ -9,6 +9,7 @@ from finlab.research.evaluation.document import Column, Row
 from finlab.research.evaluation.experiment import Experiment, check_names, paper_figures
 from finlab.research.evaluation.experiments import closed_loop
 from finlab.research.evaluation.method_specs import load_method_specs
+from finlab.research.evaluation.verdict import Comparison
 from finlab.swim.control import CONTROLLERS
 from finlab.swim.simulation import RunLog, straight
 
@@ -101,6 +102,21 @@ def _printed(_: Sequence[Row]) -> list[Row]:
     ]
 
 
+def _compared(rows: Sequence[Row]) -> list[Comparison]:
+    """Each figure of the paper's table of power and speed beside those on layout A."""
+    methods = {"baseline": BASELINE, "ours": "paper"}
+    compared = []
+    for name, figures in paper_figures()["velocity"].items():
+        about = {"layout": "A", "lost": 0, "speed": None, "controller": "velocity"}
+        about["method"] = methods[name]
+        row = next((r for r in rows if about.items() <= r.items()), {})
+        for key, printed in figures.items():
+            interval = row.get(f"{key}_interval")
+            what = f"{name}: {key}"
+            compared.append(Comparison(what, printed, row.get(key), interval, closed_loop.POOL))
+    return compared
+
+
 experiment = Experiment(
     name="velocity",
     question="What power does it take to keep a speed and a depth, and how well are they kept?",
@@ -111,8 +127,7 @@ experiment = Experiment(
         Column("controller", "controller", "code"),
         Column("method", "method", "code"),
         Column("runs", "runs", "count"),
-        Column("mae", "MAE of the speed", "metres", unit="m/s"),
-        Column("mae_std", "spread", "error", unit="m/s"),
+        Column("mae", "MAE of the speed", "metres", "mae_interval", unit="m/s"),
         Column("mae_settled", "after 10 s", "metres", unit="m/s"),
         Column("depth_rmse", "depth RMSE", "metres", unit="m"),
         *closed_loop.POWER,
@@ -121,7 +136,18 @@ experiment = Experiment(
     run=run,
     note="Runs from rest; rows without a speed are over all speeds. Inertial power is the paper's "
     "sum of I alpha omega, of its magnitudes. The paper's runs took place in a pool.",
-    quick={"layouts": ("A",), "lost": (0,)},
-    full={"layouts": ("A",), "lost": (0,), "runs": 5},
+    quick={
+        "layouts": ("A",),
+        "methods": ("dual", BASELINE),
+        "controllers": ("velocity",),
+        "lost": (0,),
+        "runs": 2,
+    },
+    usual={"methods": ("paper", BASELINE, "dual"), "controllers": ("velocity",), "runs": 5},
+    full={"controllers": ("velocity", "tracking")},
+    pieces=("layouts", "controllers", "lost"),
+    measures=(*closed_loop.MEASURES, "finlab/research/evaluation/experiments/velocity.py"),
+    probe={"runs": 1, "duration": 11.0},
+    compared=_compared,
     printed=_printed,
 )

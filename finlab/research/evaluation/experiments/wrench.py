@@ -23,10 +23,12 @@ from finlab.research.evaluation.scoring import (
     Columns,
     joined,
     mean_interval,
+    quantile_interval,
     run_method,
     share_interval,
 )
 from finlab.research.evaluation.splits import SPLITS, SplitCase, make_case, make_split, own_sigma
+from finlab.research.evaluation.verdict import Comparison
 from finlab.research.executor import map_parts
 
 SUCCESS_LEVELS = (
@@ -36,18 +38,27 @@ SUCCESS_LEVELS = (
 )  # levels t of `success_t`, the share of targets with `err_norm <= t`
 OWN_DOMAIN = 0x0711
 """Leads the seed of the draws on a user's own layout."""
-HARD = (
-    "id",
-    "ood",
-    "ood-fins",
-    "limits",
-    "failure",
-    "near-singular",
-    "fins-mixed",
-    "tables",
-    "many-fins",
+PRINTED_METHODS = {"ours": "paper", "qp": "qp", "sqp": "paper_sqp"}
+"""Name in the paper's table -> our method of the same steps."""
+PRINTED_KEYS = {
+    "err_norm_mean": "mean error",
+    "err_norm_median": "median error",
+    "err_norm_p95": "95th percentile of the error",
+    "err_norm_max": "largest error",
+    "err_phys_mean": "mean error in N and N m",
+    "success_0.5": "share within 0.5",
+    "success_1.0": "share within 1.0",
+}
+"""Figures of the paper's table, in words."""
+MEASURES = (
+    "finlab/actuators/fin/fin_laws.py",
+    "finlab/physics/plant.py",
+    "finlab/physics/objective.py",
+    "finlab/research/random_layouts.py",
+    "finlab/research/evaluation/scoring.py",
+    "finlab/research/evaluation/splits.py",
 )
-"""Splits of the report."""
+"""What decides the rows of all experiments on random robots, beside the methods."""
 
 
 def run(
@@ -135,8 +146,11 @@ def _row(split: str, method: str, fins: int | None, scores: Columns) -> Row:
     }
     intervals = {
         "err_norm_mean": mean_interval(error, group),
+        "err_norm_median": quantile_interval(error, group, 0.5),
+        "err_norm_p95": quantile_interval(error, group, 0.95),
+        "err_phys_mean": mean_interval(scores["err_phys"], group),
         "power_mean": mean_interval(scores["power"], group),
-        "success_0.01": share_interval(error <= 0.01, group),
+        **{f"success_{level}": share_interval(error <= level, group) for level in SUCCESS_LEVELS},
     }
     plain = {key: float(value) for key, value in row.items()}
     return about | plain | {f"{key}_interval": list(ends) for key, ends in intervals.items()}
@@ -183,6 +197,32 @@ def _printed(rows: Sequence[Row]) -> list[Row]:
     ]
 
 
+def _compared(rows: Sequence[Row]) -> list[Comparison]:
+    """Each figure of the paper's table beside that of our method of the same steps."""
+    printed = paper_figures()["wrench_tracking"]
+    compared = []
+    for split, table in printed.items():
+        for name, method in PRINTED_METHODS.items():
+            figures = table[name]
+            row = next((r for r in rows if (r["split"], r["method"]) == (split, method)), {})
+            for key, words in PRINTED_KEYS.items():
+                obstacle = ""
+                if key == "err_norm_max" and row.get("n", 0) < figures["n"]:
+                    obstacle = (
+                        f"The largest of {row.get('n', 0):,} and of {figures['n']:,} targets."
+                    )
+                compared.append(
+                    Comparison(
+                        f"{split}, {name}: {words}",
+                        figures[key],
+                        row.get(key),
+                        row.get(f"{key}_interval"),
+                        obstacle,
+                    )
+                )
+    return compared
+
+
 experiment = Experiment(
     name="wrench",
     question="How far off are the wrenches of each method, of those that a robot can deliver?",
@@ -210,14 +250,25 @@ experiment = Experiment(
         "seed lands, 95 times of 100. Time: that of all targets of a layout over their number. "
         "Printed: the paper's figures, on its own layouts and targets."
     ),
-    quick={"split": HARD[:4], "methods": ("dual", "paper", "sqp"), "layouts": 10, "targets": 5},
-    full={
-        "split": HARD,
-        "methods": ("dual", "mdn", "paper", "qp", "sqp", "analytic"),
-        "layouts": 30,
-        "targets": 8,
+    quick={
+        "split": ("id", "ood"),
+        "methods": ("dual", "paper", "qp", "paper_sqp"),
+        "layouts": 10,
+        "targets": 5,
     },
+    usual={
+        "split": ("id", "ood"),
+        "methods": ("dual", "paper", "qp", "paper_sqp"),
+        "layouts": 100,
+        "targets": 100,
+    },
+    full={"targets": 1000},
+    pieces=("split", "methods"),
+    measures=(*MEASURES, "finlab/research/evaluation/experiments/wrench.py"),
+    probe={"layouts": 2, "targets": 3},
+    compared=_compared,
     printed=_printed,
     picture=fins_picture,
     for_picture={"by_fins": True},
+    only_for_picture=lambda row: row["fins"] is not None,
 )

@@ -6,6 +6,7 @@ folder of parts and a `data.json` that says how it was drawn and holds the wrenc
 standard deviation.
 """
 
+import hashlib
 import io
 import json
 from collections.abc import Mapping
@@ -264,9 +265,12 @@ class SampleSet:
                 f"{folder}: an unfinished data set; run `finlab data generate` again"
             ) from error
         self._table = _read_table(folder, self.layouts, self.commands, device)
+        self.sha256 = data_hash(folder)
+        """SHA-256 of its files."""
         self._device = device
-        self._epoch = -1
         self._order = torch.empty(0)
+        self._order_of: tuple[int, int, int] | None = None
+        """Seed, epoch and length of the order at hand; None before the first batch."""
 
     def batch(self, step: int, size: int, seed: int, one_layout: bool, rows: slice) -> SampleBatch:
         """Some rows of batch number `step` of `size` samples, a function of step and seed: random
@@ -278,12 +282,10 @@ class SampleSet:
                 f"batches of {size} samples need at least as many, the data set has {count}"
             )
         epoch, place = divmod(step, count if one_layout else count // size)
-        if epoch != self._epoch:
+        if self._order_of != (seed, epoch, count):
             draw = seeded_generator(seed, epoch, self._device)
-            self._epoch, self._order = (
-                epoch,
-                torch.randperm(count, generator=draw, device=self._device),
-            )
+            self._order = torch.randperm(count, generator=draw, device=self._device)
+            self._order_of = seed, epoch, count
         if one_layout:
             draw = seeded_generator(seed, 1_000_000 + step, self._device)
             command = torch.randint(self.commands, (size,), generator=draw, device=self._device)
@@ -291,6 +293,14 @@ class SampleSet:
         else:
             chosen = self._order[place * size : (place + 1) * size][rows]
         return self._table.batch(chosen)
+
+
+def data_hash(folder: Path) -> str:
+    """Returns the SHA-256 of a data set's files, one after the other."""
+    found = hashlib.sha256((folder / DATA_FILE).read_bytes())
+    for path in sorted(folder.glob("part-*.npz")):
+        found.update(path.read_bytes())
+    return found.hexdigest()
 
 
 @lru_cache(maxsize=1)

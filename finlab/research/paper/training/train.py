@@ -14,13 +14,20 @@ from finlab.errors import DataError
 from finlab.layout import FinModelSpec
 from finlab.research.networks.checkpoint import (
     read_checkpoint,
+    read_normalization,
     resolve_checkpoint,
     write_checkpoint,
 )
 from finlab.research.networks.trained import ArraysByName, TrainedWeights, sizes_for_file
 from finlab.research.paper.surrogate import SurrogateConfig
 from finlab.research.paper.training import modules
-from finlab.research.paper.training.recipes import PaperLoop, PaperRecipe, recipe, write_card
+from finlab.research.paper.training.recipes import (
+    PaperLoop,
+    PaperRecipe,
+    recipe,
+    recipe_hash,
+    write_card,
+)
 from finlab.research.paper.training.samples import (
     N_FINS,
     DataSettings,
@@ -141,7 +148,7 @@ def surrogate_terms(config: SurrogateConfig, weights: Weights, source: BatchSour
 
     def terms(step: int) -> dict[str, Tensor]:
         batch = source.batch(step)
-        with source.place.autocast(max(config.hidden)):
+        with source.place.autocast(max(config.hidden), source.settings.is_float32(step)):
             return {"loss": modules.physics(wrench, batch, std).mean()}
 
     return terms
@@ -197,10 +204,11 @@ def allocator_terms(
     def terms(step: int) -> dict[str, Tensor]:
         batch = source.batch(step)
         target = (batch.wrench - mean) / std
-        with source.place.autocast(network_width):
+        in_float32 = source.settings.is_float32(step)
+        with source.place.autocast(network_width, in_float32):
             hidden = network.encoded(weights, batch.features, target, batch.mask)
         mixture = network.mixture(weights, hidden.float())
-        with source.place.autocast(surrogate_width):
+        with source.place.autocast(surrogate_width, in_float32):
             guide = modules.guidance(mixture, frozen, batch, std, source.noise(step)).mean()
         imitate = modules.imitation(mixture, batch).mean()
         entropy = modules.negative_entropy(mixture, batch.mask).mean()
@@ -227,9 +235,13 @@ def _train(
             generate(output / "data", recipe(options.preset).data)
         place.wait()
         samples = SampleSet(options.data or output / "data", place.device)
+        made_by = recipe(options.preset)
+        if made_by.normalization is not None:
+            samples.normalization = read_normalization(resolve_checkpoint(made_by.normalization))
         weights = begin(options.seed, place.device)
         identity = {"preset": options.preset, "seed": options.seed, "training": asdict(settings)}
         identity |= {"data": samples.settings, "surrogate_sha256": surrogate}
+        identity |= {"data_sha256": samples.sha256, "recipe_sha256": recipe_hash(made_by, verb)}
 
         def save(state: ArraysByName, progress: dict[str, Any]) -> None:
             made = checkpoint(samples, state)

@@ -1,0 +1,298 @@
+"""The paper's conclusions, each as a printed figure, ours from the rows of a report, and a verdict.
+
+Each is a quotient of two figures of one table, so that scales and targets that differ from the
+paper's cancel as far as they can.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+from finlab.research.evaluation.document import Row, format_digits, format_error
+from finlab.research.evaluation.experiment import paper_figures
+from finlab.research.evaluation.verdict import NEAR, Comparison, ratio_interval_of
+
+Rows = Mapping[str, Sequence[Row]]
+"""Rows of a report, by the name of the experiment."""
+
+
+def claims(rows: Rows) -> list[Comparison]:
+    """Returns the paper's conclusions, of those experiments whose rows are there.
+
+    Args:
+        rows: of a report.
+    """
+    found: list[Comparison] = []
+    for name, judge in JUDGES.items():
+        if name in rows:
+            found += judge(rows[name])
+    return found + _two_tables(rows)
+
+
+def found_row(rows: Sequence[Row], **values: object) -> Row:
+    """Returns the first row that has some values; an empty one where there is none.
+
+    Args:
+        rows: the rows.
+        values: wanted values by key.
+    """
+    for row in rows:
+        if all(row.get(key) == value for key, value in values.items()):
+            return row
+    return {}
+
+
+def quotient(
+    what: str, printed: float, numerator: Row, denominator: Row, key: str, obstacle: str = ""
+) -> Comparison:
+    """Returns the comparison of a printed quotient with that of two rows' figures.
+
+    Args:
+        what: what is measured.
+        printed: the quotient of the paper's figures.
+        numerator: row of the numerator; an empty one where it was not run.
+        denominator: row of the denominator.
+        key: of the figure.
+        obstacle: as for `Comparison`.
+    """
+    above = numerator.get(key)
+    below = denominator.get(key)
+    figure = above / below if above is not None and below else None
+    interval = ratio_interval_of(numerator, denominator, key)
+    return Comparison(what, printed, figure, interval, obstacle)
+
+
+def sentences(rows: Rows) -> list[str]:
+    """Returns what the rows say of the paper's conclusions, with their figures.
+
+    Args:
+        rows: of a report.
+    """
+    said = []
+    for words in (_sqp_words, _temperature_words, _stages_words, _ranking_words, _tables_words):
+        sentence = words(rows)
+        if sentence:
+            said.append(sentence)
+    return said
+
+
+EXACT = 0.01
+"""Mean error up to which a solver that knows the plant counts as exact, on the paper's scale."""
+
+
+def _sqp_words(rows: Rows) -> str:
+    """Whether the printed SQP, solved to its end, is as far off as printed."""
+    table = rows.get("wrench", ())
+    printed = paper_figures()["wrench_tracking"]
+    figures = [found_row(table, split=split, method="paper_sqp") for split in ("id", "ood")]
+    if not all(figures):
+        return ""
+    ours = " and ".join(format_error(row["err_norm_mean"]) for row in figures)
+    theirs = " and ".join(format_error(_of(printed[split], "sqp")) for split in ("id", "ood"))
+    errors = (
+        f"its mean errors are {ours} on seen and unseen layouts, where the paper prints {theirs}"
+    )
+    if max(row["err_norm_mean"] for row in figures) > EXACT:
+        return f"The printed SQP does not reach its targets: {errors}."
+    return (
+        f"The printed SQP, solved to its end, is exact: {errors}. So the paper's main comparison, "
+        "its method against this baseline, is not reproduced."
+    )
+
+
+def _temperature_words(rows: Rows) -> str:
+    """Whether a temperature is best."""
+    usable = [row for row in rows.get("temperature", ()) if row.get("best_j_mean") is not None]
+    if not usable:
+        return ""
+    means = [float(row["best_j_mean"]) for row in usable]
+    temperatures = [float(row["temperature"]) for row in usable]
+    ends = f"from {format_error(min(means))} to {format_error(max(means))}"
+    span = f"between the temperatures {min(temperatures):g} and {max(temperatures):g}"
+    if max(means) > NEAR * min(means):
+        return f"The temperature of the draw matters: the mean J goes {ends} {span}."
+    return (
+        f"The temperature of the draw is flat: the mean J goes {ends} {span}, where the paper "
+        "draws an optimum between."
+    )
+
+
+def _stage(rows: Rows, variant: str) -> float | None:
+    """Mean J_norm by the plant of a variant of the pipeline; None where it was not run."""
+    row = found_row(rows.get("ablation", ()), variant=variant, scored_by="plant")
+    return row.get("j_norm_mean")
+
+
+def _stages_words(rows: Rows) -> str:
+    """Which of the two rows without refinement is better."""
+    mean = _stage(rows, "mean_only")
+    drawn = _stage(rows, "without_refinement")
+    if mean is None or drawn is None:
+        return ""
+    printed = paper_figures()["ablation"]
+    theirs = [printed[name]["err_norm_mean"] for name in ("mean_only", "without_refinement")]
+    figures = (
+        f"J_norm is {format_error(mean)} for the mixture's mean and {format_error(drawn)} for the "
+        f"best draw, the paper prints {format_error(theirs[0])} and {format_error(theirs[1])}"
+    )
+    if mean > drawn:
+        return f"The mixture's mean and the best draw change places: {figures}."
+    return f"The mixture's mean is better than the best draw, as in the paper: {figures}."
+
+
+def _ranking_words(rows: Rows) -> str:
+    """What ranking by physics brings."""
+    likely = _stage(rows, "nll_selection")
+    whole = _stage(rows, "ours")
+    if likely is None or not whole:
+        return ""
+    printed = paper_figures()["ablation"]
+    theirs = printed["nll_selection"]["err_norm_mean"] / printed["ours"]["err_norm_mean"]
+    return (
+        f"Ranking by physics is {format_digits(likely / whole, 2)} times better than by likelihood "
+        f"in J_norm, by the plant; the paper prints {format_digits(theirs, 2)}."
+    )
+
+
+def _tables_words(rows: Rows) -> str:
+    """That the paper's two tables of one pipeline contradict each other."""
+    if not _two_tables(rows):
+        return ""
+    whole = math.sqrt(paper_figures()["ablation"]["ours"]["err_norm_mean"])
+    tracking = paper_figures()["wrench_tracking"]["id"]["ours"]["err_norm_mean"]
+    ours = found_row(rows["wrench"], split="id", method="paper")["err_norm_mean"]
+    stage = _stage(rows, "ours")
+    assert stage is not None
+    return (
+        "The paper's two tables contradict each other: the same pipeline errs by "
+        f"{format_error(whole)}, the root of J_norm in its ablation, and by "
+        f"{format_error(tracking)} in its table of layouts. Ours errs by "
+        f"{format_error(math.sqrt(stage))} and {format_error(ours)}."
+    )
+
+
+def _wrench(rows: Sequence[Row]) -> list[Comparison]:
+    """Baselines over the paper's method, and unseen layouts over seen ones."""
+    printed = paper_figures()["wrench_tracking"]
+    judged = []
+    for split in ("id", "ood"):
+        ours = found_row(rows, split=split, method="paper")
+        for printed_name, method in (("qp", "qp"), ("sqp", "paper_sqp")):
+            baseline = found_row(rows, split=split, method=method)
+            ratio = _of(printed[split], printed_name) / _of(printed[split], "ours")
+            what = f"error of the printed {printed_name.upper()} over the paper's method, {split}"
+            judged.append(quotient(what, ratio, baseline, ours, "err_norm_mean"))
+    for printed_name, method in (("ours", "paper"), ("qp", "qp"), ("sqp", "paper_sqp")):
+        ratio = _of(printed["ood"], printed_name) / _of(printed["id"], printed_name)
+        what = f"error on unseen layouts over that on seen ones, {method}"
+        unseen = found_row(rows, split="ood", method=method)
+        seen = found_row(rows, split="id", method=method)
+        judged.append(quotient(what, ratio, unseen, seen, "err_norm_mean"))
+    return judged
+
+
+def _of(table: Mapping[str, Mapping[str, float]], name: str) -> float:
+    """Mean error that the paper prints for a method."""
+    return float(table[name]["err_norm_mean"])
+
+
+def _ablation(rows: Sequence[Row]) -> list[Comparison]:
+    """What each stage of the pipeline brings, and whether the paper's two tables agree."""
+    printed = paper_figures()["ablation"]
+    whole = printed["ours"]["err_norm_mean"]
+    ours = found_row(rows, variant="ours", scored_by="plant")
+    judged = []
+    words = {
+        "mean_only": "J_norm of the mixture's mean over the whole pipeline",
+        "without_refinement": "J_norm without refinement over the whole pipeline",
+        "nll_selection": "J_norm ranked by likelihood over ranked by physics",
+        "random_warm_start": "J_norm from a random start over that from the network",
+    }
+    for variant, what in words.items():
+        row = found_row(rows, variant=variant, scored_by="plant")
+        ratio = printed[variant]["err_norm_mean"] / whole
+        judged.append(quotient(what, ratio, row, ours, "j_norm_mean"))
+    mean = found_row(rows, variant="mean_only", scored_by="plant")
+    drawn = found_row(rows, variant="without_refinement", scored_by="plant")
+    ratio = printed["mean_only"]["err_norm_mean"] / printed["without_refinement"]["err_norm_mean"]
+    what = "J_norm of the mixture's mean over the best draw, neither refined"
+    judged.append(quotient(what, ratio, mean, drawn, "j_norm_mean"))
+    return judged
+
+
+def _two_tables(rows: Rows) -> list[Comparison]:
+    """The error of one pipeline by the two tables that have it: in the paper they contradict each
+    other."""
+    whole = paper_figures()["ablation"]["ours"]["err_norm_mean"]
+    tracking = paper_figures()["wrench_tracking"]["id"]["ours"]["err_norm_mean"]
+    ours = found_row(rows.get("wrench", ()), split="id", method="paper")
+    stage = found_row(rows.get("ablation", ()), variant="ours", scored_by="plant")
+    if not ours or not stage:
+        return []
+    return [
+        Comparison(
+            "error of the whole pipeline in the table of layouts over the root of its J_norm in "
+            "the ablation",
+            tracking / math.sqrt(whole),
+            ours["err_norm_mean"] / math.sqrt(stage["j_norm_mean"]),
+            None,
+            f"The paper's two tables contradict each other: {math.sqrt(whole):.3f} and "
+            f"{tracking:.3f} for one pipeline.",
+        )
+    ]
+
+
+def _temperature(rows: Sequence[Row]) -> list[Comparison]:
+    """Whether the best temperature lies between the extremes, as the paper draws it without
+    numbers: J at both over the least, which is clearly more than 1 where there is an optimum."""
+    usable = [row for row in rows if row.get("best_j_mean") is not None]
+    if not usable:
+        return []
+    usable = sorted(usable, key=lambda row: float(row["temperature"]))
+    least = min(usable, key=lambda row: float(row["best_j_mean"]))
+    judged = []
+    for name, row in (("lowest", usable[0]), ("highest", usable[-1])):
+        what = f"J at the {name} temperature, {row['temperature']:g}, over the least, at least"
+        judged.append(replace(quotient(what, NEAR, row, least, "best_j_mean"), at_least=True))
+    return judged
+
+
+def _velocity(rows: Sequence[Row]) -> list[Comparison]:
+    """Power and error of the paper's method over its baseline."""
+    printed = paper_figures()["velocity"]
+    judged = []
+    about = {"lost": 0, "speed": None, "controller": "velocity"}
+    words = {"inertial_w": "inertial power", "mae": "error of the speed"}
+    for layout in dict.fromkeys(row["layout"] for row in rows):
+        ours = found_row(rows, layout=layout, method="paper", **about)
+        base = found_row(rows, layout=layout, method="fixed_frequency", **about)
+        for key, noun in words.items():
+            ratio = printed["ours"][key] / printed["baseline"][key]
+            what = f"{noun} of the paper's method over its baseline, layout {layout}"
+            judged.append(quotient(what, ratio, ours, base, key))
+    return judged
+
+
+def _trajectory(rows: Sequence[Row]) -> list[Comparison]:
+    """How much one and two lost fins add to the error."""
+    printed = paper_figures()["fault_tolerance"]
+    healthy = printed["healthy"]["ours"]["ate"]
+    about = {"layout": "all", "controller": "waypoint", "method": "paper"}
+    whole = found_row(rows, lost=0, **about)
+    judged = []
+    for count, name in ((1, "one_fin"), (2, "two_fins")):
+        ratio = printed[name]["ours"]["ate"] / healthy
+        what = f"ATE with {count} lost over that of the whole robot, all layouts"
+        damaged = found_row(rows, lost=count, **about)
+        judged.append(quotient(what, ratio, damaged, whole, "ate"))
+    return judged
+
+
+JUDGES: Mapping[str, Callable[[Sequence[Row]], list[Comparison]]] = {
+    "wrench": _wrench,
+    "ablation": _ablation,
+    "temperature": _temperature,
+    "trajectory": _trajectory,
+    "velocity": _velocity,
+}
+"""Experiment -> what its rows say of the paper's conclusions."""
