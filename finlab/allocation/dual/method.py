@@ -232,13 +232,14 @@ class Dual(Method):
         self, policy: Policy, lost: NDArray[np.bool_] | None, free: NDArray[np.bool_] | None
     ) -> PreparedAnswers | None:
         """Prepares questions about single wrenches; see `Method.prepared_answers`."""
-        if self.plant.interaction is not None or not self._most_core_error >= 0.0:
+        if not self._most_core_error >= 0.0:
             return None
         from finlab.core.prepared_call import RowBound, prepared_call
 
         conditions = Conditions(None, lost, free)
+        core = self.compiled.core if self.plant.interaction is None else self.coupled
         call = prepared_call(
-            self.compiled.core,
+            core,
             core_policy(policy),
             conditions,
             self.settings.calm,
