@@ -389,8 +389,6 @@ class Dual(Method):
         self, conditions: Conditions, targets: Array, policy: Policy, multipliers: Array | None
     ) -> Solved:
         """Solves as `solve_under`, for a robot whose actuators act on each other."""
-        from finlab.allocation.dual.outer_iterations import finished_answer
-
         record = core_policy(policy)
         if len(targets) == 1:
             most_error = self._error_allowed()
@@ -400,6 +398,10 @@ class Dual(Method):
             answer = row.copied()
         else:
             answer = self.coupled.answer_many(targets, record, None, conditions)
+            if self._are_finished(answer, conditions):
+                return self._solution_of_finished(answer, targets, conditions)
+        from finlab.allocation.dual.outer_iterations import finished_answer
+
         problem = self.problem_under(conditions)
         answer = finished_answer(problem, targets, policy, answer)
         notes = partial(self.notes_of, set(), targets[~answer.is_attainable], conditions)

@@ -50,7 +50,10 @@ static void forces_of_commands(const fl_coupled_robot *robot, const real *block,
 static void offset_along_axes(const fl_coupled_robot *robot, const real *block, const fl_span *span,
                               real force[][3], real body[][3], int has_slope, real *offset,
                               real by_axes[][3][6]) {
-  if (fl_jets_of_lines(robot, span, force, offset, has_slope ? by_axes : 0)) return;
+  if (robot->line_jets) {
+    fl_jets_of_lines(robot, span, force, offset, has_slope ? by_axes : 0);
+    return;
+  }
   real unused[FL_MOST][3];
   real slope[FL_MOST][3][6];
   robot->offset(robot->constants, *body, 1, robot->inflow, *unused, offset,
@@ -342,15 +345,13 @@ static int step_to_answer(outer_search *search, fl_answer *answer, real merit) {
 }
 
 /* Whether iterations would end at known forces again: forces of the dual's answer, and their
-   commands, have each line push the same way, and cost no less. */
-int fl_leads_to_known(const real *block, const fl_work *work, const known_end *known,
-                      real force[][2], real command[][3]) {
+   power [W], have each line push the same way, and cost no less. */
+int fl_leads_to_known(const real *block, const known_end *known, real force[][2], real power) {
+  if (power < (1 - MUCH_CHEAPER) * known->power) return 0;
   for (int i = 0; i < COUNT(block); i++) {
     if (force[i][0] * known->force[i][0] < 0) return 0;
   }
-  real unused[FL_MOST][2];
-  const real power = fl_power_of_commands(block, work, command, unused);
-  return power >= (1 - MUCH_CHEAPER) * known->power;
+  return 1;
 }
 
 /* One outer iteration: the dual's answer on the linear model, and a step to its forces. `has_ended`
@@ -360,8 +361,11 @@ static int iterate(outer_search *search, int is_first, fl_answer *out, int *has_
   const int code = answer_linear(search->block, search->work, &search->question, is_first, &answer);
   if (code) return code;
   search->newton_steps += (real)answer.newton_steps;
-  search->is_known = search->known && fl_leads_to_known(search->block, search->work, search->known,
-                                                        answer.force, answer.command);
+  if (search->known) {
+    real unused[FL_MOST][2];
+    const real power = fl_power_of_commands(search->block, search->work, answer.command, unused);
+    search->is_known = fl_leads_to_known(search->block, search->known, answer.force, power);
+  }
   *has_ended = 1;
   if (search->is_known) return FL_OK;
   search->penalty = larger(search->penalty, fl_exact_penalty(search->block, answer.multipliers));
