@@ -9,7 +9,7 @@ from typing import TypeVar
 
 from finlab.errors import FinlabError
 
-VERSION = 19
+VERSION = 21
 """What `fl_version()` of the C files returns; both rise together where a signature or a struct
 changes."""
 SIGNATURES = {
@@ -34,6 +34,8 @@ SIGNATURES = {
     "fl_power_bound_of_row": "rppppp",
     "fl_reach": "vpppppirppp",
     "fl_jets": "vppipppp",
+    "fl_line_jets_length": "ip",
+    "fl_prepare_line_jets": "vpp",
     "fl_message_rows": "vppipppp",
     "fl_message_wrench": "vpipppp",
     "fl_outer_iterations": "ipppppppp",

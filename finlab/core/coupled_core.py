@@ -100,7 +100,8 @@ class CoupledCore:
         """
         n = len(wrench_offset.frames)
         self._core = library()
-        self._n = n
+        self.n = n
+        """How many actuators there are."""
         self._block_linear = block.copy()
         """The block of the linear model, which the core changes in each iteration."""
         self._work = prepared_work(self._block_linear)
@@ -136,6 +137,11 @@ class CoupledCore:
         robot["axis_counts"] = wrench_offset.counts
         robot["starts"] = _address_of(starts)
         robot["start_count"] = len(starts)
+        self._line_jets = np.zeros(self._core.fl_line_jets_length(robot.ctypes.data))
+        """Jets of a robot of thrusters as the core has prepared them; empty of other robots."""
+        if len(self._line_jets):
+            self._core.fl_prepare_line_jets(robot.ctypes.data, self._line_jets.ctypes.data)
+            robot["line_jets"] = self._line_jets.ctypes.data
         self._robot: Record = robot
         self._limits: Record = np.zeros(1, struct("fl_outer_limits"))
         """When the iterations end."""
@@ -143,6 +149,9 @@ class CoupledCore:
         """What they end with."""
         self._robot_address = robot.ctypes.data
         self._block_address = self._block_linear.ctypes.data
+        self._block_uncoupled_address = _address_of(block)
+        self._is_busy = np.zeros(1, np.int32)
+        """Not 0 while the work area is in use without the interpreter's lock, which is never."""
         self._work_address = ctypes.addressof(self._work)
         self._rows = AnswerRows(n)
         self._force = np.zeros((n, 2))
@@ -246,6 +255,20 @@ class CoupledCore:
             self._raise_from_callback()
         return self._rows.written(memory, row, code)
 
+    def prepared_call(self) -> Record | None:
+        """Returns an `fl_prepared_call` (1,) of this robot, without question and rows; None where
+        the offset is a function of Python, whose exceptions have to be raised again, and which lets
+        another thread have the interpreter's lock."""
+        if self._wrench_offset.core_constants is None:
+            return None
+        record = np.zeros(1, struct("fl_prepared_call"))
+        record["block"] = self._block_uncoupled_address
+        record["work"] = self._work_address
+        record["coupled"] = self._robot_address
+        record["block_linear"] = self._block_address
+        record["is_busy"] = self._is_busy.ctypes.data
+        return record
+
     def answer_many(
         self,
         wrenches: Array,
@@ -272,10 +295,10 @@ class CoupledCore:
         """
         wrenches = np.ascontiguousarray(wrenches)
         count = len(wrenches)
-        force = np.empty((count, self._n, 2))
+        force = np.empty((count, self.n, 2))
         multipliers_found = np.empty((count, 6))
         wrench_served = np.empty((count, 6))
-        command = np.empty((count, self._n, 3))
+        command = np.empty((count, self.n, 3))
         is_attainable = np.empty(count, np.bool_)
         error = np.empty(count)
         is_truncated = np.empty(count, np.bool_)
@@ -327,7 +350,7 @@ class CoupledCore:
         slope: int | None,
     ) -> None:
         """Writes the offset and its derivatives for C; the arguments are those of the callback."""
-        n = self._n
+        n = self.n
         if self._raised is not None:
             return  # the answer is lost already: C only has to come to its end
         asked = self._wrench_offset

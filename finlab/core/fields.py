@@ -27,6 +27,7 @@ _NUMPY_TYPES: dict[str, Any] = {
     "fl_question_at": np.uintp,
     "fl_work_at": np.uintp,
     "fl_row_at": np.uintp,
+    "fl_coupled_at": np.uintp,
     "fl_flag_at": np.uintp,
 }
 """Types of fields in numpy by those in C; addresses are whole numbers."""

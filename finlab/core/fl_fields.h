@@ -125,6 +125,10 @@ FL_END(fl_answer_row)
 FL_BEGIN(fl_prepared_call)
 FL_FIELD(fl_reals, block, , "address", "numbers of the robot")
 FL_FIELD(fl_work_at, work, , "address", "its prepared work area")
+FL_FIELD(fl_coupled_at, coupled, , "address",
+         "what its actuators do to each other; 0 where that is nothing")
+FL_FIELD(fl_row_at, block_linear, , "address",
+         "numbers of its linear model, which answers change; 0 unless `coupled`")
 FL_FIELD(fl_question_at, question, , "address",
          "all that is asked but wrench, commands of the tick before, calm and multipliers")
 FL_FIELD(fl_row_at, rows, , "address", "(row_count, row_numbers) of answers")
@@ -180,6 +184,8 @@ FL_FIELD(fl_reals, constants, , "address", "what that function works with, such 
 FL_FIELD(fl_reals, inflow, , "address",
          "(n, 3) velocities of the actuators' positions through the water [m/s]; 0 at rest")
 FL_FIELD(fl_reals, block_uncoupled, , "address", "block of the robot by its laws alone")
+FL_FIELD(fl_reals, line_jets, , "address",
+         "what fl_prepare_line_jets has written; 0 where jets are no others than fl_jets says")
 FL_FIELD(fl_reals, frames, , "address",
          "(n, 3, 3) axes of the laws' forces in the body frame, in rows")
 FL_FIELD(fl_real, axis_counts, [6], "1", "1 of axes that count, else 0")

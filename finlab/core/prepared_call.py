@@ -9,7 +9,7 @@ import ctypes
 import sys
 from collections.abc import Callable
 from functools import cache
-from typing import Any, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -26,6 +26,9 @@ from finlab.core.calls import (
     QuestionRecord,
 )
 from finlab.core.fields import Record
+
+if TYPE_CHECKING:
+    from finlab.core.coupled_core import CoupledCore
 
 Answer: TypeAlias = Callable[[object, object, Array | None], AnswerRow | None]
 """Answers a wrench, with the command (n, 3) of the tick before and multipliers (6,) to begin with,
@@ -73,7 +76,7 @@ class PreparedCall(NamedTuple):
 
 
 def prepared_call(
-    core: Core,
+    core: "Core | CoupledCore",
     policy: Record | None,
     conditions: Conditions,
     calm: float,
@@ -91,13 +94,16 @@ def prepared_call(
         most_error: error up to which commands are exact [1].
 
     Returns:
-        The call; None where this interpreter has no such functions.
+        The call; None where this interpreter has no such functions, or C asks Python for what
+        actuators do to each other.
     """
     if not has_builtin_functions():
         return None
+    record = core.prepared_call()
+    if record is None:
+        return None
     question = QuestionRecord(core.n)
     question.write(policy, None, conditions)
-    record = core.prepared_call()
     record["question"] = question.address
     record["most_wrench"] = most_wrench
     record["most_error"] = most_error

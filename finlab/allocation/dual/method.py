@@ -232,13 +232,14 @@ class Dual(Method):
         self, policy: Policy, lost: NDArray[np.bool_] | None, free: NDArray[np.bool_] | None
     ) -> PreparedAnswers | None:
         """Prepares questions about single wrenches; see `Method.prepared_answers`."""
-        if self.plant.interaction is not None or not self._most_core_error >= 0.0:
+        if not self._most_core_error >= 0.0:
             return None
         from finlab.core.prepared_call import RowBound, prepared_call
 
         conditions = Conditions(None, lost, free)
+        core = self.compiled.core if self.plant.interaction is None else self.coupled
         call = prepared_call(
-            self.compiled.core,
+            core,
             core_policy(policy),
             conditions,
             self.settings.calm,
@@ -388,8 +389,6 @@ class Dual(Method):
         self, conditions: Conditions, targets: Array, policy: Policy, multipliers: Array | None
     ) -> Solved:
         """Solves as `solve_under`, for a robot whose actuators act on each other."""
-        from finlab.allocation.dual.outer_iterations import finished_answer
-
         record = core_policy(policy)
         if len(targets) == 1:
             most_error = self._error_allowed()
@@ -399,6 +398,10 @@ class Dual(Method):
             answer = row.copied()
         else:
             answer = self.coupled.answer_many(targets, record, None, conditions)
+            if self._are_finished(answer, conditions):
+                return self._solution_of_finished(answer, targets, conditions)
+        from finlab.allocation.dual.outer_iterations import finished_answer
+
         problem = self.problem_under(conditions)
         answer = finished_answer(problem, targets, policy, answer)
         notes = partial(self.notes_of, set(), targets[~answer.is_attainable], conditions)

@@ -90,13 +90,15 @@ static void basis_of(const real *block, fl_span *span) {
 
 static void matrices_of(const real *block, fl_span *span) {
   for (int i = 0; i < COUNT(block); i++) {
-    for (int row = 0; row < 2; row++) {
+    const int rows = (int)ACTUATOR(block, i)->rows;
+    memset(span->effectiveness_reduced[i], 0, sizeof span->effectiveness_reduced[i]);
+    for (int row = 0; row < rows; row++) {
+      real *reduced = span->effectiveness_reduced[i][row];
       real column[6];
       column_of(block, span, i, row, column);
-      for (int j = 0; j < 6; j++) {
-        real sum = 0;
-        for (int k = 0; k < 6; k++) sum += span->basis[k][j] * (column[k] / span->axis_scale[k]);
-        span->effectiveness_reduced[i][row][j] = sum;
+      for (int k = 0; k < 6; k++) {
+        const real scaled = column[k] / span->axis_scale[k];
+        for (int j = 0; j < 6; j++) reduced[j] += span->basis[k][j] * scaled;
       }
     }
   }

@@ -462,8 +462,7 @@ typedef struct {
 real fl_linearize_coupled(const fl_coupled_robot *robot, real *block, fl_work *work,
                           const real *wrench, real command[][3], int is_chord, real *residual);
 real fl_exact_penalty(const real *block, const real *lambda);
-int fl_leads_to_known(const real *block, const fl_work *work, const known_end *known,
-                      real force[][2], real command[][3]);
+int fl_leads_to_known(const real *block, const known_end *known, real force[][2], real power);
 int fl_iterations_from(const fl_coupled_robot *robot, real *block, fl_work *work,
                        const fl_question *question, const fl_outer_limits *limits,
                        const known_end *known, real force[][2], fl_answer *answer,

@@ -1,35 +1,11 @@
 /* What jets take from forces by a formula of eight constants, and what speed takes;
    docs/theory/interaction.md has both. */
-#include "internal.h"
+#include "jets.h"
 
-#define NO_AREA R(1e-12)    /* [m^2] beside the disc of an actuator, which may have none */
-#define FLOOR_SHARE R(1e-4) /* squared speed over that of a jet to which its size is rounded off */
-#define FAR_BEHIND 14       /* a jet is nothing at so many `behind` upstream of its outlet */
-#define FAR_ASIDE 28        /* nor where the exponent of its profile is above that */
-#define SATURATED_AT 14     /* from here on a sigmoid is 0 or 1 but for less than ROUNDING */
-
-/* Numbers of a robot: a `water`, then an `outlet` for each of its n actuators. */
-typedef struct {
-  real n;
-  real formula; /* 1 where jets count, else speed alone takes */
-  real density;
-  real still; /* speed of a jet below which it counts as none [m/s] */
-  /* The constants. */
-  real length, width, spread, lag, most, side, housing, hull, behind, grazing;
-  real center[3], half[3]; /* of the ellipsoid that stands for the hull [m]; 0 for none */
-} water;
-
-typedef struct {
-  real position[3], diameter, advance;
-} outlet;
-
-typedef struct {
-  real thrust;       /* [N] */
-  real speed;        /* of the water far behind [m/s] */
-  real ahead[3];     /* direction of the force */
-  real mass_flow;    /* [kg/s] */
-  real per_diameter; /* one over the diameter of its outlet [1/m] */
-} jet;
+#define NO_AREA R(1e-12) /* [m^2] beside the disc of an actuator, which may have none */
+#define FAR_BEHIND 14    /* a jet is nothing at so many `behind` upstream of its outlet */
+#define FAR_ASIDE 28     /* nor where the exponent of its profile is above that */
+#define SATURATED_AT 14  /* from here on a sigmoid is 0 or 1 but for less than ROUNDING */
 
 /* (1 + tanh x) / 2; most arguments are far out, where it needs no exponential. */
 static real sigmoid(real x) {
@@ -40,7 +16,7 @@ static real sigmoid(real x) {
 
 /* The jet of a force, by momentum theory; a little thrust is left where there is none, so
    that it has a direction. */
-static jet jet_of(const water *w, const outlet *from, const real *force) {
+jet fl_jet_of(const water *w, const outlet *from, const real *force) {
   const real disc = PI / 4 * from->diameter * from->diameter;
   const real area = disc + NO_AREA;
   const real thrust_still = w->density * area * w->still * w->still / 2;
@@ -54,18 +30,9 @@ static jet jet_of(const water *w, const outlet *from, const real *force) {
   return made;
 }
 
-/* How a jet meets an actuator. */
-typedef struct {
-  int from;            /* whose jet it is */
-  real from_outlet[3]; /* way from its outlet, in diameters */
-  real along;          /* the same along the jet */
-  real speed;          /* [m/s] */
-  real slope;          /* of the speed by `along` */
-} jet_met;
-
 /* How fast the jet of an actuator is at another one: a Gaussian profile that widens along
    the jet. Returns whether there is anything of it. */
-static int meets(const water *w, const outlet *from, const jet *j, const outlet *to, jet_met *met) {
+int fl_jet_meets(const water *w, const outlet *from, const jet *j, const outlet *to, jet_met *met) {
   real *way = met->from_outlet;
   for (int c = 0; c < 3; c++) way[c] = (to->position[c] - from->position[c]) * j->per_diameter;
   const real x = -dot(way, j->ahead, 3);
@@ -92,7 +59,7 @@ static int meets(const water *w, const outlet *from, const jet *j, const outlet 
 
 /* Share of a jet that meets the hull, and its derivatives by the direction, in which it is
    constant along it. */
-static real share_on_hull(const water *w, const outlet *from, const real *ahead, real *slope) {
+real fl_share_on_hull(const water *w, const outlet *from, const real *ahead, real *slope) {
   real position[3]; /* on the scale of the ellipsoid, which is then a unit sphere */
   real course[3];
   for (int c = 0; c < 3; c++) {
@@ -115,7 +82,7 @@ static real share_on_hull(const water *w, const outlet *from, const real *ahead,
 static void add_hull(const water *w, const outlet *p, const jet *j, const real *force, real *change,
                      real by_force[3][3]) {
   real d_share[3];
-  const real lost = w->hull * share_on_hull(w, p, j->ahead, d_share);
+  const real lost = w->hull * fl_share_on_hull(w, p, j->ahead, d_share);
   for (int b = 0; b < 3; b++) change[b] -= lost * force[b];
   for (int c = 0; c < 3; c++) {
     const real d_lost = w->hull * d_share[c] / j->thrust;
@@ -187,7 +154,7 @@ static int jets_at(const water *w, const outlet *outlets, const jet *jets, int i
   int count = 0;
   for (int j = 0; j < (int)w->n; j++) {
     if (j == i || !(outlets[j].diameter > 0)) continue;
-    if (!meets(w, outlets + j, jets + j, outlets + i, met + count)) continue;
+    if (!fl_jet_meets(w, outlets + j, jets + j, outlets + i, met + count)) continue;
     met[count].from = j;
     for (int c = 0; c < 3; c++) u[c] -= met[count].speed * jets[j].ahead[c];
     count++;
@@ -220,15 +187,15 @@ static void add_slopes_of_jets(const jet *jets, const jet_met *met, int count, r
    derivatives (n, 3, 6). */
 static void offset_of(const water *w, const real *force, const real *inflow, real *change,
                       real *wrench, real *slope) {
-  const outlet *outlets = (const outlet *)(w + 1);
+  const outlet *outlets = outlets_of(w);
   const int n = (int)w->n;
   const int has_jets = w->formula != 0;
-  const int has_hull = has_jets && w->half[0] > 0 && w->half[1] > 0 && w->half[2] > 0;
+  const int meets_hull = has_hull(w);
   jet jets[FL_MOST];
   memset(change, 0, (size_t)3 * (size_t)n * sizeof *change);
   memset(wrench, 0, 6 * sizeof *wrench);
   if (slope) memset(slope, 0, (size_t)18 * (size_t)n * sizeof *slope);
-  for (int i = 0; i < n; i++) jets[i] = jet_of(w, outlets + i, force + 3 * i);
+  for (int i = 0; i < n; i++) jets[i] = fl_jet_of(w, outlets + i, force + 3 * i);
   for (int i = 0; i < n; i++) {
     const outlet *at = outlets + i;
     const real *f = force + 3 * i;
@@ -239,7 +206,7 @@ static void offset_of(const water *w, const real *force, const real *inflow, rea
     real by_force[3][3] = {{0}};
     real by_water[3][3] = {{0}};
     if (has_jets) count = jets_at(w, outlets, jets, i, met, u);
-    if (has_hull) add_hull(w, at, jets + i, f, taken, by_force);
+    if (meets_hull) add_hull(w, at, jets + i, f, taken, by_force);
     if (count > 0) {
       add_taken(w, at, jets + i, f, u, slope != 0, taken, by_force, by_water);
     }

@@ -1,7 +1,7 @@
 /* Answers where actuators act on each other, Eq. 18, in outer iterations: the dual of the model
    made linear at the last forces, then Levenberg-Marquardt steps on the whole model (sequential
    convex programming). finlab/allocation/dual/outer_iterations.py says where they converge. */
-#include "internal.h"
+#include "jets.h"
 
 /* Parts of sets with gaps that are looked at after the first iteration, which begins near
    its answer. */
@@ -45,6 +45,30 @@ static void forces_of_commands(const fl_coupled_robot *robot, const real *block,
   }
 }
 
+/* What actuators do to each other at forces: the offset (6,), and, where wanted, its derivatives
+   (n, 3, 6) by the forces along the laws' axes. */
+static void offset_along_axes(const fl_coupled_robot *robot, const real *block, const fl_span *span,
+                              real force[][3], real body[][3], int has_slope, real *offset,
+                              real by_axes[][3][6]) {
+  if (robot->line_jets) {
+    fl_jets_of_lines(robot, span, force, offset, has_slope ? by_axes : 0);
+    return;
+  }
+  real unused[FL_MOST][3];
+  real slope[FL_MOST][3][6];
+  robot->offset(robot->constants, *body, 1, robot->inflow, *unused, offset,
+                has_slope ? **slope : 0);
+  for (int i = 0; has_slope && i < COUNT(block); i++) {
+    for (int c = 0; c < law_axes(ACTUATOR(block, i)); c++) {
+      const real *axis = robot->frames + 9 * i + 3 * c;
+      for (int k = 0; k < 6; k++) {
+        by_axes[i][c][k] = axis[0] * slope[i][0][k] + axis[1] * slope[i][1][k] +
+                           axis[2] * slope[i][2][k];
+      }
+    }
+  }
+}
+
 /* Makes the wrench of a block linear at commands: its effectiveness becomes that of the laws
    and the slope of what the actuators do to each other, its offset what is left. By a chord the
    slope stays that of the commands before, and the offset alone is evaluated. Their residual from
@@ -56,11 +80,10 @@ real fl_linearize_coupled(const fl_coupled_robot *robot, real *block, fl_work *w
   fl_head *head = (fl_head *)block;
   real force[FL_MOST][3];
   real body[FL_MOST][3];
-  real unused[FL_MOST][3];
   real offset[6];
-  real slope[FL_MOST][3][6];
+  real slope[FL_MOST][3][6]; /* by the forces along the laws' axes */
   forces_of_commands(robot, block, span, command, force, body);
-  robot->offset(robot->constants, *body, 1, robot->inflow, *unused, offset, is_chord ? 0 : **slope);
+  offset_along_axes(robot, robot->block_uncoupled, span, force, body, !is_chord, offset, slope);
   for (int k = 0; k < 6; k++) {
     head->wrench_offset[k] = HEAD(robot->block_uncoupled)->wrench_offset[k] +
                              robot->axis_counts[k] * offset[k];
@@ -70,14 +93,11 @@ real fl_linearize_coupled(const fl_coupled_robot *robot, real *block, fl_work *w
     const fl_actuator *plain = ACTUATOR(robot->block_uncoupled, i);
     fl_actuator *linear = (fl_actuator *)ACTUATOR(block, i);
     for (int c = 0; c < law_axes(plain); c++) {
-      const real *axis = robot->frames + 9 * i + 3 * c;
       const real *by_laws = plain->effectiveness_normalized[c];
       real *by_model = linear->effectiveness_normalized[c];
       for (int k = 0; k < 6; k++) {
         if (!is_chord) {
-          const real along = axis[0] * slope[i][0][k] + axis[1] * slope[i][1][k] +
-                             axis[2] * slope[i][2][k];
-          by_model[k] = by_laws[k] + robot->axis_counts[k] * along / head->wrench_scale[k];
+          by_model[k] = by_laws[k] + robot->axis_counts[k] * slope[i][c][k] / head->wrench_scale[k];
         }
         const real more = (by_model[k] - by_laws[k]) * head->wrench_scale[k];
         head->wrench_offset[k] -= force[i][c] * more;
@@ -325,15 +345,13 @@ static int step_to_answer(outer_search *search, fl_answer *answer, real merit) {
 }
 
 /* Whether iterations would end at known forces again: forces of the dual's answer, and their
-   commands, have each line push the same way, and cost no less. */
-int fl_leads_to_known(const real *block, const fl_work *work, const known_end *known,
-                      real force[][2], real command[][3]) {
+   power [W], have each line push the same way, and cost no less. */
+int fl_leads_to_known(const real *block, const known_end *known, real force[][2], real power) {
+  if (power < (1 - MUCH_CHEAPER) * known->power) return 0;
   for (int i = 0; i < COUNT(block); i++) {
     if (force[i][0] * known->force[i][0] < 0) return 0;
   }
-  real unused[FL_MOST][2];
-  const real power = fl_power_of_commands(block, work, command, unused);
-  return power >= (1 - MUCH_CHEAPER) * known->power;
+  return 1;
 }
 
 /* One outer iteration: the dual's answer on the linear model, and a step to its forces. `has_ended`
@@ -343,8 +361,11 @@ static int iterate(outer_search *search, int is_first, fl_answer *out, int *has_
   const int code = answer_linear(search->block, search->work, &search->question, is_first, &answer);
   if (code) return code;
   search->newton_steps += (real)answer.newton_steps;
-  search->is_known = search->known && fl_leads_to_known(search->block, search->work, search->known,
-                                                        answer.force, answer.command);
+  if (search->known) {
+    real unused[FL_MOST][2];
+    const real power = fl_power_of_commands(search->block, search->work, answer.command, unused);
+    search->is_known = fl_leads_to_known(search->block, search->known, answer.force, power);
+  }
   *has_ended = 1;
   if (search->is_known) return FL_OK;
   search->penalty = larger(search->penalty, fl_exact_penalty(search->block, answer.multipliers));

@@ -116,6 +116,13 @@ static change_of_forces compare_responses(const newton_search *search) {
   return change;
 }
 
+/* Power of the responses [W], sum P(y) = sum s y - sum c*(s), from the dual value and its gradient:
+   Eq. 3 and 6. */
+static real power_found(const newton_search *search) {
+  const fl_state *found = search->work->state_found;
+  return found->dual_value - dot(found->lambda_reduced, found->residual, 6);
+}
+
 /* Takes the responses of the linear model for the forces, and its multipliers. */
 static void take_responses(newton_search *search) {
   const fl_state *found = search->work->state_found;
@@ -246,8 +253,7 @@ static int run_rounds(newton_search *search, const known_end *known) {
     const real small_gain = SMALL_GAIN * FABS(work->state_found->dual_value);
     const int is_settled = change.largest <= FINE && search->held.gain <= small_gain;
 
-    fl_commands_for_forces(search->block, &work->box, search->force, 0, search->command);
-    if (known && fl_leads_to_known(search->block, work, known, search->force, search->command)) {
+    if (known && fl_leads_to_known(search->block, known, search->force, power_found(search))) {
       /* A start that is about as cheap may have an answer of its own that these rounds have left:
          outer iterations, whose merit falls, would not. */
       if (k == 0) return NEWTON_KNOWN;

@@ -37,7 +37,7 @@ typedef struct {
   int may_prune;                  /* whether starts that lead to the best forces are left out */
   fl_byte known_way[KNOWN_MOST][FL_MOST]; /* 1 of lines that push ahead, as they were looked at */
   int known_count;
-  real null_space[FL_MOST][FL_MOST]; /* N of `find_null_space` */
+  real null_space[FL_MOST][FL_MOST]; /* columns of N of `find_null_space` */
   real turn_cost[FL_MOST]; /* what it costs at least to turn each of the best forces [W] */
   real turn_gain[FL_MOST]; /* what jets would take less without each of them, nearly [W] */
   fl_answer *answer;       /* by which they were found */
@@ -123,7 +123,7 @@ static void find_null_space(start_search *search) {
     for (int i = 0; i < n; i++) {
       const real *most_i = ACTUATOR(block, i)->row_force_max;
       const real part = dot(row[i], multiplier, 6) * most_i[0] / most_j[0];
-      search->null_space[i][j] = (real)(i == j) - part;
+      search->null_space[j][i] = (real)(i == j) - part;
     }
   }
 }
@@ -186,9 +186,11 @@ static void move_by_linear_model(const start_search *search, real start[][2], re
   for (int i = 0; i < n; i++) {
     moved[i][0] = search->force[i][0];
     moved[i][1] = 0;
-    for (int j = 0; j < n; j++) {
-      moved[i][0] += search->null_space[i][j] * (start[j][0] - search->force[j][0]);
-    }
+  }
+  for (int j = 0; j < n; j++) {
+    const real off = start[j][0] - search->force[j][0];
+    if (off == 0) continue; /* as all but the reversed one */
+    for (int i = 0; i < n; i++) moved[i][0] += search->null_space[j][i] * off;
   }
 }
 

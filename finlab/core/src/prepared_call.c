@@ -175,8 +175,8 @@ static int find_row(python_object *bound, const fl_prepared_call *call) {
 }
 
 /* Asks what is prepared about a wrench, in a row; `previous` and `multipliers` are None for none.
-   Returns what fl_answer_into_row does, or FL_BAD_ARGUMENT where an argument is of another type
-   than is read here. */
+   Returns what fl_answer_into_row does, of coupled robots fl_answer_coupled_into_row, or
+   FL_BAD_ARGUMENT where an argument is of another type than is read here. */
 static int ask(const fl_prepared_call *call, python_object *wrench, python_object *previous,
                python_object *multipliers, real *row) {
   const int n = COUNT(call->block);
@@ -194,6 +194,10 @@ static int ask(const fl_prepared_call *call, python_object *wrench, python_objec
     if (type_of(multipliers) != known.array_type) return FL_BAD_ARGUMENT;
     if (!read_array(multipliers, 1, 6, 1, multipliers_begin)) return FL_BAD_ARGUMENT;
     question.multipliers = multipliers_begin;
+  }
+  if (call->coupled) {
+    return fl_answer_coupled_into_row(call->coupled, call->block_linear, call->work, &question,
+                                      call->most_error, row);
   }
   return fl_answer_into_row(call->block, call->work, &question, call->most_error, row);
 }
