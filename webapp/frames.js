@@ -29,6 +29,7 @@
   const WORK_MS = 1000; // for so long after a key or a press beside the view actuators stand still there
   const TIMED_EVERY = 15, MOST_COST_MS = 200; // frames, and what one may count as: the first takes longer
   const SPACING = 1.4; // between frames that take long, in times of one
+  const LABELS_MS = 600; // labels of new actuators are drawn where they are with the picture after the first
   const PICTURE = 2; // pixels of a saved picture per pixel of the page
   const APART = 1.9; // between the phases of fins, which look alive so
 
@@ -182,7 +183,10 @@
     flap(commands, rate, still, counts = { '/robot': commands.length }) {
       patch();
       listenToRequests();
-      if (commands.length !== parts.length) [phases, turns] = [commands.map((_, k) => APART * k), commands.map(() => 0)];
+      if (commands.length !== parts.length) {
+        [phases, turns] = [commands.map((_, k) => APART * k), commands.map(() => 0)];
+        setTimeout(() => { ask(); root()?.invalidate(); }, LABELS_MS);
+      }
       [parts, speed, frozen] = [commands, rate, still];
       robots = Object.keys(counts);
       blades = robots.flatMap((name) => [...Array(counts[name]).keys()].map((k) => `${name}/fins/${k}/turn/blade`));

@@ -22,6 +22,7 @@ from finlab.physics import make_law
 from finlab.swim.design_files import stored_table
 from tests.webapp.stand_in import AtOnce
 from webapp.session import Session, files
+from webapp.session.looking import TWO_ROBOTS
 from webapp.tasks.designs import Designs
 from webapp.tasks.solver import Solver
 
@@ -176,3 +177,54 @@ def test_a_link_carries_the_wrench_and_says_that_it_is_a_copy(
         with pytest.raises(FinlabError, match="expected"):
             there.open_link(f"{fragment.partition('&')[0]}&wrench={wrench}")
         assert theirs.state.target == state.target
+
+
+def test_a_link_of_two_shows_both_and_says_what_does_not_travel(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    mine = Session(load_layout("octo"))
+    theirs = Session(load_layout("ucat"))
+    browser = Browser()
+    scripts: list[str] = []
+    monkeypatch.setattr("webapp.tasks.designs.run_script", lambda _, script: scripts.append(script))
+    designs = designs_of(mine, browser)
+    with pytest.raises(FinlabError, match="open it first"):
+        designs.share_pair()
+    mine.set_target(2, -1.25)
+    mine.toggle_loss(mine.state.layout.names[0])
+    mine.two_robots.choose("right", "Shipped: bluerov2")
+    mine.show_drawer(TWO_ROBOTS)
+    designs.share_pair()
+    assert "What is damaged does not travel" in scripts[0]
+    fragment = re.findall(rf'"({files.FRAGMENT}[^"]*)"', scripts[0])[0]
+    there = designs_of(theirs, browser)
+    there.open_link(fragment)
+    pair = theirs.two_robots.pair
+    assert pair is not None and pair.left.is_this
+    layouts = [standing.state.layout for standing in pair.both]
+    assert layouts == [load_layout("octo"), load_layout("bluerov2")]
+    assert theirs.state.target == mine.state.target
+    assert theirs.undo() == "Open octo"
+    state = theirs.state
+    for broken in ("", "y", GOOD_LINK[:-9]):
+        with pytest.raises(FinlabError, match="no whole design|no design"):
+            there.open_link(f"{fragment.partition('&beside')[0]}&beside={broken or '?'}")
+        assert theirs.state == state
+
+
+def test_a_link_or_a_file_is_put_beside_this_robot() -> None:
+    session = Session(load_layout("ucat"))
+    designs = designs_of(session, Browser())
+    state = session.state
+    address = f"http://127.0.0.1:8080/?shared#{files.FRAGMENT}{GOOD_LINK}{files.WRENCH}1,0,0,0,0,0"
+    designs.open_link_beside(f"  {address} ")
+    designs.open_beside("octo.yaml", yaml_text(layout_to_dict(load_layout("octo"))).encode())
+    assert session.state == state, "this robot and its wrench stay"
+    pair = session.two_robots.pair
+    assert pair is not None and pair.right.title == "File: octo.yaml"
+    assert [source.title for source in session.two_robots.guests] == [
+        "Link: ucat",
+        "File: octo.yaml",
+    ]
+    with pytest.raises(FinlabError, match="no whole design"):
+        designs.open_link_beside("https://example.org/")

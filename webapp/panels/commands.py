@@ -5,7 +5,7 @@ from functools import partial
 from typing import Any, NamedTuple
 
 from webapp.page import Page
-from webapp.session.looking import TASKS
+from webapp.session.looking import TASKS, TWO_ROBOTS
 from webapp.session.state import LEAST
 from webapp.session.targets import PRESETS
 
@@ -75,6 +75,8 @@ def page_commands(page: Page) -> list[Command]:
     for word in LEAST:
         commands.append(Command(f"Keep {word} least", partial(session.keep_least, word)))
     commands += [
+        Command("Two robots side by side", partial(session.show_drawer, TWO_ROBOTS)),
+        Command("Two robots: swap", session.two_robots.swap),
         Command("Swim: pause or go on", pause_or_go_on, "B"),
         Command("Swim: back to the design", scenery.end_swim),
         Command("Frame what is selected", scenery.frame, "F"),

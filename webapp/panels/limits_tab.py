@@ -66,6 +66,10 @@ def add_improving(page: Page) -> None:
         if result is not None:
             session.accept_layout(result.layout)
 
+    def compare() -> None:
+        if improver.proposal is not None:
+            session.two_robots.show_proposal(improver.proposal)
+
     goals = gui.add_dropdown("Goal", tuple(GOALS_BY_WORDS), hint="What to raise.")
     page.bind(goals, partial(change, SearchRequest.with_goal), lambda draft: draft.goal)
     add_fin_buttons(
@@ -107,8 +111,13 @@ def add_improving(page: Page) -> None:
     for handle in (bar, cancel):
         board.show(handle, visible=lambda improving: improving)
     add_html(gui, marker("fl-verdict"))
-    verdicts = {"Accept": accept, "Leave": improver.forget}
-    verdict = page.add_buttons("Result", verdicts, visible=False, hint="Accepting can be undone.")
+    verdicts = {"Accept": accept, "Compare": compare, "Leave": improver.forget}
+    verdict = page.add_buttons(
+        "Result",
+        verdicts,
+        visible=False,
+        hint="Accepting can be undone; to compare is to see both.",
+    )
     board.show(
         verdict, visible=lambda improvement: improvement is not None and improvement.improved
     )

@@ -11,7 +11,7 @@ from webapp.markup.two_robots import figures_table, losses_tables, summary
 from webapp.markup.words import html, marker
 from webapp.page import Page
 from webapp.session.looking import CANDIDATES
-from webapp.session.two_robots import PLACES, Pair, Source
+from webapp.session.two_robots import PLACES, PROPOSAL, Pair, Source
 from webapp.tasks.solver import Reply
 from webapp.tasks.two_robots import Cards
 
@@ -35,7 +35,15 @@ def add_two_robots(page: Page) -> None:
         page.bind(robots, partial(choose, place), partial(_title_at, PLACES.index(place)))
     page.add_html(_notes)
     add_html(gui, marker("fl-accept"))
-    accepts = {f"Accept {place}": partial(two_robots.accept, place) for place in PLACES}
+
+    def accept(place: str) -> None:
+        pair = two_robots.pair
+        is_proposal = pair is not None and pair.both[PLACES.index(place)].title == PROPOSAL
+        two_robots.accept(place)
+        if is_proposal:
+            page.jobs.improver.forget()
+
+    accepts = {f"Accept {place}": partial(accept, place) for place in PLACES}
     page.add_buttons("This robot", accepts, hint="It becomes the robot; undo takes that back.")
 
     def swap() -> None:
@@ -90,7 +98,8 @@ def _notes(
     same_layout = left.state.layout == right.state.layout
     if same_layout and left.state.damage == right.state.damage:
         return html(
-            "<div class='fl said'>Both are the same robot; choose another one on one side.</div>"
+            "<div class='fl'><div class='versus-said'>Both are the same robot; choose another one "
+            "on one side.</div></div>"
         )
     if left.state.method != right.state.method:
         sentences.append(
@@ -100,7 +109,7 @@ def _notes(
     if not pair_busy:
         replies = (left_reply, right_reply)
         sentences += summary(pair, replies, _cards_of(cards, cards_busy))
-    return html("<div class='fl said'>{}</div>", " ".join(sentences))
+    return html("<div class='fl'><div class='versus-said'>{}</div></div>", " ".join(sentences))
 
 
 def add_figures_of_both(page: Page) -> None:

@@ -112,16 +112,16 @@ class TwoRobots:
             self._pair = Pair(left, right)
         return self._pair
 
-    def sources(self, proposal: Layout | None = None) -> tuple[Source, ...]:
+    def sources(self, proposal: State | None = None) -> tuple[Source, ...]:
         """All robots that may be chosen, each with a title of its own.
 
         Args:
-            proposal: what a search has found for this robot; None where there is nothing.
+            proposal: the robot that a search has found; None where there is none.
         """
         session = self._session
         sources = [THIS_ROBOT]
         if proposal is not None:
-            sources.append(replace(Source.of_state(PROPOSAL, session.state), layout=proposal))
+            sources.append(Source.of_state(PROPOSAL, proposal))
         if session.saved != session.state.layout:
             sources.append(Source(SAVED, session.saved))
         sources += self._earlier()
@@ -136,7 +136,7 @@ class TwoRobots:
                 titles.add(source.title)
         return tuple(sources)
 
-    def choose(self, place: str, title: str, proposal: Layout | None = None) -> None:
+    def choose(self, place: str, title: str, proposal: State | None = None) -> None:
         """Another robot on one of `PLACES`, by its title. FinlabError: there is none of that."""
         by_title = {source.title: source for source in self.sources(proposal)}
         self._put(place, by_title[one_of(title, "robot", by_title)])
@@ -145,6 +145,11 @@ class TwoRobots:
         """Put a robot on one of `PLACES`, and look at both."""
         self._put(place, source)
         self._session.show_drawer(TWO_ROBOTS)
+
+    def show_proposal(self, proposal: State) -> None:
+        """Look at this robot, at the left, and what a search has found for it."""
+        self._chosen = [THIS_ROBOT, THIS_ROBOT]
+        self.show("right", Source.of_state(PROPOSAL, proposal))
 
     def welcome(self, place: str, title: str, layout: Layout, lost: tuple[str, ...]) -> None:
         """Take in a robot of a file or a link, put it on one of `PLACES`, and look at both.

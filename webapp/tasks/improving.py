@@ -114,10 +114,13 @@ class Improver(Slot[Search, Improvement]):
         return None if progress is None else progress.layout
 
     @property
-    def proposal(self) -> Layout | None:
-        """The layout that is offered, with what is lost; None where none is better."""
+    def proposal(self) -> State | None:
+        """The state of the search with the layout that is offered; None where none is better."""
+        search = self.question
         answer = self.answer
-        return answer.layout if answer is not None and answer.improved else None
+        if search is None or answer is None or not answer.improved:
+            return None
+        return replace(search.state, layout=answer.layout)
 
     def start(self, state: State, request: SearchRequest) -> None:
         """Starts a search that moves the working actuators of a state; mirror pairs stay so.
