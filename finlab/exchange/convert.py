@@ -112,12 +112,27 @@ def convert(
     if form == "layout":
         save_layout(layout, output)
     else:
-        if layout.interaction is not None:
-            exchange.note(
-                f"What the actuators do to each other is left out: {form} has no place for it."
-            )
-        write_whole(output, WRITERS[form](layout, exchange, suffix))
+        write_whole(output, text_in(form, layout, exchange, suffix))
     return layout, exchange.notes
+
+
+def text_in(form: str, layout: Layout, exchange: Exchange, suffix: str) -> str:
+    """Returns a layout in a format of others, as text.
+
+    Args:
+        form: a key of `WRITERS`.
+        layout: the layout to write.
+        exchange: gets the notes on what the format cannot hold.
+        suffix: of the file, such as `.csv`; some formats have several forms.
+
+    Raises:
+        LayoutError: the format cannot hold the layout.
+    """
+    if layout.interaction is not None:
+        exchange.note(
+            f"What the actuators do to each other is left out: {form} has no place for it."
+        )
+    return WRITERS[form](layout, exchange, suffix)
 
 
 def read_any(file: str, exchange: Exchange) -> Layout:

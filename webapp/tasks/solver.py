@@ -218,6 +218,17 @@ class Solver:
             self._made.pop(next(iter(self._made)))
         return allocator
 
+    def checkpoint_of(self, state: State) -> str | None:
+        """The checkpoint that a state is answered with, as a name or folder; None for the shipped
+        one, and for methods without networks."""
+        is_papers = self.first_network != SHIPPED
+        if state.method == "mdn":
+            return None if is_papers or self._checkpoint is None else str(self._checkpoint)
+        network = state.network or self.first_network
+        if state.method != "paper" or network == SHIPPED:
+            return None
+        return str(self.networks()[one_of(network, "network", self.networks())])
+
     def _choice(self, method: str, network: str) -> MethodChoice:
         """A method with its networks, loaded once."""
         if (method, network) not in self._choices:
