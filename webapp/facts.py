@@ -12,6 +12,7 @@ from webapp.session.two_robots import Pair
 from webapp.tasks.answering import ShownAnswer
 from webapp.tasks.jobs import Jobs
 from webapp.tasks.solver import Reply
+from webapp.tasks.take_home import HomeQuestion
 
 
 class PairFacts(NamedTuple):
@@ -122,6 +123,9 @@ def facts_of(
         "judgement_stage": jobs.log.stage,
         "by_page": jobs.log.by_page,
         "log_moment": jobs.log.moment,
+        "offers": jobs.offers.answer,
+        "offers_error": jobs.offers.error,
+        "is_offered": jobs.offers.answered == HomeQuestion.of_state(state),
         # A swim, and the view.
         "swims": swimming.active,
         "swimmer": swimmer,

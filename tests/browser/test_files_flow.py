@@ -181,3 +181,20 @@ def test_a_wrong_file_is_told_where_and_changes_nothing(page: Any, tmp_path: Pat
     page.upload("Fit from measurements (CSV)", tmp_path / "huge.csv")
     page.until(lambda: any("huge.csv: has 160,000,000 bytes" in note for note in page.notes()))
     assert page.session.state == before and not page.view.jobs.fitting.busy
+
+
+def test_a_robot_is_taken_home_in_a_format_of_others(page: Any, tmp_path: Path) -> None:
+    page.tab("Export")
+    px4 = page.page.locator(".fl-home button", has_text="PX4")
+    px4.wait_for()
+    assert px4.is_disabled() and "has no thruster" in page.text("#home-px4")
+    model = page.download("MJCF", tmp_path / "ucat.xml").read_text()
+    assert model.startswith("<mujoco")
+    page.view.do(lambda: page.session.open_layout(load_layout("bluerov2_heavy")))
+    page.until(lambda: px4.is_enabled())
+    parameters = page.download("PX4", tmp_path / "robot.params").read_text()
+    assert "CA_ROTOR_COUNT\t8" in parameters
+    assert "load_layout('bluerov2_heavy')" in page.text("[data-fl~=Python] pre.command")
+    page.press("Copy as Python")
+    page.page.locator("[data-fl~=Python] .copy[data-done]").wait_for()
+    assert page.problems == []

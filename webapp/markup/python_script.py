@@ -1,14 +1,12 @@
 """The question on the page as a script in Python that prints the same answer."""
 
 from dataclasses import replace
-from typing import Any
 
 from finlab.axes import AXES
 from finlab.layout import Layout
 from finlab.layout.damage import NO_DAMAGE, Damage
-from webapp.session.files import shipped
+from webapp.session.files import robot_file, shipped
 from webapp.session.state import DRAWING, State
-from webapp.tasks.take_home import robot_file
 
 
 def script_of(state: State, checkpoint: str | None = None) -> str:
@@ -20,28 +18,36 @@ def script_of(state: State, checkpoint: str | None = None) -> str:
             shipped one, and for methods without networks.
     """
     robot, free = robot_and_free_axes(state.layout)
-    arguments = [repr(state.method)] if state.method != "dual" else []
+    made_of = ["robot"]
+    if state.method != "dual":
+        made_of.append(repr(state.method))
     if checkpoint is not None:
-        arguments.append(f"checkpoint={checkpoint!r}")
+        made_of.append(f"checkpoint={checkpoint!r}")
     if state.method in DRAWING and state.temperature is not None:
-        arguments.append(f"temperature={state.temperature!r}")
+        made_of.append(f"temperature={state.temperature!r}")
+    asked = ["wrench"]
+    if state.damage != NO_DAMAGE:
+        asked.append(f"damage=finlab.Damage({_damage_arguments(state.damage)})")
+    if free:
+        asked.append(f"free={free!r}")
+    if state.policy != "closest":
+        asked.append(f"policy={state.policy!r}")
+    if state.flow is not None:
+        asked.append(f"flow={list(state.flow)!r}")
+    if len(asked) == 1:
+        call = ["answer = allocator.allocate(wrench)"]
+    else:
+        call = ["answer = allocator.allocate(", *[f"    {each}," for each in asked], ")"]
     lines = [
         "import finlab",
         "",
         f"robot = finlab.load_layout({robot!r})",
-        f"allocator = finlab.Allocator({', '.join(['robot', *arguments])})",
-        "answer = allocator.allocate(",
-        f"    {list(state.target)!r},  # Fx, Fy, Fz [N], Tx, Ty, Tz [N m]",
+        f"allocator = finlab.Allocator({', '.join(made_of)})",
+        f"wrench = {list(state.target)!r}  # N, N m",
+        *call,
+        "print(answer)",
+        "print(answer.command.tolist())",
     ]
-    if state.damage != NO_DAMAGE:
-        lines.append(f"    damage=finlab.Damage({_damage_arguments(state.damage)}),")
-    if free:
-        lines.append(f"    free={free!r},")
-    if state.policy != "closest":
-        lines.append(f"    policy={state.policy!r},")
-    if state.flow is not None:
-        lines.append(f"    flow={list(state.flow)!r},")
-    lines += [")", "print(answer)", "print(answer.command.tolist())"]
     return "\n".join(lines) + "\n"
 
 
@@ -63,13 +69,6 @@ def _damage_arguments(damage: Damage) -> str:
     arguments: list[str] = []
     if damage.lost:
         arguments.append(f"lost={list(damage.lost)!r}")
-    faults: dict[str, Any] = {
-        "weak": damage.weak,
-        "torn": damage.torn,
-        "stuck": damage.stuck,
-        "running": damage.running,
-    }
-    for kind, values in faults.items():
-        if values:
-            arguments.append(f"{kind}={dict(values)!r}")
+    for kind, by_name in damage.faults_by_kind.items():
+        arguments.append(f"{kind}={dict(by_name)!r}")
     return ", ".join(arguments)

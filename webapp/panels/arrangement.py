@@ -32,6 +32,7 @@ from webapp.panels.log_tab import add_log, add_losses, log_plots, replays_table
 from webapp.panels.modes_tab import add_candidates, add_comparison
 from webapp.panels.null_space import add_null_space
 from webapp.panels.swim_tab import add_figures, add_run, add_scenario, add_timeline
+from webapp.panels.take_home import add_python, add_take_home
 from webapp.panels.two_robots import add_figures_of_both, add_two_robots
 from webapp.panels.wrench_tab import add_answer, add_commands, add_jets, add_speed, add_target
 from webapp.session.looking import CANDIDATES, NULL_SPACE, TASKS, TWO_ROBOTS
@@ -118,7 +119,9 @@ PANELS = (
     Panel(RIGHT, (SIMULATE,), "Run", add_run),
     Panel(RIGHT, (SIMULATE,), "Figures", add_figures),
     Panel(DRAWER, (SIMULATE,), "Swim over time", add_timeline),
+    Panel(LEFT, (EXPORT,), "Take home", add_take_home),
     Panel(RIGHT, (EXPORT,), "Files", add_files),
+    Panel(RIGHT, (EXPORT,), "Python", add_python),
     Panel(VIEW, TASKS, "Camera", card(camera)),
     Panel(VIEW, TASKS, "Display", add_switches, is_folded=True),
 )

@@ -64,18 +64,20 @@ def _design(state: State) -> str:
 
 
 def _file_card(file: str, purpose: str, command: str) -> str:
-    """The purpose of a file, and a command that reads it.
+    """The purpose of a file, and a command that reads it."""
+    return copy_card(html("<b>{}</b> <span class='dim'>is {}:</span>", file, purpose), command)
 
-    A click copies the command to the clipboard, where the browser allows that.
-    """
+
+def copy_card(words: str, text: str) -> str:
+    """A text below some words, which a click copies to the clipboard, where the browser allows
+    that."""
     copy = "navigator.clipboard?.writeText(this.innerText); this.previousSibling.dataset.done = 1"
     return html(
-        "<div class='fl'><div class='said copy'><b>{}</b> <span class='dim'>is {}:</span></div>"
+        "<div class='fl'><div class='said copy'>{}</div>"
         '<pre class="command" title="click to copy" onclick="{}">{}</pre></div>',
-        file,
-        purpose,
+        words,
         copy,
-        command,
+        text,
     )
 
 

@@ -55,7 +55,7 @@ VARIABLES = (
     f"[data-mantine-color-scheme=dark] {{ --fl-reach: {css(REACH_DARK)}; }}"
 )
 """The colours of the theme as variables of CSS."""
-STYLE_SHEETS = ("style.css", "frame.css", "inquiry.css", "two_robots.css")
+STYLE_SHEETS = ("style.css", "frame.css", "inquiry.css", "two_robots.css", "take_home.css")
 """Files of `webapp/markup` that style the page."""
 STYLE = html(
     "<style>{}{}</style>",

@@ -73,6 +73,15 @@ def design_name(layout: Layout) -> str:
     return f"{file_stem(layout.name)}.{'zip' if has_files(layout) else 'yaml'}"
 
 
+def robot_file(layout: Layout) -> str:
+    """What commands and scripts open a robot by: its name where it is shipped, else the file that
+    the page makes of it."""
+    shipped = shipped_name(layout)
+    if shipped is not None:
+        return shipped
+    return file_stem(layout.name) + BUNDLE if has_files(layout) else design_name(layout)
+
+
 def read_layout(
     name: str, content: bytes, answers: Answers = design_files.NO_ANSWERS
 ) -> design_files.Opened | design_files.Unanswered:

@@ -23,12 +23,13 @@ from webapp.session import Session, files
 from webapp.session.files import BESIDE, FRAGMENT, WRENCH, file_stem, packed, unpacked
 from webapp.session.granted import SourceFile
 from webapp.session.looking import TWO_ROBOTS
-from webapp.session.state import State
+from webapp.session.state import State, one_of
 from webapp.tasks.importing import rows_of
 from webapp.tasks.modes_csv import modes_csv
 from webapp.tasks.slot import Deferred
 from webapp.tasks.solver import Modes, Solver
 from webapp.tasks.swimming import Swimming
+from webapp.tasks.take_home import BY_KEY, HomeQuestion, Written
 from webapp.viser_internals import run_script
 
 KINDS = (
@@ -255,6 +256,18 @@ class Designs:
         """Send the graph of the robot's actuators: the same text as `finlab export --graph`."""
         layout = self._session.state.layout
         self._export(file_stem(layout.name) + files.GRAPH, lambda: graph_text(layout).encode())
+
+    def take_home(self, key: str) -> None:
+        """Send the robot in a format of others, one of `FORMATS`. FinlabError: the format cannot
+        hold it."""
+        form = BY_KEY[one_of(key, "format", BY_KEY)]
+        question = HomeQuestion.of_state(self._session.state)
+        name = form.file_name(question.layout)
+
+        def send(written: Written) -> None:
+            self._download(name, written.content, " ".join(written.notes))
+
+        self._deferred.make(partial(form.write, question), send, name)
 
     def save_modes(self, answer: Allocation, modes: Modes) -> None:
         """Send the candidates of an answer as CSV."""

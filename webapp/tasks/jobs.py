@@ -23,6 +23,7 @@ from webapp.tasks.log_reading import LogReading
 from webapp.tasks.slot import Slot
 from webapp.tasks.solver import JetComparison
 from webapp.tasks.swimming import Swimming
+from webapp.tasks.take_home import HomeQuestion, Offer, offers_of
 from webapp.tasks.two_robots import Pairing
 
 REST_S = 0.12
@@ -60,6 +61,8 @@ class Jobs:
         self.log = LogReading(context)
         self.comparison = Comparison(context)
         self.pairing = Pairing(context)
+        self.offers: Slot[HomeQuestion, tuple[Offer, ...]] = Slot(pools.brief, bell, offers_of)
+        """In which formats the robot can be taken home."""
         self.swimming = Swimming(context)
         self.first = frozenset[Slot[Any, Any]]([self.answering.slot, *self.pairing.slots])
         """What a change of the state waits for before the page is written."""
@@ -85,6 +88,8 @@ class Jobs:
             self.ranging.ask(
                 State(state.able, state.damage, target=state.target, speed=state.speed)
             )
+        if task == "Export":
+            self.offers.ask(HomeQuestion.of_state(state))
         drawn = session.display.drawn
         if task == "Design" and (session.drawer == "Reach" or drawn != "none"):
             before = session.before
@@ -122,5 +127,6 @@ class Jobs:
         for slot in (self.comparison, self.improver, self.growing, self.fitting, self.log):
             slot.forget()
         self.pairing.forget()
+        self.offers.forget()
         for of_robot in (self.answering, self.analyst, self.ranging, self.jet_comparison):
             of_robot.forget()

@@ -17,16 +17,17 @@ from finlab.exchange.convert import text_in
 from finlab.files.guarded import packed
 from finlab.layout import Layout
 from webapp.markup.words import in_app
-from webapp.session.files import BUNDLE, design_name, file_stem, has_files, shipped_name
+from webapp.session.files import file_stem, robot_file, shipped_name
 from webapp.session.state import Flow, State
 
-FINS_AGAIN = "whoever opens it again says which of them are fins."
+FINS_AGAIN = "; whoever opens it again says which of them are fins."
 """What is said in place of the option by which the command line is told so."""
-OPTIONS = {
-    "--fins names the fins among them.": FINS_AGAIN,
-    "--fins names the fins again.": FINS_AGAIN,
+IN_PAGE = {
+    "; --fins names the fins among them.": FINS_AGAIN,
+    ", --fins names the fins again.": FINS_AGAIN,
+    ", and A ": ", and a ",
 }
-"""Ends of notes that name options of commands -> what the page says."""
+"""Parts of the library's sentences -> what the page says."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +107,7 @@ def offers_of(question: HomeQuestion) -> tuple[Offer, ...]:
         try:
             written = (form.check or form.write)(question)
         except FinlabError as error:
-            offers.append(Offer(form, name, reason=in_app(as_sentence(str(error)))))
+            offers.append(Offer(form, name, reason=_said(as_sentence(str(error)))))
         else:
             offers.append(Offer(form, name, written.notes))
     return tuple(offers)
@@ -124,9 +125,9 @@ def _exchanged(form: str, suffix: str) -> Callable[[HomeQuestion], Written]:
 
 
 def _said(note: str) -> str:
-    """A note of the library in the words of the page."""
-    for option, words in OPTIONS.items():
-        note = note.replace(option, words)
+    """A sentence of the library in the words of the page."""
+    for words, own_words in IN_PAGE.items():
+        note = note.replace(words, own_words)
     return in_app(note)
 
 
@@ -139,9 +140,9 @@ def _check_c(question: HomeQuestion) -> Written:
     if question.lost:
         notes.append(f"It is of the robot without {', '.join(question.lost)}.")
     if question.flow is None and layout.flow_driven:
+        names = ", ".join(layout.flow_driven)
         notes.append(
-            f"{', '.join(layout.flow_driven)}: no force at rest; set the speed through the water "
-            "that it is to be of."
+            f"At rest {names} give nothing; set the speed through the water that it is to be of."
         )
     elif question.flow is not None:
         notes.append(f"It is of {question.flow[0]:g} m/s through the water.")
@@ -158,19 +159,10 @@ def _write_ros(question: HomeQuestion) -> Written:
     """Parameters of the ROS 2 node."""
     robot = robot_file(question.layout)
     text = ros_parameters(robot, question.policy, question.lost)  # type: ignore[arg-type]
-    notes = ()
+    notes: tuple[str, ...] = ()
     if robot != shipped_name(question.layout):
         notes = (f"It names {robot}: save that, too, at the right.",)
     return Written(text.encode(), notes)
-
-
-def robot_file(layout: Layout) -> str:
-    """What commands and scripts open a robot by: its name where it is shipped, else the file that
-    the page makes of it."""
-    shipped = shipped_name(layout)
-    if shipped is not None:
-        return shipped
-    return file_stem(layout.name) + BUNDLE if has_files(layout) else design_name(layout)
 
 
 BOARDS = "On board"
