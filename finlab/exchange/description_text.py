@@ -118,7 +118,7 @@ def description_text(layout: Layout, exchange: Exchange, form: Mapping[str, str]
     )
     if any(actuator.KIND.force_number is None for actuator in layout.actuators):
         exchange.note(
-            "Others than thrusters are joints that push nothing; --fins names the fins among them."
+            "Others than thrusters are joints that push nothing", "--fins names the fins among them"
         )
     text = form["robot"].format(name=escape(layout.name), parts="".join(texts))
     root = ElementTree.fromstring(text)

@@ -207,8 +207,9 @@ class Exchange:
             if actuator.name not in names
         }
         if len(kinds) == layout.n:
+            within = form.replace("A ", "a ", 1) if form.startswith("A ") else form
             raise LayoutError(
-                f"layout {layout.name} has no thruster, and {form} has a place for these alone"
+                f"layout {layout.name} has no thruster, and {within} has a place for these alone"
             )
         if kinds:
             left_out = ", ".join(f"{name} ({kind})" for name, kind in kinds.items())

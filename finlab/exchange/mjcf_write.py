@@ -296,23 +296,25 @@ def _note_what_is_left_out(layout: Layout, exchange: Exchange) -> None:
     )
     for actuator in layout.actuators:
         words = _words_of(actuator)
-        if words:
-            exchange.note(words)
+        if words is not None:
+            exchange.note(*words)
 
 
-def _words_of(actuator: Actuator) -> str:
-    """What is to be known of how an actuator stands in a model; empty of a thruster."""
+def _words_of(actuator: Actuator) -> tuple[str, str] | None:
+    """What is to be known of how an actuator stands in a model, and what to do about it; None of a
+    thruster."""
     drive = _drive(actuator)
     if drive.row < 0:
-        return "A rudder is a joint with a servo: the flow's force on it is not MuJoCo's."
+        return "A rudder is a joint with a servo: the flow's force on it is not MuJoCo's", ""
     if drive.turns and actuator.KIND.force_number is None:
         return (
             "A fin is a hinge at its zero direction and a motor of its mean thrust; finlab.exchange"
-            ".mujoco_control makes their ctrl of an answer, --fins names the fins again."
+            ".mujoco_control makes their ctrl of an answer",
+            "--fins names the fins again",
         )
     if drive.turns:
-        return "What turns has a motor NAME [N] and a servo NAME_angle [rad]."
-    return ""
+        return "What turns has a motor NAME [N] and a servo NAME_angle [rad]", ""
+    return None
 
 
 def _text(values: Sequence[float]) -> str:

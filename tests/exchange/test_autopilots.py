@@ -219,7 +219,7 @@ def test_what_has_no_place_is_named(tmp_path: Path) -> None:
         "PX4 has a place for thrusters alone; left out are front_right (fin), "
     )
     with pytest.raises(
-        LayoutError, match="layout A has no thruster, and A matrix has a place for these alone"
+        LayoutError, match="layout A has no thruster, and a matrix has a place for these alone"
     ):
         written(finlab.load_layout("A"), tmp_path / "a.csv")
 

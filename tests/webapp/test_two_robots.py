@@ -21,6 +21,7 @@ from webapp.scene.two_robots import half_extent, pair_scale, placement
 from webapp.scene.wrench_nodes import ARROWS, LENGTH, Scale
 from webapp.session import Session, files
 from webapp.session.looking import TWO_ROBOTS
+from webapp.session.state import State
 from webapp.session.two_robots import PROPOSAL, SAVED, THIS, Pair, Source
 from webapp.tasks.slot import Pool
 from webapp.tasks.solver import Solver
@@ -222,7 +223,7 @@ def test_cards_can_be_given_up_and_made_again(session: Session, pool: Pool) -> N
 def test_the_better_figure_is_marked(
     left: float | None, right: float | None, is_less_better: bool, better: int | None
 ) -> None:
-    row = FigureRow("", Figure("", left), Figure("", right), is_less_better)
+    row = FigureRow("", [Figure("", left), Figure("", right)], is_less_better)
     assert row.better == better
 
 
@@ -238,7 +239,7 @@ def test_less_power_for_less_wrench_is_no_merit(
     table = figures_table(pair, (pairing.left.answer, pairing.right.answer), (None, None))
     power = table.split("power [W]")[1].split("</tr>")[0]
     assert "better" not in power
-    assert "Out of reach" in table and "surge" in table.split(">missing<")[1].split("</tr>")[0]
+    assert "exact" in table and "surge" in table.split(">missing<")[1].split("</tr>")[0]
 
 
 @pytest.mark.parametrize("view", CAMERAS)
@@ -305,7 +306,7 @@ def test_before_is_the_state_just_before(session: Session) -> None:
 
 
 def test_a_source_keeps_what_is_asked(session: Session) -> None:
-    source = Source("mine", load_layout("octo"))
+    source = Source("mine", State(load_layout("octo")))
     session.set_speed(0.5)
     state = source.state_for(session.state)
     assert state.speed == 0.5 and state.layout.name == "octo" and not state.links

@@ -1,6 +1,7 @@
 """Markup of two robots beside each other: their figures in one table, what each loses with one
 actuator, and the status of both."""
 
+import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -17,6 +18,7 @@ from finlab.analysis.card_text import (
     AxisRow,
     axis_rows,
 )
+from finlab.arrays import Array
 from finlab.axes import MOTIONS, UNITS, MotionAxis
 from finlab.display import Column, listed
 from finlab.physics.objective import REACHED
@@ -30,6 +32,10 @@ from webapp.theme import DEAD, css
 
 SAME = 1e-3
 """Relative difference of two figures up to which none is the better one."""
+LEVER = 0.2
+"""Lever over which torques count as forces [m], as for the weakest direction."""
+MOST_NAMED = 2
+"""Actuators that cost axes and are named; of more their number is told."""
 BETTER = Markup("<span class='better-sign' title='better' role='img' aria-label='better'>✓</span>")
 """Sign beside the better one of two figures."""
 
@@ -46,8 +52,8 @@ class FigureRow(NamedTuple):
     """A figure of both robots."""
 
     heading: str
-    left: Figure
-    right: Figure
+    both: Sequence[Figure]
+    """Of the left and the right one."""
     is_less_better: bool = False
     is_judged: bool = True
     """Whether one of two such figures is better than the other."""
@@ -56,7 +62,7 @@ class FigureRow(NamedTuple):
     @property
     def better(self) -> int | None:
         """Index of the better one; None where they are alike, or one is not known."""
-        left, right = self.left.value, self.right.value
+        left, right = [figure.value for figure in self.both]
         if not self.is_judged or left is None or right is None:
             return None
         if abs(left - right) <= SAME * max(abs(left), abs(right), 1e-9):
@@ -108,7 +114,7 @@ def _markup_of(row: FigureRow, is_old: bool) -> str:
     """A row of the table."""
     better = row.better
     cells = []
-    for index, figure in enumerate((row.left, row.right)):
+    for index, figure in enumerate(row.both):
         is_better = index == better
         style = "better" if is_better else ""
         sign = BETTER if is_better else ""
@@ -119,42 +125,45 @@ def _markup_of(row: FigureRow, is_old: bool) -> str:
 
 def _answer_rows(replies: Sequence[Reply | None]) -> list[FigureRow]:
     """What both do for the wrench."""
-    errors = []
-    watts = []
-    loads = []
+    errors: list[Figure] = []
+    watts: list[Figure] = []
+    missing: list[Figure] = []
     for reply in replies:
         if reply is None:
-            errors.append(UNKNOWN)
-            watts.append(UNKNOWN)
-            loads.append(UNKNOWN)
+            for figures in (errors, watts, missing):
+                figures.append(UNKNOWN)
             continue
         answer = reply.answer
-        verdict = verdict_of(answer, reply.in_reach).value
         is_exact = answer.err_norm <= REACHED
-        error = f"{verdict}" if is_exact else f"{verdict}, {error_digits(answer.err_norm)}"
-        # All that is exact is alike.
-        errors.append(Figure(error, 0.0 if is_exact else float(answer.err_norm)))
+        left_undone = np.nan_to_num(answer.unallocated)
+        error = "exact" if is_exact else error_digits(answer.err_norm)
+        # Errors are shares of what each robot can push: between two that fall short, the missing
+        # wrench says which is better.
+        errors.append(Figure(error, float(not is_exact)))
         # Less power for less wrench is no merit.
         watts.append(Figure(three_digits(answer.power), answer.power if is_exact else None))
-        missing = np.nan_to_num(answer.unallocated)
-        loads.append(Figure("nothing" if is_exact else missing_axes(missing), None))
+        words = "nothing" if is_exact else missing_axes(left_undone)
+        missing.append(Figure(words, 0.0 if is_exact else size_of(left_undone)))
     hint = "missing, as a share of what each can push; exact up to 0.001"
-    left_error, right_error = errors
-    left_watts, right_watts = watts
-    left_missing, right_missing = loads
     rows = [
-        FigureRow("error", left_error, right_error, is_less_better=True, hint=hint),
-        FigureRow("power [W]", left_watts, right_watts, is_less_better=True),
+        FigureRow("error", errors, is_less_better=True, hint=hint),
+        FigureRow("power [W]", watts, is_less_better=True),
     ]
-    if any(load.text != "nothing" for load in loads):
-        rows.append(FigureRow("missing", left_missing, right_missing, is_judged=False))
+    if any(figure.text != "nothing" for figure in missing):
+        hint = f"the largest part; compared with torques over {LEVER:g} m"
+        rows.append(FigureRow("missing", missing, is_less_better=True, hint=hint))
     return rows
 
 
-def missing_axes(missing: np.ndarray) -> str:
-    """The largest missing component of a wrench (6,) [N, N m] in words: `surge 4.2 N`."""
-    scaled = np.abs(missing) * np.array([1.0, 1.0, 1.0, 5.0, 5.0, 5.0])
-    axis = int(np.argmax(scaled))
+def size_of(wrench: Array) -> float:
+    """The size of a wrench (6,) [N, N m], with its torques over `LEVER` [N]."""
+    return math.hypot(*wrench[:3].tolist(), *(wrench[3:] / LEVER).tolist())
+
+
+def missing_axes(missing: Array) -> str:
+    """The largest component of a missing wrench (6,) [N, N m]: `surge 4.2 N`."""
+    forces = np.abs(missing) / np.array([1.0, 1.0, 1.0, LEVER, LEVER, LEVER])
+    axis = int(np.argmax(forces))
     return f"{MOTIONS[axis]} {three_digits(float(missing[axis]))} {UNITS[axis]}"
 
 
@@ -162,8 +171,8 @@ def _reach_rows(pair: Pair, cards: Sequence[ScoreCard | None]) -> list[FigureRow
     """What both can push."""
     rows = []
     for column in CARD_COLUMNS:
-        left, right = [_card_figure(column, card) for card in cards]
-        rows.append(FigureRow(column.heading, left, right))
+        figures = [_card_figure(column, card) for card in cards]
+        rows.append(FigureRow(column.heading, figures))
     rows_by_card: list[dict[MotionAxis, AxisRow]] = []
     for card in cards:
         by_axis = {} if card is None else {row.axis: row for row in axis_rows(card)}
@@ -171,11 +180,11 @@ def _reach_rows(pair: Pair, cards: Sequence[ScoreCard | None]) -> list[FigureRow
     commanded = np.any([standing.state.layout.commanded for standing in pair.both], axis=0)
     for axis, unit, counts in zip(MOTIONS, UNITS, commanded.tolist(), strict=True):
         if counts:
-            left, right = [
+            figures = [
                 _axis_figure(axis, by_axis, card)
                 for by_axis, card in zip(rows_by_card, cards, strict=True)
             ]
-            rows.append(FigureRow(f"{axis} [{unit}]", left, right, hint=LARGEST.hint))
+            rows.append(FigureRow(f"{axis} [{unit}]", figures, hint=LARGEST.hint))
     return rows
 
 
@@ -202,8 +211,8 @@ def _robot_rows(pair: Pair) -> list[FigureRow]:
     """What both are made of."""
 
     def row(heading: str, text_of: Callable[[Standing], str]) -> FigureRow:
-        left, right = [Figure(text_of(standing), None) for standing in pair.both]
-        return FigureRow(heading, left, right, is_judged=False)
+        figures = [Figure(text_of(standing), None) for standing in pair.both]
+        return FigureRow(heading, figures, is_judged=False)
 
     rows = [
         row("actuators", lambda standing: standing.state.layout.counts_in_words),
@@ -229,7 +238,7 @@ def summary(
     """Sentences that say what the tables come to; arguments as for `figures_table`."""
     sentences = []
     power = _answer_rows(replies)[1]
-    watts = [power.left.value, power.right.value]
+    watts = [figure.value for figure in power.both]
     better = power.better
     if better is not None:
         least, most = watts[better], watts[1 - better]
@@ -247,12 +256,16 @@ def summary(
         elif won:
             sentences.append(f"The {place} one reaches further along {listed(won)}.")
     for place, card in zip(PLACES, cards, strict=True):
-        costly = [] if card is None else [loss.actuator for loss in card.losses if loss.lost]
-        if costly:
-            words = "loses axes with any actuator"
-            if card is not None and len(costly) < len(card.losses):
-                words = f"loses axes with {listed(costly)}"
-            sentences.append(f"The {place} one {words}.")
+        if card is None:
+            continue
+        costly = [loss.actuator for loss in card.losses if loss.lost]
+        if len(costly) > MOST_NAMED:
+            sentences.append(
+                f"Without any one of {len(costly)} actuators the {place} one loses axes."
+            )
+        elif costly:
+            names = " or ".join(costly)
+            sentences.append(f"Without {names} the {place} one loses axes.")
     return tuple(sentences)
 
 
@@ -296,7 +309,6 @@ def status_of_both(pair: Pair, replies: Sequence[Reply | None], is_busy: bool) -
     """The status line of both: name, power, and verdict of each."""
     markup = []
     for place, standing, reply in zip(PLACES, pair.both, replies, strict=True):
-        name = standing.state.layout.name
         figures = ""
         words = WORKING
         color = DEAD
@@ -305,18 +317,13 @@ def status_of_both(pair: Pair, replies: Sequence[Reply | None], is_busy: bool) -
             words = verdict.value
             color = COLORS[verdict]
             figures = html(
-                "<span class='dim'>power</span> <b class='power'>{}</b> W",
+                "<span><span class='dim'>power</span> <b class='power'>{}</b> W</span>",
                 three_digits(reply.answer.power),
             )
-        markup.append(
-            html(
-                "<span class='both'><span class='dim'>{}</span> <b>{}</b></span>"
-                "<span>{}</span><span class='pill' style='background:{}'>{}</span>",
-                place,
-                name,
-                figures,
-                css(color),
-                words,
-            )
+        template = (
+            "<span class='both'><span><span class='dim'>{}</span> <b>{}</b></span>{}"
+            "<span class='pill' style='background:{}'>{}</span></span>"
         )
+        name = standing.state.layout.name
+        markup.append(html(template, place, name, figures, css(color), words))
     return markup

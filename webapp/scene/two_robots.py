@@ -42,7 +42,9 @@ from webapp.viser_internals import run_script
 GAP = 0.3
 """Gap between the two, as a share of the width of the wider one."""
 HALF_VIEW = 0.62
-"""Half of the width that a view of size 1 has free, in a narrow window [m]."""
+"""Half of the width that a view of size 1 has free above an open drawer [m]."""
+HALF_HIGH_VIEW = 0.42
+"""The same where the drawer is folded: the view is higher, and as wide as before."""
 BELOW_NAME = 0.06
 """How far below a robot its name stands, for a view of size 1 [m]."""
 RESIZED = (0.75, 1.34)
@@ -62,13 +64,14 @@ class Placement(NamedTuple):
     """Direction (3,) that points downwards in the picture."""
 
 
-def placement(left: Layout, right: Layout, view: str) -> Placement:
+def placement(left: Layout, right: Layout, view: str, is_folded: bool = False) -> Placement:
     """Where two robots stand so that they are left and right in a view of the camera.
 
     Args:
         left: the one that is seen at the left.
         right: the other one.
         view: key of `CAMERAS`.
+        is_folded: whether the drawer below the view is folded.
     """
     line = -np.array(CAMERAS[view])
     line /= np.linalg.norm(line)
@@ -81,7 +84,8 @@ def placement(left: Layout, right: Layout, view: str) -> Placement:
     whole = 2.0 * sum(widths) + gap
     left_place = -(0.5 * whole - widths[0]) * across
     right_place = (0.5 * whole - widths[1]) * across
-    size = max(view_size(left), view_size(right), 0.5 * whole / HALF_VIEW)
+    half_view = HALF_HIGH_VIEW if is_folded else HALF_VIEW
+    size = max(view_size(left), view_size(right), 0.5 * whole / half_view)
     return Placement(left_place, right_place, size, down)
 
 
@@ -230,6 +234,7 @@ class PairScene:
         self._pair: Pair | None = None
         self._view = "3D"
         self._size = 0.0
+        self._is_folded = False
         self._flaps = b""
         board.act(self._show)
 
@@ -254,7 +259,8 @@ class PairScene:
 
     def _aim(self, pair: Pair) -> Placement:
         """Where the two stand; the camera moves where they are of another size."""
-        placed = placement(pair.left.state.layout, pair.right.state.layout, self._view)
+        layouts = [standing.state.layout for standing in pair.both]
+        placed = placement(layouts[0], layouts[1], self._view, self._is_folded)
         least, most = RESIZED
         if not least * placed.size < self._size < most * placed.size:
             self._size = placed.size
@@ -269,6 +275,7 @@ class PairScene:
         right_reply: Reply | None,
         scale: Scale,
         display: Display,
+        drawer: str | None,
     ) -> None:
         if pair is None:
             self._pair = None
@@ -276,6 +283,7 @@ class PairScene:
             self.hide()
             return
         self._pair = pair
+        self._is_folded = drawer is None
         if self._robots is None or self._floor is None:
             scene = self._client.scene
             left, right = [PairedRobot(scene, place) for place in PLACES]

@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 
 from finlab.errors import FinlabError
 from finlab.layout import Layout
-from finlab.layout.damage import NO_DAMAGE, Damage
+from finlab.layout.damage import Damage
 from webapp.session.base import BaseSession
 from webapp.session.files import shipped
 from webapp.session.looking import TWO_ROBOTS
-from webapp.session.state import Links, State, is_same_robot, method_for, one_of
+from webapp.session.state import State, is_same_robot, method_for, one_of
 
 PLACES = ("left", "right")
 """Where the two stand, as seen from the camera."""
@@ -32,27 +32,22 @@ class Source:
 
     title: str
     """Where it comes from, as the list has it."""
-    layout: Layout | None
-    """None for the one that the page works on."""
-    damage: Damage = NO_DAMAGE
-    links: Links = ()
-
-    @staticmethod
-    def of_state(title: str, state: State) -> "Source":
-        """The robot of a state, with what is damaged of it."""
-        return Source(title, state.layout, state.damage, state.links)
+    state: State | None
+    """The robot with its damage; None for the one that the page works on."""
 
     def state_for(self, question: State) -> State:
         """The robot with the question of another state: wrench, speed, policy, and the method where
         it takes all its actuators."""
-        if self.layout is None:
+        if self.state is None:
             return question
         return replace(
-            question,
-            layout=self.layout,
-            damage=self.damage,
-            links=self.links,
-            method=method_for(self.layout, question.method),
+            self.state,
+            target=question.target,
+            speed=question.speed,
+            policy=question.policy,
+            method=method_for(self.state.layout, question.method),
+            temperature=question.temperature,
+            network=question.network,
         )
 
 
@@ -121,13 +116,13 @@ class TwoRobots:
         session = self._session
         sources = [THIS_ROBOT]
         if proposal is not None:
-            sources.append(Source.of_state(PROPOSAL, proposal))
+            sources.append(Source(PROPOSAL, proposal))
         if session.saved != session.state.layout:
-            sources.append(Source(SAVED, session.saved))
+            sources.append(Source(SAVED, State(session.saved)))
         sources += self._earlier()
         sources += self.guests
         for name, layout in shipped().items():
-            sources.append(Source(f"Shipped: {name}", layout))
+            sources.append(Source(f"Shipped: {name}", State(layout)))
         # A step of undo that is shown stays in the list when newer ones come.
         titles = {source.title for source in sources}
         for source in self._both():
@@ -149,7 +144,7 @@ class TwoRobots:
     def show_proposal(self, proposal: State) -> None:
         """Look at this robot, at the left, and what a search has found for it."""
         self._chosen = [THIS_ROBOT, THIS_ROBOT]
-        self.show("right", Source.of_state(PROPOSAL, proposal))
+        self.show("right", Source(PROPOSAL, proposal))
 
     def welcome(self, place: str, title: str, layout: Layout, lost: tuple[str, ...]) -> None:
         """Take in a robot of a file or a link, put it on one of `PLACES`, and look at both.
@@ -161,7 +156,7 @@ class TwoRobots:
             lost: names of its lost actuators.
         """
         taken = {source.title for source in self.sources()}
-        guest = Source(_own_title(title, taken), layout, Damage(lost))
+        guest = Source(_own_title(title, taken), State(layout, Damage(lost)))
         self.guests = (*self.guests, guest)[-MOST_GUESTS:]
         self.show(place, guest)
 
@@ -181,21 +176,21 @@ class TwoRobots:
         index = PLACES.index(one_of(place, "place", PLACES))
         both = self._both()
         source = both[index]
-        if source.layout is None:
+        if source.state is None:
             raise FinlabError(f"the {place} one is this robot already; accept the other one")
         session = self._session
         state = source.state_for(session.state)
-        before = Source.of_state(f"Before: Accept {state.layout.name}", session.state)
+        before = Source(f"Before: Accept {state.layout.name}", session.state)
         if not session.accept_state(f"Accept {state.layout.name}", state):
             raise FinlabError(f"the {place} one is the same as this robot; nothing changes")
-        self._chosen = [before if each.layout is None else each for each in both]
+        self._chosen = [before if each.state is None else each for each in both]
         self._chosen[index] = THIS_ROBOT
 
     def _standing(self) -> tuple[Standing, Standing]:
         """Both, with the question of this moment."""
         question = self._session.state
         left, right = [
-            Standing(source.title, source.state_for(question), source.layout is None)
+            Standing(source.title, source.state_for(question), source.state is None)
             for source in self._both()
         ]
         return left, right
@@ -211,7 +206,7 @@ class TwoRobots:
         name = next(
             name for name, known in shipped().items() if known != self._session.state.layout
         )
-        return [THIS_ROBOT, Source(f"Shipped: {name}", shipped()[name])]
+        return [THIS_ROBOT, Source(f"Shipped: {name}", State(shipped()[name]))]
 
     def _put(self, place: str, source: Source) -> None:
         index = PLACES.index(one_of(place, "place", PLACES))
@@ -230,7 +225,7 @@ class TwoRobots:
             if not is_same_robot(state, later):
                 title = _own_title(f"Before: {step.name}", titles)
                 titles.add(title)
-                sources.append(Source.of_state(title, state))
+                sources.append(Source(title, state))
             later = state
             if len(sources) == MOST_EARLIER:
                 break

@@ -20,15 +20,6 @@ from webapp.markup.words import in_app
 from webapp.session.files import file_stem, robot_file, shipped_name
 from webapp.session.state import Flow, State
 
-FINS_AGAIN = "; whoever opens it again says which of them are fins."
-"""What is said in place of the option by which the command line is told so."""
-IN_PAGE = {
-    "; --fins names the fins among them.": FINS_AGAIN,
-    ", --fins names the fins again.": FINS_AGAIN,
-    ", and A ": ", and a ",
-}
-"""Parts of the library's sentences -> what the page says."""
-
 
 @dataclass(frozen=True)
 class HomeQuestion:
@@ -107,7 +98,7 @@ def offers_of(question: HomeQuestion) -> tuple[Offer, ...]:
         try:
             written = (form.check or form.write)(question)
         except FinlabError as error:
-            offers.append(Offer(form, name, reason=_said(as_sentence(str(error)))))
+            offers.append(Offer(form, name, reason=in_app(as_sentence(str(error)))))
         else:
             offers.append(Offer(form, name, written.notes))
     return tuple(offers)
@@ -119,16 +110,10 @@ def _exchanged(form: str, suffix: str) -> Callable[[HomeQuestion], Written]:
     def write(question: HomeQuestion) -> Written:
         exchange = Exchange()
         text = text_in(form, question.layout, exchange, suffix)
-        return Written(text.encode(), tuple([_said(note) for note in exchange.notes]))
+        notes = [in_app(f"{note.sentence}.") for note in exchange.taken]
+        return Written(text.encode(), tuple(notes))
 
     return write
-
-
-def _said(note: str) -> str:
-    """A sentence of the library in the words of the page."""
-    for words, own_words in IN_PAGE.items():
-        note = note.replace(words, own_words)
-    return in_app(note)
 
 
 def _check_c(question: HomeQuestion) -> Written:
