@@ -6,7 +6,6 @@ The drawer of candidates (`panels/modes_tab.py`) shows them beside the plot.
 import numpy as np
 from markupsafe import Markup
 
-from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
 from finlab.axes import AXES, UNITS
 from finlab.display import listed
@@ -44,34 +43,24 @@ def step_words(modes: Modes, step: int | None) -> str:
 def _exact_words(errors: Array) -> str:
     """How many of the samples are exact, by their errors (K,)."""
     n_samples = len(errors)
-    n_exact = n_exact_of(errors)
+    n_exact = int(np.count_nonzero(errors <= ALTERNATIVE_ERROR))
     if n_exact == n_samples:
         return "made exact"
     return f"{n_exact or 'none'} of {n_samples} made exact"
 
 
-def n_exact_of(errors: Array) -> int:
-    """How many of some samples give the wrench, by their errors (K,)."""
-    return int(np.count_nonzero(errors <= ALTERNATIVE_ERROR))
-
-
-def is_in_vain(modes: Modes) -> bool:
-    """Whether samples were refined, and none of them gives the wrench."""
-    return modes.steps > 0 and n_exact_of(modes.refinement[-1].err_norm) == 0
-
-
-def vain_sentence(modes: Modes, best: Allocation | None) -> str:
+def vain_sentence(modes: Modes) -> str:
     """Why the plot has rings that no line leads to.
 
     Args:
         modes: the modes of an answer, with the refinement of the samples.
-        best: the answer; None where there is none.
 
     Returns:
         Markup: which wrench no sample was refined to, by how much the nearest one misses it, and
         how many of them have a fin at its limit. Nothing where a sample gives the wrench.
     """
-    if best is None or not is_in_vain(modes):
+    best = modes.answer
+    if best is None or not modes.is_in_vain:
         return Markup()
     end = modes.refinement[-1]
     n_samples = len(end.err_norm)

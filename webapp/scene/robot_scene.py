@@ -71,6 +71,8 @@ class RobotScene:
         self._attainable = AttainableNodes(scene)
         self._direction = DirectionHandle(self._client, self._turn)
         self._handle = WrenchHandle(scene, "/robot/wrench", self._pull)
+        self.pulled: Grip | None = None
+        """What of the wrench is in the user's hand; None for nothing."""
         self.pulled_newtons = 1.0
         """Force of an arrow of 0.1 m and size 1 while the wrench is in the user's hand [N]."""
         self._newtons_before = 1.0
@@ -86,9 +88,8 @@ class RobotScene:
             self._show_stage,
             self._place,
             self._push,
-            self._flap,
+            self._animate,
             self._show_wrench,
-            self._show_handle,
             self._show_sets,
         )
         for show in (*shows, self._offer):
@@ -255,7 +256,7 @@ class RobotScene:
             jets = None if visible_layout.interaction is None else robot
             self._jets.refresh(jets, forces, scaled, self._arrow_size)
 
-    def _flap(
+    def _animate(
         self,
         visible_layout: Layout,
         shown_allocation: Allocation | None,
@@ -264,19 +265,45 @@ class RobotScene:
         display: Display,
         swim: SwimSettings,
         paused: bool,
+        target: tuple[float, ...],
+        scale: Scale,
+        task: str,
+        swims: bool,
+        pulled: Grip | None,
         pair: Pair | None,
     ) -> None:
-        """The page moves the fins (`frames.js`): it is told the commands of all, and how fast."""
-        if pair is not None:
+        """What the page moves itself (`frames.js`), in one message: the fins, and the handle."""
+        script = ""
+        if pair is None:
+            script = self._flapping(moment, display, swim, paused)
+        else:
             self._flaps = ""
-            return
+        size = arrow_size(visible_layout)
+        if pulled is None:
+            self._newtons_before = self.pulled_newtons = scale.newtons
+        # The foot of the arrow is that of the wrench's nodes.
+        per_newton = size * LENGTH / scale.newtons
+        Fx, Fy, Fz = target[:3]
+        tip = per_newton * Fx, per_newton * Fy, per_newton * Fz
+        is_visible = display.handle and task == "Allocate" and not swims and pair is None
+        commanded = visible_layout.commanded.tolist()
+        script += self._handle.show(target, tip, size, commanded, is_visible)
+        if script:
+            run_script(self._client.gui, script)
+
+    def _flapping(
+        self, moment: Moment | None, display: Display, swim: SwimSettings, paused: bool
+    ) -> str:
+        """A script that tells the page the commands of all fins, and how fast they beat; empty
+        where it knows them."""
         speed, still = (
             (SPEED, display.frozen) if moment is None else (swim.speed, paused or moment.done)
         )
         moves = msgspec.json.encode([self._moves, speed, still]).decode()[1:-1]
-        if moves != self._flaps:
-            self._flaps = moves
-            run_script(self._client.gui, f"finlabFrames.flap({moves});")
+        if moves == self._flaps:
+            return ""
+        self._flaps = moves
+        return f"finlabFrames.flap({moves});"
 
     def _show_wrench(
         self,
@@ -300,32 +327,9 @@ class RobotScene:
         lengths = LENGTH / scale.newtons, LENGTH / scale.torque
         self._wrench.refresh(demanded, delivered, missing, self._top, *lengths, self._arrow_size)
 
-    @property
-    def pulled(self) -> Grip | None:
-        """What of the wrench is in the user's hand; None for nothing."""
-        return self._handle.grip
-
-    def _show_handle(
-        self,
-        visible_layout: Layout,
-        target: tuple[float, ...],
-        scale: Scale,
-        task: str,
-        display: Display,
-        swims: bool,
-        pulled: Grip | None,
-    ) -> None:
-        size = arrow_size(visible_layout)
-        if pulled is None:
-            self._newtons_before = self.pulled_newtons = scale.newtons
-        # The foot of the arrow is that of the wrench's nodes.
-        tip = np.array(target[:3]) * (size * LENGTH / scale.newtons)
-        is_visible = display.handle and task == "Allocate" and not swims
-        commanded = visible_layout.commanded.tolist()
-        self._handle.show(target, tip, size, commanded, is_visible)
-
     def _pull(self, phase: str, grip: Grip, tip: Array, angle: float) -> None:
         session = self._session
+        self.pulled = self._handle.grip
         if phase == "start":
             session.history.end_merge()
             return

@@ -69,11 +69,25 @@ class Modes:
     """The null space that these ways lie in, where that is looked at."""
     ends: tuple[int, ...] = ()
     """For each proposal the shown mode at which it ends, -1 where that is none of them."""
+    answer: Allocation | None = None
+    """The answer to which the proposals were made; None where there are none."""
 
     @property
     def steps(self) -> int:
         """Steps of the refinement."""
         return max(len(self.refinement) - 1, 0)
+
+    @cached_property
+    def n_exact(self) -> int:
+        """How many of the proposals give the wrench at the end of their refinement."""
+        if not self.steps:
+            return 0
+        return int(np.count_nonzero(self.refinement[-1].err_norm <= ALTERNATIVE_ERROR))
+
+    @property
+    def is_in_vain(self) -> bool:
+        """Whether proposals were refined, and none of them gives the wrench."""
+        return len(self.refinement) > 1 and self.n_exact == 0
 
     def proposal_of(self, mode: int) -> int | None:
         """The first proposal that ends at a mode: the likeliest, as those come first."""
@@ -99,7 +113,7 @@ def modes_of(
     ends = np.full(len(last), -1)
     for k in reversed(range(len(visible))):
         ends[same_signature(visible[k].mode.signature, signatures)] = k
-    return Modes(visible, len(modes), ways, ends=tuple(ends.tolist()))
+    return Modes(visible, len(modes), ways, ends=tuple(ends.tolist()), answer=answer)
 
 
 def named_modes(modes: Sequence[Mode], badge: str) -> tuple[NamedMode, ...]:
