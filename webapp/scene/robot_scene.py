@@ -177,6 +177,7 @@ class RobotScene:
         damage: Damage,
         dragged: int | None,
         swims: bool,
+        follows: str,
     ) -> None:
         hull = hull_of(visible_layout)
         sizes = (part_size(visible_layout), arrow_size(visible_layout))
@@ -188,7 +189,7 @@ class RobotScene:
             )
         for node in self._fins[visible_layout.n :]:
             node.hide()
-        edited = selected if task == "Design" and not swims else None
+        edited = selected if task == "Design" and not (swims or follows) else None
         stuck = () if swims else damage.stuck
         for i, actuator in enumerate(visible_layout.actuators):
             remark = (
@@ -271,6 +272,7 @@ class RobotScene:
         swims: bool,
         pulled: Grip | None,
         pair: Pair | None,
+        follows: str,
     ) -> None:
         """What the page moves itself (`frames.js`), in one message: the fins, and the handle."""
         script = ""
@@ -286,6 +288,7 @@ class RobotScene:
         Fx, Fy, Fz = target[:3]
         tip = per_newton * Fx, per_newton * Fy, per_newton * Fz
         is_visible = display.handle and task == "Allocate" and not swims and pair is None
+        is_visible = is_visible and not follows
         commanded = visible_layout.commanded.tolist()
         script += self._handle.show(target, tip, size, commanded, is_visible)
         if script:
