@@ -20,6 +20,7 @@ from webapp.intents import Intents
 from webapp.page import Page
 from webapp.panels.following import begin_following
 from webapp.panels.frame import Frame
+from webapp.panels.presenting import begin_presenting
 from webapp.session import Session
 from webapp.start_page import connect_start_page
 from webapp.tasks.context import Context
@@ -69,6 +70,7 @@ class View:
         page.presses.start()
         connect_start_page(page)
         begin_following(page)
+        begin_presenting(page)
         self._revision: int | None = None
         self._is_due = True
         self._held_for: Slots = NO_SLOTS

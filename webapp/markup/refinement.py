@@ -65,15 +65,14 @@ def vain_sentence(modes: Modes) -> str:
     end = modes.refinement[-1]
     n_samples = len(end.err_norm)
     nearest = error_digits(float(np.min(end.err_norm)))
-    parts = [
-        f"{wrench_words(best.target)}: none of {n_samples} samples was refined to it.",
-        f"The nearest misses it by {nearest} of what the robot can push.",
-    ]
+    words = f"{wrench_words(best.target)}: none of {n_samples} samples was refined to it."
     n_limited = _n_at_limit(end.command, best.layout.lower, best.layout.upper)
     if n_limited:
-        share = "each" if n_limited == n_samples else f"{n_limited}"
-        parts.append(f"In {share} of them a fin has come to its limit before.")
-    return html("<div class='fl missing said vain'>{}</div>", " ".join(parts))
+        share = "each" if n_limited == n_samples else f"{n_limited} of them"
+        words += f" In {share} a fin came to its limit; the nearest misses {nearest}."
+    else:
+        words += f" The nearest misses {nearest}."
+    return html("<div class='fl'><div class='missing said vain'>{}</div></div>", words)
 
 
 def _n_at_limit(command: Array, lower: Array, upper: Array) -> int:

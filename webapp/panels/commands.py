@@ -87,7 +87,8 @@ def page_commands(page: Page) -> list[Command]:
         look = partial(scenery.look_from, view)
         commands.append(Command(f"Camera: {view}", look, key, looks=True))
     commands += [
-        Command("Freeze or move the fins", partial(session.toggle, "frozen"), "P"),
+        Command("Present, or leave", partial(session.toggle, "presents"), "P", looks=True),
+        Command("Freeze or move the fins", partial(session.toggle, "frozen"), "H"),
         Command("Dark or light theme", partial(session.toggle, "dark")),
         Command("Tour: start, or next stop", session.guide.tour, "T"),
         Command("Export the bundle for the robot", page.designs.bundle),

@@ -36,8 +36,10 @@ from webapp.panels.arrangement import (
 )
 from webapp.panels.commands import add_page_commands
 from webapp.panels.following import add_following
+from webapp.panels.gamepad import add_gamepad
 from webapp.panels.log_tab import plot_rows
 from webapp.panels.nudging import add_nudging
+from webapp.panels.presenting import add_presenting
 from webapp.panels.status import add_corner
 from webapp.session.granted import SourceFile
 from webapp.session.lessons import Stop
@@ -56,7 +58,14 @@ VARIABLES = (
     f"[data-mantine-color-scheme=dark] {{ --fl-reach: {css(REACH_DARK)}; }}"
 )
 """The colours of the theme as variables of CSS."""
-STYLE_SHEETS = ("style.css", "frame.css", "inquiry.css", "two_robots.css", "following.css")
+STYLE_SHEETS = (
+    "style.css",
+    "frame.css",
+    "inquiry.css",
+    "two_robots.css",
+    "following.css",
+    "presenting.css",
+)
 """Files of `webapp/markup` that style the page."""
 STYLE = html(
     "<style>{}{}</style>",
@@ -149,10 +158,12 @@ class Frame:
         page.board.act(self._guard_reload)
         page.board.act(self._set_title)
         add_nudging(page)
+        add_gamepad(page)
         self._listen()
         self.sections: list[Section] = []
         add_corner(page)
         add_following(page)
+        add_presenting(page)
         for region in REGIONS:
             with gui.add_folder(region):
                 add_html(gui, marker(f"fl-region fl-{region}"))

@@ -42,6 +42,8 @@ CAMERAS = {
     "Front": (1.3, 0.0, 0.1),
 }
 """Where the camera stands in each view [m]."""
+PRESENTED = 1.8
+"""Factor of the thickness of arrows while the page presents."""
 SPEED = 0.5
 LONGEST_NAME = 24
 """Letters of a name that stand over the robot; of a longer one so many."""
@@ -82,9 +84,11 @@ class RobotScene:
         self._works: list[bool] = []
         self._size = view_size(session.state.layout)
         self._arrow_size = 1.0
+        self._thickness = 1.0
         self._top = 0.0
         self._flaps = ""
         shows = (
+            self._thicken,
             self._show_stage,
             self._place,
             self._push,
@@ -223,7 +227,9 @@ class RobotScene:
         scale: Scale,
         moment: Moment | None,
         pair: Pair | None,
+        display: Display,
     ) -> None:
+        del display  # it may have changed how thick arrows are
         if pair is not None:  # this robot is hidden
             return
         idle = lost if moment is None else moment.lost
@@ -288,6 +294,7 @@ class RobotScene:
         Fx, Fy, Fz = target[:3]
         tip = per_newton * Fx, per_newton * Fy, per_newton * Fz
         is_visible = display.handle and task == "Allocate" and not swims and pair is None
+        is_visible = is_visible and not display.presents
         is_visible = is_visible and not follows
         commanded = visible_layout.commanded.tolist()
         script += self._handle.show(target, tip, size, commanded, is_visible)
@@ -307,6 +314,14 @@ class RobotScene:
             return ""
         self._flaps = moves
         return f"finlabFrames.flap({moves});"
+
+    def _thicken(self, display: Display) -> None:
+        """Thick arrows are seen from the last row."""
+        factor = PRESENTED if display.presents else 1.0
+        if factor != self._thickness:
+            self._thickness = factor
+            self._forces.thicken(factor)
+            self._wrench.thicken(factor)
 
     def _show_wrench(
         self,
