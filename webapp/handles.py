@@ -3,7 +3,7 @@
 
 import json
 from collections.abc import Callable, Mapping
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -91,6 +91,7 @@ Act = Callable[[str, str], object]
 """Carries out what was meant with a key and a text, or raises a `FinlabError`."""
 
 
+@lru_cache(maxsize=512)
 def press(kind: str, key: str) -> str:
     """Attributes of an element that can be pressed; its text is "", "shift" or "ctrl", what was
     held."""

@@ -119,7 +119,9 @@ class View:
             return
         self._is_due = True
         self.intents.is_new = False
-        self.page.following.tell()
+        following = self.page.following
+        if following.lecture is not None:
+            following.lecture.tell()
         jobs = self.jobs
         if came and not done and jobs.beside.issuperset(came):
             # Nothing is asked because of what comes beside an answer.
@@ -209,7 +211,7 @@ class View:
             self.scenery.follow_guide()
             pair = pair_facts(session, self.jobs)
             scale = self.scenery.fit(
-                session.state.target, answer.shown_allocation, pair.allocations
+                session.state.target, answer.shown_allocation, pair.pair_allocations
             )
             robot = self.scenery.robot
             facts = facts_of(session, self.jobs, answer, robot.dragged, robot.pulled, scale, pair)

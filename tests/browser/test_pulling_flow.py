@@ -126,7 +126,7 @@ def test_presenting_hides_all_panels_and_escape_leaves(page: Any) -> None:
     assert "The robot gives it with" in page.text(".fl-present .sentence")
     page.page.keyboard.press("Escape")
     page.page.locator(".fl-tasks").wait_for()
-    page.until(lambda: page.page.locator(".fl-present").count() == 0)
+    page.until(lambda: page.page.locator(".fl-present").is_hidden())
     assert page.problems == []
 
 

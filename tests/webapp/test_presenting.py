@@ -24,13 +24,12 @@ def tab() -> Iterator[Tab]:
 
 
 def presented(tab: Tab) -> str:
-    """What stands beside the robot."""
-    return next(
-        str(rule.last)
-        for group in tab.view.board.groups
-        for rule in group.rules
-        if getattr(rule.make, "__name__", "") == "_presented"
-    )
+    """What stands beside the robot; empty where nobody can see it."""
+    for group in tab.view.board.groups:
+        for rule in group.rules:
+            if getattr(rule.make, "__name__", "") == "_presented":
+                return str(rule.last) if group.is_visible else ""
+    raise AssertionError("there is no such rule")
 
 
 def test_nothing_is_there_until_it_is_asked_for(tab: Tab) -> None:

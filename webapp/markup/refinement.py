@@ -35,18 +35,13 @@ def step_words(modes: Modes, step: int | None) -> str:
     elif step_shown <= TRACE_STEPS.descent:
         words = "descent in forces"
     else:
-        words = _exact_words(errors)
+        n_samples = len(errors)
+        n_exact = int(np.count_nonzero(errors <= ALTERNATIVE_ERROR))
+        words = "made exact"
+        if n_exact < n_samples:
+            words = f"{n_exact or 'none'} of {n_samples} made exact"
     median = error_digits(float(np.median(errors)))
     return html("{} <span class='dim'>· median error</span> {}", words, median)
-
-
-def _exact_words(errors: Array) -> str:
-    """How many of the samples are exact, by their errors (K,)."""
-    n_samples = len(errors)
-    n_exact = int(np.count_nonzero(errors <= ALTERNATIVE_ERROR))
-    if n_exact == n_samples:
-        return "made exact"
-    return f"{n_exact or 'none'} of {n_samples} made exact"
 
 
 def vain_sentence(modes: Modes) -> str:

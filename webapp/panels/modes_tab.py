@@ -172,7 +172,7 @@ def mode_table(modes: Modes, mode: int) -> str:
     fins."""
     if not modes.visible:
         return ""
-    of_fins = any(not math.isnan(named.mode.effort) for named in modes.visible)
+    of_fins = any([not math.isnan(named.mode.effort) for named in modes.visible])
     rows = []
     for k, (candidate, name, badge) in enumerate(modes.visible):
         rows.append(

@@ -36,10 +36,12 @@ def add_presenting(page: Page) -> None:
             session.set_display(KEY, False)
 
     def show(display: Display) -> None:
+        presented.is_visible = display.presents
         run_script(page.gui, f"finlabPresenting.show({json.dumps(display.presents)});")
 
-    page.board.group(fail)
+    page.board.group()
     page.board.act(show)
+    presented = page.board.group(fail)  # made while it can be seen
     page.add_html(_presented)
     page.presses.on("present", lambda key, _: session.set_display(KEY, key == "on"), looks=True)
 
@@ -50,7 +52,6 @@ def begin_presenting(page: Page) -> None:
 
 
 def _presented(
-    display: Display,
     state: State,
     shown_allocation: Allocation | None,
     busy: bool,
@@ -60,9 +61,7 @@ def _presented(
     step: int | None,
     searching: bool,
 ) -> str:
-    """What stands beside the robot; nothing where the page does not present."""
-    if not display.presents:
-        return ""
+    """What stands beside the robot."""
     answer = None if busy else shown_allocation
     plot = presented_plot(modes, mode, step) if not searching else Markup()
     leave = button("Leave (Esc)", "present", "off", Markup("class='leave'"))

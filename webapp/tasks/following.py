@@ -95,6 +95,10 @@ class FollowFacts(NamedTuple):
     """Pages that follow it."""
 
 
+NOBODY = FollowFacts("", False, "", 0)
+"""Where a page follows none, and none follows it."""
+
+
 class Following:
     """Whom one page follows, and who follows it."""
 
@@ -107,6 +111,8 @@ class Following:
         self._shown: Scene | None = None
         self.lecture = lectures.of(context.session)
         """The own session's, where it may be followed."""
+        self.facts = NOBODY
+        """What the page says of it."""
         if self.lecture is not None:  # the page was loaded anew
             self._open(self.lecture)
 
@@ -115,12 +121,11 @@ class Following:
         """Whether the page shows what another one shows."""
         return self._followed is not None
 
-    @property
-    def facts(self) -> FollowFacts:
-        """What the page says of it."""
+    def _note(self) -> None:
+        """Brings what the page says of it up to date."""
         followed = self._followed
         lecture = self.lecture
-        return FollowFacts(
+        self.facts = FollowFacts(
             follows="" if followed is None else followed.code,
             is_followed_open=followed is not None and followed.is_open,
             lecture_code="" if lecture is None else lecture.code,
@@ -137,12 +142,14 @@ class Following:
         lecture.is_open = True
         lecture.teacher = self
         lecture.tell()
+        self._note()
 
     def stop_lecture(self) -> None:
         """Lets nobody follow this page any more."""
         if self.lecture is not None:
             self._lectures.end(self.lecture)
             self.lecture = None
+            self._note()
 
     def follow(self, code: str) -> None:
         """Shows what the page of a code shows. FinlabError: there is none, or it is this one."""
@@ -175,11 +182,7 @@ class Following:
             self._followed.count()
         self._followed = None
         self._shown = None
-
-    def tell(self) -> None:
-        """Something on this page has changed: those who follow it look."""
-        if self.lecture is not None and self.lecture.followers:
-            self.lecture.tell()
+        self._note()
 
     def ring(self) -> None:
         """Let this page look."""
@@ -187,6 +190,7 @@ class Following:
 
     def attend(self) -> bool:
         """Shows what the followed page shows; whether the page is to be written."""
+        self._note()
         if self._followed is not None and self._follower is not None and self._followed.is_open:
             scene = Scene.of(self._followed.session)
             if scene != self._shown:

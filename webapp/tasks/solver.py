@@ -72,22 +72,17 @@ class Modes:
     answer: Allocation | None = None
     """The answer to which the proposals were made; None where there are none."""
 
-    @property
+    @cached_property
     def steps(self) -> int:
         """Steps of the refinement."""
         return max(len(self.refinement) - 1, 0)
 
     @cached_property
-    def n_exact(self) -> int:
-        """How many of the proposals give the wrench at the end of their refinement."""
-        if not self.steps:
-            return 0
-        return int(np.count_nonzero(self.refinement[-1].err_norm <= ALTERNATIVE_ERROR))
-
-    @property
     def is_in_vain(self) -> bool:
         """Whether proposals were refined, and none of them gives the wrench."""
-        return len(self.refinement) > 1 and self.n_exact == 0
+        if not self.steps:
+            return False
+        return not (self.refinement[-1].err_norm <= ALTERNATIVE_ERROR).any()
 
     def proposal_of(self, mode: int) -> int | None:
         """The first proposal that ends at a mode: the likeliest, as those come first."""
