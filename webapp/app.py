@@ -14,6 +14,7 @@ import viser
 from finlab.layout import Layout
 from webapp.session import Display, Session
 from webapp.session.looking import DARK
+from webapp.tasks.following import Lectures
 from webapp.tasks.slot import Pools
 from webapp.tasks.solver import Solver
 from webapp.view import View
@@ -97,6 +98,7 @@ class App:
         self._server = server
         self._solver = solver
         self._pools = Pools()
+        self._lectures = Lectures()
         self._store = SessionStore(lambda: Session(layout, display))
         self.views: dict[int, View] = {}
         self._keys: dict[int, str] = {}
@@ -154,7 +156,7 @@ class App:
             remembered = [key, *remembered]
         client.local_storage.set_item(STORAGE_KEY, json.dumps(remembered[:MAX_KEYS]))
         with icons_at_hand():
-            view = View(client, session, self._solver, self._pools, self._loop)
+            view = View(client, session, self._solver, self._pools, self._loop, self._lectures)
         self.views[client.client_id] = view
 
     async def _drop_if_gone(self, client_id: int) -> None:

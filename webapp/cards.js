@@ -39,10 +39,15 @@
       card.remove();
       window.finlabPresses.tell('answer', String(index), '');
     }),
-    share: (title, text, fragment) => show(title, text, ['Copy the link', 'Close'], (index, button, card) => {
+    share: (title, text, fragment) => show(title, text, ['Copy the link', 'Let others follow', 'Close'], (index, button, card) => {
       if (index) card.remove();
-      else copy(card.querySelector('input')).then((done) => { button.textContent = done ? 'Copied' : 'Press Ctrl+C'; });
+      if (index === 1) window.finlabPresses.tell('let-follow', '', '');
+      if (!index) copy(card.querySelector('input')).then((done) => { button.textContent = done ? 'Copied' : 'Press Ctrl+C'; });
       // Without a query viser's page would take what stands behind the # for a part of its server's name.
     }, `${location.origin}${location.pathname}?shared#${fragment}`),
+    follow: (title, text, code) => show(title, text, ['Copy the link', 'Close'], (index, button, card) => {
+      if (index) card.remove();
+      else copy(card.querySelector('input')).then((done) => { button.textContent = done ? 'Copied' : 'Press Ctrl+C'; });
+    }, `${location.origin}${location.pathname}?follow=${code}`),
   };
 })();

@@ -24,26 +24,25 @@ class PairFacts(NamedTuple):
     """The newest answer of the left one, perhaps to an earlier question."""
     right_reply: Reply | None
     """The same of the right one."""
+    pair_allocations: tuple[Allocation | None, ...]
+    """Answers of both; none where they are not looked at."""
+    has_this_robot: bool
+    """Whether the robot that the page works on can be seen."""
 
-    @property
-    def has_this_robot(self) -> bool:
-        """Whether the robot that the page works on can be seen."""
-        return self.pair is None or any(standing.is_this for standing in self.pair.both)
 
-    @property
-    def allocations(self) -> tuple[Allocation | None, ...]:
-        """Answers of both; none where they are not looked at."""
-        if self.pair is None:
-            return ()
-        replies = (self.left_reply, self.right_reply)
-        return tuple([None if reply is None else reply.answer for reply in replies])
+NO_PAIR = PairFacts(None, None, None, (), True)
+"""Where no two robots are looked at."""
 
 
 def pair_facts(session: Session, jobs: Jobs) -> PairFacts:
     """The two robots of a session, unless one swims."""
     pair = None if jobs.swimming.swimmer is not None else session.two_robots.pair
-    pairing = jobs.pairing
-    return PairFacts(pair, pairing.reply(0, pair), pairing.reply(1, pair))
+    if pair is None:
+        return NO_PAIR
+    replies = (jobs.pairing.reply(0, pair), jobs.pairing.reply(1, pair))
+    allocations = tuple([None if reply is None else reply.answer for reply in replies])
+    has_this_robot = any(standing.is_this for standing in pair.both)
+    return PairFacts(pair, *replies, allocations, has_this_robot)
 
 
 def facts_of(
@@ -99,7 +98,7 @@ def facts_of(
         # Two robots beside each other.
         **pair._asdict(),
         "pair_sources": session.two_robots.sources(jobs.improver.proposal) if pair.pair else (),
-        "pair_busy": any(slot.busy for slot in jobs.pairing.slots),
+        "pair_busy": pair.pair is not None and any(slot.busy for slot in jobs.pairing.slots),
         "cards": jobs.pairing.cards.answer,
         "cards_error": jobs.pairing.cards.error,
         "cards_progress": jobs.pairing.cards.progress,

@@ -179,6 +179,14 @@
     count: 0, // frames that were drawn
     picture,
     follow(start) { stood = start; },
+    // A node stands elsewhere: told with what lets actuators move, it needs no message of its own.
+    place(name, position) {
+      const node = viewer().nodePoseData[name] ??= { wxyz: [1, 0, 0, 0] };
+      node.position = position;
+      if (node.poseUpdateState !== 'waitForMakeObject') node.poseUpdateState = 'needsUpdate';
+      due = Math.max(due, performance.now() + 1);
+      root()?.invalidate();
+    },
     // Counts: how many of the commands are for each robot, by the name of its node.
     flap(commands, rate, still, counts = { '/robot': commands.length }) {
       patch();

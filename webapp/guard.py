@@ -9,7 +9,7 @@ from http import HTTPStatus
 from http.cookies import CookieError, SimpleCookie
 from ipaddress import ip_address
 from types import MappingProxyType
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import parse_qs, urlencode, urlsplit
 
 from websockets.datastructures import Headers
 from websockets.http11 import Response
@@ -67,9 +67,12 @@ class Guard:
             return answer(HTTPStatus.FORBIDDEN, "Pages of other sites may not use this server.\n")
         if self.token is None:
             return None
-        if self._is_token(parse_qs(path.partition("?")[2]).get("token", [""])[0]):
+        query = parse_qs(path.partition("?")[2])
+        if self._is_token(query.pop("token", [""])[0]):
             cookie = f"{COOKIE}={self.token}; Path=/; HttpOnly; SameSite=Strict"
-            return answer(HTTPStatus.SEE_OTHER, "", {"Location": "/", "Set-Cookie": cookie})
+            rest = urlencode(query, doseq=True)
+            place = f"/?{rest}" if rest else "/"
+            return answer(HTTPStatus.SEE_OTHER, "", {"Location": place, "Set-Cookie": cookie})
         if self._is_token(_cookie(headers.get("cookie", ""))):
             return None
         return answer(

@@ -3,7 +3,7 @@
 
 import json
 from collections.abc import Callable, Mapping
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -85,10 +85,13 @@ picture."""
 KINDS = [int, str, str, str]
 """Number, kind, key and text of a word."""
 
+Do = Callable[[Callable[[], object]], None]
+"""Carries out an intent."""
 Act = Callable[[str, str], object]
 """Carries out what was meant with a key and a text, or raises a `FinlabError`."""
 
 
+@lru_cache(maxsize=512)
 def press(kind: str, key: str) -> str:
     """Attributes of an element that can be pressed; its text is "", "shift" or "ctrl", what was
     held."""
@@ -110,23 +113,29 @@ def placed(key: str, count: int) -> int:
 class Presses:
     """All of one page."""
 
-    def __init__(
-        self, gui: viser.GuiApi, do: Callable[[Callable[[], object]], None], bell: Bell
-    ) -> None:
-        """Listen to the page; `do` carries out what was meant."""
+    def __init__(self, gui: viser.GuiApi, do: Do, bell: Bell, look: Do | None = None) -> None:
+        """Listen to the page.
+
+        Args:
+            gui: of the page.
+            do: carries out what was meant.
+            bell: wakes the page.
+            look: the same for what may be done on a page that is locked; `do` where it is None.
+        """
         self._gui = gui
         self._do = do
+        self._look = look or do
         self._bell = bell
-        self._acts: dict[str, Act] = {}
+        self._acts: dict[str, tuple[Act, Do]] = {}
         self._last = 0
         hidden = "<style>[data-fl~=presses] + div {{ display: none; }}</style>{}"
         add_html(gui, html(hidden, marker("fl-presses")))
         self._box = gui.add_text("presses", "")
         on_user_change(self._box, self.read)
 
-    def on(self, kind: str, act: Act) -> None:
-        """Who hears of a kind."""
-        self._acts[kind] = act
+    def on(self, kind: str, act: Act, looks: bool = False) -> None:
+        """Who hears of a kind; one that only `looks` is heard on a page that is locked as well."""
+        self._acts[kind] = act, self._look if looks else self._do
 
     def start(self) -> None:
         """Let the page's half begin."""
@@ -147,7 +156,8 @@ class Presses:
             if number > self._last:
                 self._last = number
                 if kind in self._acts:
-                    self._do(partial(self._acts[kind], key, text))
+                    act, do = self._acts[kind]
+                    do(partial(act, key, text))
         self._bell.ring_later(HEARD_S, self)
 
     def attend(self) -> bool:

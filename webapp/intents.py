@@ -30,6 +30,8 @@ class Intents:
         """Whether something was done, or went wrong, since the page was written."""
         self.changed_handles: list[Any] = []
         """Handles that a user has changed: the session may have refused it."""
+        self.lock = ""
+        """Why nothing may be changed on this page; empty where it may."""
         self.has_fault = False
         """Whether something went wrong since the page was written: nothing that was drawn is
         trusted."""
@@ -37,6 +39,13 @@ class Intents:
     def do(self, act: Callable[[], object], handle: Any = None) -> None:
         """Carry out an intent, by the input `handle` that the user has changed, if any; a refusal
         becomes a note, and the page goes back to what the session holds."""
+        self.look(self._refuse if self.lock else act, handle)
+
+    def _refuse(self) -> None:
+        raise FinlabError(self.lock)
+
+    def look(self, act: Callable[[], object], handle: Any = None) -> None:
+        """The same for what a page may do that is locked."""
         self._faults.clear()
         try:
             act()

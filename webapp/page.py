@@ -21,6 +21,7 @@ from webapp.number_boxes import NumberBoxes
 from webapp.scene.scenery import Scenery
 from webapp.tasks.context import Context
 from webapp.tasks.designs import Designs, Opening
+from webapp.tasks.following import Following, Lectures
 from webapp.tasks.importing import Importing
 from webapp.tasks.jobs import Jobs
 from webapp.tasks.slot import Deferred
@@ -36,19 +37,25 @@ Input = TypeVar("Input")
 class Page:
     """The scene of one client around its session, and what the panels beside it may ask for."""
 
-    def __init__(self, client: viser.ClientHandle, context: Context, intents: Intents) -> None:
-        """A page without panels; what a user does goes to `intents`."""
+    def __init__(
+        self, client: viser.ClientHandle, context: Context, intents: Intents, lectures: Lectures
+    ) -> None:
+        """A page without panels; what a user does goes to `intents`. It may follow one of
+        `lectures`."""
         self.client = client
         self.gui = client.gui
         self.do = intents.do
+        self.look = intents.look
+        self._intents = intents
         self.notify = intents.notify
         session = self.session = context.session
         solver = self.solver = context.solver
         self.jobs = Jobs(context)
+        self.following = Following(context, lectures)
         self.board = Board(intents.fault)
         self.deferred = Deferred(context.pools.brief, context.bell, intents.do)
         self.scenery = Scenery(client, session, self.jobs.swimming, self.board, intents)
-        self.presses = Presses(client.gui, intents.do, context.bell)
+        self.presses = Presses(client.gui, intents.do, context.bell, intents.look)
         self.number_boxes = NumberBoxes(
             self.presses, intents.do, lambda _: session.history.end_merge()
         )
@@ -73,6 +80,10 @@ class Page:
     def shown_allocation(self) -> Allocation | None:
         """What is on the robot."""
         return self.jobs.answering.shown_answer().shown_allocation
+
+    def lock(self, why: str) -> None:
+        """Let nothing be changed on this page, for a reason; let it again where that is empty."""
+        self._intents.lock = why
 
     def undo(self) -> None:
         """Take back the last step, and say which."""

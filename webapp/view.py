@@ -18,10 +18,13 @@ from finlab.errors import FinlabError
 from webapp.facts import facts_of, pair_facts
 from webapp.intents import Intents
 from webapp.page import Page
+from webapp.panels.following import begin_following
 from webapp.panels.frame import Frame
+from webapp.panels.presenting import begin_presenting
 from webapp.session import Session
 from webapp.start_page import connect_start_page
 from webapp.tasks.context import Context
+from webapp.tasks.following import Lectures
 from webapp.tasks.slot import Attended, Bell, Pools, Slot
 from webapp.tasks.solver import Solver
 from webapp.viser_internals import Outbox
@@ -45,16 +48,18 @@ class View:
         solver: Solver,
         pools: Pools,
         loop: asyncio.AbstractEventLoop,
+        lectures: Lectures | None = None,
     ) -> None:
         """Build the page and begin; called on `loop`, which is viser's. Threads of `pools`
-        compute."""
+        compute; the page may follow one of `lectures`."""
         self.client = client
         self.session = session
         self._loop = loop
         self._outbox = Outbox(client)
         self.bell = Bell(loop)
         self.intents = Intents(client, self.bell)
-        page = self.page = Page(client, Context(session, solver, pools, self.bell), self.intents)
+        context = Context(session, solver, pools, self.bell)
+        page = self.page = Page(client, context, self.intents, lectures or Lectures())
         self.do = page.do
         self.jobs = page.jobs
         self.board = page.board
@@ -64,6 +69,8 @@ class View:
         self.frame = Frame(page)
         page.presses.start()
         connect_start_page(page)
+        begin_following(page)
+        begin_presenting(page)
         self._revision: int | None = None
         self._is_due = True
         self._held_for: Slots = NO_SLOTS
@@ -112,6 +119,9 @@ class View:
             return
         self._is_due = True
         self.intents.is_new = False
+        following = self.page.following
+        if following.lecture is not None:
+            following.lecture.tell()
         jobs = self.jobs
         if came and not done and jobs.beside.issuperset(came):
             # Nothing is asked because of what comes beside an answer.
@@ -201,10 +211,11 @@ class View:
             self.scenery.follow_guide()
             pair = pair_facts(session, self.jobs)
             scale = self.scenery.fit(
-                session.state.target, answer.shown_allocation, pair.allocations
+                session.state.target, answer.shown_allocation, pair.pair_allocations
             )
             robot = self.scenery.robot
             facts = facts_of(session, self.jobs, answer, robot.dragged, robot.pulled, scale, pair)
+            facts |= self.page.following.facts._asdict()
         except Exception as error:
             board.fail(error)
         else:
@@ -217,3 +228,4 @@ class View:
             self._patience.cancel()
         self.jobs.stop()
         self.deferred.forget()
+        self.page.following.close()

@@ -23,6 +23,8 @@ viser-project/viser:
 - `keep_private`: no message to the other pages about an input of one page; `_gui_api.py`,
   `sync_other_clients`.
 - `assign`: several properties of a node in one message; `_scene_handles.py`, `_queue_update`.
+- `know_position`: a pose that is known here and not sent, of a node that a script in the page
+  places; `_scene_handles.py`, `SceneNodeHandle.position`.
 - `slider_marks`: marks of a slider that can be others later; `_gui_handles.py`, `GuiSliderProps`.
 - `uuid_of`: a public name of a widget's element in the page; `_gui_handles.py`.
 - `run_script`, `run_file`: a public way to run a script, as `add_plotly` does; `_gui_api.py`.
@@ -454,6 +456,11 @@ def assign(handle: Any, values: dict[str, Any]) -> None:
     for name, value in values.items():
         if name not in own:
             setattr(handle, name, value)
+
+
+def know_position(handle: Any, position: NDArray[np.float64]) -> None:
+    """Remember where a node is that a script in the page has placed: nothing is sent."""
+    handle._impl.position = position
 
 
 def write_content(handle: Any, content: str) -> None:

@@ -242,9 +242,9 @@ def test_only_what_changes_is_drawn(page: Any) -> None:
     assert drawn() == before, "a page that nobody touches draws no frame"
     blade = "() => window.__viserMutable.nodeRefFromName['/robot/fins/0/turn/blade'].quaternion.x"
     still = page.page.evaluate(blade)
-    page.key("p")
+    page.key("h")
     page.until(lambda: page.page.evaluate(blade) != still and drawn() > before)
-    page.key("p")
+    page.key("h")
     page.until(lambda: page.page.evaluate(blade) == pytest.approx(still, abs=1e-6))
 
 

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from finlab.research.mdn.method import TRACE_STEPS
 from tests.webapp.stand_in import Direct, context_of, load_stand_in
 from webapp.markup.mode_plot import AXIS_LEFT, LABEL_SIZE, mode_plot
 from webapp.markup.plot import WIDTH
-from webapp.markup.refinement import is_in_vain, step_words, vain_sentence
+from webapp.markup.refinement import step_words, vain_sentence
 from webapp.markup.words import error_digits, small, three_digits
 from webapp.panels.modes_tab import mode_table
 from webapp.session import Session
@@ -122,13 +123,13 @@ def test_samples_and_modes_are_drawn_and_listed() -> None:
     )
 
 
-def refined_to(modes: Modes, errors: list[float]) -> Modes:
+def refined_to(modes: Modes, errors: list[float], answer: Any = None) -> Modes:
     """Modes whose samples end with errors, one after the other."""
     *ways, end = modes.refinement
     repeated = np.resize(errors, len(end.err_norm))
     # Of the stand-in's two steps neither is as late as the one in which samples become exact.
     late = [replace(end, err_norm=repeated)] * TRACE_STEPS.steps
-    return replace(modes, refinement=(*ways[:1], *late))
+    return replace(modes, refinement=(*ways[:1], *late), answer=answer or modes.answer)
 
 
 def test_samples_are_called_exact_where_they_are() -> None:
@@ -137,33 +138,32 @@ def test_samples_are_called_exact_where_they_are() -> None:
         State(load_layout("ucat"), target=(12.0, 0.0, 0.0, 0.0, 0.0, -0.25))
     )
     n_samples = len(modes.refinement[-1].err_norm)
-    vain = refined_to(modes, [2.66e-2, 3e-2])
+    vain = refined_to(modes, [2.66e-2, 3e-2], answer.answer)
     words = step_words(vain, None)
     assert f"none of {n_samples} made exact" in words and "2.66e−02" not in words.split("·")[0]
-    assert is_in_vain(vain)
-    sentence = vain_sentence(vain, answer.answer)
+    assert vain.is_in_vain
+    sentence = vain_sentence(vain)
     asked = f"Fx 12 N and Tz −0.25 N m: none of {n_samples} samples was refined to it."
-    assert asked in sentence and "The nearest misses it by 2.66e−02" in sentence
+    assert asked in sentence and "he nearest misses 2.66e−02" in sentence
     some = refined_to(modes, [1e-6, 3e-2])
     assert f"{n_samples // 2} of {n_samples} made exact" in step_words(some, None)
-    assert not is_in_vain(some) and vain_sentence(some, answer.answer) == ""
+    assert not some.is_in_vain and vain_sentence(some) == ""
     assert "made exact" in step_words(refined_to(modes, [1e-6]), None)
-    assert vain_sentence(NO_MODES, answer.answer) == vain_sentence(vain, None) == ""
+    assert vain_sentence(NO_MODES) == ""
 
 
 def test_samples_that_end_at_a_limit_are_counted() -> None:
     modes = modes_of_turn()
     layout = load_layout("ucat")
-    answer = Solver(load=load_stand_in).reply(State(layout, target=PRESETS["Turn"])).answer
     vain = refined_to(modes, [1.0])
     end = vain.refinement[-1]
     command = np.broadcast_to(0.5 * (layout.lower + layout.upper), end.command.shape).copy()
     command[:3, 1, 0] = layout.upper[1, 0]
     command[:, 0] = np.nan
     limited = replace(vain, refinement=(*vain.refinement[:-1], replace(end, command=command)))
-    assert "In 3 of them a fin" in vain_sentence(limited, answer)
+    assert "In 3 of them a fin came" in vain_sentence(limited)
     command[:, 2, 1] = layout.upper[2, 1]
-    assert "In each of them a fin" in vain_sentence(limited, answer)
+    assert "In each a fin came" in vain_sentence(limited)
 
 
 def test_figures_keep_their_width() -> None:

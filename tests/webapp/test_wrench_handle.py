@@ -100,7 +100,7 @@ def tab() -> Iterator[Tab]:
 def opened(tab: Tab) -> Tab:
     """The page, as at first sight."""
     tab.on_loop(lambda: tab.view.do(tab.view.session.start_over))
-    tab.on_loop(lambda: tab.view.do(lambda: tab.view.session.show_task("Allocate")))
+    tab.on_loop(lambda: tab.view.do(lambda: tab.view.session.show_drawer("Candidates")))
     tab.settle()
     return tab
 

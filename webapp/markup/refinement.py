@@ -6,7 +6,6 @@ The drawer of candidates (`panels/modes_tab.py`) shows them beside the plot.
 import numpy as np
 from markupsafe import Markup
 
-from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
 from finlab.axes import AXES, UNITS
 from finlab.display import listed
@@ -36,55 +35,39 @@ def step_words(modes: Modes, step: int | None) -> str:
     elif step_shown <= TRACE_STEPS.descent:
         words = "descent in forces"
     else:
-        words = _exact_words(errors)
+        n_samples = len(errors)
+        n_exact = int(np.count_nonzero(errors <= ALTERNATIVE_ERROR))
+        words = "made exact"
+        if n_exact < n_samples:
+            words = f"{n_exact or 'none'} of {n_samples} made exact"
     median = error_digits(float(np.median(errors)))
     return html("{} <span class='dim'>· median error</span> {}", words, median)
 
 
-def _exact_words(errors: Array) -> str:
-    """How many of the samples are exact, by their errors (K,)."""
-    n_samples = len(errors)
-    n_exact = n_exact_of(errors)
-    if n_exact == n_samples:
-        return "made exact"
-    return f"{n_exact or 'none'} of {n_samples} made exact"
-
-
-def n_exact_of(errors: Array) -> int:
-    """How many of some samples give the wrench, by their errors (K,)."""
-    return int(np.count_nonzero(errors <= ALTERNATIVE_ERROR))
-
-
-def is_in_vain(modes: Modes) -> bool:
-    """Whether samples were refined, and none of them gives the wrench."""
-    return modes.steps > 0 and n_exact_of(modes.refinement[-1].err_norm) == 0
-
-
-def vain_sentence(modes: Modes, best: Allocation | None) -> str:
+def vain_sentence(modes: Modes) -> str:
     """Why the plot has rings that no line leads to.
 
     Args:
         modes: the modes of an answer, with the refinement of the samples.
-        best: the answer; None where there is none.
 
     Returns:
         Markup: which wrench no sample was refined to, by how much the nearest one misses it, and
         how many of them have a fin at its limit. Nothing where a sample gives the wrench.
     """
-    if best is None or not is_in_vain(modes):
+    best = modes.answer
+    if best is None or not modes.is_in_vain:
         return Markup()
     end = modes.refinement[-1]
     n_samples = len(end.err_norm)
     nearest = error_digits(float(np.min(end.err_norm)))
-    parts = [
-        f"{wrench_words(best.target)}: none of {n_samples} samples was refined to it.",
-        f"The nearest misses it by {nearest} of what the robot can push.",
-    ]
+    words = f"{wrench_words(best.target)}: none of {n_samples} samples was refined to it."
     n_limited = _n_at_limit(end.command, best.layout.lower, best.layout.upper)
     if n_limited:
-        share = "each" if n_limited == n_samples else f"{n_limited}"
-        parts.append(f"In {share} of them a fin has come to its limit before.")
-    return html("<div class='fl missing said vain'>{}</div>", " ".join(parts))
+        share = "each" if n_limited == n_samples else f"{n_limited} of them"
+        words += f" In {share} a fin came to its limit; the nearest misses {nearest}."
+    else:
+        words += f" The nearest misses {nearest}."
+    return html("<div class='fl'><div class='missing said vain'>{}</div></div>", words)
 
 
 def _n_at_limit(command: Array, lower: Array, upper: Array) -> int:

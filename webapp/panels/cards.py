@@ -24,7 +24,7 @@ from webapp.session.state import LEAST, Flow, least_of
 from webapp.tasks.designs import KINDS
 
 SWITCHES = {
-    "frozen": ("Freeze", "Fins hold still at their zero direction, propellers stand (P)."),
+    "frozen": ("Freeze", "Fins hold still at their zero direction, propellers stand (H)."),
     "handle": ("Handle", "Drag the tip of the wrench in the view, or turn its rings (Allocate)."),
     "shadows": ("Shadows", "Slow without a graphics card."),
     "dark": ("Dark", "Dark theme; at first that of the system."),

@@ -25,6 +25,8 @@ class Command(NamedTuple):
     """As viser calls it; None for none."""
     modifier: Any = None
     """Keys that are held with it, as viser calls them."""
+    looks: bool = False
+    """Whether it changes nothing but what this page looks like."""
 
 
 def add_page_commands(page: Page) -> None:
@@ -34,8 +36,9 @@ def add_page_commands(page: Page) -> None:
         handle = page.gui.add_command(command.label, hotkey=command.key, modifier=command.modifier)
 
         @handle.on_trigger
-        async def _triggered(_event: Any, act: Callable[[], object] = command.act) -> None:
-            page.do(act)
+        async def _triggered(_event: Any, command: Command = command) -> None:
+            do = page.look if command.looks else page.do
+            do(command.act)
 
 
 def page_commands(page: Page) -> list[Command]:
@@ -79,13 +82,15 @@ def page_commands(page: Page) -> list[Command]:
         Command("Two robots: swap", session.two_robots.swap),
         Command("Swim: pause or go on", pause_or_go_on, "B"),
         Command("Swim: back to the design", scenery.end_swim),
-        Command("Frame what is selected", scenery.frame, "F"),
-        Command("Save the view as a picture", scenery.save),
+        Command("Frame what is selected", scenery.frame, "F", looks=True),
+        Command("Save the view as a picture", scenery.save, looks=True),
     ]
     for view, key in CAMERA_KEYS.items():
-        commands.append(Command(f"Camera: {view}", partial(scenery.look_from, view), key))
+        look = partial(scenery.look_from, view)
+        commands.append(Command(f"Camera: {view}", look, key, looks=True))
     commands += [
-        Command("Freeze or move the fins", partial(session.toggle, "frozen"), "P"),
+        Command("Present, or leave", partial(session.toggle, "presents"), "P", looks=True),
+        Command("Freeze or move the fins", partial(session.toggle, "frozen"), "H"),
         Command("Dark or light theme", partial(session.toggle, "dark")),
         Command("Tour: start, or next stop", session.guide.tour, "T"),
         Command("Export the bundle for the robot", page.designs.bundle),

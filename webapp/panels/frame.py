@@ -35,8 +35,11 @@ from webapp.panels.arrangement import (
     Panel,
 )
 from webapp.panels.commands import add_page_commands
+from webapp.panels.following import add_following
+from webapp.panels.gamepad import add_gamepad
 from webapp.panels.log_tab import plot_rows
 from webapp.panels.nudging import add_nudging
+from webapp.panels.presenting import add_presenting
 from webapp.panels.status import add_corner
 from webapp.session.granted import SourceFile
 from webapp.session.lessons import Stop
@@ -55,7 +58,15 @@ VARIABLES = (
     f"[data-mantine-color-scheme=dark] {{ --fl-reach: {css(REACH_DARK)}; }}"
 )
 """The colours of the theme as variables of CSS."""
-STYLE_SHEETS = ("style.css", "frame.css", "inquiry.css", "two_robots.css", "take_home.css")
+STYLE_SHEETS = (
+    "style.css",
+    "frame.css",
+    "inquiry.css",
+    "two_robots.css",
+    "take_home.css",
+    "following.css",
+    "presenting.css",
+)
 """Files of `webapp/markup` that style the page."""
 STYLE = html(
     "<style>{}{}</style>",
@@ -63,6 +74,8 @@ STYLE = html(
     [Markup(files("webapp.markup").joinpath(name).read_text("utf-8")) for name in STYLE_SHEETS],
 )
 """The style element of all pages."""
+LOOKS = ("look", "frame", "picture", "scheme", "typed")
+"""Buttons by their kinds that change nothing but what this page looks like."""
 LOW_DRAWER = ":root { --tall: 92px; }"
 """Style of a drawer for plots over time that has none yet."""
 USUAL_DRAWER = ":root {{ --fl-usual: {}px; }}"
@@ -146,9 +159,12 @@ class Frame:
         page.board.act(self._guard_reload)
         page.board.act(self._set_title)
         add_nudging(page)
+        add_gamepad(page)
         self._listen()
         self.sections: list[Section] = []
         add_corner(page)
+        add_following(page)
+        add_presenting(page)
         for region in REGIONS:
             with gui.add_folder(region):
                 add_html(gui, marker(f"fl-region fl-{region}"))
@@ -237,7 +253,7 @@ class Frame:
             "typed": lambda *_: session.history.end_merge(),
         }
         for kind, act in acts.items():
-            self._page.presses.on(kind, act)
+            self._page.presses.on(kind, act, looks=kind in LOOKS)
 
 
 def _drawer_height(

@@ -12,7 +12,7 @@ from finlab.physics.objective import REACHED
 from finlab.research.mdn.method import TRACE_STEPS
 from webapp.handles import add_html, placed, press
 from webapp.markup.mode_plot import mode_plot
-from webapp.markup.refinement import is_in_vain, step_words, vain_sentence
+from webapp.markup.refinement import step_words, vain_sentence
 from webapp.markup.verdict import Verdict, verdict_of
 from webapp.markup.words import (
     error_digits,
@@ -77,7 +77,6 @@ def add_candidates(page: Page) -> None:
     page.presses.on("play", lambda _key, _modifier: jobs.refining.toggle())
     page.presses.on("loop", lambda _key, _modifier: session.set_loop(not session.loops))
     page.add_html(_player)
-    page.add_html(lambda modes, best, searching: "" if searching else vain_sentence(modes, best))
     hint = "How many steps of refinement the samples have had, in the plot and on the robot."
     slider = gui.add_slider("Step", 0, TRACE_STEPS.steps, 1, TRACE_STEPS.steps, hint=hint)
     page.bind(slider, jobs.refining.hold, lambda step, modes: modes.steps if step is None else step)
@@ -132,14 +131,17 @@ def _temperature(state: State) -> float:
 
 
 def _player(modes: Modes, step: int | None, playing: bool, loops: bool) -> str:
+    """Buttons that play the refinement, what its present step has made of the samples, and why none
+    of them gives the wrench where that is so."""
     if not modes.steps:
         return ""
+    why = vain_sentence(modes) if modes.is_in_vain else ""
     play = ("❚❚", "Pause") if playing else ("▶", "Play")
     row = (
         "<div class='fl fl-player'><button {} title='let the samples travel to where they end'>{} "
         "{}</button>"
         "<button {} aria-pressed='{}' title='begin anew at the "
-        "end'>Loop</button><span>{}</span></div>"
+        "end'>Loop</button><span>{}</span></div>{}"
     )
     return html(
         row,
@@ -148,6 +150,7 @@ def _player(modes: Modes, step: int | None, playing: bool, loops: bool) -> str:
         press("loop", ""),
         str(loops).lower(),
         step_words(modes, step),
+        why,
     )
 
 
@@ -156,7 +159,7 @@ def _origin_words(method: str, best: Allocation | None, in_reach: bool, modes: M
     sentence = LEARNED
     if method != "paper":
         aside = BESIDE.get(method, f" The answer, number 1, is that of method {method}.")
-        sentence = IN_VAIN if is_in_vain(modes) else PROPOSED + aside
+        sentence = IN_VAIN if modes.is_in_vain else PROPOSED + aside
         if best is not None and not in_reach:
             sentence = BEYOND.format(best.policy.kind)
         elif best is not None and not np.nan_to_num(best.target).any():
@@ -169,7 +172,7 @@ def mode_table(modes: Modes, mode: int) -> str:
     fins."""
     if not modes.visible:
         return ""
-    of_fins = any(not math.isnan(named.mode.effort) for named in modes.visible)
+    of_fins = any([not math.isnan(named.mode.effort) for named in modes.visible])
     rows = []
     for k, (candidate, name, badge) in enumerate(modes.visible):
         rows.append(

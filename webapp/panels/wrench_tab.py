@@ -102,7 +102,9 @@ class Tracks:
         """Show the target; first the ends: a value beyond them would not be shown."""
         for axis, slider in enumerate(self._sliders):
             rounded = round(target[axis], DIGITS) + 0.0
-            limit = widened_end(self._ends[axis], rounded)
+            limit = self._ends[axis]
+            if abs(rounded) > limit:
+                limit = widened_end(limit, rounded)
             if limit != self.limits[axis]:
                 self.limits[axis] = slider.max = limit
                 slider.min = -limit

@@ -48,6 +48,7 @@ class Arrows:
             head_length=HEAD_LENGTH * thickness,
             visible=False,
         )
+        self._thickness = thickness
         self._is_visible = False
         self._size = 0.0
         self._colors: NDArray[np.uint8] | None = None
@@ -55,6 +56,16 @@ class Arrows:
         self._drawn = b""
         """Which of them are."""
         self._points: NDArray[np.float32] | None = None
+
+    def thicken(self, factor: float) -> None:
+        """Draw all arrows thicker by a factor."""
+        thickness = factor * self._thickness
+        set_properties(
+            self.node,
+            shaft_radius=thickness,
+            head_radius=HEAD_RADIUS * thickness,
+            head_length=HEAD_LENGTH * thickness,
+        )
 
     def show(self, starts: Array, vectors: Array, colors: NDArray[np.uint8], size: float) -> None:
         """Show arrows; those of no length are left out.
@@ -131,6 +142,10 @@ class ForceNodes:
         self._sizes = (1.0, 1.0)
         self._swept: tuple[list[float], list[float]] = ([], [])
         """Half angles and angles [rad] of the fans that are shown (n,)."""
+
+    def thicken(self, factor: float) -> None:
+        """Draw the arrows thicker by a factor."""
+        self._arrows.thicken(factor)
 
     def place(self, layout: Layout, sizes: tuple[float, float]) -> None:
         """Where actuators stand; `sizes` are of them and of arrows."""

@@ -42,6 +42,8 @@ CAMERAS = {
     "Front": (1.3, 0.0, 0.1),
 }
 """Where the camera stands in each view [m]."""
+PRESENTED = 1.8
+"""Factor of the thickness of arrows while the page presents."""
 SPEED = 0.5
 LONGEST_NAME = 24
 """Letters of a name that stand over the robot; of a longer one so many."""
@@ -71,6 +73,8 @@ class RobotScene:
         self._attainable = AttainableNodes(scene)
         self._direction = DirectionHandle(self._client, self._turn)
         self._handle = WrenchHandle(scene, "/robot/wrench", self._pull)
+        self.pulled: Grip | None = None
+        """What of the wrench is in the user's hand; None for nothing."""
         self.pulled_newtons = 1.0
         """Force of an arrow of 0.1 m and size 1 while the wrench is in the user's hand [N]."""
         self._newtons_before = 1.0
@@ -80,15 +84,16 @@ class RobotScene:
         self._works: list[bool] = []
         self._size = view_size(session.state.layout)
         self._arrow_size = 1.0
+        self._thickness = 1.0
         self._top = 0.0
         self._flaps = ""
         shows = (
+            self._thicken,
             self._show_stage,
             self._place,
             self._push,
-            self._flap,
+            self._animate,
             self._show_wrench,
-            self._show_handle,
             self._show_sets,
         )
         for show in (*shows, self._offer):
@@ -176,6 +181,7 @@ class RobotScene:
         damage: Damage,
         dragged: int | None,
         swims: bool,
+        follows: str,
     ) -> None:
         hull = hull_of(visible_layout)
         sizes = (part_size(visible_layout), arrow_size(visible_layout))
@@ -187,7 +193,7 @@ class RobotScene:
             )
         for node in self._fins[visible_layout.n :]:
             node.hide()
-        edited = selected if task == "Design" and not swims else None
+        edited = selected if task == "Design" and not (swims or follows) else None
         stuck = () if swims else damage.stuck
         for i, actuator in enumerate(visible_layout.actuators):
             remark = (
@@ -221,7 +227,9 @@ class RobotScene:
         scale: Scale,
         moment: Moment | None,
         pair: Pair | None,
+        display: Display,
     ) -> None:
+        del display  # it may have changed how thick arrows are
         if pair is not None:  # this robot is hidden
             return
         idle = lost if moment is None else moment.lost
@@ -255,7 +263,7 @@ class RobotScene:
             jets = None if visible_layout.interaction is None else robot
             self._jets.refresh(jets, forces, scaled, self._arrow_size)
 
-    def _flap(
+    def _animate(
         self,
         visible_layout: Layout,
         shown_allocation: Allocation | None,
@@ -264,19 +272,56 @@ class RobotScene:
         display: Display,
         swim: SwimSettings,
         paused: bool,
+        target: tuple[float, ...],
+        scale: Scale,
+        task: str,
+        swims: bool,
+        pulled: Grip | None,
         pair: Pair | None,
+        follows: str,
     ) -> None:
-        """The page moves the fins (`frames.js`): it is told the commands of all, and how fast."""
-        if pair is not None:
+        """What the page moves itself (`frames.js`), in one message: the fins, and the handle."""
+        script = ""
+        if pair is None:
+            script = self._flapping(moment, display, swim, paused)
+        else:
             self._flaps = ""
-            return
+        size = arrow_size(visible_layout)
+        if pulled is None:
+            self._newtons_before = self.pulled_newtons = scale.newtons
+        # The foot of the arrow is that of the wrench's nodes.
+        per_newton = size * LENGTH / scale.newtons
+        Fx, Fy, Fz = target[:3]
+        tip = per_newton * Fx, per_newton * Fy, per_newton * Fz
+        is_visible = display.handle and task == "Allocate" and not swims and pair is None
+        is_visible = is_visible and not display.presents
+        is_visible = is_visible and not follows
+        commanded = visible_layout.commanded.tolist()
+        script += self._handle.show(target, tip, size, commanded, is_visible)
+        if script:
+            run_script(self._client.gui, script)
+
+    def _flapping(
+        self, moment: Moment | None, display: Display, swim: SwimSettings, paused: bool
+    ) -> str:
+        """A script that tells the page the commands of all fins, and how fast they beat; empty
+        where it knows them."""
         speed, still = (
             (SPEED, display.frozen) if moment is None else (swim.speed, paused or moment.done)
         )
         moves = msgspec.json.encode([self._moves, speed, still]).decode()[1:-1]
-        if moves != self._flaps:
-            self._flaps = moves
-            run_script(self._client.gui, f"finlabFrames.flap({moves});")
+        if moves == self._flaps:
+            return ""
+        self._flaps = moves
+        return f"finlabFrames.flap({moves});"
+
+    def _thicken(self, display: Display) -> None:
+        """Thick arrows are seen from the last row."""
+        factor = PRESENTED if display.presents else 1.0
+        if factor != self._thickness:
+            self._thickness = factor
+            self._forces.thicken(factor)
+            self._wrench.thicken(factor)
 
     def _show_wrench(
         self,
@@ -300,32 +345,9 @@ class RobotScene:
         lengths = LENGTH / scale.newtons, LENGTH / scale.torque
         self._wrench.refresh(demanded, delivered, missing, self._top, *lengths, self._arrow_size)
 
-    @property
-    def pulled(self) -> Grip | None:
-        """What of the wrench is in the user's hand; None for nothing."""
-        return self._handle.grip
-
-    def _show_handle(
-        self,
-        visible_layout: Layout,
-        target: tuple[float, ...],
-        scale: Scale,
-        task: str,
-        display: Display,
-        swims: bool,
-        pulled: Grip | None,
-    ) -> None:
-        size = arrow_size(visible_layout)
-        if pulled is None:
-            self._newtons_before = self.pulled_newtons = scale.newtons
-        # The foot of the arrow is that of the wrench's nodes.
-        tip = np.array(target[:3]) * (size * LENGTH / scale.newtons)
-        is_visible = display.handle and task == "Allocate" and not swims
-        commanded = visible_layout.commanded.tolist()
-        self._handle.show(target, tip, size, commanded, is_visible)
-
     def _pull(self, phase: str, grip: Grip, tip: Array, angle: float) -> None:
         session = self._session
+        self.pulled = self._handle.grip
         if phase == "start":
             session.history.end_merge()
             return

@@ -16,6 +16,7 @@ import viser
 from finlab.arrays import Array
 from webapp.handles import set_properties
 from webapp.session.targets import nudge, slider_end
+from webapp.viser_internals import know_position
 
 TIP_SIZE = 0.13
 """Length of the gizmo's axes at the tip, for arrows of size 1 [m]."""
@@ -143,6 +144,12 @@ class WrenchHandle:
         """What is held; None for nothing."""
         self._target: tuple[float, ...] = (0.0,) * 6
         self._angle = 0.0
+        self._tip_at: tuple[float, float, float] | None = None
+        """Where the gizmo of the tip was brought to [m]; None where a hand has left it."""
+        self._is_turned = False
+        """Whether a ring stands where a hand has turned it to."""
+        self._shown: tuple[float, tuple[bool, ...], bool] | None = None
+        """What the gizmos look like: arguments of `_set_looks`."""
         look: dict[str, Any] = {"depth_test": False, "line_width": 2.5, "visible": False}
         self._tip = scene.add_transform_controls(
             f"{parent}/tip", TIP_SIZE, disable_rotations=True, opacity=0.9, **look
@@ -167,33 +174,50 @@ class WrenchHandle:
     def show(
         self,
         target: tuple[float, ...],
-        tip: Array,
+        tip: tuple[float, float, float],
         size: float,
         commanded: Sequence[bool],
         is_visible: bool,
-    ) -> None:
+    ) -> str:
         """Stand at the tip of the asked force; what is held is left to the hand.
 
         Args:
             target: wrench that is asked for (6,) [N, N m].
-            tip: of its force's arrow, from the arrow's foot (3,) [m].
+            tip: of its force's arrow, from the arrow's foot [m].
             size: of the arrows.
             commanded: whether the robot commands each axis (6,).
             is_visible: whether the handle is shown.
+
+        Returns:
+            A script for the page that brings the gizmo of the tip there; empty for none.
         """
         self._target = target
+        shown = size, tuple(commanded), is_visible
+        if shown != self._shown:
+            self._shown = shown
+            self._set_looks(*shown)
+        if not is_visible:
+            return ""
         held = self.grip
+        if held is None and self._is_turned:
+            self._is_turned = False
+            for ring in self._rings:
+                set_properties(ring, wxyz=UPRIGHT)
+        if (held is not None and held.ring is None) or tip == self._tip_at:
+            return ""
+        self._tip_at = tip
+        know_position(self._tip, np.array(tip))
+        x, y, z = tip
+        return f"finlabFrames.place('{self._tip.name}', [{x:.5f}, {y:.5f}, {z:.5f}]);"
+
+    def _set_looks(self, size: float, commanded: Sequence[bool], is_visible: bool) -> None:
+        """Let the gizmos fit the robot; arguments as for `show`."""
         moves = tuple(map(bool, commanded[:AXIS_COUNT]))
         set_properties(
             self._tip, visible=is_visible and any(moves), active_axes=moves, scale=TIP_SIZE * size
         )
-        if held is None or held.ring is not None:
-            set_properties(self._tip, position=tip)
-        for axis, ring in enumerate(self._rings):
-            turns = bool(commanded[AXIS_COUNT + axis])
-            set_properties(ring, visible=is_visible and turns, scale=RING_SIZE * size)
-            if held is None or held.ring != axis:
-                set_properties(ring, wxyz=UPRIGHT)
+        for ring, turns in zip(self._rings, commanded[AXIS_COUNT:], strict=True):
+            set_properties(ring, visible=is_visible and bool(turns), scale=RING_SIZE * size)
 
     def _hearing(self, ring: int | None) -> Callable[[Any], Any]:
         async def pulled(event: Any) -> None:
@@ -206,6 +230,9 @@ class WrenchHandle:
             if ring is not None:
                 angle = turn_of(np.array(self._rings[ring].wxyz), ring)
                 self._angle = unwound(angle, self._angle)
+                self._is_turned = True
+            else:
+                self._tip_at = None
             if event.phase == "end":
                 self.grip = None
             self._on_pull(event.phase, grip, np.array(self._tip.position), self._angle)

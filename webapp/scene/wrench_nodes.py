@@ -120,8 +120,16 @@ class WrenchNodes:
             part("missing_torque", MISSING, unit_ring(0.05)),
         )
         self._torques = [UnitMesh(ring, about_z) for ring in rings]
+        self._thickness = 1.0
+        """Factor of the arrows' thickness."""
         self._placed: tuple[float, float] | None = None
         """Top of the hull [m] and size that the nodes stand for."""
+
+    def thicken(self, factor: float) -> None:
+        """Draw the arrows of forces thicker by a factor; that of the asked one with the next
+        target."""
+        self._forces.thicken(factor)
+        self._thickness = factor
 
     def refresh(
         self,
@@ -154,7 +162,8 @@ class WrenchNodes:
         Fx, Fy, Fz = target[:3]
         asked_force = length_scale * Fx, length_scale * Fy, length_scale * Fz
         length = math.hypot(*asked_force)
-        self._asked_force.show(asked_force, length, (round(length, DIGITS), size, size))
+        width = size * self._thickness
+        self._asked_force.show(asked_force, length, (round(length, DIGITS), width, width))
         for ring, wrench in zip(self._torques, (target, got, missing), strict=True):
             torque = wrench[3:]
             length = math.hypot(*torque)

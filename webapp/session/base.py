@@ -200,14 +200,19 @@ class BaseSession:
         `history.end_merge`."""
         self._ask(f"Ask for {AXES[axis]}", self.state.with_target(axis, value))
 
-    def pull(self, target: Sequence[float]) -> None:
-        """The target wrench (6,) [N, N m] on its way in the user's hand: one step of undo, until
-        `history.end_merge`."""
+    def pull(self, target: Sequence[float], step: str = "Pull the wrench") -> None:
+        """The target wrench on its way in the user's hand: one step of undo, until
+        `history.end_merge`.
+
+        Args:
+            target: components (6,) [N, N m].
+            step: what undo calls it.
+        """
         state = self.state
         for axis, value in zip(range(len(AXES)), target, strict=True):
             if value != state.target[axis]:
                 state = state.with_target(axis, value)
-        self._ask("Pull the wrench", state)
+        self._ask(step, state)
 
     def _ask(self, name: str, state: State) -> None:
         """Another question by a step of undo: one for all of the same name, until

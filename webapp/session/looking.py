@@ -65,6 +65,8 @@ class Display:
     dark: bool = False
     handle: bool = True
     """Whether the wrench can be pulled in the view."""
+    presents: bool = False
+    """Whether the page shows nothing but the robot and what is said of it, in large type."""
     has_own_theme: bool = False
     """Whether the user has chosen light or dark; until then it is the system's."""
     drawn: str = "none"

@@ -158,8 +158,9 @@ class Answering:
         if reply is None:
             self.search.forget()
             return
-        drawer = session.drawer
-        if session.desk.task not in PROVED:
+        presents = session.display.presents
+        drawer = CANDIDATES if presents and session.state.layout.is_of_fins else session.drawer
+        if session.desk.task not in PROVED and not presents:
             return
         if drawer not in MODE_DRAWERS:
             # A mode that is chosen stays on the robot when the drawer is closed.

@@ -1,7 +1,7 @@
 """The solver: from a state to an answer with all that a page shows of it, by allocators that it
 keeps."""
 
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -69,11 +69,20 @@ class Modes:
     """The null space that these ways lie in, where that is looked at."""
     ends: tuple[int, ...] = ()
     """For each proposal the shown mode at which it ends, -1 where that is none of them."""
+    answer: Allocation | None = None
+    """The answer to which the proposals were made; None where there are none."""
 
-    @property
+    @cached_property
     def steps(self) -> int:
         """Steps of the refinement."""
         return max(len(self.refinement) - 1, 0)
+
+    @cached_property
+    def is_in_vain(self) -> bool:
+        """Whether proposals were refined, and none of them gives the wrench."""
+        if not self.steps:
+            return False
+        return not (self.refinement[-1].err_norm <= ALTERNATIVE_ERROR).any()
 
     def proposal_of(self, mode: int) -> int | None:
         """The first proposal that ends at a mode: the likeliest, as those come first."""
@@ -99,7 +108,7 @@ def modes_of(
     ends = np.full(len(last), -1)
     for k in reversed(range(len(visible))):
         ends[same_signature(visible[k].mode.signature, signatures)] = k
-    return Modes(visible, len(modes), ways, ends=tuple(ends.tolist()))
+    return Modes(visible, len(modes), ways, ends=tuple(ends.tolist()), answer=answer)
 
 
 def named_modes(modes: Sequence[Mode], badge: str) -> tuple[NamedMode, ...]:
@@ -154,6 +163,18 @@ class Reply:
     """Whether any command of the working fins gives what is asked."""
 
 
+class KnownModes(NamedTuple):
+    """Modes of a reply that are kept."""
+
+    reply: Reply
+    seen: bool
+    modes: Modes
+
+
+KEPT_REPLIES = 4
+"""Answers that are kept, and modes: pages that follow another one ask for them again at once."""
+
+
 class JetComparison(NamedTuple):
     """Answers to a state whose jets count, both judged with them."""
 
@@ -175,6 +196,10 @@ class Solver:
         self._load = load
         self._choices: dict[tuple[str, str], MethodChoice] = {}
         self._made: dict[tuple[Layout, str, float | None, str], Allocator] = {}
+        self._replies: deque[Reply] = deque(maxlen=KEPT_REPLIES)
+        """The last answers, the newest first."""
+        self._modes: deque[KnownModes] = deque(maxlen=KEPT_REPLIES)
+        """Modes that were found last, the newest first."""
         own = checkpoint is not None and _is_papers(resolve_checkpoint(checkpoint))
         self.first_network = str(resolve_checkpoint(checkpoint)) if own and checkpoint else SHIPPED
         """The network that method `paper` begins with."""
@@ -241,14 +266,19 @@ class Solver:
         return self._choices[method, network]
 
     def reply(self, state: State) -> Reply:
-        """The answer to a state with all that a page shows of it, computed to the end. Fails as
-        `solve`."""
+        """The answer to a state with all that a page shows of it, computed to the end; the last
+        ones are kept, for pages that follow another one. Fails as `solve`."""
+        for known in self._replies:
+            if known.state is state:
+                return known
         answer = judged_by_plant(self.solve(state))
         _ = answer.forces, answer.power, answer.effort  # here, not where the page is written
         in_reach = answer.reachable
         if not in_reach and state.method != "dual":  # which misses nothing that can be reached
             in_reach = self.solve(replace(state, method="dual")).reachable
-        return Reply(state, answer, in_reach)
+        reply = Reply(state, answer, in_reach)
+        self._replies.appendleft(reply)
+        return reply
 
     def jet_comparison(self, state: State) -> JetComparison:
         """The answer to a state of a robot whose jets count, and that of the laws alone. Fails as
@@ -271,6 +301,15 @@ class Solver:
         """The answer, and beside it all distinct ways to do the same that the network proposes:
         tens of milliseconds. Method `paper` has a network of its own. Where they are not `seen` it
         is only proved."""
+        for known in self._modes:
+            if known.reply is reply and known.seen == seen:
+                return known.modes
+        modes = self._modes_of(reply, seen)
+        self._modes.appendleft(KnownModes(reply, seen, modes))
+        return modes
+
+    def _modes_of(self, reply: Reply, seen: bool) -> Modes:
+        """As `modes`, which keeps the last ones."""
         answer = reply.answer
         state = reply.state
         _ = answer.bound  # to prove what is least takes longer than to find it
