@@ -48,12 +48,19 @@ METHOD_WORDS = {
     "ipopt": "a general solver, slow",
 }
 """Name of each method -> what is said of it in the list of methods."""
-COMMANDS = html(
-    "<button title='all commands and their keys (Ctrl+K)' onclick='{}'>Commands</button>",
+COMMANDS_SCRIPT = (
     "document.documentElement.dispatchEvent(new KeyboardEvent("
-    '"keydown", { key: "k", code: "KeyK", ctrlKey: true, bubbles: true }))',
+    '"keydown", { key: "k", code: "KeyK", ctrlKey: true, bubbles: true }))'
 )
-"""A button that opens the list of commands, as Ctrl+K does."""
+"""Opens the list of commands, as Ctrl+K does."""
+
+
+def commands_button(attributes: str = "") -> str:
+    """A button that opens the list of commands; `attributes` are markup."""
+    template = (
+        "<button {} title='all commands and their keys (Ctrl+K)' onclick='{}'>Commands</button>"
+    )
+    return html(template, attributes, COMMANDS_SCRIPT)
 
 
 def card(markup: Callable[..., str]) -> Callable[[Page], object]:
@@ -201,7 +208,8 @@ def add_answering(page: Page) -> None:
         session.set_setting("method", method_of_option.get(option, option))
 
     page.bind(methods, set_method, _option)
-    add_html(gui, html("<div class='fl-help'>{}{}{}</div>", _menu(LESSONS), _menu(TOUR), COMMANDS))
+    lists = _menu(LESSONS), _menu(TOUR)
+    add_html(gui, html("<div class='fl-help'>{}{}</div>", lists, commands_button()))
 
 
 def _options(layout: Layout) -> tuple[str, ...]:
