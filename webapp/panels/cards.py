@@ -19,13 +19,18 @@ from webapp.page import Page
 from webapp.scene.robot_scene import CAMERAS
 from webapp.session.files import MAX_LINK
 from webapp.session.lessons import LESSONS, TOUR, Stop
-from webapp.session.looking import TASKS
+from webapp.session.looking import ARROW_LENGTHS, TASKS
 from webapp.session.state import LEAST, Flow, least_of
 from webapp.tasks.designs import KINDS
 
 SWITCHES = {
     "frozen": ("Freeze", "Fins hold still at their zero direction, propellers stand (P)."),
     "handle": ("Handle", "Drag the tip of the wrench in the view, or turn its rings (Allocate)."),
+    "arrows": ("Forces", "What each actuator gives, as an arrow."),
+    "fixed_scale": (
+        "Fixed scale",
+        "Arrows by the most that the robot can give, so that answers compare; else by this answer.",
+    ),
     "shadows": ("Shadows", "Slow without a graphics card."),
     "dark": ("Dark", "Dark theme; at first that of the system."),
 }
@@ -157,6 +162,20 @@ def add_switches(page: Page) -> None:
             partial(page.session.set_display, key),
             lambda display, key=key: getattr(display, key),
         )
+        if key == "fixed_scale":
+            _add_arrow_length(page)
+
+
+def _add_arrow_length(page: Page) -> None:
+    """The slider of the length of arrows."""
+    hint = "How long arrows and rings are, beside what fits the view."
+    slider = page.gui.add_slider("Arrow length", *ARROW_LENGTHS, 0.1, 1.0, hint=hint)
+    page.bind_number(
+        slider,
+        partial(page.session.set_display, "arrow_length"),
+        lambda display: display.arrow_length,
+        digits=1,
+    )
 
 
 def add_file(page: Page) -> None:
