@@ -219,7 +219,8 @@ def add_answering(page: Page) -> None:
     )
     page.board.show(least, visible=lambda layout: layout.is_of_fins)
     add_html(gui, marker("fl-method"))
-    methods = gui.add_dropdown("Method", tuple(METHODS))
+    hint = "It stays when another robot is opened, where it takes that one; else dual answers."
+    methods = gui.add_dropdown("Method", tuple(METHODS), hint=hint)
     page.board.show(methods, options=_options)
     method_of_option = {_option(name): name for name in METHODS}
 

@@ -14,7 +14,16 @@ from finlab.physics.objective import REACHED
 from webapp.handles import set_properties
 from webapp.markup.two_robots import status_of_both
 from webapp.markup.verdict import COLORS, WORKING, verdict_of, verdict_sentence
-from webapp.markup.words import ROUNDING, error_digits, html, parts_word, three_digits
+from webapp.markup.words import (
+    ROUNDING,
+    error_digits,
+    html,
+    parts_word,
+    signed,
+    three_digits,
+    time_digits,
+    with_unit,
+)
 from webapp.page import Page
 from webapp.scene.stage import arrow_size
 from webapp.scene.two_robots import pair_arrow_size
@@ -33,8 +42,6 @@ ARROWS = ("asked", "delivered", "missing")
 """Arrows of the legend by name."""
 SLOWEST_WATER = 5e-4
 """Speed of the water from which it is in the legend of a swim [m/s]."""
-FEW_MS = 10.0
-"""Time of an answer up to which it has two digits [ms]; no measurement repeats to a third one."""
 
 
 def add_corner(page: Page) -> None:
@@ -239,31 +246,28 @@ def _figures(allocation: Allocation, least: bool, in_reach: bool, refined: str, 
     unallocated = allocation.unallocated.tolist()
     unallocated = [value if abs(value) >= ROUNDING else 0.0 for value in unallocated]
     missing = zip(AXES, unallocated, UNITS, strict=True)
-    rest = ", ".join([f"{axis} {value:+.2g} {unit}" for axis, value, unit in missing]).replace(
-        "-", "−"
-    )
+    rest = ", ".join([f"{axis} {signed(value)} {unit}" for axis, value, unit in missing])
     method = allocation.method
     figures = [
         f"<span title='missing, as a share of what the robot can push: {rest}'><span class='dim'>"
         f"error</span> <b class='err'>{error_digits(allocation.err_norm)}</b></span>"
     ]
     kinds = (
-        ("power", "watts", allocation.power, " W"),
-        ("effort", "effort", allocation.effort, ""),
+        ("power", "watts", with_unit(allocation.power, "W")),
+        ("effort", "effort", three_digits(allocation.effort)),
     )
-    for word, kind, value, unit in kinds:
-        if value is None:  # effort is of fins
+    for word, kind, figure in kinds:
+        if word == "effort" and allocation.effort is None:  # it is of fins
             continue
         is_least = least and LEAST.get(kind) == method
         if word == "power":
             is_least = is_least and is_proved_least(allocation)
         label = f"least {word}" if is_least else word
+        number, _, unit = figure.partition(" ")
         figures.append(
-            f"<span><span class='dim'>{label}</span> <b class='{word}'>{three_digits(value)}</b>"
-            f"{unit}</span>"
+            f"<span><span class='dim'>{label}</span> <b class='{word}'>{number}</b> {unit}</span>"
         )
-    ms = allocation.solve_ms
-    time = f"{ms:.2g}" if ms < FEW_MS else f"{ms:.0f}"
+    time = time_digits(allocation.solve_ms)
     who = html("<span class='dim'>{}</span> {} ms", method, time) if least else badge or "network"
     figures.append(html("<span class='aside'>{}</span>", who))
     figures.append(

@@ -23,7 +23,7 @@ from webapp.tasks.swimmer import Swimmer
 from webapp.theme import ASKED, DEAD, DELIVERED, LIGHT, MISSING, REACH, Rgb
 from webapp.viser_internals import assign
 
-NEWTONS = tuple([digit * 10.0**power for power in range(-2, 6) for digit in (1.0, 2.0, 5.0)])
+NEWTONS = tuple([digit * 10.0**power for power in range(-2, 7) for digit in (1.0, 2.0, 5.0)])
 """Forces [N] that an arrow of 0.1 m may stand for."""
 LENGTH = 0.1
 """Length that the legend speaks of [m]."""
