@@ -208,7 +208,8 @@ def main(words: Sequence[str]) -> None:
         p50, p90, most = (float(np.percentile(values, q)) for q in (50, 90, 100))
         print(f"{name:14} p50 {p50:5.0f} ms   p90 {p90:5.0f} ms   most {most:5.0f} ms")
     print(
-        f"{pages} pages, {followers} of them follow; {cost.own_states} different wrenches at the end"
+        f"{pages} pages, {followers} of them follow; "
+        f"{cost.own_states} different wrenches at the end"
     )
 
 

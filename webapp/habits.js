@@ -15,7 +15,12 @@
 
   window.addEventListener('keydown', (event) => {
     const held = event.ctrlKey || event.metaKey;
-    if (event.key === 'Escape') document.querySelector('[popover]:popover-open')?.hidePopover(); // the page's key else
+    const menu = event.key === 'Escape' && document.querySelector('[popover]:popover-open');
+    if (menu) { // else it is a key of the page, which would close the tour as well
+      menu.hidePopover();
+      event.stopImmediatePropagation();
+      return;
+    }
     if (typing(event.target)) return;
     if (held && !event.shiftKey && event.key.toLowerCase() === 'y') {
       event.preventDefault();

@@ -22,7 +22,7 @@ from webapp.session.targets import FIRST_TARGET
 from webapp.viser_internals import run_script
 
 PICTURES = "pictures"
-"""Folder of `webapp/markup` with a WebP picture of each robot, made by `tools/robot_pictures.py`."""
+"""Folder of `webapp/markup` with a picture (WebP) of each robot, from `tools/robot_pictures.py`."""
 
 
 class Example(NamedTuple):

@@ -91,7 +91,7 @@ MODE_COLORS: tuple[Rgb, ...] = (
 class Look:
     """What differs between the light and the dark theme: the water at the top and bottom of the
     view, fine and strong lines of the floor, the hull, the window that marks the bow, shafts and
-    struts, thin lines."""
+    struts, thin lines, outlines of arrows."""
 
     water_top: Rgb
     water_bottom: Rgb
@@ -101,6 +101,7 @@ class Look:
     glass: Rgb
     metal: Rgb
     line: Rgb
+    halo: Rgb
 
 
 LIGHT = Look(
@@ -112,6 +113,7 @@ LIGHT = Look(
     glass=(44, 62, 78),
     metal=(98, 108, 118),
     line=(84, 104, 118),
+    halo=(22, 32, 40),
 )
 DARK = Look(
     water_top=(24, 42, 54),
@@ -122,6 +124,7 @@ DARK = Look(
     glass=(58, 80, 100),
     metal=(120, 130, 140),
     line=(150, 170, 184),
+    halo=(248, 250, 252),
 )
 
 

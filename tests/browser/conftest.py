@@ -71,13 +71,14 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     from finlab.layout import load_layout
     from webapp.app import App
     from webapp.session import Display
+    from webapp.start_page import start_page
     from webapp.tasks.solver import Solver
     from webapp.viser_internals import start_server, stop_server
 
     prepare(["webapp.session.files", "webapp.tasks.fitting"])
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
-        server = start_server()
+        server = start_server(start_page=start_page())
         app = App(server, Solver(), load_layout("ucat"), Display(shadows=False, frozen=True))
         yield Served(f"http://127.0.0.1:{server.get_port()}/?fixedDpr=0.1", app, server)
         app.stop()

@@ -17,7 +17,7 @@ from tests.webapp.stand_in import StandIn, context_of, load_stand_in, until
 from webapp.markup.mode_plot import mode_plot
 from webapp.markup.words import source_words, three_digits
 from webapp.panels.files_tab import command_line
-from webapp.panels.modes_tab import comparison_table
+from webapp.panels.modes_tab import comparison_table, why_left_out
 from webapp.panels.status import corner
 from webapp.session.state import COMPARED, LEAST, State, compared
 from webapp.session.targets import PRESETS
@@ -68,6 +68,40 @@ def test_a_method_that_fails_keeps_nobody_else_waiting(worker: Pool) -> None:
     answers = dict(comparison.run.answers)
     assert answers["paper"] == "ipopt is out of order in this test"
     assert isinstance(answers["sqp"], Allocation)
+
+
+def test_a_method_that_is_left_out_says_why_in_four_words() -> None:
+    solver = Solver()
+    reasons = {}
+    for robot, method, policy in (
+        ("ucat", "qp", "priority"),
+        ("catamaran", "px4", "closest"),
+        ("fish", "paper", "closest"),
+    ):
+        state = State(load_layout(robot), method=method, policy=policy)
+        with pytest.raises(FinlabError) as error:
+            solver.solve(state.with_target(0, 1.0))
+        reasons[method] = str(error.value)
+    for reason in (*reasons.values(), "something else"):
+        assert len(why_left_out(reason).split()) == 4
+    assert why_left_out(reasons["px4"]) == "is for thrusters alone"
+    run = Run(State(UCAT), (("qp", reasons["qp"]),))
+    table = comparison_table(run, False)
+    assert "knows policy closest alone</td>" in table and "title='policy: method" in table
+
+
+def test_what_is_in_reach_is_compared_under_every_policy(worker: Pool) -> None:
+    comparison = Comparison(context_of(worker, solver=Solver()))
+    comparison.start(State(UCAT, target=PRESETS["Turn"], policy="priority"))
+    until(lambda: len(comparison.run.answers) >= 3)
+    comparison.cancel()
+    answers = dict(comparison.run.answers)
+    assert isinstance(answers["dual"], Allocation) and answers["dual"].target[0] == 1.2
+    qp = answers["qp"]
+    if isinstance(qp, Allocation):
+        assert qp.reachable
+    else:
+        assert qp.startswith("policy:")
 
 
 def test_the_table_tells_what_is_kept_least() -> None:

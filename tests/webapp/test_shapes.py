@@ -152,11 +152,11 @@ class Recorded:
         return lambda *_, **options: Node(**options)
 
 
-def test_forces_start_at_blades_and_fans_reach_as_far_as_they_beat() -> None:
+def test_forces_start_beside_blades_and_fans_reach_as_far_as_they_beat() -> None:
     layout = load_layout("ucat")
     scene = Recorded()
     nodes: Any = ForceNodes(scene)  # type: ignore[arg-type]
-    nodes.place(layout, (1.0, 1.0))
+    nodes.place(layout, hull_of(layout), (1.0, 1.0))
     forces = np.array([[0.1, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.2, 0.0], [0.0, 0.0, 1e-6]])
     amplitude = np.array([0.5, 0.0, 0.0, 0.0])
     nodes.command(forces, amplitude, np.array([0.3, 0.0, 0.0, 0.0]))
@@ -173,7 +173,7 @@ def test_forces_start_at_blades_and_fans_reach_as_far_as_they_beat() -> None:
         fans.batched_wxyzs, fans.batched_positions, fans.batched_scales, strict=True
     ):
         turned = Rotation.from_quat(wxyz[[1, 2, 3, 0]]).apply(wedge * scale) + place
-        own = (turned - arrows.points[0, 0]) @ layout.frames[0].T
+        own = (turned - nodes._middles[0]) @ layout.frames[0].T
         assert own[:, 0] == pytest.approx(0.0, abs=1e-3), "all of it lies across the shaft"
         assert np.hypot(own[:, 1], own[:, 2]).max() == pytest.approx(CHORD, rel=0.05)
         angles += np.arctan2(-own[:, 2], -own[:, 1]).tolist()

@@ -17,7 +17,7 @@ from finlab.arrays import Array
 from finlab.axes import AXES, MOTIONS
 from finlab.layout import Actuator, Fin, Layout
 from finlab.layout.damage import NO_DAMAGE, Damage
-from webapp.markup.words import damage_words, html, saturated
+from webapp.markup.words import KILO, damage_words, html, saturated, signed_degrees
 from webapp.theme import DEAD, css, fin_color, ink
 
 FIN_HEADER = Markup(
@@ -106,7 +106,13 @@ def wrench_bars(demanded: Sequence[float], delivered: Sequence[float] | None) ->
 @lru_cache(maxsize=32)
 def _bars_header(force_scale: float, torque_scale: float) -> str:
     """What stands above the bars, whose ends stand for a force [N] and a torque [N m]."""
-    return BARS_HEADER.format(f"±{force_scale:g} N, ±{torque_scale:g} N m")
+    ends = f"±{_end(force_scale, 'N')}, ±{_end(torque_scale, 'N m')}"
+    return BARS_HEADER.format(ends)
+
+
+def _end(scale: float, unit: str) -> str:
+    """What the end of a bar stands for."""
+    return f"{scale / 1000.0:g} k{unit}" if scale >= KILO else f"{scale:g} {unit}"
 
 
 def nice_limit(value: float) -> float:
@@ -149,8 +155,12 @@ def _bar_row(axis: int, demanded: float | None, delivered: float | None, scale: 
     markup.append("</div>")
     columns = (("asked", demanded, "free"), ("given", delivered, "–"), ("missing", missing, "–"))
     digits = 2 if axis < 3 else 3
+    factor = 1.0
+    if scale >= KILO:  # all figures of the axis are in kN or kN m, as its scale is
+        factor = 1000.0
+        digits = 1
     for style, value, placeholder in columns:
-        rounded = 0.0 if value is None else round(value, digits)
+        rounded = 0.0 if value is None else round(value / factor, digits)
         if value is None:
             text = placeholder
         elif rounded:
@@ -249,7 +259,7 @@ def _fin_cells(
     amplitude, frequency, direction = command
     amplitude_style = "full" if limits[0] else ""
     frequency_style = "full" if limits[1] else ""
-    angle = f"{round(math.degrees(direction)):+d}".replace("-", "−")
+    angle = signed_degrees(direction)
     return (
         f"<td class='{amplitude_style}'>{math.degrees(amplitude):.1f}</td>"
         f"<td class='{frequency_style}'>{frequency:.2f}</td>"
@@ -270,8 +280,7 @@ def _plain_cells(
     remark = actuator.type
     if actuator.KIND.sticks_at_angle:
         along = force
-        angle = round(math.degrees(command[actuator.KIND.stuck_number]))
-        remark = f"{actuator.type}, {angle:+d}°".replace("-", "−")
+        remark = f"{actuator.type}, {signed_degrees(command[actuator.KIND.stuck_number])}°"
     return html(
         "<td colspan='3' class='words'>{}</td><td class='{}'>{}</td><td>{}</td>",
         remark,

@@ -19,7 +19,7 @@ import numpy as np
 from markupsafe import Markup
 
 from finlab.arrays import Array
-from webapp.markup.words import html
+from webapp.markup.words import html, without_powers
 from webapp.theme import Rgb, css
 
 WIDTH = 388
@@ -81,7 +81,7 @@ def cost_axis(word: str, values: Array, max_ticks: int = MOST_TICKS) -> Axis:
             break
     ticks = []
     for k in range(math.ceil(low / step), math.floor(high / step) + 1):
-        ticks.append((k * step, f"{k * step + 0.0:.4g}".replace("-", "−")))
+        ticks.append((k * step, without_powers(f"{k * step + 0.0:.4g}").replace("-", "−")))
     return Axis(word, low, high, tuple(ticks))
 
 

@@ -5,6 +5,7 @@ from markupsafe import Markup
 
 from finlab.forces.reach import Ranges
 from finlab.layout import Layout
+from webapp.markup.words import KILO, prefixed
 
 CLOSE = 0.28
 """Share of a slider below which the texts of two marks would lie on each other."""
@@ -50,6 +51,8 @@ def _end_texts(values: tuple[float, ...], width: float) -> list[str]:
             digits = 3
         rounded = round(value, digits)
         text = f"{rounded:.{digits}f}" if rounded else "0"
+        if abs(value) >= KILO:
+            text = "".join(prefixed(value))
         texts.append(text.replace("-", "−"))
     return texts
 

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from finlab.display import NO_NUMBER, Column
-from webapp.markup.words import DASH, html
+from webapp.markup.words import DASH, html, without_powers
 
 
 def head_row(columns: Iterable[Column]) -> str:
@@ -31,8 +31,9 @@ def cells(columns: Iterable[Column], item: Any) -> str:
 
 
 def cell_text(column: Column, item: Any) -> str:
-    """The text of a cell; numbers have a real minus sign, and a dash where there is none."""
+    """The text of a cell; numbers have a real minus sign, SI prefixes where they are large, and a
+    dash where there is none."""
     text = column.cell(item)
     if column.is_text:
         return text
-    return DASH if text == NO_NUMBER else text.replace("-", "−")
+    return DASH if text == NO_NUMBER else without_powers(text).replace("-", "−")

@@ -6,6 +6,7 @@ that a quantity looks the same wherever it stands.
 """
 
 import math
+import re
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from typing import Any
@@ -115,6 +116,8 @@ COMPONENT = "component "
 """How the source of a candidate begins that comes from a component of a mixture."""
 MOST_LISTED = 2
 """Components of a mixture that are named; of more their number is told."""
+KILO = 1e4
+"""Size of a quantity in its unit from which it is told in thousands of it."""
 ROUNDING = 1e-9
 """Normalized error, and size of a quantity in its unit, below which the digits are those of the
 computer's rounding."""
@@ -141,6 +144,50 @@ def error_digits(value: float) -> str:
     return "≤ 1e−9" if value < ROUNDING else small(value)
 
 
+PREFIXES = ("", "k", "M", "G", "T")
+"""SI prefixes of thousands."""
+LARGE = re.compile(r"(\d(?:\.\d+)?)e\+(\d+)")
+"""A large number with a power of ten."""
+
+
+def prefixed(value: float) -> tuple[str, str]:
+    """Three significant digits of a number from `KILO` on, and the SI prefix that it has then."""
+    order = min(int(math.log10(abs(value)) / 3.0 + 1e-9), len(PREFIXES) - 1)
+    digits = finlab.display.three_digits(value / 1000.0**order).replace("-", "−")
+    return digits, PREFIXES[order]
+
+
+def without_powers(text: str) -> str:
+    """A text whose large numbers have SI prefixes in place of powers of ten: `2.80M`."""
+
+    def short(match: re.Match[str]) -> str:
+        return "".join(prefixed(float(match[0])))
+
+    return LARGE.sub(short, text)
+
+
+def with_unit(value: float | None, unit: str) -> str:
+    """Three significant digits and a unit, in thousands or millions of it where the number would be
+    long: `327 W`, `25.8 kW`."""
+    if value is not None and math.isfinite(value) and abs(value) >= KILO:
+        digits, prefix = prefixed(value)
+        return f"{digits} {prefix}{unit}"
+    return f"{three_digits(value)} {unit}"
+
+
+def signed(value: float) -> str:
+    """Three significant digits with a sign, which zero has not."""
+    text = three_digits(value)
+    is_positive = value >= ROUNDING and math.isfinite(value)
+    return f"+{text}" if is_positive else text
+
+
+def signed_degrees(angle: float) -> str:
+    """An angle [rad] in degrees with a sign, which zero has not: `+30`."""
+    rounded = round(math.degrees(angle))
+    return f"{rounded:+d}".replace("-", "−") if rounded else "0"
+
+
 def degrees(angle: float) -> str:
     """An angle [rad] as people read it: `−30`."""
     return f"{math.degrees(angle):.0f}".replace("-", "−")
@@ -151,8 +198,17 @@ def three_digits(value: float | None) -> str:
     there is no number, and zero where it is the computer's rounding."""
     if value is not None and abs(value) < ROUNDING:
         value = 0.0
-    text = finlab.display.three_digits(value)
+    text = without_powers(finlab.display.three_digits(value))
     return DASH if text == NO_NUMBER else text.replace("-", "−")
+
+
+FEW_MS = 10.0
+"""Time of an answer up to which it has two digits [ms]; no measurement repeats to a third one."""
+
+
+def time_digits(ms: float) -> str:
+    """The time of an answer [ms]."""
+    return f"{ms:.2g}" if 1e-3 <= ms < FEW_MS else f"{ms:.0f}"
 
 
 def source_words(sources: Sequence[str]) -> str:

@@ -29,6 +29,7 @@ from webapp.panels.granted_card import add_granted
 from webapp.panels.hull_panel import add_hull
 from webapp.panels.limits_tab import add_improving, add_reach
 from webapp.panels.log_tab import add_log, add_losses, log_plots, replays_table
+from webapp.panels.menu import add_menu
 from webapp.panels.modes_tab import add_candidates, add_comparison
 from webapp.panels.null_space import add_null_space
 from webapp.panels.swim_tab import add_figures, add_run, add_scenario, add_timeline
@@ -90,6 +91,7 @@ PANELS = (
     Panel(TOP, TASKS, "History", add_history),
     Panel(TOP, TASKS, "Tasks", card(tasks)),
     Panel(TOP, TASKS, "Answers", add_answering),
+    Panel(TOP, TASKS, "Menu", add_menu),
     Panel(LEFT, TASKS, "Guide", card(guide_card), need=NEEDS_GUIDE),
     Panel(LEFT, (DESIGN,), "Actuators", add_actuator_list),
     Panel(LEFT, (DESIGN,), "Taken for granted", add_granted, need=NEEDS_FILE),

@@ -19,13 +19,18 @@ from webapp.page import Page
 from webapp.scene.robot_scene import CAMERAS
 from webapp.session.files import MAX_LINK
 from webapp.session.lessons import LESSONS, TOUR, Stop
-from webapp.session.looking import TASKS
+from webapp.session.looking import ARROW_LENGTHS, TASKS
 from webapp.session.state import LEAST, Flow, least_of
 from webapp.tasks.designs import KINDS
 
 SWITCHES = {
     "frozen": ("Freeze", "Fins hold still at their zero direction, propellers stand (H)."),
     "handle": ("Handle", "Drag the tip of the wrench in the view, or turn its rings (Allocate)."),
+    "arrows": ("Forces", "What each actuator gives, as an arrow."),
+    "fixed_scale": (
+        "Fixed scale",
+        "Arrows by the most that the robot can give, so that answers compare; else by this answer.",
+    ),
     "shadows": ("Shadows", "Slow without a graphics card."),
     "dark": ("Dark", "Dark theme; at first that of the system."),
 }
@@ -48,12 +53,19 @@ METHOD_WORDS = {
     "ipopt": "a general solver, slow",
 }
 """Name of each method -> what is said of it in the list of methods."""
-COMMANDS = html(
-    "<button title='all commands and their keys (Ctrl+K)' onclick='{}'>Commands</button>",
+COMMANDS_SCRIPT = (
     "document.documentElement.dispatchEvent(new KeyboardEvent("
-    '"keydown", { key: "k", code: "KeyK", ctrlKey: true, bubbles: true }))',
+    '"keydown", { key: "k", code: "KeyK", ctrlKey: true, bubbles: true }))'
 )
-"""A button that opens the list of commands, as Ctrl+K does."""
+"""Opens the list of commands, as Ctrl+K does."""
+
+
+def commands_button(attributes: str = "") -> str:
+    """A button that opens the list of commands; `attributes` are markup."""
+    template = (
+        "<button {} title='all commands and their keys (Ctrl+K)' onclick='{}'>Commands</button>"
+    )
+    return html(template, attributes, COMMANDS_SCRIPT)
 
 
 def card(markup: Callable[..., str]) -> Callable[[Page], object]:
@@ -150,6 +162,20 @@ def add_switches(page: Page) -> None:
             partial(page.session.set_display, key),
             lambda display, key=key: getattr(display, key),
         )
+        if key == "fixed_scale":
+            _add_arrow_length(page)
+
+
+def _add_arrow_length(page: Page) -> None:
+    """The slider of the length of arrows."""
+    hint = "How long arrows and rings are, beside what fits the view."
+    slider = page.gui.add_slider("Arrow length", *ARROW_LENGTHS, 0.1, 1.0, hint=hint)
+    page.bind_number(
+        slider,
+        partial(page.session.set_display, "arrow_length"),
+        lambda display: display.arrow_length,
+        digits=1,
+    )
 
 
 def add_file(page: Page) -> None:
@@ -193,7 +219,8 @@ def add_answering(page: Page) -> None:
     )
     page.board.show(least, visible=lambda layout: layout.is_of_fins)
     add_html(gui, marker("fl-method"))
-    methods = gui.add_dropdown("Method", tuple(METHODS))
+    hint = "It stays when another robot is opened, where it takes that one; else dual answers."
+    methods = gui.add_dropdown("Method", tuple(METHODS), hint=hint)
     page.board.show(methods, options=_options)
     method_of_option = {_option(name): name for name in METHODS}
 
@@ -201,7 +228,8 @@ def add_answering(page: Page) -> None:
         session.set_setting("method", method_of_option.get(option, option))
 
     page.bind(methods, set_method, _option)
-    add_html(gui, html("<div class='fl-help'>{}{}{}</div>", _menu(LESSONS), _menu(TOUR), COMMANDS))
+    lists = _menu(LESSONS), _menu(TOUR)
+    add_html(gui, html("<div class='fl-help'>{}{}</div>", lists, commands_button()))
 
 
 def _options(layout: Layout) -> tuple[str, ...]:

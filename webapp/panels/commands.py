@@ -5,13 +5,17 @@ from functools import partial
 from typing import Any, NamedTuple
 
 from webapp.page import Page
+from webapp.session.lessons import LESSONS, TOUR
 from webapp.session.looking import TASKS, TWO_ROBOTS
 from webapp.session.state import LEAST
 from webapp.session.targets import PRESETS
+from webapp.start_page import show_start_page
 
 CTRL = "cmd/ctrl"
 CTRL_SHIFT = "cmd/ctrl+shift"
 ALT = "alt"
+BACK = "The robot is as it was before; what was made meanwhile is there by Undo"
+"""What is said where tour or lesson are closed by a key."""
 CAMERA_KEYS = {"3D": "1", "Top": "2", "Side": "3", "Front": "4"}
 """Keys of the views of the camera."""
 
@@ -50,6 +54,14 @@ def page_commands(page: Page) -> list[Command]:
     def toggle_loss_of_selected() -> None:
         session.toggle_loss(session.selected or session.state.layout.names[0])
 
+    def leave() -> None:
+        if session.selected is not None:
+            session.select(None)
+        elif session.guide.stop is not None:
+            course = session.guide.course
+            session.guide.end()
+            page.notify(f"Closed the {course}", BACK, calm=True)
+
     def pause_or_go_on() -> None:
         swimming.set_running(not swimming.running)
 
@@ -61,7 +73,7 @@ def page_commands(page: Page) -> list[Command]:
         Command("Undo", page.undo, "Z", CTRL),
         Command("Redo", page.redo, "Z", CTRL_SHIFT),
         Command("Select the next fin", session.select_next, "N"),
-        Command("Select nothing", partial(session.select, None), "escape"),
+        Command("Select nothing, or close tour and lesson", leave, "escape"),
         Command("Duplicate the selected fin", session.duplicate, "D", CTRL),
         Command("Mirror the selected fin", session.mirror, "M"),
         Command("Delete the selected fin", session.delete, "delete"),
@@ -94,5 +106,10 @@ def page_commands(page: Page) -> list[Command]:
         Command("Dark or light theme", partial(session.toggle, "dark")),
         Command("Tour: start, or next stop", session.guide.tour, "T"),
         Command("Export the bundle for the robot", page.designs.bundle),
+        Command("Start page", partial(show_start_page, page)),
     ]
+    for name, course in (("Tour", TOUR), ("Lesson", LESSONS)):
+        for number, stop in enumerate(course, start=1):
+            label = f"{name} {number}: {stop.title}"
+            commands.append(Command(label, partial(session.guide.open, stop.name)))
     return commands

@@ -17,9 +17,11 @@ from webapp.markup.verdict import Verdict, verdict_of
 from webapp.markup.words import (
     error_digits,
     html,
+    in_app,
     marker,
     source_words,
     three_digits,
+    time_digits,
     unlearned_sentence,
 )
 from webapp.page import Page
@@ -226,6 +228,28 @@ def add_comparison(page: Page) -> None:
     page.add_html(lambda run, state: comparison_table(run, run.state not in (None, state)))
 
 
+LEFT_OUT = {
+    "policy:": "knows policy closest alone",
+    "of thrusters only": "is for thrusters alone",
+    "with a mounting angle only": "is for level shafts",
+    "of fins only": "is for fins alone",
+    "CasADi": "CasADi is not installed",
+    "checkpoint": "has no network here",
+    "flow": "knows no moving water",
+}
+"""Words of the reason why a method has no answer -> what the table says of it, in four words."""
+NO_ANSWER = "has no answer here"
+"""What it says of any other reason."""
+
+
+def why_left_out(reason: str) -> str:
+    """Why a method has no answer, in four words; its row's hint has the whole `reason`."""
+    for word, words in LEFT_OUT.items():
+        if word in reason:
+            return words
+    return NO_ANSWER
+
+
 def comparison_table(run: Run, stale: bool) -> str:
     """Error, power, effort and time of each method."""
     if run.state is None:
@@ -245,16 +269,20 @@ def comparison_table(run: Run, stale: bool) -> str:
             words = unlearned_sentence(answer.layout, answer.unknown_fins)
             cells = html("<td colspan='4' class='words missing'>{}</td>", words)
         elif isinstance(answer, Allocation):
-            figures = (answer.power, answer.effort, answer.solve_ms)
+            figures = (
+                three_digits(answer.power),
+                three_digits(answer.effort),
+                time_digits(answer.solve_ms),
+            )
             kind = KINDS[verdict_of(answer, in_reach)]
             error = html("<td class='{}'>{}</td>", kind, error_digits(answer.err_norm))
-            cells = error + Markup().join(
-                html("<td>{}</td>", three_digits(value)) for value in figures
-            )
+            cells = error + Markup().join(html("<td>{}</td>", text) for text in figures)
+        elif isinstance(answer, str):
+            template = "<td colspan='4' class='words dim' title='{}'>{}</td>"
+            cells = html(template, in_app(answer), why_left_out(answer))
         else:
-            cells = html(
-                "<td colspan='4' class='words dim'>{}</td>", answer or ("…" if run.running else "–")
-            )
+            waiting = "…" if run.running else "–"
+            cells = html("<td colspan='4' class='words dim'>{}</td>", waiting)
         rows.append(html("<tr><td>{}</td><td>{}</td>{}</tr>", method, least_of(method), cells))
     header = Markup(
         "<tr><th>method</th><th>least</th><th>error</th><th>power [W]</th><th>effort</th><th>time "
@@ -264,7 +292,7 @@ def comparison_table(run: Run, stale: bool) -> str:
     colors = html(
         "<div class='said'><span class='given'>Green</span>: exact, an error of at most {}. <span "
         "class='near'>Ochre</span>: approximate, another method is exact. <span "
-        "class='missing'>Orange</span>: out of reach of all.</div>",
+        "class='missing'>Orange</span>: out of reach of all. In reach policies are alike.</div>",
         REACHED,
     )
     note = (

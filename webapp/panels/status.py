@@ -14,7 +14,16 @@ from finlab.physics.objective import REACHED
 from webapp.handles import set_properties
 from webapp.markup.two_robots import status_of_both
 from webapp.markup.verdict import COLORS, WORKING, verdict_of, verdict_sentence
-from webapp.markup.words import ROUNDING, error_digits, html, parts_word, three_digits
+from webapp.markup.words import (
+    ROUNDING,
+    error_digits,
+    html,
+    parts_word,
+    signed,
+    three_digits,
+    time_digits,
+    with_unit,
+)
 from webapp.page import Page
 from webapp.scene.stage import arrow_size
 from webapp.scene.two_robots import pair_arrow_size
@@ -29,12 +38,10 @@ from webapp.theme import ASKED, DEAD, DELIVERED, REACH, TAKEN, WATER, css
 
 LONG = 24
 """Characters of a verdict above which it takes a line of its own in a small view."""
-ARROWS = {"asked": 0.65, "delivered": 1.0, "missing": 1.0}
-"""Arrows of the legend by name -> their opacity."""
+ARROWS = ("asked", "delivered", "missing")
+"""Arrows of the legend by name."""
 SLOWEST_WATER = 5e-4
 """Speed of the water from which it is in the legend of a swim [m/s]."""
-FEW_MS = 10.0
-"""Time of an answer up to which it has two digits [ms]; no measurement repeats to a third one."""
 
 
 def add_corner(page: Page) -> None:
@@ -72,13 +79,13 @@ def _corner_of_facts(
 ) -> str:
     """The corner as the facts of a page have it, which are the arguments by name."""
     if swimmer is not None and moment is not None:
-        return swim_corner(swimmer, moment, pace, scale.newtons)
+        return swim_corner(swimmer, moment, pace, scale, display.arrow_length)
     if pair is not None:
-        keys = legend(*scale, pair_arrow_size(pair), "")
+        keys = legend(scale, pair_arrow_size(pair), display.arrow_length, "")
         return _cards(keys, status_of_both(pair, (left_reply, right_reply), pair_busy))
     size = arrow_size(state.layout)
     has_sets = display.drawn != "none" and task == "Design"
-    keys = legend(*scale, size, set_rows(analysis if has_sets else None, size))
+    keys = legend(scale, size, display.arrow_length, set_rows(analysis if has_sets else None, size))
     if state.layout.interaction is not None:
         keys += JETS
     is_best = shown_allocation is best
@@ -96,32 +103,47 @@ def _corner_of_facts(
 
 
 @lru_cache(maxsize=32)
-def legend(newtons: float, torque: float, size: float, more_rows: str) -> str:
+def legend(scale: Scale, size: float, arrow_length: float, more_rows: str) -> str:
     """Keys of the arrows, and scales of arrows and rings.
 
     Args:
-        newtons: force of an arrow of 0.1 m where `size` is 1 [N].
-        torque: torque of such a ring [N m].
+        scale: what arrows and rings stand for where `size` is 1.
         size: factor of the length of arrows on this robot.
+        arrow_length: the factor that the user has chosen.
         more_rows: markup of further keys.
     """
     # By name, so that the dark theme can lighten them.
     rows = []
-    for name, opacity in ARROWS.items():
-        rows.append(_key(_arrow(f"var(--fl-{name})", opacity), name))
-    ring = f"{0.1 * size:g} m = {torque:g} N m"
-    scales = "<div class='dim scales'><span>{}</span><span><i>radius </i>{}</span></div>"
+    for name in ARROWS:
+        rows.append(_key(_arrow(f"var(--fl-{name})", 1.0), name))
     return html(
         "<div class='fl-legend'>{}{}</div>{}",
         rows,
         more_rows,
-        html(scales, _length(newtons, size), ring),
+        scale_words(scale, size * arrow_length),
     )
 
 
-def _length(newtons: float, size: float) -> str:
-    """What the length of an arrow says; where there is little room, without the word in it."""
-    return html("<i>arrow </i>{:g} m = {:g} N", 0.1 * size, newtons)
+def scale_words(scale: Scale, size: float, has_rings: bool = True) -> str:
+    """What the lengths of arrows and the radii of rings say; actuators have a scale of their own.
+
+    Args:
+        scale: what they stand for where `size` is 1.
+        size: factor of their length.
+        has_rings: whether there are rings.
+    """
+    length = f"{0.1 * size:.3g} m"
+    parts = [html("<span>{} = {}</span>", length, in_unit(scale.newtons, "N"))]
+    if has_rings:
+        torque = in_unit(scale.torque, "N m")
+        parts.append(html("<span>ring {}</span>", torque))
+    parts.append(html("<span>actuator {}</span>", in_unit(scale.actuator, "N")))
+    return html("<div class='dim scales'>{}</div>", parts)
+
+
+def in_unit(value: float, unit: str) -> str:
+    """A value in a unit, or in thousands of it where it is that large."""
+    return f"{value / 1000.0:g} k{unit}" if value >= 1000.0 else f"{value:g} {unit}"
 
 
 def set_rows(analysis: Analysis | None, size: float) -> str:
@@ -224,31 +246,28 @@ def _figures(allocation: Allocation, least: bool, in_reach: bool, refined: str, 
     unallocated = allocation.unallocated.tolist()
     unallocated = [value if abs(value) >= ROUNDING else 0.0 for value in unallocated]
     missing = zip(AXES, unallocated, UNITS, strict=True)
-    rest = ", ".join([f"{axis} {value:+.2g} {unit}" for axis, value, unit in missing]).replace(
-        "-", "−"
-    )
+    rest = ", ".join([f"{axis} {signed(value)} {unit}" for axis, value, unit in missing])
     method = allocation.method
     figures = [
         f"<span title='missing, as a share of what the robot can push: {rest}'><span class='dim'>"
         f"error</span> <b class='err'>{error_digits(allocation.err_norm)}</b></span>"
     ]
     kinds = (
-        ("power", "watts", allocation.power, " W"),
-        ("effort", "effort", allocation.effort, ""),
+        ("power", "watts", with_unit(allocation.power, "W")),
+        ("effort", "effort", three_digits(allocation.effort)),
     )
-    for word, kind, value, unit in kinds:
-        if value is None:  # effort is of fins
+    for word, kind, figure in kinds:
+        if word == "effort" and allocation.effort is None:  # it is of fins
             continue
         is_least = least and LEAST.get(kind) == method
         if word == "power":
             is_least = is_least and is_proved_least(allocation)
         label = f"least {word}" if is_least else word
+        number, _, unit = figure.partition(" ")
         figures.append(
-            f"<span><span class='dim'>{label}</span> <b class='{word}'>{three_digits(value)}</b>"
-            f"{unit}</span>"
+            f"<span><span class='dim'>{label}</span> <b class='{word}'>{number}</b> {unit}</span>"
         )
-    ms = allocation.solve_ms
-    time = f"{ms:.2g}" if ms < FEW_MS else f"{ms:.0f}"
+    time = time_digits(allocation.solve_ms)
     who = html("<span class='dim'>{}</span> {} ms", method, time) if least else badge or "network"
     figures.append(html("<span class='aside'>{}</span>", who))
     figures.append(
@@ -257,14 +276,17 @@ def _figures(allocation: Allocation, least: bool, in_reach: bool, refined: str, 
     return Markup("".join(figures))
 
 
-def swim_corner(swimmer: Swimmer, moment: Moment, pace: str, newtons: float) -> str:
+def swim_corner(
+    swimmer: Swimmer, moment: Moment, pace: str, scale: Scale, arrow_length: float
+) -> str:
     """Legend and status line of a swim.
 
     Args:
         swimmer: the robot that swims.
         moment: the moment that the page shows.
         pace: how fast it goes, in words.
-        newtons: force of an arrow of 0.1 m [N].
+        scale: what arrows stand for.
+        arrow_length: the factor that the user has chosen.
     """
     line = "<svg width='44' height='10'><path d='M0 5H44' stroke='{}' stroke-width='3.5'/></svg>"
     trails = [
@@ -284,12 +306,10 @@ def swim_corner(swimmer: Swimmer, moment: Moment, pace: str, newtons: float) -> 
         html("<span><span class='dim'>power</span> <b>{}</b> W</span>", power),
         html("<span>{}</span>", pace),
     ]
-    scale = html(
-        "<div class='dim scales'><span>{}</span></div>",
-        _length(newtons, arrow_size(swimmer.layout)),
-    )
+    size = arrow_size(swimmer.layout) * arrow_length
+    words = scale_words(scale, size, has_rings=False)
     jets = "" if swimmer.layout.interaction is None else JETS
-    return _cards(html("<div class='fl-legend'>{}</div>{}{}", trails, scale, jets), markup)
+    return _cards(html("<div class='fl-legend'>{}</div>{}{}", trails, words, jets), markup)
 
 
 def _cards(legend: str, status: list[str]) -> str:

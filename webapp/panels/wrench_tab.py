@@ -21,7 +21,16 @@ from webapp.handles import add_html, placed, press
 from webapp.markup.answer import bars_of, fin_table
 from webapp.markup.reach import reach_style
 from webapp.markup.verdict import answer_sentence
-from webapp.markup.words import ROUNDING, SPEED, error_digits, html, marker, row, three_digits
+from webapp.markup.words import (
+    ROUNDING,
+    SPEED,
+    error_digits,
+    html,
+    marker,
+    row,
+    three_digits,
+    with_unit,
+)
 from webapp.page import Page
 from webapp.panels.damage import add_fin_buttons
 from webapp.session.state import MAX_SPEED, Flow, State
@@ -156,7 +165,7 @@ def add_target(page: Page) -> None:
     page.add_html(_ranges_error)
     policies = (
         "Come closest, keep the direction, serve axes by priority, heave first, or give no axis "
-        "more than was asked for."
+        "more than was asked for. Another robot begins with closest."
     )
     box = gui.add_dropdown("Out of reach", POLICY_NAMES, hint=policies)
     page.bind(box, partial(session.set_setting, "policy"), lambda policy: policy)
@@ -219,7 +228,7 @@ def _hint(axis: int, low: float, reach: float) -> str:
     unit = UNITS[axis]
     if reach < ROUNDING:
         return f"{word}: no working actuator pushes along it."
-    at_most = f"±{three_digits(reach)} {unit} if nothing else is asked to stay"
+    at_most = f"±{with_unit(reach, unit)} if nothing else is asked to stay"
     if not np.isfinite(low):
         return f"{word}: the other five are out of reach as they are; {at_most}."
     return f"{word}: the marks show what is within reach with the others as they are; {at_most}."

@@ -15,19 +15,24 @@ from numpy.typing import NDArray
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.swim.hull.mesh_file import Mesh
+from finlab.swim.hull.surface import Surface
 from webapp.handles import set_properties
-from webapp.scene.actuator_shapes import CHORD, ROOT, SHORTEST, SPAN
-from webapp.theme import Rgb, fin_color
+from webapp.scene.actuator_node import shape_of
+from webapp.scene.actuator_shapes import CHORD, RADIUS, ROOT, SHORTEST, SPAN
+from webapp.scene.outline import DIGITS, HEAD_LENGTH, HEAD_RADIUS, Outline
+from webapp.theme import Rgb, fin_color, look
 from webapp.viser_internals import assign
 
-HEAD_RADIUS = 2.5
-"""Radius of an arrow's head, in radii of its shaft."""
-HEAD_LENGTH = 4.2
-"""Length of an arrow's head, in radii of its shaft."""
 THICKNESS = 0.007
 """Radius of the shafts of forces, for arrows of size 1 [m]."""
-DIGITS = 4
-"""Places and lengths are sent in tenths of a millimetre, so that rounding errors are not."""
+HALO = 0.0022
+"""How far the outline of such an arrow stands off it, for size 1 [m]."""
+FREE = 0.014
+"""How far from blade, foil or duct an arrow begins, for actuators of size 1 [m]."""
+BEHIND = 0.045
+"""Length of a fin's housing on the other side of its blade, for size 1 [m]."""
+STOCK = 0.54
+"""How far a rudder's stock reaches from its middle, in spans."""
 WEDGES = 10
 """A fan is so many wedges beside each other."""
 WEDGE = 0.05
@@ -120,6 +125,8 @@ class ForceNodes:
     def __init__(self, scene: viser.SceneApi, robot: str = "/robot") -> None:
         """Nothing is shown yet; `robot` is the node of the robot."""
         self._arrows = Arrows(scene, f"{robot}/forces", THICKNESS)
+        self._halo = Outline(scene, f"{robot}/halo", THICKNESS, HALO, look(False).halo)
+        self._is_dark = False
         wedge = unit_wedge()
         self._fans = scene.add_batched_meshes_simple(
             f"{robot}/fans",
@@ -139,6 +146,12 @@ class ForceNodes:
         self._colors = np.zeros((0, 3), dtype=np.uint8)
         """Of each actuator (n, 3), in linear light."""
         self._middles = self._turns = self._starts = np.zeros((0, 3))
+        self._clearance = np.zeros(0)
+        """How far along its force each arrow begins from there (n,) [m]."""
+        self._outward = np.zeros((0, 3))
+        """Directions (n, 3) away from the hull; zero within it."""
+        self._gaps = np.zeros(0)
+        """Distances of the arrows' starts from the hull (n,) [m]."""
         self._sizes = (1.0, 1.0)
         self._swept: tuple[list[float], list[float]] = ([], [])
         """Half angles and angles [rad] of the fans that are shown (n,)."""
@@ -146,20 +159,69 @@ class ForceNodes:
     def thicken(self, factor: float) -> None:
         """Draw the arrows thicker by a factor."""
         self._arrows.thicken(factor)
+        self._halo.thicken(factor)
 
-    def place(self, layout: Layout, sizes: tuple[float, float]) -> None:
-        """Where actuators stand; `sizes` are of them and of arrows."""
+    def place(self, layout: Layout, hull: Surface, sizes: tuple[float, float]) -> None:
+        """Where actuators stand beside a hull; `sizes` are of them and of arrows."""
         size, _ = self._sizes = sizes
         self._colors = linear([fin_color(k) for k in range(layout.n)])
         shafts = layout.frames[:, 0] * layout.is_fin[:, None]
-        self._starts = layout.position + size * (ROOT + SPAN / 2) * shafts
+        self._middles = layout.position + size * (ROOT + SPAN / 2) * shafts
+        starts = []
+        clearance = []
+        outward = []
+        gaps = []
+        for actuator, place, frame in zip(
+            layout.actuators, layout.position, layout.frames, strict=True
+        ):
+            is_outside = float((place - np.array(hull.center)) @ frame[0]) >= 0.0
+            start = place
+            free = 0.0
+            if actuator.KIND.drawn_as == "fin":
+                end = ROOT + SPAN + FREE if is_outside else -BEHIND - FREE
+                start = place + size * end * frame[0]
+            elif actuator.KIND.drawn_as == "foil":
+                _, span = shape_of(actuator, size)
+                end = STOCK * span + FREE * size
+                start = place + (end if is_outside else -end) * frame[0]
+            else:
+                free = size * (RADIUS / 2 + FREE)
+            away = start - hull.anchor(start)
+            gap = float(np.linalg.norm(away))
+            starts.append(start)
+            clearance.append(free)
+            outward.append(away / gap if gap > 0.0 else np.zeros(3))
+            gaps.append(gap)
+        self._starts = np.array(starts)
+        self._clearance = np.array(clearance)
+        self._outward = np.array(outward)
+        self._gaps = np.array(gaps)
         self._turns = np.array([quaternion(frame.T) for frame in layout.frames])
         self._swept = ([], [])  # the fans are elsewhere
+
+    def paint(self, is_dark: bool) -> None:
+        """The outlines' colour of the dark or the light theme."""
+        if is_dark != self._is_dark:
+            self._is_dark = is_dark
+            self._halo.paint(look(is_dark).halo)
+
+    def _clear_starts(self, forces: Array) -> Array:
+        """Where arrows of forces (n, 3) [m] begin, clear of what gives them; one that would end in
+        the hull ends at its actuator instead."""
+        length = np.sqrt((forces * forces).sum(axis=1, keepdims=True))
+        free = self._clearance[:, None] * forces / np.maximum(length, SHORTEST)
+        is_into_hull = (forces * self._outward).sum(axis=1) < -self._gaps
+        is_into_hull &= self._gaps > 0.0
+        ahead = self._starts + free
+        behind = self._starts - free - forces
+        return np.asarray(np.where(is_into_hull[:, None], behind, ahead))
 
     def command(self, forces: Array, half_angles: list[float], middles: list[float]) -> None:
         """Show forces (n, 3) as arrows [m], and fans of half angles (n,) about angles (n,)
         [rad]."""
-        self._arrows.show(self._starts, forces, self._colors, self._sizes[1])
+        starts = self._clear_starts(forces)
+        self._arrows.show(starts, forces, self._colors, self._sizes[1])
+        self._halo.show(starts, forces, self._sizes[1])
         swept = ([round(x, DIGITS) for x in half_angles], [round(x, DIGITS) for x in middles])
         if swept == self._swept:
             return
@@ -176,7 +238,7 @@ class ForceNodes:
         scales = np.full((*across.shape, 3), size)
         scales[..., 2] *= np.tan(half) / math.tan(WEDGE)
         turns = turned_about_x(self._turns[beats, None], across)
-        positions = np.broadcast_to(self._starts[beats, None], (*across.shape, 3))
+        positions = np.broadcast_to(self._middles[beats, None], (*across.shape, 3))
         set_properties(
             fans,
             batched_colors=np.repeat(self._colors[beats], WEDGES, axis=0),

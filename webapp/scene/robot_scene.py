@@ -36,7 +36,7 @@ from webapp.theme import LIGHT, fin_color
 from webapp.viser_internals import run_script
 
 CAMERAS = {
-    "3D": (0.44, 0.42, 0.52),
+    "3D": (0.46, 0.44, 0.545),
     "Top": (-0.001, 0.0, 1.35),
     "Side": (0.0, -1.3, 0.1),
     "Front": (1.3, 0.0, 0.1),
@@ -117,7 +117,7 @@ class RobotScene:
         self._size = view_size(self._session.state.layout)
         position = self._size * np.array(CAMERAS[one_of(view, "view", CAMERAS)])
         # Lower than the robot's middle: below it stands the legend.
-        self.aim(position, np.array([0.0, 0.0, -0.02 * self._size]))
+        self.aim(position, np.array([0.0, 0.0, -0.04 * self._size]))
 
     def aim(self, position: Array, target: Array) -> None:
         """Let the camera see from a place (3,) to another one (3,) [m]."""
@@ -207,7 +207,7 @@ class RobotScene:
             moved = actuator.name == edited
             pinned = actuator.name in stuck
             self._fins[i].place(actuator, hull, sizes, moved, label, pinned, i == dragged)
-        self._forces.place(visible_layout, sizes)
+        self._forces.place(visible_layout, hull, sizes)
         self._works = []
         if edited is None:
             self._direction.show(None, np.zeros(3), 1.0, LIGHT.line)
@@ -229,7 +229,6 @@ class RobotScene:
         pair: Pair | None,
         display: Display,
     ) -> None:
-        del display  # it may have changed how thick arrows are
         if pair is not None:  # this robot is hidden
             return
         idle = lost if moment is None else moment.lost
@@ -242,7 +241,8 @@ class RobotScene:
         else:
             commands = np.full((visible_layout.n, 3), np.nan)
             forces = np.zeros((visible_layout.n, 3))
-        scaled = LENGTH / scale.newtons
+        self._forces.paint(display.dark)
+        scaled = display.arrow_length * LENGTH / scale.actuator
         works, moves = motions(visible_layout, commands, idle)
         self._moves = moves
         if works != self._works:
@@ -250,7 +250,9 @@ class RobotScene:
             for node, alive in zip(self._fins, works, strict=False):
                 node.command(alive)
         arrows = forces * (scaled * self._arrow_size)
-        if False in works:
+        if not display.arrows:
+            arrows[:] = 0.0
+        elif False in works:
             arrows[~np.array(works)] = 0.0
         swept = [move.amplitude if alive else 0.0 for move, alive in zip(moves, works, strict=True)]
         self._forces.command(arrows, swept, [move.angle for move in moves])
@@ -290,7 +292,7 @@ class RobotScene:
         if pulled is None:
             self._newtons_before = self.pulled_newtons = scale.newtons
         # The foot of the arrow is that of the wrench's nodes.
-        per_newton = size * LENGTH / scale.newtons
+        per_newton = size * display.arrow_length * LENGTH / scale.newtons
         Fx, Fy, Fz = target[:3]
         tip = per_newton * Fx, per_newton * Fy, per_newton * Fz
         is_visible = display.handle and task == "Allocate" and not swims and pair is None
@@ -331,10 +333,12 @@ class RobotScene:
         scale: Scale,
         moment: Moment | None,
         pair: Pair | None,
+        display: Display,
     ) -> None:
         if pair is not None:
             return
-        demanded: Sequence[float] = target
+        # An axis that the robot does not command takes what comes.
+        demanded: Sequence[float] = (np.array(target) * visible_layout.commanded).tolist()
         delivered = missing = NO_WRENCH
         if moment is not None:
             demanded = (moment.asked * FORCES_ONLY).tolist()
@@ -342,7 +346,8 @@ class RobotScene:
         elif shown_allocation is not None:
             delivered = shown_allocation.wrench.tolist()
             missing = missing_part(shown_allocation)
-        lengths = LENGTH / scale.newtons, LENGTH / scale.torque
+        length = display.arrow_length * LENGTH
+        lengths = length / scale.newtons, length / scale.torque
         self._wrench.refresh(demanded, delivered, missing, self._top, *lengths, self._arrow_size)
 
     def _pull(self, phase: str, grip: Grip, tip: Array, angle: float) -> None:
@@ -356,7 +361,8 @@ class RobotScene:
         target = list(state.target)
         if grip.ring is None:
             size = arrow_size(state.layout)
-            pull = pulled_force(tip, grip, self._newtons_before, size, reach[:3], LENGTH)
+            length = session.display.arrow_length * LENGTH
+            pull = pulled_force(tip, grip, self._newtons_before, size, reach[:3], length)
             target[:3] = pull.force
             self.pulled_newtons = pull.newtons
         else:

@@ -17,19 +17,20 @@ from webapp.scene.actuator_shapes import NOTHING, force_arrow, joined, tube
 from webapp.scene.robot_scene import RobotScene
 from webapp.scene.stage import Shape, add_floor, aim_camera, paint_floor, view_size
 from webapp.scene.two_robots import PairScene, pair_scale
-from webapp.scene.wrench_nodes import Scale, fitting_scale, swim_scale
+from webapp.scene.wrench_nodes import Scale, fitting_scale, fixed_scale, swim_scale
 from webapp.session import Session
 from webapp.session.files import file_stem
 from webapp.session.lessons import Stop
 from webapp.session.looking import Display
 from webapp.session.swim_plan import SwimSettings
+from webapp.session.targets import axis_reach, full_thrust
 from webapp.session.two_robots import Pair
 from webapp.tasks.swimmer import PLACE, Moment, Swimmer
 from webapp.tasks.swimming import Swimming
 from webapp.theme import ASKED, BRAND, DELIVERED, WATER
 from webapp.viser_internals import run_script
 
-INITIAL_SCALE = Scale(1.0, 1.0)
+INITIAL_SCALE = Scale(1.0, 1.0, 1.0)
 
 
 class Scenery:
@@ -52,6 +53,8 @@ class Scenery:
         """Where the camera stood before the tour or lesson, and looked at."""
         self._fault = intents.fault
         self._scale = self._swam = INITIAL_SCALE
+        self._is_fixed = False
+        """Whether the scale is that of the most that the robot can give."""
         self._fitted: tuple[Sequence[float], Allocation | None] | None = None
         board.group(self._fail, is_view=True)
         board.act(self._show)
@@ -116,10 +119,13 @@ class Scenery:
             self._fitted = None
             self._scale = pair_scale(target, pair_allocations, self._scale)
             return self._scale
+        if self._is_fixed != self._session.display.fixed_scale:
+            self._is_fixed = self._session.display.fixed_scale
+            self._fitted = None
         fitted = self._fitted
         if fitted is None or fitted[0] != target or fitted[1] is not shown_allocation:
             try:
-                self._scale = fitting_scale(target, shown_allocation, self._scale)
+                self._scale = self._fitting(target, shown_allocation)
                 self._fitted = (target, shown_allocation)
             except Exception as error:
                 self._scale = INITIAL_SCALE
@@ -128,6 +134,16 @@ class Scenery:
             self._fitted = None
             self._scale = self._scale._replace(newtons=self.robot.pulled_newtons)
         return self._scale
+
+    def _fitting(self, target: Sequence[float], shown_allocation: Allocation | None) -> Scale:
+        """The scale of what is shown, or of the most that the robot can give."""
+        state = self._session.state
+        if not self._is_fixed:
+            commanded = (np.array(target) * state.layout.commanded).tolist()
+            return fitting_scale(commanded, shown_allocation, self._scale)
+        reach = axis_reach(state.able, state.lost, state.flow).tolist()
+        most = float(full_thrust(state.able, state.flow).max())
+        return fixed_scale(reach, most, self._scale)
 
     def _fail(self, error: Exception | None) -> None:
         if error is None:

@@ -113,7 +113,8 @@ def pair_scale(
     scales = [fitting_scale(target, allocation, now) for allocation in allocations]
     newtons = max(scale.newtons for scale in scales)
     torque = max(scale.torque for scale in scales)
-    return Scale(newtons, torque)
+    actuator = max(scale.actuator for scale in scales)
+    return Scale(newtons, torque, actuator)
 
 
 class PairedRobot:
@@ -183,10 +184,12 @@ class PairedRobot:
             label = f"{index + 1} {remark}".strip()
             is_stuck = actuator.name in damage.stuck
             self._actuators[index].place(actuator, hull, sizes, False, label, is_stuck, False)
-        self._forces.place(layout, sizes)
+        self._forces.place(layout, hull, sizes)
         self._works = []
 
-    def push(self, standing: Standing, reply: Reply | None, scale: Scale, size: float) -> None:
+    def push(
+        self, standing: Standing, reply: Reply | None, scale: Scale, size: float, display: Display
+    ) -> None:
         """Show what a robot does for its wrench; None while that is not known."""
         state = standing.state
         layout = state.layout
@@ -203,15 +206,20 @@ class PairedRobot:
             self._works = works
             for node, alive in zip(self._actuators, works, strict=False):
                 node.command(alive)
-        length = LENGTH / scale.newtons
-        arrows = np.where(np.array(works)[:, None], forces * (length * size), 0.0)
+        length = display.arrow_length * LENGTH
+        per_newton = size * length / scale.actuator
+        is_drawn = np.array(works)[:, None] & display.arrows
+        arrows = np.where(is_drawn, forces * per_newton, 0.0)
+        self._forces.paint(display.dark)
         swept = [
             move.amplitude if alive else 0.0 for move, alive in zip(self.moves, works, strict=True)
         ]
         self._forces.command(arrows, swept, [move.angle for move in self.moves])
-        radius = LENGTH / scale.torque
+        lengths = length / scale.newtons, length / scale.torque
         top = hull_top(layout)
-        self._wrench.refresh(state.target, delivered, missing, top, length, radius, size)
+        # An axis that the robot does not command takes what comes.
+        demanded = (np.array(state.target) * layout.commanded).tolist()
+        self._wrench.refresh(demanded, delivered, missing, top, *lengths, size)
 
 
 def _leave_alone(*_: object) -> None:
@@ -311,7 +319,7 @@ class PairScene:
         for robot, standing, position, reply in robots:
             robot.stand(standing, position, size, display)
             robot.name_at(standing.state.layout, placed)
-            robot.push(standing, reply, scale, size)
+            robot.push(standing, reply, scale, size, display)
             hull = hull_of(standing.state.layout)
             bottoms.append(hull.center[2] - hull.half[2])
         floor = np.array([0.0, 0.0, min(bottoms) - BELOW * size])

@@ -14,15 +14,16 @@ from finlab.arrays import Array
 from finlab.swim.hull.mesh_file import Mesh
 from webapp.handles import set_properties
 from webapp.markup.words import missing_part
-from webapp.scene.actuator_shapes import NOTHING, SHORTEST, tube, unit_arrow, unit_ring
-from webapp.scene.force_nodes import DIGITS, Arrows, linear, quaternion
+from webapp.scene.actuator_shapes import NOTHING, SHORTEST, tube, unit_ring
+from webapp.scene.force_nodes import Arrows, linear, quaternion
+from webapp.scene.outline import DIGITS, Outline
 from webapp.scene.stage import Shape
 from webapp.tasks.analysing import Analysis
 from webapp.tasks.swimmer import Swimmer
 from webapp.theme import ASKED, DEAD, DELIVERED, LIGHT, MISSING, REACH, Rgb
 from webapp.viser_internals import assign
 
-NEWTONS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
+NEWTONS = tuple([digit * 10.0**power for power in range(-2, 7) for digit in (1.0, 2.0, 5.0)])
 """Forces [N] that an arrow of 0.1 m may stand for."""
 LENGTH = 0.1
 """Length that the legend speaks of [m]."""
@@ -30,12 +31,20 @@ ARROWS = (0.1, 0.3)
 """The longest arrow stays within these [m]; between them the scale is left alone, so it seldom
 jumps."""
 
-TORQUES = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
+ACTUATOR_ARROWS = (0.07, 0.2)
+"""The same for the forces of actuators [m], which have a scale of their own: of thirty that push
+together none could be seen on that of their sum."""
+
+TORQUES = NEWTONS
 """Torques [N m] that a ring of a radius of 0.1 m may stand for."""
 RINGS = (0.05, 0.16)
 """The largest ring's radius stays within these [m]."""
 HEIGHT = 0.16
 """How far above the hull the arrows begin [m]; inside it they could not be seen."""
+FORCE_THICKNESS = 0.0075
+"""Radius of the shafts of the wrench's force, for size 1 [m]."""
+ASKED_MARGIN = 0.0042
+"""How far what is asked stands off what is delivered, for size 1 [m]."""
 FORCE_COLORS = linear([DELIVERED, MISSING])
 """Of the arrows of the delivered and of the missing force (2, 3), in linear light."""
 NO_LENGTH = (0.0, 0.0, 0.0)
@@ -53,6 +62,8 @@ class Scale(NamedTuple):
     """Force of an arrow of 0.1 m [N]."""
     torque: float
     """Torque of a ring of a radius of 0.1 m [N m]."""
+    actuator: float
+    """Force of an actuator's arrow of 0.1 m [N]."""
 
 
 def fitting_scale(
@@ -61,14 +72,35 @@ def fitting_scale(
     """The scale for a target (6,) and what is shown of it; `now` as far as that is good enough."""
     forces = [list(target[:3])]
     torques = [list(target[3:])]
+    actuator_force = 0.0
     if shown_allocation is not None:
         wrench = shown_allocation.wrench.tolist()
-        forces += [wrench[:3], *shown_allocation.forces.tolist()]
+        forces.append(wrench[:3])
         torques += [missing_part(shown_allocation)[3:], wrench[3:]]
+        actuator_force = max([math.hypot(*f) for f in shown_allocation.forces.tolist()])
     force = max([math.hypot(*vector) for vector in forces])
     torque = max([math.hypot(*vector) for vector in torques])
-    newtons = fitting(NEWTONS, force, now.newtons, LENGTH, ARROWS)
-    return Scale(newtons, fitting(TORQUES, torque, now.torque, LENGTH, RINGS))
+    return _scale(force, torque, actuator_force, now)
+
+
+def _scale(force: float, torque: float, actuator_force: float, now: Scale) -> Scale:
+    """The scale of which the largest force [N], torque [N m] and force of an actuator [N] fit."""
+    return Scale(
+        fitting(NEWTONS, force, now.newtons, LENGTH, ARROWS),
+        fitting(TORQUES, torque, now.torque, LENGTH, RINGS),
+        fitting(NEWTONS, actuator_force, now.actuator, LENGTH, ACTUATOR_ARROWS),
+    )
+
+
+def fixed_scale(reach: Sequence[float], full_thrust: float, now: Scale) -> Scale:
+    """The scale of the most that a robot can give, on which answers compare.
+
+    Args:
+        reach: largest size of each component of its wrench (6,) [N, N m].
+        full_thrust: largest force of an actuator [N].
+        now: the scale so far.
+    """
+    return _scale(max(reach[:3]), max(reach[3:]), full_thrust, now)
 
 
 def fitting(
@@ -85,12 +117,16 @@ def swim_scale(swimmer: Swimmer, previous: Scale) -> Scale:
     """The scale of a swim, which only grows, so that its arrows compare; `before` is the last
     one."""
     moment = swimmer.visible_moment
-    sizes = [
-        np.linalg.norm(v, axis=-1).max()
-        for v in (moment.force, moment.asked[:3], moment.delivered[:3])
-    ]
-    fits = (step for step in NEWTONS if LENGTH * max(sizes) / step <= ARROWS[1])
-    return Scale(max(next(fits, NEWTONS[-1]), previous.newtons), 1.0)
+    sizes = [float(np.linalg.norm(v)) for v in (moment.asked[:3], moment.delivered[:3])]
+    actuator_force = float(np.linalg.norm(moment.force, axis=-1).max())
+    newtons = _least_step(max(sizes), ARROWS[1])
+    actuator = _least_step(actuator_force, ACTUATOR_ARROWS[1])
+    return Scale(max(newtons, previous.newtons), 1.0, max(actuator, previous.actuator))
+
+
+def _least_step(force: float, longest: float) -> float:
+    """The first of `NEWTONS` by which an arrow of a force [N] is no longer than `longest` [m]."""
+    return next((step for step in NEWTONS if LENGTH * force / step <= longest), NEWTONS[-1])
 
 
 class WrenchNodes:
@@ -106,22 +142,21 @@ class WrenchNodes:
             scene.add_icosphere(f"{name}/hub", 0.012, color=(70, 78, 86), cast_shadow=False),
         ]
 
-        def part(
-            word: str, color: Rgb, mesh: Mesh, opacity: float | None = None
-        ) -> viser.MeshHandle:
-            shape = Shape(scene, f"{name}/{word}", color, mesh, opacity=opacity, cast_shadow=False)
+        def part(word: str, color: Rgb, mesh: Mesh, side: str = "front") -> viser.MeshHandle:
+            shape = Shape(scene, f"{name}/{word}", color, mesh, side=side, cast_shadow=False)
             return shape.node
 
-        self._forces = Arrows(scene, f"{name}/forces", 0.0065)
-        self._asked_force = UnitMesh(part("asked_force", ASKED, unit_arrow(0.011), 0.4), along_x)
+        self._forces = Arrows(scene, f"{name}/forces", FORCE_THICKNESS)
+        # What is asked frames what is delivered, and is seen where both are one.
+        self._asked_force = Outline(
+            scene, f"{name}/asked_force", FORCE_THICKNESS, ASKED_MARGIN, ASKED
+        )
         rings = (
-            part("asked_torque", ASKED, unit_ring(0.07), 0.4),
+            part("asked_torque", ASKED, unit_ring(0.075), side="back"),
             part("delivered_torque", DELIVERED, unit_ring(0.042)),
             part("missing_torque", MISSING, unit_ring(0.05)),
         )
         self._torques = [UnitMesh(ring, about_z) for ring in rings]
-        self._thickness = 1.0
-        """Factor of the arrows' thickness."""
         self._placed: tuple[float, float] | None = None
         """Top of the hull [m] and size that the nodes stand for."""
 
@@ -129,7 +164,7 @@ class WrenchNodes:
         """Draw the arrows of forces thicker by a factor; that of the asked one with the next
         target."""
         self._forces.thicken(factor)
-        self._thickness = factor
+        self._asked_force.thicken(factor)
 
     def refresh(
         self,
@@ -161,9 +196,7 @@ class WrenchNodes:
         )
         Fx, Fy, Fz = target[:3]
         asked_force = length_scale * Fx, length_scale * Fy, length_scale * Fz
-        length = math.hypot(*asked_force)
-        width = size * self._thickness
-        self._asked_force.show(asked_force, length, (round(length, DIGITS), width, width))
+        self._asked_force.show(np.zeros((1, 3)), np.array([asked_force]), size)
         for ring, wrench in zip(self._torques, (target, got, missing), strict=True):
             torque = wrench[3:]
             length = math.hypot(*torque)

@@ -22,7 +22,7 @@ from webapp.session.key_words import key_words
 from webapp.session.layout_edits import partner, unlinked, with_twin
 from webapp.session.lessons import Guide
 from webapp.session.looking import Display
-from webapp.session.state import State, method_for
+from webapp.session.state import FIRST_POLICY, State, method_for
 from webapp.session.two_robots import TwoRobots
 
 UNITS = ("kg", "kgm2", "m", "n")
@@ -56,7 +56,8 @@ class Session(BaseSession):
         granted: tuple[Granted, ...] = (),
         source: SourceFile | None = None,
     ) -> None:
-        """Another layout; the target stays, damage and links are forgotten.
+        """Another layout; the target stays, damage and links are forgotten. The method stays where
+        it takes the robot, else `dual` answers; the policy is `closest` again.
 
         Args:
             layout: the robot.
@@ -72,6 +73,7 @@ class Session(BaseSession):
             damage=Damage(lost),
             links=(),
             method=method,
+            policy=FIRST_POLICY,
             granted=granted,
             source=source,
         )

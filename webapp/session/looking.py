@@ -32,6 +32,8 @@ MODE_DRAWERS = (CANDIDATES, NULL_SPACE)
 DRAWN: dict[str, WrenchHalf | None] = {"none": None, "forces": "force", "torques": "torque"}
 """What set can be drawn, by the word on its button."""
 
+ARROW_LENGTHS = (0.2, 4.0)
+"""Factors by which arrows may be shorter or longer than they are drawn at first."""
 DARK = "dark"
 """What a page calls the dark colour scheme of its system."""
 
@@ -69,6 +71,12 @@ class Display:
     """Whether the page shows nothing but the robot and what is said of it, in large type."""
     has_own_theme: bool = False
     """Whether the user has chosen light or dark; until then it is the system's."""
+    arrows: bool = True
+    """Forces of actuators are drawn as arrows."""
+    fixed_scale: bool = False
+    """Arrows are scaled by the most that the robot can give, not by what it gives now."""
+    arrow_length: float = 1.0
+    """Factor of the length of all arrows."""
     drawn: str = "none"
     """Key of `DRAWN`: the attainable set that is shown."""
 
@@ -82,6 +90,8 @@ class Display:
         if isinstance(value_now, bool) and not isinstance(value, bool):
             raise FinlabError(f"{key}: expected on or off, got {value!r:.40}")
         changes = {key: value}
+        if key == "arrow_length":
+            changes[key] = number(value, "arrow length", *ARROW_LENGTHS)
         if key == "dark":
             changes["has_own_theme"] = True
         return replace(self, **changes)

@@ -22,9 +22,11 @@ from webapp.session.granted import Granted, SourceFile
 
 Links = tuple[tuple[str, str], ...]
 """Mirror pairs by name; an actuator is in at most one of them."""
-MAX_TARGET = 1000.0
+MAX_TARGET = 1e6
 """Largest target component that the page may ask for [N, N m]."""
 Flow = tuple[float, float, float, float, float, float]
+FIRST_POLICY = "closest"
+"""The policy that a robot begins with."""
 MAX_SPEED = 3.0
 """Greatest speed through the water that the page may ask for [m/s]."""
 STRENGTH_RANGE = (0.05, 1.0)
@@ -53,7 +55,7 @@ class State:
     network: str = ""
     """Which of the networks that are there method `paper` answers with; empty for the one it began
     with."""
-    policy: str = "closest"
+    policy: str = FIRST_POLICY
     links: Links = ()
     speed: float = 0.0
     """Speed ahead through the water [m/s]."""
@@ -221,8 +223,14 @@ def number(value: Any, name: str, low: float, high: float) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise FinlabError(f"{name}: expected a number, got {value!r:.60}")
     if not low <= value <= high:  # a NaN compares false as well
-        raise FinlabError(f"{name}: expected a number from {low:g} to {high:g}, got {value:g}")
+        ends = f"{_plain(low)} to {_plain(high)}"
+        raise FinlabError(f"{name}: expected a number from {ends}, got {_plain(value)}")
     return float(value)
+
+
+def _plain(value: float) -> str:
+    """A number without a power of ten where its digits can be written out."""
+    return f"{value:,.0f}" if 1e6 <= abs(value) < 1e12 else f"{value:g}"
 
 
 def numbers(

@@ -86,8 +86,15 @@ class Designs:
 
     def open_shipped(self, layout: Layout) -> None:
         """A robot that is shipped."""
+        before = self._session.state
         self._session.open_layout(layout)
-        self.remind(f"Opened {layout.name}")
+        text = self._what_else(before)
+        if text:
+            self._notify(f"Opened {layout.name}", text, calm=True)
+
+    def _what_else(self, before: State) -> str:
+        """What another robot changed of how it is asked, and what becomes of it in a lesson."""
+        return _with(changed_words(before, self._session.state), self._session.guide.reminder)
 
     def open_link(self, text: str) -> None:
         """A design from the part of an address behind the #; it may be anything."""
@@ -166,9 +173,10 @@ class Designs:
 
     def _take_link(self, wrench: str, opened: Opened) -> None:
         """Puts the design of a link on the page, with the wrench that comes with it."""
+        before = self._session.state
         self._session.open_layout(opened.layout, lost=opened.lost)
         text = f"{opened.layout.name} is a copy; whoever shared it does not see what you change"
-        self._notify("Opened from a link", _with(text, self._session.guide.reminder), calm=True)
+        self._notify("Opened from a link", _with(text, self._what_else(before)), calm=True)
         if wrench:
             self._session.ask_for(wrench.split(","))
         self._tell_missing(opened)
@@ -176,9 +184,11 @@ class Designs:
     def take(self, opened: Opened, source: SourceFile) -> None:
         """Puts the design of a file on the page, and says what to know of it."""
         session = self._session
+        before = session.state
         session.open_layout(opened.layout, lost=opened.lost, **rows_of(opened, source))
-        reminder = session.guide.reminder
-        self.remind(f"Opened {opened.layout.name}")
+        reminder = self._what_else(before)
+        if reminder:
+            self._notify(f"Opened {opened.layout.name}", reminder, calm=True)
         open_rows = [row for row in session.state.granted if not row.is_settled(opened.layout)]
         if open_rows:
             session.show_task("Design")
@@ -293,9 +303,19 @@ class Designs:
         self._notify("Saved", text, calm=True)
 
 
+def changed_words(before: State, now: State) -> str:
+    """What another robot changed of how it is asked; nothing where it changed nothing."""
+    words = []
+    if now.method != before.method:
+        words.append(f"method {before.method} does not take this robot, {now.method} answers")
+    if now.policy != before.policy:
+        words.append(f"out of reach the policy is {now.policy} again, not {before.policy}")
+    return "; ".join(words)
+
+
 def _with(text: str, reminder: str) -> str:
-    """A text with a reminder, if there is one, as a sentence after it."""
-    return f"{text.removesuffix('.')}. {reminder}" if reminder else text
+    """A text with a reminder as a sentence after it; either may be empty."""
+    return ". ".join([part.removesuffix(".") for part in (text, reminder) if part])
 
 
 class Opening:

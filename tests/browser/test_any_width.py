@@ -1,0 +1,110 @@
+"""At every width all is within reach: the start page, the bar or its menu, and the status."""
+
+from typing import Any
+
+import pytest
+
+from tests.browser.test_frame import SCHEME_SCRIPT, findings
+from webapp.session.lessons import LESSONS
+from webapp.start_page import ROBOTS
+
+SIZES = ((1400, 860), (1024, 700), (933, 573), (390, 844))
+"""Widths and heights of the window [px]: a laptop, a tablet, a laptop at 150 %, a phone."""
+WORDS = ("New", "Open", "Save", "Share", "Undo", "Redo")
+"""What the bar has, or its menu."""
+SHIFT_SCRIPT = """() => new Promise((done) => new PerformanceObserver((list) =>
+  done(list.getEntries().reduce((sum, entry) => sum + entry.value, 0))
+).observe({ type: 'layout-shift', buffered: true }) ?? setTimeout(() => done(0), 300))"""
+"""Script: how far what was drawn has moved by itself."""
+
+
+class Newcomer:
+    """A page that was opened without a link, for what `findings` asks of one."""
+
+    def __init__(self, tab: Any) -> None:
+        """Takes its tab."""
+        self.page = tab
+
+    def rest(self, milliseconds: int) -> None:
+        """Lets time pass."""
+        self.page.wait_for_timeout(milliseconds)
+
+
+def test_a_newcomer_sees_three_doors_and_six_robots(browser: Any, served: Any) -> None:
+    context = browser.new_context(
+        viewport={"width": 500, "height": 420}, color_scheme="dark", reduced_motion="reduce"
+    )
+    tab = context.new_page()
+    tab.set_default_timeout(120_000)
+    tab.goto(served.url.partition("?")[0], wait_until="commit")
+    tab.locator("#fl-start").wait_for()
+    for door in ("Design mine", "Show me", "Open a file or log"):
+        assert tab.get_by_text(door, exact=True).is_visible()
+    assert tab.locator("#fl-start .robots img").count() == len(ROBOTS)
+    assert tab.evaluate(SHIFT_SCRIPT) < 0.01
+    for width, height in SIZES:
+        tab.set_viewport_size({"width": width, "height": height})
+        assert tab.evaluate("document.querySelector('#fl-start').scrollWidth") == width
+    assert findings(Newcomer(tab)) == [], "dark"
+    tab.evaluate("document.querySelector('#fl-start').classList.remove('dark')")
+    assert findings(Newcomer(tab), ["color-contrast"]) == [], "light"
+    tab.locator("[data-start='robot catamaran']").click()
+    tab.locator("#fl-start").wait_for(state="hidden")
+    tab.wait_for_function(SCHEME_SCRIPT, arg="dark")
+    session = served.app.views[max(served.app.views)].session
+    assert session.state.layout.name == "catamaran"
+    assert session.display.dark, "as the system has it"
+    tab.reload()
+    tab.locator(".fl-status .err").wait_for(state="attached")
+    assert not tab.locator("#fl-start").is_visible(), "there is work now"
+    context.close()
+
+
+@pytest.fixture
+def resized(page: Any) -> Any:
+    """The page; its window has its first size again afterwards."""
+    before = page.page.viewport_size
+    yield page
+    page.page.set_viewport_size(before)
+
+
+def test_bar_and_status_have_all_at_every_width(resized: Any) -> None:
+    page = resized
+    tab = page.page
+    menu = tab.locator(".fl-more > button")
+    for width, height in SIZES:
+        tab.set_viewport_size({"width": width, "height": height})
+        page.rest(200)
+        status = page.text(".fl-status")
+        assert "dual" in status and " ms" in status, f"method and time at {width} px"
+        assert tab.evaluate("document.documentElement.scrollWidth") == width
+        if menu.is_visible():
+            box = menu.bounding_box()
+            assert box["x"] + box["width"] <= width
+            menu.click()
+        for word in WORDS:
+            button = tab.get_by_role("button", name=word, exact=True).locator("visible=true").first
+            button.wait_for()
+        for word in ("Lessons", "Tour", "Commands"):
+            tab.get_by_text(word, exact=True).locator("visible=true").first.wait_for()
+        if menu.is_visible():
+            tab.get_by_text("Method: dual").wait_for()
+            if width == SIZES[-1][0]:
+                assert findings(page) == [], f"the menu at {width} px"
+            tab.keyboard.press("Escape")
+            tab.locator("#fl-menu").wait_for(state="hidden")
+
+
+def test_a_lesson_is_opened_from_the_menu_of_a_phone_and_closed_by_a_key(resized: Any) -> None:
+    page = resized
+    tab = page.page
+    tab.set_viewport_size({"width": 390, "height": 844})
+    page.rest(200)
+    tab.locator(".fl-more > button").click()
+    tab.get_by_text("Lessons", exact=True).locator("visible=true").click()
+    tab.locator(f"#fl-menu [data-key={LESSONS[5].name}]").click()
+    page.until(lambda: page.session.guide.stop == LESSONS[5])
+    assert not tab.locator("#fl-menu").is_visible()
+    page.key("Escape")
+    page.until(lambda: page.session.guide.stop is None)
+    assert page.problems == []

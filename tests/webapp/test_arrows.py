@@ -1,0 +1,182 @@
+"""Arrows stand clear of what gives their forces, are framed by their outlines, and fit the view."""
+
+import math
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import viser
+from scipy.spatial.transform import Rotation
+
+from finlab import Allocator
+from finlab.allocation.allocation import Allocation
+from finlab.assets import shipped_layouts
+from finlab.layout import load_layout
+from finlab.swim.hull import hull_of
+from tests.webapp.stand_in import SilentClient
+from webapp.markup.words import html
+from webapp.panels.status import in_unit, scale_words
+from webapp.scene.actuator_node import _moving, shape_of
+from webapp.scene.force_nodes import ForceNodes
+from webapp.scene.outline import HEAD_LENGTH, HEAD_RADIUS, Outline, turned_to
+from webapp.scene.stage import arrow_size, part_size
+from webapp.scene.wrench_nodes import (
+    ACTUATOR_ARROWS,
+    ARROWS,
+    LENGTH,
+    Scale,
+    WrenchNodes,
+    fitting_scale,
+    fixed_scale,
+)
+
+ONE = Scale(1.0, 1.0, 1.0)
+
+
+class Node(SimpleNamespace):
+    """A node that keeps what it is told."""
+
+    def __getattr__(self, name: str) -> Any:
+        """Nothing was told."""
+        return None
+
+
+class Recorded:
+    """A scene of such nodes."""
+
+    def __getattr__(self, name: str) -> Any:
+        return lambda *_, **options: Node(**options)
+
+
+@pytest.mark.parametrize("name", ["ucat", "octo", "bluerov2", "catamaran", "torpedo", "fish"])
+def test_arrows_begin_outside_of_what_gives_the_force(name: str) -> None:
+    layout = load_layout(shipped_layouts()[name])
+    size = part_size(layout)
+    nodes: Any = ForceNodes(Recorded())  # type: ignore[arg-type]
+    nodes.place(layout, hull_of(layout), (size, arrow_size(layout)))
+    for direction in np.random.default_rng(3).normal(size=(20, 3)):
+        forces = []
+        for actuator in layout.actuators:  # across a fin's shaft, along a thruster's axis
+            frame = np.array(actuator.frame)
+            is_across = actuator.KIND.drawn_as in ("fin", "foil")
+            force = direction - frame[0] * (direction @ frame[0]) if is_across else frame[0]
+            forces.append(0.15 * force / np.linalg.norm(force))
+        vectors = np.array(forces)
+        starts = nodes._clear_starts(vectors)
+        for k, actuator in enumerate(layout.actuators):
+            if actuator.KIND.drawn_as not in ("fin", "foil"):
+                off = np.linalg.norm(starts[k] - layout.position[k])
+                assert off > 0.5 * 0.046 * size, "beyond the duct"
+                continue
+            slenderness, scale = shape_of(actuator, size)
+            blade = scale * _moving(actuator.KIND.drawn_as, slenderness).vertices[:, 0]
+            own = (starts[k] - layout.position[k]) @ np.array(actuator.frame[0])
+            assert own > blade.max() or own < blade.min(), f"beside the blade of {actuator.name}"
+
+
+def test_an_arrow_that_would_end_in_the_hull_ends_at_its_actuator() -> None:
+    layout = load_layout(shipped_layouts()["ucat"])
+    hull = hull_of(layout)
+    nodes: Any = ForceNodes(Recorded())  # type: ignore[arg-type]
+    nodes.place(layout, hull, (1.0, 1.0))
+    inward = -0.5 * nodes._outward
+    starts = nodes._clear_starts(inward)
+    assert not hull.contains(starts + inward).any() and not hull.contains(starts).any()
+    np.testing.assert_allclose(starts + inward, nodes._starts, atol=1e-9)
+    outward = 0.5 * nodes._outward
+    np.testing.assert_allclose(nodes._clear_starts(outward), nodes._starts, atol=1e-9)
+
+
+def test_turns_take_the_x_axis_to_directions() -> None:
+    directions = np.random.default_rng(1).normal(size=(40, 3))
+    directions = np.concatenate([directions, np.eye(3), -np.eye(3)])
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    turned = Rotation.from_quat(turned_to(directions)[:, [1, 2, 3, 0]]).apply([1.0, 0.0, 0.0])
+    np.testing.assert_allclose(turned, directions, atol=1e-9)
+
+
+def test_an_outline_is_one_margin_outside_of_its_arrow() -> None:
+    scene = Recorded()
+    outline: Any = Outline(scene, "/outline", 0.01, 0.003, (0, 0, 0))  # type: ignore[arg-type]
+    starts = np.array([[0.1, 0.2, 0.3], [0.0, 0.0, 0.0]])
+    vectors = np.array([[0.2, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    outline.show(starts, vectors, 2.0)
+    shafts, heads = outline._nodes
+    assert shafts.visible and shafts.batched_positions.shape == (1, 3)
+    margin = 2.0 * 0.003
+    radius = 2.0 * 0.01
+    assert shafts.batched_positions[0] == pytest.approx([0.1 - margin, 0.2, 0.3])
+    assert shafts.batched_scales[0, 1] == pytest.approx(radius + margin, abs=1e-4)
+    base = float(heads.batched_positions[0, 0])
+    length, wide, _ = heads.batched_scales[0].tolist()
+    head = HEAD_LENGTH * radius
+    assert base == pytest.approx(0.3 - head - margin, abs=2e-4)
+    # Distance of the tip of the arrow from the side of the cone about it.
+    half = math.atan2(HEAD_RADIUS, HEAD_LENGTH)
+    assert math.atan2(wide, length) == pytest.approx(half, abs=1e-3)
+    beyond = base + length - 0.3
+    assert beyond * math.sin(half) == pytest.approx(margin, abs=3e-4)
+    outline.show(starts, 0.0 * vectors, 2.0)
+    assert not shafts.visible and not heads.visible
+
+
+def test_what_is_asked_frames_what_is_delivered() -> None:
+    nodes: Any = WrenchNodes(Recorded())  # type: ignore[arg-type]
+    wrench = [1.0, 0.5, 0.0, 0.0, 0.0, 0.2]
+    nodes.refresh(wrench, wrench, [0.0] * 6, 0.1, 0.1, 0.1, 1.0)
+    shafts, heads = nodes._asked_force._nodes
+    arrow = nodes._forces.node
+    assert shafts.visible and heads.visible and arrow.visible
+    assert shafts.batched_scales[0, 1] > arrow.shaft_radius
+    assert all(node.side == "back" for node in (shafts, heads)), "what is delivered is seen in it"
+
+
+def answer_of(name: str, wrench: tuple[float, ...]) -> Allocation:
+    """The answer of a shipped robot."""
+    answer: Allocation = Allocator(load_layout(shipped_layouts()[name])).allocate(wrench)
+    return answer
+
+
+@pytest.mark.parametrize(
+    ("name", "wrench"),
+    [
+        ("ucat", (1.2, 0.0, 0.0, 0.0, 0.0, 0.25)),
+        ("bluerov2_heavy", (90.0, 0.0, 0.0, 0.0, 0.0, 0.0)),
+        ("octo", (0.2, 0.0, 0.0, 0.0, 0.0, 0.0)),
+    ],
+)
+def test_arrows_of_actuators_and_of_the_wrench_both_fit(
+    name: str, wrench: tuple[float, ...]
+) -> None:
+    answer = answer_of(name, wrench)
+    scale = fitting_scale(wrench, answer, ONE)
+    longest = LENGTH * np.linalg.norm(answer.forces, axis=1).max() / scale.actuator
+    assert ACTUATOR_ARROWS[0] <= longest <= ACTUATOR_ARROWS[1]
+    assert ARROWS[0] <= LENGTH * wrench[0] / scale.newtons <= ARROWS[1]
+    assert fitting_scale(wrench, answer, scale) == scale, "it rests"
+
+
+def test_a_fixed_scale_does_not_know_the_answer() -> None:
+    scale = fixed_scale([23.0, 13.0, 26.0, 4.0, 6.0, 6.0], 6.7, ONE)
+    assert LENGTH * 26.0 / scale.newtons <= ARROWS[1]
+    assert LENGTH * 6.7 / scale.actuator <= ACTUATOR_ARROWS[1]
+
+
+def test_large_forces_are_in_thousands() -> None:
+    assert in_unit(2000.0, "N") == "2 kN" and in_unit(500.0, "N m") == "500 N m"
+    words = scale_words(Scale(5000.0, 200.0, 0.5), 3.0)
+    for part in ("0.3 m = 5 kN", "ring 200 N m", "actuator 0.5 N"):
+        assert html("{}", part) in words
+
+
+def test_outlines_are_nodes_of_viser() -> None:
+    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    client: Any = SilentClient(server)
+    outline = Outline(client.scene, "/outline", 0.01, 0.003, (1, 2, 3))
+    outline.show(np.zeros((1, 3)), np.array([[0.0, 0.2, 0.0]]), 1.0)
+    outline.paint((9, 8, 7))
+    for node in outline._nodes:
+        assert node.visible and node.batched_colors.tolist() == [9, 8, 7]
+        assert node.batched_wxyzs.shape == (1, 4) and node.batched_positions.shape == (1, 3)
+    server.stop()
