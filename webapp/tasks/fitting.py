@@ -104,7 +104,7 @@ class Fitting(Slot[Upload, FitResult | WhichVoltage]):
         if len(content) > MAX_BYTES:
             raise DataError(
                 f"{short}: has {len(content):,} bytes, expected at most {MAX_BYTES:,}; cut it "
-                "into shorter series, write cycle means, or use `finlab fit fin`"
+                "into shorter series, or write cycle means"
             )
         actuator = self._session.state.layout.actuator(actuator_name)
         if not actuator.KIND.models:
