@@ -61,15 +61,16 @@ def test_a_sample_puts_its_robot_and_worst_moment_on_the_page() -> None:
     (spell,) = judgement.spells
     assert reading.moment is not None and spell.start < reading.moment < spell.end
     np.testing.assert_allclose(session.state.target[5], 24.0, rtol=1e-6)
-    assert "of the log, bluerov2_heavy" in _whose_robot(judgement, session.state.layout)
+    assert "of the log, bluerov2_heavy" in _whose_robot(judgement, session.state.layout, False)
     improved = judgement.improved
     assert improved is not None and improved.name == "bluerov2_heavy improved"
     moved = moved_markup(judgement)
     assert "bluerov2_heavy improved" in moved and "moved" in moved
     kept = [a == improved.actuator(a.name) for a in judgement.robot.actuators]
     assert moved.count("<tr><td>") == kept.count(False)
-    assert "not the robot of the log" in _whose_robot(judgement, load_layout("ucat"))
-    assert "the improved robot" in _whose_robot(judgement, improved)
+    assert "not the robot of the log" in _whose_robot(judgement, load_layout("ucat"), False)
+    assert "log-swim" in _whose_robot(judgement, judgement.robot, True)
+    assert "the improved robot" in _whose_robot(judgement, improved, False)
 
 
 def test_the_empty_page_offers_samples_and_says_how_far_it_is() -> None:
