@@ -80,7 +80,9 @@ def test_a_sample_log_shows_its_robot_and_its_moment(page: Any) -> None:
     page.tab("Log")
     page.page.get_by_role("button", name="PX4 (.ulg)").click()
     page.page.locator(".fl-timeline svg").first.wait_for()
-    page.until(lambda: session.state.layout.name == "dive" and abs(session.state.target[5] - 18.0) < 0.01)
+    page.until(
+        lambda: session.state.layout.name == "dive" and abs(session.state.target[5] - 18.0) < 0.01
+    )
     page.until(lambda: "of the log, dive" in page.page.locator("body").inner_text())
     page.page.get_by_role("button", name="Stop here").or_(
         page.page.get_by_role("button", name="Open the improved robot")
