@@ -24,7 +24,8 @@ NAMES = {
     "finlab.swim.control": "CONTROLLERS Completion Controller Diagnosis FaultMonitor Finding Foresighted "
     "Learner Measurement MonitorSettings MotionObserver Setpoint TrackingController "
     "VelocityController WaypointController gains_for make_controller steerable_loss steers",
-    "finlab.exchange": "Exchange FOREIGN convert is_robot_table mujoco_control read_any read_robot",
+    "finlab.exchange": "Answers Choice Exchange FOREIGN Note Question QuestionError Reading "
+    "convert is_robot_table mujoco_control read_any read_asking read_robot",
     "finlab.fit": "FinFit Measurements fit_fin read_measurements write_fin",
     "finlab.swim.hull": "Surface contradicts displaced estimated hull_of lift_of",
     "finlab.layout": "Actuator Azimuth Body Damage Fin FinModelSpec Hull Layout Limits "

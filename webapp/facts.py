@@ -114,7 +114,7 @@ def facts_of(
         "progress": jobs.improver.progress,
         "improving": jobs.improver.busy,
         "growing": jobs.growing.answer,
-        "fit_result": jobs.fitting.answer,
+        "fit_result": jobs.fitting.result,
         "fit_error": jobs.fitting.error,
         "fit_progress": jobs.fitting.progress,
         "judgement": jobs.log.shown,

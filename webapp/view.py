@@ -15,6 +15,7 @@ import viser
 
 from finlab.allocation.allocation import Allocation
 from finlab.errors import FinlabError
+from webapp.box_labels import in_boxes
 from webapp.facts import facts_of, pair_facts
 from webapp.intents import Intents
 from webapp.page import Page
@@ -140,7 +141,7 @@ class View:
         try:
             came = waiting.attend()
         except FinlabError as error:
-            self.intents.notify("Not possible", str(error))
+            self.intents.notify("Not possible", in_boxes(error))
             return True
         except Exception as error:
             self.intents.fault(error)

@@ -6,6 +6,7 @@ of YAML and JSON, and `motor_factors` its records. The app asks `is_robot_table`
 
 import csv
 import math
+import re
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -16,6 +17,8 @@ from finlab.files.csv_table import LENGTHS, number_in
 
 FACTORS = ("roll", "pitch", "yaw", "throttle", "forward", "lateral")
 """Columns of motor factors of ArduSub, in the order of its calls."""
+_VOLTAGE = re.compile(r"[@ ]?\b\d+(?:\.\d+)? ?v(?:olts?)?\b", re.IGNORECASE)
+"""A voltage in a header."""
 MEASUREMENT_COLUMNS = {"phi", "pwm", "escsignal", "rpm", "current", "power", "voltage", "t", "time"}
 """Columns by which a table of measurements is recognized, which `finlab fit` reads."""
 VECTOR_COLUMNS = {
@@ -117,7 +120,9 @@ def plain_of(table: Table) -> dict[str, Any]:
     header = table.header
     rows = table.rows
     columns = {plain(cell) for cell in header}
-    measured = MEASUREMENT_COLUMNS & {cell.removesuffix("us") for cell in columns}
+    # A column may say at which voltage it was measured: `power 12V`.
+    bare = {plain(_VOLTAGE.sub("", cell)) for cell in header}
+    measured = MEASUREMENT_COLUMNS & {cell.removesuffix("us") for cell in columns | bare}
     if measured:
         raise LayoutError(
             f"holds measurements ({', '.join(sorted(measured))}); `finlab fit` reads them"

@@ -79,6 +79,15 @@ OVERLAP = 0.3
 tables."""
 
 
+class VoltageError(DataError):
+    """A bench was measured at several voltages, and none is named."""
+
+    def __init__(self, text: str, levels: tuple[float, ...] = ()) -> None:
+        """Takes the sentence, and the voltages [V], rising."""
+        super().__init__(text)
+        self.levels = levels
+
+
 def by_voltage(rows: Rows, command: Array) -> list[Rows]:
     """Splits the rows of one table by the voltage of the supply.
 
@@ -120,8 +129,8 @@ def at_voltage(
         source: names of the files, for the sentences.
 
     Raises:
-        DataError: there are several voltages and none is named, or the one that is does not lie
-            among them.
+        VoltageError: there are several voltages and none is named.
+        DataError: the one that is named does not lie among them.
     """
     medians = []
     for rows in tables:
@@ -133,7 +142,8 @@ def at_voltage(
     levels = np.array([np.median(voltages[group]) for group in groups])
     measured = f"measured at {', '.join(f'{level:.4g}' for level in levels)} V"
     if voltage is None and len(groups) > 1:
-        raise DataError(f"{source}: {measured}; say which counts, --voltage {levels[-1]:.4g}")
+        text = f"{source}: {measured}; say which counts, --voltage {levels[-1]:.4g}"
+        raise VoltageError(text, tuple(levels.tolist()))
     rows_of_level = [concatenate([tables[k] for k in group]) for group in groups]
     if voltage is None:
         return rows_of_level[0], ()

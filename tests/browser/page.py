@@ -92,6 +92,7 @@ class Page:
             session.draft = SearchRequest()
             session.swim = SwimSettings()
             self.view.jobs.improver.forget()
+            self.view.jobs.log.forget()
             self.view.scenery.end_swim()
             self.view.scenery.robot.look_from("3D")
             done.set()

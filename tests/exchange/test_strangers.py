@@ -129,7 +129,7 @@ def test_rows_and_frames_may_be_said() -> None:
     layout, notes = read(
         "a.yaml", "frame: FLU\ntam: {fx: [1], fy: [0], fz: [0], tz: [1]}", frame="FRD"
     )
-    assert effectiveness_of(layout)[0, 5] == -1.0 and "--frame FRD was taken" in notes
+    assert effectiveness_of(layout)[0, 5] == -1.0 and "FRD was taken" in notes
 
 
 def test_a_boat_commands_the_axes_of_its_rows() -> None:

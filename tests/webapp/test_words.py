@@ -251,20 +251,22 @@ def test_the_panel_shows_what_the_command_line_prints(name: str) -> None:
 
 
 def test_no_option_of_a_command_is_named_where_the_page_has_a_control() -> None:
-    rooms = ("analysis", "allocation", "exchange", "fit", "layout")
+    # Of files of others the page asks questions, and shows notes without what to do about them
+    # (tests/exchange/test_questions.py); of a bench it asks for the voltage.
+    rooms = ("analysis", "allocation", "fit", "layout")
     option = re.compile(r"--[a-z]+")
     paths = chain.from_iterable(
         (Path(finlab.__file__).parent / room).rglob("*.py") for room in rooms
     )
     texts = []
     for path in paths:
-        if path.name == "convert.py":  # which writes files of others
+        if path.name == "thruster_bench.py":
             continue
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):
             if isinstance(node, ast.Constant) and isinstance(node.value, str):
                 texts.append(node.value)
     texts = [text for text in texts if option.search(text)]
-    assert any("--flow" in text for text in texts) and any("--frame" in text for text in texts)
+    assert any("--flow" in text for text in texts)
     for text in texts:
         for named in option.finditer(in_app(text)):
             assert re.search(r"finlab [a-z ]+$", in_app(text)[: named.start()]), text

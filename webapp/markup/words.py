@@ -102,7 +102,7 @@ CONTROLS = {
     "`finlab fit` reads them": "select the thruster that was measured, and open them again",
     "; finlab layout convert reads": "; also read are",
     ", or take `finlab layout convert`, which opens it": "",
-    "--scale": "which the page does not ask for",
+    " (--scale)": "",
     "; --whole judges it nevertheless": "",
     "; `finlab fit fin` takes": "; those of fins are",
 }

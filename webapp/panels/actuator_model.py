@@ -6,7 +6,7 @@ from which a table is fitted.
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,7 +23,7 @@ from finlab.physics import make_law, plant_of
 from webapp.markup.plot import Plot, exact_axis, positive_axis
 from webapp.markup.words import degrees, html, in_app
 from webapp.page import Page
-from webapp.tasks.fitting import MAX_BYTES, FitResult
+from webapp.tasks.fitting import MAX_BYTES, FitResult, WhichVoltage
 from webapp.theme import BLUE, GREEN, ORANGE
 
 BEYOND = 0.01
@@ -96,6 +96,14 @@ def add_fit(page: Page) -> None:
         fitting.start(session.selected, name, content)
         session.show_task("Design")
 
+    def ask_voltage(asked: WhichVoltage) -> None:
+        answers = {}
+        for level in asked.levels:
+            answers[f"{level:.4g} V"] = partial(fitting.start_at, asked, level)
+        text = f"{asked.upload.name} was measured at several. Which does the robot have?"
+        page.ask("At which voltage?", text, answers)
+
+    fitting.ask_voltage = ask_voltage
     page.add_html(of_selected(curves_html))
     page.opening.add(TABLE_SUFFIXES, upload)
     hint = (

@@ -12,6 +12,8 @@ from webapp.page import Page
 from webapp.session.granted import BODY, Granted, SourceFile
 from webapp.viser_internals import run_script
 
+FIRST_OF_MODEL = "forward"
+"""Field in the first box of the model of a thruster, whose power was taken."""
 MOST_NAMED = 3
 """Most actuators that a row names; of more their number is told."""
 
@@ -36,7 +38,8 @@ def add_granted(page: Page) -> None:
         for name in names:
             session.select_also(name)
         kind = session.state.layout.actuator(names[-1]).type if names else ""
-        label = json.dumps(box_label(row.field, kind))
+        field = FIRST_OF_MODEL if row.field == "model" else row.field
+        label = json.dumps(box_label(field, kind))
         run_script(page.gui, f"finlabInquiry.point({label});")
 
     page.presses.on("granted", go)

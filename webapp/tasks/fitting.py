@@ -2,9 +2,9 @@
 
 import re
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -34,6 +34,17 @@ class Upload:
     name: str
     """Of the file."""
     content: bytes
+    voltage: float | None = None
+    """At which the rows count [V]; None where the user was not asked."""
+
+
+@dataclass(frozen=True, eq=False)
+class WhichVoltage:
+    """A file of a thruster that was measured at several voltages: the user knows which counts."""
+
+    upload: Upload
+    levels: tuple[float, ...]
+    """The voltages [V], rising."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +59,7 @@ class FitResult:
     """The fit; None where the file was a finished table."""
 
 
-class Fitting(Slot[Upload, FitResult]):
+class Fitting(Slot[Upload, FitResult | WhichVoltage]):
     """One file at a time for one page; what came of it goes on the fin at once, and undo takes it
     off."""
 
@@ -62,6 +73,18 @@ class Fitting(Slot[Upload, FitResult]):
             title="Not fitted",
         )
         self._session = context.session
+        self.ask_voltage: Callable[[WhichVoltage], object] = lambda _: None
+        """Asks the user which of several voltages counts."""
+
+    @property
+    def result(self) -> FitResult | None:
+        """The fit; None where there is none, or where a voltage is asked for."""
+        return self.answer if isinstance(self.answer, FitResult) else None
+
+    def start_at(self, asked: WhichVoltage, voltage: float) -> None:
+        """Fit a file by its rows at one voltage [V]."""
+        self.forget()
+        self.ask(replace(asked.upload, voltage=voltage))
 
     def start(self, actuator_name: str, file_name: str, content: bytes) -> None:
         """Begin with a file for an actuator.
@@ -81,7 +104,7 @@ class Fitting(Slot[Upload, FitResult]):
         if len(content) > MAX_BYTES:
             raise DataError(
                 f"{short}: has {len(content):,} bytes, expected at most {MAX_BYTES:,}; cut it "
-                "into shorter series, write cycle means, or use `finlab fit fin`"
+                "into shorter series, or write cycle means"
             )
         actuator = self._session.state.layout.actuator(actuator_name)
         if not actuator.KIND.models:
@@ -93,7 +116,7 @@ class Fitting(Slot[Upload, FitResult]):
 
     def put_on_all(self) -> None:
         """What was found for all that still have the model that this one had."""
-        fit_result = self.answer
+        fit_result = self.result
         session = self._session
         if fit_result is not None:
             old_model = _model(fit_result.upload.actuator)
@@ -110,8 +133,12 @@ class Fitting(Slot[Upload, FitResult]):
         """Put what was found on its actuator. FinlabError: that is another one by now."""
         was_busy = self.busy
         came = super().attend()
-        if was_busy and not self.busy and self.answer is not None:
-            self._put_on(self.answer)
+        answer = self.answer
+        if was_busy and not self.busy and isinstance(answer, WhichVoltage):
+            self.forget()
+            self.ask_voltage(answer)
+        elif was_busy and not self.busy and isinstance(answer, FitResult):
+            self._put_on(answer)
         return came
 
     def _put_on(self, fit_result: FitResult) -> None:
@@ -126,8 +153,8 @@ class Fitting(Slot[Upload, FitResult]):
         session.set_model([name], **fit_result.fields)
 
 
-def fit_upload(upload: Upload, work: Work[Upload]) -> FitResult:
-    """Returns the model that a file becomes.
+def fit_upload(upload: Upload, work: Work[Upload]) -> FitResult | WhichVoltage:
+    """Returns the model that a file becomes, or a question about it.
 
     Args:
         upload: the file and its actuator.
@@ -137,10 +164,10 @@ def fit_upload(upload: Upload, work: Work[Upload]) -> FitResult:
         FinlabError: the file cannot be read or fitted, or the fit was cancelled.
     """
     # The result is kept, and the file may be large.
-    without_content = Upload(upload.actuator, upload.name, b"")
+    without_content = replace(upload, content=b"")
     with as_file(upload.name, upload.content) as path:
         if not isinstance(upload.actuator, Fin):
-            return _bench_fit(path, without_content)
+            return _bench_fit(path, without_content, upload)
         if in_worker(_is_table, path):
             return FitResult(
                 without_content, {"model": stored_table(upload.content, table_folder())}
@@ -188,9 +215,10 @@ def _model(actuator: Actuator) -> object:
     return getattr(actuator, "model", None)
 
 
-def _bench_fit(path: Path, upload: Upload) -> FitResult:
-    """A thruster, fixed or turning, by its bench table, or by a finished one."""
-    from finlab.fit.thruster_bench import read_bench
+def _bench_fit(path: Path, upload: Upload, whole: Upload) -> FitResult | WhichVoltage:
+    """A thruster, fixed or turning, by its bench table, or by a finished one; or the question which
+    voltage counts, about the `whole` upload."""
+    from finlab.fit.thruster_bench import VoltageError, read_bench
     from finlab.fit.thruster_fit import fit_thruster
 
     def fields_of(table: PowerTable) -> dict[str, Any]:
@@ -203,7 +231,11 @@ def _bench_fit(path: Path, upload: Upload) -> FitResult:
 
     with suppress(LayoutError):
         return FitResult(upload, fields_of(in_worker(PowerTable.read, path)))
-    fit = fit_thruster(in_worker(read_bench, [path]))
+    try:
+        bench = in_worker(read_bench, [path], upload.voltage)
+    except VoltageError as error:
+        return WhichVoltage(whole, error.levels)
+    fit = fit_thruster(bench)
     more = {"dead_band": fit.dead_band, "torque_per_newton": fit.torque_per_newton}
     return FitResult(upload, {**fields_of(fit.table), **more, "uncertainty": None}, fit)
 

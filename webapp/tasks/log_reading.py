@@ -2,7 +2,6 @@
 
 import time
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,7 +17,7 @@ from webapp.tasks.log_samples import Sample
 from webapp.tasks.slot import Slot, Work
 
 if TYPE_CHECKING:  # who opens no log needs none of it
-    from finlab.log import Judgement, Log
+    from finlab.log import Judgement
     from finlab.log.judging import Progress
 
 SUFFIXES = ".ulg,.bin,.tlog,.mcap,.db3,.bag,.npz"
@@ -146,9 +145,11 @@ def judge_upload(file: LogFile, work: Work[LogFile]) -> "Judgement":
     cancelled. FinlabError: it cannot be read."""
     try:
         from finlab.log import judge
+        from webapp.tasks.swim_logs import read_any_log
 
+        robots = [file.page_robot, *shipped().values()] if file.robot is None else [file.robot]
         with as_file(file.name, file.content) as path:
-            log = in_worker(read_any_log, path, file.robot, file.page_robot)
+            log = in_worker(read_any_log, path, file.robot, robots)
     except ModuleNotFoundError as error:
         raise FinlabError(f"{file.name} needs {error.name}; {install_command('logs')}") from None
     next_report_s = 0.0
@@ -160,15 +161,3 @@ def judge_upload(file: LogFile, work: Work[LogFile]) -> "Judgement":
             next_report_s = time.monotonic() + REPORT_PERIOD_S
 
     return judge(log, report=report, cancelled=work.cancelled.is_set)
-
-
-def read_any_log(path: Path, robot: Layout | None, page_robot: Layout) -> "Log":
-    """Returns a log of a program, or of a swim, which may be of the page's robot or a shipped
-    one."""
-    from finlab.log import read_log
-    from webapp.tasks.swim_logs import SUFFIX, read_swim
-
-    if Path(path).suffix.lower() == SUFFIX:
-        robots = [robot] if robot is not None else [page_robot, *shipped().values()]
-        return read_swim(Path(path), robots)
-    return read_log(path, robot)

@@ -7,7 +7,7 @@ import numpy as np
 
 from finlab.errors import DataError
 from finlab.layout import Layout
-from finlab.log import Log
+from finlab.log import Log, read_log
 from finlab.log.read import log_of_record
 from finlab.log.recorded import LogRecord, Series
 from finlab.swim.simulation.log import load_log
@@ -19,6 +19,23 @@ UNKNOWN_ROBOT = (
     "{}; open that robot first"
 )
 """The error about a swim whose robot is not at hand: the file holds the names of its actuators."""
+
+
+def read_any_log(path: Path, robot: Layout | None, robots: Sequence[Layout]) -> Log:
+    """Returns the log of an autopilot, of ROS or of a swim.
+
+    Args:
+        path: of the file.
+        robot: by whose laws the log of a program is judged; by its own parameters when None.
+        robots: robots that a swim may be of.
+
+    Raises:
+        DataError: it is damaged, of an unknown kind, or of no known robot.
+        LayoutError: the robot does not fit it.
+    """
+    if path.suffix.lower() == SUFFIX:
+        return read_swim(path, robots)
+    return read_log(path, robot)
 
 
 def read_swim(path: Path, robots: Sequence[Layout]) -> Log:
