@@ -233,7 +233,7 @@ def functions() -> ctypes.PyDLL:
                     "fl_support_of_set",
                 ),
                 *("fl_gauge_radius", "fl_gauge_lean", "fl_largest_slope", "fl_refine_commands"),
-                *("fl_drag_of_lift", "fl_dual_value"),
+                *("fl_drag_of_lift", "fl_dual_value", "fl_error_allowed", "fl_meet_and_cheapen"),
                 *("fl_nearest_point", "fl_farthest_along_ray"),
             ),
             REAL,

@@ -3,18 +3,22 @@
 
 import gc
 import weakref
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from finlab.allocation.dual.compiled import Compiled, core_policy
+from finlab.allocation.dual.outer_iterations import coupled_core
 from finlab.allocation.policy import CLOSEST, POLICY_NAMES, as_policy
 from finlab.arrays import Array
 from finlab.core.calls import NOMINAL, ROWS, AnswerMemory, AnswerRow, Conditions, Core
+from finlab.core.coupled_core import CoupledCore
 from finlab.core.prepared_call import Answer, has_builtin_functions, prepared_call
+from finlab.interaction.jets import Jets
 from finlab.layout import load_layout
-from finlab.physics.plant import plant_of
+from finlab.physics.plant import Plant, plant_of
 
 ROBOTS = ("bluerov2_heavy", "bluerov2", "A", "turtle_hybrid", "catamaran", "fish")
 """Shipped robots of every kind of command but foils."""
@@ -280,3 +284,58 @@ def test_memory_is_given_back_when_nobody_holds_an_answer() -> None:
     answer = None
     gc.collect()
     assert last() is None
+
+
+COUPLED = ("bluerov2_heavy", "A", "turtle_hybrid")
+"""Shipped robots that are asked with jets."""
+
+
+def with_jets(robot: str) -> CoupledCore:
+    """A shipped robot in the core, whose actuators act on each other."""
+    layout = load_layout(robot)
+    return coupled_core(Plant(replace(layout, interaction=Jets())), Compiled.of(layout))
+
+
+def prepared_with_jets(core: CoupledCore, policy: str, conditions: Conditions) -> Answer:
+    """A question to it, of which all but the wrench is known."""
+    record = core_policy(as_policy(policy))  # type: ignore[arg-type]
+    call = prepared_call(core, record, conditions, 2.0, MOST_WRENCH, MOST_ERROR)
+    assert call is not None
+    return call.answer
+
+
+@pytest.mark.parametrize("policy", ["closest", "direction"])
+@pytest.mark.parametrize("robot", COUPLED)
+def test_answers_with_jets_are_those_of_answer_row(robot: str, policy: str) -> None:
+    core = with_jets(robot)
+    record = core_policy(as_policy(policy))  # type: ignore[arg-type]
+    lost = np.arange(core.n) == 1
+    plain = core_of(robot)
+    answered = 0
+    for conditions in (NOMINAL, Conditions(lost=lost)):
+        answer = prepared_with_jets(core, policy, conditions)
+        for wrench in wrenches_of(plain, 6):
+            expected = core.answer_row(wrench, record, None, conditions, MOST_ERROR)
+            assert_same(answer(wrench, None, None), expected)
+            answered += expected.is_finished
+    assert answered > 0
+
+
+def test_ticks_with_jets_are_those_of_answer_row() -> None:
+    core = with_jets("bluerov2_heavy")
+    record = core_policy(as_policy("direction"))
+    answer = prepared_with_jets(core, "direction", NOMINAL)
+    wrenches = wrenches_of(core_of("bluerov2_heavy"), 8)
+    previous = core.answer_row(wrenches[0], record, None, NOMINAL, -1.0).command
+    for wrench in wrenches:
+        conditions = Conditions(previous=previous, calm=2.0)
+        expected = core.answer_row(wrench, record, None, conditions, MOST_ERROR)
+        assert_same(answer(wrench, previous, None), expected)
+        previous = expected.command
+
+
+def test_an_interaction_that_asks_python_has_no_prepared_call() -> None:
+    core = with_jets("bluerov2_heavy")
+    offset = core._wrench_offset._replace(core_constants=None)
+    asking = CoupledCore(Compiled.of(load_layout("bluerov2_heavy")).block, offset)
+    assert prepared_call(asking, None, NOMINAL, 2.0, MOST_WRENCH, MOST_ERROR) is None

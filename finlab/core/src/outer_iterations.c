@@ -84,7 +84,9 @@ real fl_linearize_coupled(const fl_coupled_robot *robot, real *block, fl_work *w
   real slope[FL_MOST][3][6]; /* by the forces along the laws' axes */
   forces_of_commands(robot, block, span, command, force, body);
   offset_along_axes(robot, robot->block_uncoupled, span, force, body, !is_chord, offset, slope);
+  real per_scale[6]; /* 1 / sigma of axes that count, else 0 */
   for (int k = 0; k < 6; k++) {
+    per_scale[k] = robot->axis_counts[k] / head->wrench_scale[k];
     head->wrench_offset[k] = HEAD(robot->block_uncoupled)->wrench_offset[k] +
                              robot->axis_counts[k] * offset[k];
     residual[k] = (wrench[k] - head->wrench_offset[k]) / head->wrench_scale[k];
@@ -96,9 +98,7 @@ real fl_linearize_coupled(const fl_coupled_robot *robot, real *block, fl_work *w
       const real *by_laws = plain->effectiveness_normalized[c];
       real *by_model = linear->effectiveness_normalized[c];
       for (int k = 0; k < 6; k++) {
-        if (!is_chord) {
-          by_model[k] = by_laws[k] + robot->axis_counts[k] * slope[i][c][k] / head->wrench_scale[k];
-        }
+        if (!is_chord) by_model[k] = by_laws[k] + slope[i][c][k] * per_scale[k];
         const real more = (by_model[k] - by_laws[k]) * head->wrench_scale[k];
         head->wrench_offset[k] -= force[i][c] * more;
         residual[k] -= force[i][c] * by_laws[k];

@@ -183,14 +183,16 @@ static int were_known_ways(start_search *search, const fl_byte *way) {
    b. */
 static void move_by_linear_model(const start_search *search, real start[][2], real moved[][2]) {
   const int n = COUNT(search->block);
-  for (int i = 0; i < n; i++) {
-    moved[i][0] = search->force[i][0];
-    moved[i][1] = 0;
-  }
+  real way[FL_MOST]; /* N (y - b) */
+  memset(way, 0, (size_t)n * sizeof *way);
   for (int j = 0; j < n; j++) {
     const real off = start[j][0] - search->force[j][0];
     if (off == 0) continue; /* as all but the reversed one */
-    for (int i = 0; i < n; i++) moved[i][0] += search->null_space[j][i] * off;
+    for (int i = 0; i < n; i++) way[i] += search->null_space[j][i] * off;
+  }
+  for (int i = 0; i < n; i++) {
+    moved[i][0] = search->force[i][0] + way[i];
+    moved[i][1] = 0;
   }
 }
 
@@ -202,7 +204,8 @@ static int is_pruned(start_search *search, real moved[][2]) {
   int turned = 0;
   real cost = 0;
   real gain = 0;
-  fl_byte way[FL_MOST] = {0};
+  fl_byte way[FL_MOST];
+  memset(way, 0, (size_t)n);
   for (int i = 0; i < n; i++) {
     if (search->work->span.is_lost[i]) continue;
     way[i] = moved[i][0] > 0;
