@@ -46,7 +46,7 @@ help:
 	@echo "make figures      the tables of figures in docs/*.md, or of one page: make figures PAGE=evaluation"
 	@echo "make docs         the site in build/site: runs every block and example, and checks every link"
 	@echo "make format       let ruff correct what it can"
-	@echo "make checkpoint   train the network that is shipped (hours)"
+	@echo "make checkpoint   train the networks that are shipped (hours)"
 	@echo "make wheels       build the wheels of Linux, macOS and Windows; make sdist the sources"
 	@echo "make wheel-check  build them, install this machine's in an empty environment of each Python here and try it"
 
@@ -134,9 +134,11 @@ format: setup
 	$(BIN)/ruff format .
 	$(BIN)/clang-format -i $(CORE_FILES)
 
-# The checkpoint `default`.
+# The checkpoints `default` and `paper`.
 checkpoint: setup
-	$(BIN)/finlab train mdn -o runs/default
+	$(BIN)/finlab train mdn -o runs/default --preset shipped
+	$(BIN)/finlab train surrogate -o runs/surrogate --preset shipped
+	$(BIN)/finlab train allocator -o runs/paper --preset shipped --surrogate runs/surrogate
 
 WHEEL := $(BIN)/python -m pip wheel --disable-pip-version-check --no-deps --no-build-isolation -w dist .
 

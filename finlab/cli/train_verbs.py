@@ -29,7 +29,8 @@ class PaperOptions:
     data: Annotated[Path | None, arg(metavar="FOLDER")] = None
     """data set of `finlab data generate`; that of the surrogate or of the recipe by default."""
     preset: _Preset = "paper"
-    """recipe: smoke (a minute), short (20 minutes for both on two cores) or paper."""
+    """recipe: smoke (a minute), shipped (what comes with finlab, an hour for both), short
+    (20 minutes for both on two cores) or paper (a week)."""
     seed: Count = 0
     """of the first weights, the noise and the order of the data."""
     steps: _Count = None
@@ -54,7 +55,7 @@ def mdn(
 
     Args:
         output: folder for checkpoint, answers, log, curves and state.
-        preset: recipe: default or smoke.
+        preset: recipe: default, shipped (no clock) or smoke.
         seed: seed of the answers and of the first weights.
         minutes: time after which the run ends, answers included, instead of the recipe's.
         steps: most optimizer steps instead of the recipe's.

@@ -59,7 +59,10 @@ def test_trains_the_network_over_forces_and_allocates_with_it(
 @pytest.mark.parametrize(
     ("argv", "message"),
     [
-        (["mdn", "--preset", "paper"], "preset: expected one of default, smoke, got 'paper'"),
+        (
+            ["mdn", "--preset", "paper"],
+            "preset: expected one of default, shipped, smoke, got 'paper'",
+        ),
         (["mdn", "--minutes", "0"], "minutes: expected a number of at least 1, got 0"),
         (["mdn", "--steps", "0"], "steps: expected a number of at least 1, got 0"),
     ],

@@ -10,12 +10,14 @@ import numpy as np
 import pytest
 
 from finlab.allocation import Allocator
+from finlab.allocation.methods import choose_method
 from finlab.assets import shipped_layouts
 from finlab.cli import main
 from finlab.deploy.robot_graph import features_of, graph_text, write_graph
 from finlab.errors import LayoutError
 from finlab.layout import load_layout
 from finlab.research.paper.network import raw_features
+from finlab.research.paper.pipeline import Paper
 from tests.terminal import refused
 
 SCHEMA = Path(__file__).parents[2] / "finlab" / "layout" / "graph.schema.json"
@@ -48,6 +50,28 @@ def test_features_over_their_scales_are_what_the_papers_network_sees() -> None:
         np.testing.assert_allclose([node["features"][key] / scales[key] for key in scales], row)
     part = load_layout("turtle_hybrid").actuators[-1]
     assert {"x [m]", "force_min [N]", "force_max [N]"} <= set(features_of(part))
+
+
+def test_what_the_paper_divides_by_is_in_the_file() -> None:
+    layout = load_layout("A")
+    data = json.loads(graph_text(layout))
+    paper = data["graph"]["normalization"]["paper"]
+    choice = choose_method("paper")
+    method = choice.kind(layout, choice.settings, Allocator(layout).scale, choice.networks)
+    assert isinstance(method, Paper)
+    np.testing.assert_array_equal(list(paper["mean"].values()), method.normalization.mean)
+    np.testing.assert_array_equal(list(paper["std"].values()), method.normalization.std)
+    assert list(paper["std"]) == list(data["graph"]["normalization"]["wrench"])
+
+
+def test_a_file_of_the_version_before_is_read(tmp_path: Path) -> None:
+    layout = load_layout("A")
+    data = json.loads(graph_text(layout))
+    data["graph"]["version"] = 4
+    del data["graph"]["normalization"]["paper"]
+    file = tmp_path / "old.json"
+    file.write_text(json.dumps(data))
+    assert load_layout(file) == layout
 
 
 def test_a_graph_that_was_changed_says_where(tmp_path: Path) -> None:

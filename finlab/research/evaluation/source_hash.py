@@ -71,8 +71,9 @@ def _python_without_words(source: str) -> str:
             row, column = token.start
             lines[row - 1] = lines[row - 1][:column] + "\n"
     for node in ast.walk(ast.parse(source)):
-        is_text = isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
-        if is_text and isinstance(node.value.value, str):
+        if not isinstance(node, ast.Expr) or not isinstance(node.value, ast.Constant):
+            continue
+        if isinstance(node.value.value, str):
             first = node.lineno - 1
             last = node.end_lineno or node.lineno
             lines[first:last] = ["\n"] * (last - first)

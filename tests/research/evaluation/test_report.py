@@ -22,10 +22,11 @@ from finlab.research.evaluation.document import FORMATS, Column, ReportTable, to
 from finlab.research.evaluation.experiment import EXPERIMENTS, load_experiment
 from finlab.research.evaluation.plots import candidates_picture, fins_picture, temperature_picture
 from finlab.research.evaluation.report_page import PAGE_FILE, ROWS_FILE, make_report
+from finlab.research.evaluation.section import read_section, stale_packages
 from tests.terminal import refused
 
 TINY_SIZES: dict[str, dict[str, Any]] = {
-    "wrench": {"split": ("id", "tables"), "methods": ("dual", "qp"), "layouts": 2, "targets": 2},
+    "wrench": {"split": ("id", "ood"), "methods": ("dual", "qp"), "layouts": 2, "targets": 2},
     "latency": {"robots": ("fins-2",), "methods": ("dual", "qp"), "calls": 2},
     "ablation": {"variants": ("ours",), "layouts": 2, "targets": 1, "candidates": 4},
     "temperature": {"temperatures": (0.01, 1.0), "layouts": 2, "targets": 1, "candidates": 4},
@@ -41,7 +42,8 @@ def tiny() -> Iterator[None]:
         patch.setattr(report_page, "EXPERIMENTS", dict.fromkeys(TINY_SIZES))
         for name, sizes in TINY_SIZES.items():
             module = import_module(f"finlab.research.evaluation.experiments.{name}")
-            patch.setattr(module, "experiment", replace(module.experiment, quick=sizes))
+            tiny = replace(module.experiment, quick=sizes, probe={})
+            patch.setattr(module, "experiment", tiny)
         yield
 
 
@@ -61,6 +63,10 @@ def without_times(rows: Any) -> Any:
     return [without_times(row) for row in rows] if isinstance(rows, list) else rows
 
 
+COMMAND = r"^The command `finlab (.*)` prints the table\. Made at (?:commit [0-9a-f]{12}|version)"
+"""What stands below each table: the command and where it was run."""
+
+
 def test_page_and_rows_say_the_same(folder: Path) -> None:
     page = (folder / PAGE_FILE).read_text("utf-8")
     tables = json.loads((folder / ROWS_FILE).read_text("utf-8"))
@@ -69,15 +75,13 @@ def test_page_and_rows_say_the_same(folder: Path) -> None:
         assert words in page
     for name, rows in tables.items():
         assert rows and f"## {name.capitalize()}" in page
-    assert [row["split"] for row in tables["wrench"]] == ["id", "id", "tables", "tables"]
+    assert [row["split"] for row in tables["wrench"]] == ["id", "id", "ood", "ood"]
 
 
 def test_each_table_has_the_command_that_makes_it_again(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    commands = re.findall(
-        r"^Made by `finlab (.*)` at (?:commit [0-9a-f]{12}|version)", page_of(folder), re.M
-    )
+    commands = re.findall(COMMAND, page_of(folder), re.M)
     assert [command.split()[1] for command in commands] == list(TINY_SIZES)
     tables = json.loads((folder / ROWS_FILE).read_text("utf-8"))
     for name, command in zip(TINY_SIZES, commands, strict=True):
@@ -86,21 +90,37 @@ def test_each_table_has_the_command_that_makes_it_again(
         assert without_times(rows) == without_times(tables[name])
 
 
-def test_the_stored_report_knows_all_experiments_and_no_other() -> None:
+def test_the_stored_report_has_all_experiments_and_no_other() -> None:
     """Each with a command whose options there are, and the commit that it was made at."""
-    text = page_of(Path(report_page.__file__).parents[3] / "docs" / "report")
+    text = page_of(STORED)
     sections = re.findall(r"^## (\w+)$(.*?)(?=^## )", text, re.M | re.S)
     assert [name.lower() for name, _ in sections] == list(EXPERIMENTS)
     for name, section in sections:
-        ((command, commit),) = re.findall(
-            r"^Made by `finlab eval (.*)` at commit (.*)\.$", section, re.M
+        ((command, commits),) = re.findall(
+            r"^The command `finlab eval (.*)` prints the table\. Made at (.*) on ", section, re.M
         )
         verb, *words = shlex.split(command)
-        known = {option.replace("_", "-") for option in load_experiment(verb).options()}
-        assert verb == name.lower() and re.fullmatch("[0-9a-f]{12}", commit), (
+        experiment = load_experiment(name.lower())
+        known = {option.replace("_", "-") for option in experiment.options()}
+        assert verb in (name.lower(), experiment.program.removeprefix("finlab eval "))
+        assert re.fullmatch("commit [0-9a-f]{12}(, commit [0-9a-f]{12})*", commits), (
             "of a tree without changes"
         )
         assert {word[2:].removeprefix("no-") for word in words if word.startswith("--")} <= known
+
+
+STORED = Path(report_page.__file__).parents[3] / "docs" / "report"
+"""The report in the documentation."""
+
+
+@pytest.mark.parametrize("name", EXPERIMENTS)
+def test_no_stored_section_is_older_than_what_it_measures(name: str) -> None:
+    """`finlab eval report -o docs/report` makes anew what is, and checks the rest by its probe."""
+    experiment = load_experiment(name)
+    pieces = read_section(STORED / "sections" / f"{name}.json")
+    assert pieces
+    stale = {package for piece in pieces for package in stale_packages(experiment, piece)}
+    assert not stale, f"finlab eval report -o docs/report --sections {name}"
 
 
 def page_of(folder: Path) -> str:
@@ -117,11 +137,21 @@ def test_two_reports_of_one_seed_have_the_same_rows(folder: Path, tmp_path: Path
     assert "--sections latency,temperature --seed 3" in page.read_text("utf-8")
 
 
+def test_each_printed_figure_has_a_verdict(folder: Path) -> None:
+    page = page_of(folder)
+    assert "| id, ours: mean error | 0.086 |" in page
+    for heading in ("Wrench: beside the paper", "Ablation: beside the paper"):
+        table = page.split(f"### {heading}")[1].split("\n\n")[1].splitlines()[2:]
+        words = [line.split("|")[4].strip() for line in table]
+        assert words and set(words) <= {"reproduced", "not", "cannot be decided"}
+        assert all(line.split("|")[5].strip().endswith(".") for line in table)
+
+
 def test_a_full_disk_is_a_sentence_with_the_path(tiny: None, tmp_path: Path) -> None:
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (200, hard))
     try:
-        with pytest.raises(DataError, match=r"report\.md: cannot be written: File too large"):
+        with pytest.raises(DataError, match=r"cannot be written: File too large"):
             make_report(tmp_path, size="quick", names=["temperature"])
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
@@ -226,6 +256,24 @@ def test_the_verb_draws_its_picture(name: str, tmp_path: Path) -> None:
             min(picture.size) > 500
             and len(set(picture.convert("L").resize((90, 60)).tobytes())) > 20
         )
+
+
+@pytest.mark.parametrize("name", ["ablation", "wrench"])
+def test_a_picture_changes_no_table(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What it needs beside the table is neither printed nor in the rows."""
+    tables = []
+    for plot in ([], ["--plot", str(tmp_path / "picture.svg")]):
+        file = tmp_path / "rows.json"
+        assert main(["eval", name, *SMALL_RUNS[name], *plot, "--json", str(file)]) == 0
+        rows = json.loads(file.read_text())["rows"]
+        for row in rows:
+            row.pop("points", None)
+        tables.append((len(capsys.readouterr().out.splitlines()), without_times(rows)))
+    assert tables[0] == tables[1]
+    assert main(["eval", "wrench", *SMALL_RUNS["wrench"], "--by-fins", *plot]) == 0
+    assert len(capsys.readouterr().out.splitlines()) > tables[0][0] or name == "ablation"
 
 
 def test_a_picture_shows_the_rows() -> None:

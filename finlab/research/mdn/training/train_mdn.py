@@ -63,6 +63,8 @@ class MdnRecipe:
 
 RECIPES = {
     "default": MdnRecipe(MdnTraining(100_000, 256, 2e-3, warmup=200, ema=0.999, seconds=5400.0)),
+    # As many steps as the weights that come with finlab took, and no clock.
+    "shipped": MdnRecipe(MdnTraining(16_000, 256, 2e-3, warmup=200, ema=0.999)),
     "smoke": MdnRecipe(
         MdnTraining(30, 16, 2e-3, warmup=5, ema=0.9, seconds=5400.0, anneal=10),
         AnswerSettings(files=2, fins=2, robots=6, targets=8),

@@ -160,3 +160,16 @@ def test_parts_of_another_set_are_refused(folder: Path, tmp_path: Path) -> None:
     np.savez(tmp_path / part.name, **(arrays | {"lower": arrays["lower"][:-1]}))
     with pytest.raises(DataError, match="part-00000.npz: no part of a data set"):
         SampleSet(tmp_path, CPU)
+
+
+def test_both_kinds_of_batch_take_turns(folder: Path) -> None:
+    """Batches of one layout and of all, on one data set: each is that of a data set of its own."""
+    both = SampleSet(folder, CPU)
+    for step in range(6):
+        for one_layout in (True, False):
+            batch = both.batch(step, 16, 1, one_layout, ALL_COMMANDS)
+            alone = SampleSet(folder, CPU).batch(step, 16, 1, one_layout, ALL_COMMANDS)
+            torch.testing.assert_close(batch.command, alone.command, rtol=0.0, atol=0.0)
+    other = both.batch(0, 16, 2, True, ALL_COMMANDS)
+    again = SampleSet(folder, CPU).batch(0, 16, 2, True, ALL_COMMANDS)
+    torch.testing.assert_close(other.command, again.command, rtol=0.0, atol=0.0)

@@ -13,7 +13,11 @@ import numpy as np
 import pytest
 
 from finlab.cli import main
-from finlab.research.networks.checkpoint import read_checkpoint
+from finlab.research.networks.checkpoint import (
+    read_checkpoint,
+    read_normalization,
+    resolve_checkpoint,
+)
 from tests.terminal import refused
 
 PATIENT = (
@@ -21,6 +25,13 @@ PATIENT = (
     "import main; import sys; "
 )
 """A command that saves its state ten times a second."""
+
+
+GOLDEN = {
+    "surrogate": [18.156822, 5.9099579, 5.7872725],
+    "allocator": [17.678448, 16.317541, 14.230668],
+}
+"""Losses of the log of 30 steps of each training of the preset `smoke`."""
 
 
 @pytest.fixture(scope="module")
@@ -81,6 +92,39 @@ def test_what_is_trained_allocates_and_is_described(
         card = (trained / name / "README.md").read_text()
         assert made.sha256 in card and "| surrogate data layouts | 1000 | 60 |" in card
         assert losses(trained / name)[-1] < losses(trained / name)[0]
+
+
+def test_a_smoke_run_has_the_losses_that_it_had(trained: Path) -> None:
+    """Golden losses of 30 steps: data, first weights, batches, noise and both losses are the same.
+
+    In float32, whose order of sums depends on the processor: hence the tolerance.
+    """
+    np.testing.assert_allclose(losses(trained / "surrogate"), GOLDEN["surrogate"], rtol=0.01)
+    np.testing.assert_allclose(losses(trained / "allocator"), GOLDEN["allocator"], rtol=0.01)
+
+
+def test_the_shipped_recipe_runs_twice_to_the_same_bytes(data: Path, tmp_path: Path) -> None:
+    """At a size of seconds; what differs between the two is the time in the log alone."""
+    for name in ("first", "second"):
+        surrogate = str(tmp_path / name / "surrogate")
+        allocator = str(tmp_path / name / "paper")
+        options = ["--data", str(data), "--preset", "shipped", "--device", "cpu"]
+        assert main(["train", "surrogate", "-o", surrogate, *options, "--steps", "12"]) == 0
+        line = ["train", "allocator", "-o", allocator, "--surrogate", surrogate, *options]
+        assert main([*line, "--steps", "2"]) == 0
+    for file in ("README.md", "config.json", "model.safetensors"):
+        for part in ("surrogate", "paper"):
+            first, second = (tmp_path / name / part / file for name in ("first", "second"))
+            assert first.read_bytes() == second.read_bytes()
+    made = read_checkpoint(tmp_path / "first" / "paper")
+    card = (tmp_path / "first" / "paper" / "README.md").read_text()
+    for verb in ("surrogate", "allocator"):
+        said = made.training[verb]
+        assert len(said["data_sha256"]) == len(said["recipe_sha256"]) == 64
+        assert said["data_sha256"] in card and said["recipe_sha256"] in card
+        assert said["training"]["seconds"] is None
+    shipped = read_normalization(resolve_checkpoint("default"))
+    np.testing.assert_array_equal(made.normalization.std, shipped.std)
 
 
 def test_a_killed_run_that_goes_on_has_the_weights_of_one_that_was_not(
@@ -176,7 +220,7 @@ def test_two_processes_have_the_losses_of_one(trained: Path, tmp_path: Path) -> 
         (["data", "generate", "--varied-limits", "2"], "a share from 0 to 1"),
         (
             ["train", "surrogate", "--preset", "long"],
-            "preset: expected one of paper, short, smoke, got 'long'",
+            "preset: expected one of paper, shipped, short, smoke, got 'long'",
         ),
         (["train", "surrogate", "--data", "nowhere"], "nowhere/data.json"),
         (["train", "surrogate", "--steps", "0"], "steps: expected a number of at least 1, got 0"),
