@@ -103,9 +103,7 @@ def add_figures(page: Page) -> None:
     page.add_html(swim_card)
     page.add_html(_trim)
     log = {"Log (NPZ)": partial(page.designs.swim, page.jobs.swimming)}
-    save = page.add_buttons(
-        "Save", log, visible=False, hint="For numpy; Log opens it as well."
-    )
+    save = page.add_buttons("Save", log, visible=False, hint="For numpy; Log opens it as well.")
     page.board.show(save, visible=lambda swims: swims)
 
 
