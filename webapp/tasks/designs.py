@@ -193,7 +193,7 @@ class Designs:
         if open_rows:
             session.show_task("Design")
             count = f"{len(open_rows)} things were" if len(open_rows) > 1 else "One thing was"
-            text = f"{count} taken for granted; the list stands at the left, in Design"
+            text = f"{count} taken for granted: see that list in Design"
             self._notify(f"Opened {opened.layout.name}", _with(text, reminder), calm=True)
         self._tell_missing(opened)
 
