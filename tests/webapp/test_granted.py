@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -18,7 +19,9 @@ from webapp.markup.words import in_app
 from webapp.panels.granted_card import granted_markup
 from webapp.session import Session
 from webapp.session.granted import Granted, SourceFile
+from webapp.tasks.fitting import FitResult, Upload, WhichVoltage, fit_upload
 from webapp.tasks.importing import Importing, rows_of
+from webapp.tasks.slot import Work
 
 
 class Dialog:
@@ -247,3 +250,21 @@ def test_the_unknown_force_is_that_of_a_t200_until_it_is_answered(page: Page) ->
     dialog.answer()
     assert session.state.layout.actuators[0].force == T200_FORCE  # type: ignore[attr-defined]
     assert json.dumps(dict(session.state.source.answers))  # type: ignore[union-attr]
+
+
+def test_a_bench_of_several_voltages_asks_which_counts() -> None:
+    rows = ["pwm,thrust (kgf),power,voltage"]
+    for volts, scale in ((12, 0.7), (16, 1.0)):
+        for step in range(-4, 5):
+            force = scale * step * abs(step) / 4.0
+            watts = 100.0 * scale * abs(step / 4.0) ** 3 + 1.0
+            rows.append(f"{1500 + 100 * step},{force:.3f},{watts:.2f},{volts}")
+    thruster = load_layout("bluerov2_heavy").actuators[0]
+    upload = Upload(thruster, "bench.csv", "\n".join(rows).encode())
+    work: Work[Upload] = Work(upload, lambda: None)
+    asked = fit_upload(upload, work)
+    assert isinstance(asked, WhichVoltage) and asked.levels == (12.0, 16.0)
+    answered = fit_upload(replace(asked.upload, voltage=12.0), work)
+    assert isinstance(answered, FitResult)
+    least, most = answered.fields["force"]
+    assert most == pytest.approx(0.7 * 4.0 * 9.80665, rel=1e-6) and least == pytest.approx(-most)
