@@ -207,10 +207,8 @@ def main(words: Sequence[str]) -> None:
     for name, values in (("key to answer", cost.own), ("followed", cost.followed)):
         p50, p90, most = (float(np.percentile(values, q)) for q in (50, 90, 100))
         print(f"{name:14} p50 {p50:5.0f} ms   p90 {p90:5.0f} ms   most {most:5.0f} ms")
-    print(
-        f"{pages} pages, {followers} of them follow; "
-        f"{cost.own_states} different wrenches at the end"
-    )
+    words = f"{pages} pages, {followers} of them follow"
+    print(f"{words}; {cost.own_states} different wrenches at the end")
 
 
 if __name__ == "__main__":

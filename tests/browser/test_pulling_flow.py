@@ -74,8 +74,10 @@ def test_keys_nudge_sliders_and_what_is_selected(page: Any) -> None:
     keyboard = page.page.keyboard
     keyboard.press("PageUp")
     page.until(lambda: session.state.target[0] == pytest.approx(before + 2.0))
+    page.until(lambda: box.input_value() == "3.2")
     keyboard.press("ArrowUp")
     page.until(lambda: session.state.target[0] == pytest.approx(before + 2.2))
+    page.until(lambda: box.input_value() == "3.4")
     keyboard.press("End")
     page.until(lambda: session.state.target[0] == 29.0)
     page.tab("Design")

@@ -11,17 +11,23 @@ from finlab.display import as_sentence
 from webapp.handles import button
 from webapp.markup.mode_plot import mode_plot
 from webapp.markup.refinement import step_words, vain_sentence, wrench_words
-from webapp.markup.verdict import COLORS, WORKING, Verdict, verdict_of, verdict_sentence
+from webapp.markup.verdict import WORKING, Verdict, verdict_of, verdict_sentence
 from webapp.markup.words import html, three_digits
 from webapp.page import Page
 from webapp.session.looking import Display
 from webapp.session.state import State
 from webapp.tasks.solver import Modes
-from webapp.theme import css
 from webapp.viser_internals import run_file, run_script
 
 PLOT_PX = 250
 """Height of the plot beside a width of 400 [px]; it is drawn as wide as there is room."""
+STYLES = {
+    Verdict.EXACT: "given",
+    Verdict.APPROXIMATE: "near",
+    Verdict.UNLEARNED: "near",
+    Verdict.OUT_OF_REACH: "missing",
+}
+"""Verdict -> style class of its sentence."""
 KEY = "presents"
 """Field of `Display` that says whether a page presents."""
 
@@ -87,11 +93,8 @@ def presented_words(answer: Allocation | None, in_reach: bool) -> str:
     else:
         missing = "" if answer.reachable else f" {as_sentence(missing_words(answer))}"
         words = f"{as_sentence(verdict_sentence(answer, in_reach))}{missing}"
-    template = (
-        "<p>Asked: <b class='asked'>{}</b></p>"
-        "<p class='sentence' role='status' style='color:{}'>{}</p>"
-    )
-    return html(template, asked, css(COLORS[verdict]), words)
+    template = "<p>Asked: <b class='asked'>{}</b></p><p class='sentence {}' role='status'>{}</p>"
+    return html(template, asked, STYLES[verdict], words)
 
 
 def presented_plot(modes: Modes, mode: int, step: int | None) -> str:
