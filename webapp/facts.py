@@ -124,7 +124,9 @@ def facts_of(
         "log_moment": jobs.log.moment,
         "offers": jobs.offers.answer,
         "offers_error": jobs.offers.error,
-        "is_offered": jobs.offers.answered == HomeQuestion.of_state(state),
+        "is_offered": (
+            session.desk.task == "Export" and jobs.offers.answered == HomeQuestion.of_state(state)
+        ),
         # A swim, and the view.
         "swims": swimming.active,
         "swimmer": swimmer,

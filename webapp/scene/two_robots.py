@@ -286,9 +286,10 @@ class PairScene:
         drawer: str | None,
     ) -> None:
         if pair is None:
-            self._pair = None
-            self._size = 0.0
-            self.hide()
+            if self._pair is not None:
+                self._pair = None
+                self._size = 0.0
+                self.hide()
             return
         self._pair = pair
         self._is_folded = drawer is None
