@@ -78,8 +78,8 @@ def test_a_regret_is_what_no_angle_of_the_branch_makes_up_for(number: int) -> No
             prices = columns[i] @ multipliers
             worth = []
             for branch in range(one.lattice.branches[f]):
-                edges = one.lattice.edge[f][branch : branch + 2]
-                tangents = [tangent_at(one.robot, i, a) for a in np.linspace(*edges, SAMPLES)]
+                low, high = one.lattice.edge[f][branch : branch + 2]
+                tangents = [tangent_at(one.robot, i, a) for a in np.linspace(low, high, SAMPLES)]
                 worth.append(max(prices @ t.force[:] - t.cost for t in tangents))
             regret = np.array(choices.regret[f][: len(worth)])
             largest = np.abs(worth).max() + np.abs(regret).max()

@@ -2,6 +2,7 @@
 largest there, beside what samples of the step say."""
 
 import ctypes
+from typing import Any
 
 import numpy as np
 import pytest
@@ -54,7 +55,7 @@ def prepared(robot: Robot) -> ctypes.Array[ctypes.c_char]:
     return memory  # type: ignore[no-any-return]
 
 
-def dual_at(robot: Robot, memory: object, target: Array, multipliers: Array) -> State:
+def dual_at(robot: Robot, memory: Any, target: Array, multipliers: Array) -> State:
     """The dual of a target (6,) at multipliers (6,), both in the basis."""
     state = State()
     functions().fl_dual_at(
@@ -63,7 +64,7 @@ def dual_at(robot: Robot, memory: object, target: Array, multipliers: Array) -> 
     return state
 
 
-def welcome_multipliers(robot: Robot, memory: object, rng: np.random.Generator) -> Array | None:
+def welcome_multipliers(robot: Robot, memory: Any, rng: np.random.Generator) -> Array | None:
     """Multipliers (6,) [W] at which drag is worth more than it costs; None where drawing found
     none."""
     columns = np.array(Work.from_buffer(memory).span.effectiveness_reduced)[: robot.n]

@@ -96,7 +96,7 @@ def test_no_deflections_come_nearer_to_a_wrench_beyond_reach(number: int) -> Non
         served = (answer.wrench / allocator.scale)[counts]
         distance = np.linalg.norm(served - target)
         assert distance <= nearest * (1.0 + 1e-6)
-        beyond += distance > 1e-3
+        beyond += bool(distance > 1e-3)
     assert beyond > 0
 
 

@@ -138,7 +138,8 @@ int fl_answer_many(const real *block, fl_work *work, const fl_question *question
                    const real *wrench, int count, real *force, real *multipliers,
                    real *wrench_served, real *gap_power_bound, real *command,
                    fl_byte *is_attainable, real *error, fl_byte *is_truncated) {
-  const size_t n = (size_t)COUNT(block);
+  const answer_arrays answers = {force,         multipliers, wrench_served, command,
+                                 is_attainable, error,       is_truncated};
   fl_question q = *question;
   fl_answer out;
   lanes_robot robot;
@@ -159,14 +160,8 @@ int fl_answer_many(const real *block, fl_work *work, const fl_question *question
     memcpy(q.wrench, wrench + 6 * k, sizeof q.wrench);
     const int code = fl_answer_one(block, work, &q, &out);
     if (code) return code;
-    memcpy(force + 2 * n * (size_t)k, out.force, 2 * n * sizeof *force);
-    memcpy(multipliers + 6 * k, out.multipliers, sizeof out.multipliers);
-    memcpy(wrench_served + 6 * k, out.wrench_served, sizeof out.wrench_served);
-    memcpy(command + 3 * n * (size_t)k, out.command, 3 * n * sizeof *command);
+    write_answer_of(block, &out, k, &answers);
     gap_power_bound[k] = out.gap_power_bound;
-    is_attainable[k] = (fl_byte)out.is_attainable;
-    error[k] = out.error;
-    is_truncated[k] = (fl_byte)out.is_truncated;
   }
   return FL_OK;
 }

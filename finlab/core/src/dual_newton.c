@@ -29,7 +29,6 @@
 #define OVERSHOT R(-0.3)     /* share of the slope below which a kept step went too far, too */
 #define SEARCH_STEPS 12      /* of the search for where a step that went too far is to end */
 #define SLOPE_ENOUGH R(0.05) /* share of the slope that it may leave */
-#define SURE_SHARE R(0.1)    /* of the residual that is enough, below which no step follows */
 #define JUMPS 4              /* trials with a jump after which Newton's method stands still */
 #define JUMP_STEP R(1e-3)    /* squared step, over squared multipliers, too long to judge */
 #define SHORT_STEP R(1e-7)   /* the same, in which any large change of a force is a jump */

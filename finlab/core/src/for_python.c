@@ -168,26 +168,16 @@ int fl_answer_coupled_many(const fl_coupled_robot *robot, real *block, fl_work *
                            const fl_question *question, const real *wrench, int count, real *force,
                            real *multipliers, real *wrench_served, real *command,
                            fl_byte *is_attainable, real *error, fl_byte *is_truncated) {
-  const size_t n = (size_t)COUNT(block);
+  const answer_arrays answers = {force,         multipliers, wrench_served, command,
+                                 is_attainable, error,       is_truncated};
   fl_question q = *question;
   fl_answer out;
   fl_outer_result result;
   for (int k = 0; k < count; k++) {
-    memcpy(q.wrench, wrench, sizeof q.wrench);
+    memcpy(q.wrench, wrench + 6 * k, sizeof q.wrench);
     const int code = fl_answer_coupled(robot, block, work, &q, &out, &result);
     if (code) return code;
-    memcpy(force, out.force, 2 * n * sizeof *force);
-    memcpy(multipliers, out.multipliers, sizeof out.multipliers);
-    memcpy(wrench_served, out.wrench_served, sizeof out.wrench_served);
-    memcpy(command, out.command, 3 * n * sizeof *command);
-    wrench += 6;
-    force += 2 * n;
-    multipliers += 6;
-    wrench_served += 6;
-    command += 3 * n;
-    is_attainable[k] = (fl_byte)out.is_attainable;
-    error[k] = out.error;
-    is_truncated[k] = (fl_byte)out.is_truncated;
+    write_answer_of(block, &out, k, &answers);
   }
   return FL_OK;
 }

@@ -254,6 +254,31 @@ real fl_refine_commands(const real *block, fl_work *work, const fl_box *box, con
 void fl_step_commands(const real *block, fl_work *work, const fl_box *box, const real *residual,
                       real mu, real command[][3], real stepped[][3]);
 
+/* Arrays of answers, one after the other: the outputs of fl_answer_many. */
+typedef struct {
+  real *force;
+  real *multipliers;
+  real *wrench_served;
+  real *command;
+  fl_byte *is_attainable;
+  real *error;
+  fl_byte *is_truncated;
+} answer_arrays;
+
+/* Writes answer k into the arrays. */
+static inline void write_answer_of(const real *block, const fl_answer *answer, int k,
+                                   const answer_arrays *to) {
+  const size_t n = (size_t)COUNT(block);
+  const size_t row = (size_t)k;
+  memcpy(to->force + 2 * n * row, answer->force, 2 * n * sizeof(real));
+  memcpy(to->multipliers + 6 * row, answer->multipliers, sizeof answer->multipliers);
+  memcpy(to->wrench_served + 6 * row, answer->wrench_served, sizeof answer->wrench_served);
+  memcpy(to->command + 3 * n * row, answer->command, 3 * n * sizeof(real));
+  to->is_attainable[k] = (fl_byte)answer->is_attainable;
+  to->error[k] = answer->error;
+  to->is_truncated[k] = (fl_byte)answer->is_truncated;
+}
+
 /* feasible_set.c: what may be given now */
 void fl_limits_without_tick(const real *block, fl_work *work);
 void fl_limits_of_tick(const real *block, fl_work *work, const fl_question *q);
@@ -272,7 +297,10 @@ void fl_first_lambda_inside(const real *block, fl_work *work, const real *target
                             const real *normal, real inside, real *lambda);
 
 /* dual_newton.c: Newton's method on the dual, Eq. 8. The numbers are those of lanes, too. */
-#define SATURATED R(1e-1)     /* share c of M */
+#define SATURATED R(1e-1) /* share c of M */
+/* Share of TOLERANCE, below which no step follows: near the rim multipliers magnify what is left,
+   and whoever takes other steps has to come to the same ones. */
+#define SURE_SHARE R(0.1)
 #define FELL R(0.9)           /* a residual above this share of the last one has not improved */
 #define MU_SINGULAR 10        /* mu grows by this where the step's matrix is singular to rounding */
 #define MU_KEPT_LEAST R(0.05) /* mu after a kept step, over that before: at least */

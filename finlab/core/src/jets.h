@@ -50,8 +50,8 @@ int fl_jet_meets(const water *w, const outlet *from, const jet *j, const outlet 
 real fl_share_on_hull(const water *w, const outlet *from, const real *ahead, real *slope);
 
 /* line_jets.c: the same of actuators that push along lines, at rest in the water. The wrench offset
-   (6,) of forces along the laws' axes, and, where wanted, its derivatives (n, 3, 6) by them, of each
-   line the first alone. */
+   (6,) of forces along the laws' axes, and, where wanted, its derivatives (n, 3, 6) by them, of
+   which each line has the first alone. */
 void fl_jets_of_lines(const fl_coupled_robot *robot, const fl_span *span, real force[][3],
                       real *offset, real slope[][3][6]);
 

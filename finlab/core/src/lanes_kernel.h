@@ -6,11 +6,8 @@
    A lane whose target is met, or is left to fl_answer_one, takes up the next one: so targets that
    take few steps wait for none that takes many. No number goes from one lane to another. */
 
-#define CHUNK 64      /* targets that are on the stack at once */
-#define PRICE_STEPS 5 /* of Newton's method to a price of first multipliers */
-/* Scaled wrench that may be left: near the rim multipliers magnify it, and a single question, which
-   takes other steps, has to come to the same ones. */
-#define LANES_ENOUGH (TOLERANCE / 10)
+#define CHUNK 64                /* targets that are on the stack at once */
+#define PRICE_STEPS 5           /* of Newton's method to a price of first multipliers */
 #define LANES_STEPS 100         /* steps of Newton's method in a lane; what takes more is left */
 #define LARGEST_IN_LANES R(1e9) /* wrench [N, N m]; larger ones are left */
 #define SLIGHT R(1e-3) /* turn [rad] up to which its sine and cosine are those of their series */
@@ -357,14 +354,11 @@ static inline void solve_lanes(vector factor[6][6], const vector *right, vector 
 
 /* Solves the same for one factor of all lanes. */
 static inline void solve_alike(const real factor[6][6], const vector *right, vector *x) {
+  vector same[6][6];
   for (int i = 0; i < 6; i++) {
-    x[i] = right[i];
-    for (int k = 0; k < i; k++) x[i] -= factor[i][k] * x[k];
+    for (int k = 0; k <= i; k++) same[i][k] = lanes_of(factor[i][k]);
   }
-  for (int i = 5; i >= 0; i--) {
-    x[i] *= factor[i][i];
-    for (int k = 5; k > i; k--) x[i] -= factor[k][i] * x[k];
-  }
+  solve_lanes(same, right, x);
 }
 
 static inline vector trace_of(vector H[6][6]) {
@@ -707,7 +701,7 @@ static void newton_in_lanes(const lanes_robot *robot, candidate *candidates, con
   lanes.is_fresh = no_lanes();
   for (;;) {
     /* What has come to its end leaves. */
-    const mask is_met = at->residual_size <= LANES_ENOUGH;
+    const mask is_met = at->residual_size <= SURE_SHARE * TOLERANCE;
     const mask is_beyond = at->dual_value > beyond;
     const mask has_diverged = ~(lanes.mu <= 1 / ROUNDING); /* or is NaN */
     const mask is_late = lanes.steps >= LANES_STEPS;

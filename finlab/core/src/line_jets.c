@@ -124,27 +124,27 @@ typedef struct {
 } line_jet;
 
 static void find_line_jet(const fl_coupled_robot *robot, const fl_span *span, int i, real force,
-                          line_jet *jet) {
+                          line_jet *own_jet) {
   const line_outlet *line = line_outlets_of(robot->line_jets) + i;
   const int n = COUNT(robot->block_uncoupled);
   const int way = force < 0;
   const real thrust = SQRT(force * force + line->rest_thrust_squared);
-  jet->line = line;
-  jet->rate = rates_of(robot->line_jets, n, way, i);
-  jet->force = force;
-  jet->per_thrust = 1 / thrust;
-  jet->share = force * jet->per_thrust;
-  jet->speed = SQRT(line->squared_speed * thrust);
-  const real size = FABS(jet->share);
-  const real squared = jet->share * jet->share;
-  const real speed_per_thrust = jet->speed * jet->per_thrust;
-  jet->speed_slope = speed_per_thrust * (1 - squared / 2);
-  jet->t = (1 - size) / SHORT;
-  jet->t_slope = -speed_per_thrust * size * (1 - squared) / SHORT;
-  jet->hull_share = line->hull_share[way];
-  jet->index = i;
-  jet->is_lost = span->is_lost[i];
-  jet->is_short = !(size >= 1 - SHORT);
+  own_jet->line = line;
+  own_jet->rate = rates_of(robot->line_jets, n, way, i);
+  own_jet->force = force;
+  own_jet->per_thrust = 1 / thrust;
+  own_jet->share = force * own_jet->per_thrust;
+  own_jet->speed = SQRT(line->squared_speed * thrust);
+  const real size = FABS(own_jet->share);
+  const real squared = own_jet->share * own_jet->share;
+  const real speed_per_thrust = own_jet->speed * own_jet->per_thrust;
+  own_jet->speed_slope = speed_per_thrust * (1 - squared / 2);
+  own_jet->t = (1 - size) / SHORT;
+  own_jet->t_slope = -speed_per_thrust * size * (1 - squared) / SHORT;
+  own_jet->hull_share = line->hull_share[way];
+  own_jet->index = i;
+  own_jet->is_lost = span->is_lost[i];
+  own_jet->is_short = !(size >= 1 - SHORT);
 }
 
 /* The jet of a line whose force is short, as fl_jets has it. */
@@ -222,62 +222,64 @@ typedef struct {
   real along, even, own; /* p and m [kg/s], d [kg/m] */
 } taken;
 
-static inline taken taken_by(const water *w, const line_jet *jet, const real *u, int has_slope) {
-  const line_outlet *line = jet->line;
-  const real q = jet->share;
+static inline taken taken_by(const water *w, const line_jet *own_jet, const real *u,
+                             int has_slope) {
+  const line_outlet *line = own_jet->line;
+  const real q = own_jet->share;
   const real u_axis = dot(u, line->axis, 3);
   const real against = -q * u_axis; /* speed of the water against the jet's force */
-  const real share = against / jet->speed;
+  const real share = against / own_jet->speed;
   const real root = SQRT(share * share + FLOOR_SHARE);
   const real below = w->lag + w->most * root;
-  const real lost = share / below + jet->hull_share; /* share of the force */
-  const real side_flow = line->side_flow * jet->speed;
+  const real lost = share / below + own_jet->hull_share; /* share of the force */
+  const real side_flow = line->side_flow * own_jet->speed;
   const real speed = SQRT(dot(u, u, 3) + ROUNDING);
-  taken made = {{0}};
+  taken made;
+  memset(&made, 0, sizeof made);
   add_wrench(line->position, line->axis, made.wrench);
   add_wrench(line->position, u, made.water);
   /* Across the jet, which turns it aside, the water's speed is u + against q a. */
   made.by_water = side_flow + line->drag * speed;
-  made.by_axis = side_flow * against * q - lost * jet->force;
+  made.by_axis = side_flow * against * q - lost * own_jet->force;
   if (!has_slope) return made;
 
   const real lost_slope = (w->lag + w->most * FLOOR_SHARE / root) / (below * below);
-  const real lost_per_speed = jet->force * lost_slope / jet->speed;
+  const real lost_per_speed = own_jet->force * lost_slope / own_jet->speed;
   made.along = q * (lost_per_speed - side_flow * q);
   made.even = made.by_water;
   made.own = line->drag / speed;
   const real across_axis = u_axis + against * q; /* of the speed across */
-  const real side_per_thrust = side_flow * jet->per_thrust;
+  const real side_per_thrust = side_flow * own_jet->per_thrust;
   const real side_slope = against * (1 - q * q / 2) - across_axis * q;
-  const real d_lost = lost_per_speed * (across_axis + against * q / 2) * jet->per_thrust;
+  const real d_lost = lost_per_speed * (across_axis + against * q / 2) * own_jet->per_thrust;
   made.d_water = side_per_thrust * q / 2;
   made.d_axis = side_per_thrust * side_slope + d_lost - lost;
   return made;
 }
 
 /* Adds the water [m/s] that a jet brings to the n lines. */
-static void add_water_of_jet(const fl_coupled_robot *robot, const line_jet *jet, int n,
+static void add_water_of_jet(const fl_coupled_robot *robot, const line_jet *own_jet, int n,
                              real u[][3]) {
-  const real speed = jet->speed * jet->share;
+  const real speed = own_jet->speed * own_jet->share;
   for (int i = 0; i < n; i++) {
-    if (misses(jet, i)) continue;
-    const real brought = speed * rate_of(robot, jet, i);
-    for (int c = 0; c < 3; c++) u[i][c] -= brought * jet->line->axis[c];
+    if (misses(own_jet, i)) continue;
+    const real brought = speed * rate_of(robot, own_jet, i);
+    for (int c = 0; c < 3; c++) u[i][c] -= brought * own_jet->line->axis[c];
   }
 }
 
 /* Adds to the derivative (6,) of the wrench by the force of a line that by its jet at the n
    others. */
-static void add_slope_of_jet(const fl_coupled_robot *robot, const line_jet *jet, int n,
+static void add_slope_of_jet(const fl_coupled_robot *robot, const line_jet *own_jet, int n,
                              const taken *others, real *slope) {
-  const real *axis = jet->line->axis;
+  const real *axis = own_jet->line->axis;
   real even = 0;
   real lever[3] = {0};
   for (int i = 0; i < n; i++) {
-    if (misses(jet, i)) continue;
+    if (misses(own_jet, i)) continue;
     const taken *other = others + i;
     const real *position = line_outlets_of(robot->line_jets)[i].position;
-    const real rate = -rate_slope_of(robot, jet, i);
+    const real rate = -rate_slope_of(robot, own_jet, i);
     const real along = rate * other->along * dot(other->wrench, axis, 3);
     const real own = rate * other->own * dot(other->water, axis, 3);
     for (int k = 0; k < 6; k++) slope[k] += along * other->wrench[k] + own * other->water[k];
@@ -302,11 +304,11 @@ void fl_jets_of_lines(const fl_coupled_robot *robot, const fl_span *span, real f
   memset(u, 0, (size_t)n * sizeof u[0]);
   memset(offset, 0, 6 * sizeof *offset);
   for (int j = 0; j < n; j++) {
-    line_jet *jet = jets + j;
-    find_line_jet(robot, span, j, force[j][0], jet);
-    if (jet->is_lost) continue;
-    if (jet->is_short) jet->hull_share = short_hull_share(robot, jet);
-    add_water_of_jet(robot, jet, n, u);
+    line_jet *own_jet = jets + j;
+    find_line_jet(robot, span, j, force[j][0], own_jet);
+    if (own_jet->is_lost) continue;
+    if (own_jet->is_short) own_jet->hull_share = short_hull_share(robot, own_jet);
+    add_water_of_jet(robot, own_jet, n, u);
   }
   for (int i = 0; i < n; i++) {
     taken *own = lines + i;

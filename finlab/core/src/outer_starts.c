@@ -184,7 +184,7 @@ static int were_known_ways(start_search *search, const fl_byte *way) {
 static void move_by_linear_model(const start_search *search, real start[][2], real moved[][2]) {
   const int n = COUNT(search->block);
   real way[FL_MOST]; /* N (y - b) */
-  memset(way, 0, (size_t)n * sizeof *way);
+  for (int i = 0; i < n; i++) way[i] = 0;
   for (int j = 0; j < n; j++) {
     const real off = start[j][0] - search->force[j][0];
     if (off == 0) continue; /* as all but the reversed one */
@@ -204,8 +204,7 @@ static int is_pruned(start_search *search, real moved[][2]) {
   int turned = 0;
   real cost = 0;
   real gain = 0;
-  fl_byte way[FL_MOST];
-  memset(way, 0, (size_t)n);
+  fl_byte way[FL_MOST] = {0};
   for (int i = 0; i < n; i++) {
     if (search->work->span.is_lost[i]) continue;
     way[i] = moved[i][0] > 0;
