@@ -138,7 +138,7 @@ def _report(output: Path, made: TrainedWeights) -> None:
     print(f"{output}: checkpoint {made.name}, preset {made.preset}, sha256 {made.sha256}")
     for group, values in made.metrics.items():
         for name, value in values.items():
-            print(f"{group} {name} {value:.3g}")
+            print(f"{group} {name.replace('_', ' ')} {value:.4g}")
 
 
 def generate(

@@ -10,7 +10,8 @@ from dataclasses import replace
 
 from finlab.research.evaluation.document import Row, format_digits, format_error
 from finlab.research.evaluation.experiment import paper_figures
-from finlab.research.evaluation.verdict import NEAR, Comparison, ratio_interval_of
+from finlab.research.evaluation.scoring import paired_interval
+from finlab.research.evaluation.verdict import NEAR, Comparison
 
 Rows = Mapping[str, Sequence[Row]]
 """Rows of a report, by the name of the experiment."""
@@ -42,9 +43,7 @@ def found_row(rows: Sequence[Row], **values: object) -> Row:
     return {}
 
 
-def quotient(
-    what: str, printed: float, numerator: Row, denominator: Row, key: str, obstacle: str = ""
-) -> Comparison:
+def quotient(what: str, printed: float, numerator: Row, denominator: Row, key: str) -> Comparison:
     """Returns the comparison of a printed quotient with that of two rows' figures.
 
     Args:
@@ -53,13 +52,27 @@ def quotient(
         numerator: row of the numerator; an empty one where it was not run.
         denominator: row of the denominator.
         key: of the figure.
-        obstacle: as for `Comparison`.
     """
     above = numerator.get(key)
     below = denominator.get(key)
     figure = above / below if above is not None and below else None
-    interval = ratio_interval_of(numerator, denominator, key)
-    return Comparison(what, printed, figure, interval, obstacle)
+    return Comparison(what, printed, figure, _quotient_interval(numerator, denominator, key))
+
+
+def _quotient_interval(numerator: Row, denominator: Row, key: str) -> list[float] | None:
+    """The interval of a quotient of two rows' figures: from both on each layout where these are the
+    same layouts, else the widest that both intervals allow; None where one row has none."""
+    above = numerator.get(f"{key}_by_layout")
+    below = denominator.get(f"{key}_by_layout")
+    if above and below and numerator.get("split") == denominator.get("split"):
+        return list(paired_interval(above, below))
+    above_ends = numerator.get(f"{key}_interval")
+    below_ends = denominator.get(f"{key}_interval")
+    if not above_ends or not below_ends or None in above_ends or None in below_ends:
+        return None
+    if min(below_ends) <= 0.0:
+        return None
+    return [above_ends[0] / below_ends[1], above_ends[1] / below_ends[0]]
 
 
 def sentences(rows: Rows) -> list[str]:

@@ -96,6 +96,27 @@ def joined(parts: Sequence[Columns]) -> Columns:
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
+def means_by_layout(values: Array, group: NDArray[np.int64]) -> list[float]:
+    """Returns the mean on each layout, in the order of their numbers.
+
+    Args:
+        values: values (N,).
+        group: number of the layout of each (N,).
+    """
+    return [float(values[group == number].mean()) for number in np.unique(group)]
+
+
+def paired_interval(numerators: Sequence[float], denominators: Sequence[float]) -> Interval:
+    """Returns the confidence interval of a quotient of two means on the same layouts.
+
+    Args:
+        numerators: mean on each layout, of the one.
+        denominators: of the other.
+    """
+    above = np.array(numerators)
+    return ratio_interval(above, np.array(denominators), np.arange(len(above)))
+
+
 def mean_interval(values: Array, group: NDArray[np.int64]) -> Interval:
     """Returns the confidence interval of a mean.
 

@@ -1,9 +1,9 @@
 """Whether a figure that the paper prints is reproduced: one function decides, for every table."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 from finlab.research.evaluation.document import Column, Row, format_digits, format_error
 
@@ -146,21 +146,3 @@ def _times(ratio: float) -> str:
 def _factor(ratio: float) -> str:
     """A factor above 1 with two digits, or as a power of ten."""
     return format_digits(ratio, 2) if ratio < 1000.0 else f"10^{math.log10(ratio):.0f}"
-
-
-def ratio_interval_of(
-    numerator: Mapping[str, Any], denominator: Mapping[str, Any], key: str
-) -> Any:
-    """Returns the widest interval of a quotient of two rows' figures, from both their intervals;
-    None where one of them has none.
-
-    Args:
-        numerator: row of the numerator.
-        denominator: row of the denominator.
-        key: of the figure; its interval stands under `<key>_interval`.
-    """
-    above = numerator.get(f"{key}_interval")
-    below = denominator.get(f"{key}_interval")
-    if not above or not below or None in above or None in below or min(below) <= 0.0:
-        return None
-    return [above[0] / below[1], above[1] / below[0]]

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from finlab.research.evaluation.claims import claims, sentences
+from finlab.research.evaluation.claims import claims, quotient, sentences
 from finlab.research.evaluation.experiment import EXPERIMENTS, load_experiment, paper_figures
 from finlab.research.evaluation.verdict import Comparison, decide
 
@@ -176,3 +176,16 @@ def test_other_rows_say_otherwise() -> None:
 
 def test_without_rows_nothing_is_said() -> None:
     assert sentences({}) == [] and claims({}) == []
+
+
+def test_a_quotient_on_the_same_layouts_is_told_from_noise() -> None:
+    """Layouts differ tenfold, the two rows by a tenth on each: pairs show it, intervals do not."""
+    below = [0.1 * 1.5**k for k in range(8)]
+    first = {"split": "id", "x": sum(below), "x_by_layout": below, "x_interval": [0.1, 9.0]}
+    above = [1.1 * value for value in below]
+    second = {"split": "id", "x": sum(above), "x_by_layout": above, "x_interval": [0.1, 9.0]}
+    paired = quotient("x", 1.1, second, first, "x")
+    assert paired.interval == pytest.approx([1.1, 1.1])
+    other = quotient("x", 1.1, {**second, "split": "ood"}, first, "x")
+    assert other.interval == pytest.approx([0.1 / 9.0, 9.0 / 0.1])
+    assert quotient("x", 1.1, {}, first, "x").verdict.word == "cannot be decided"

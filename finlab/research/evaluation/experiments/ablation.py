@@ -13,7 +13,13 @@ from finlab.research.evaluation.experiment import Experiment, check_names, paper
 from finlab.research.evaluation.experiments.wrench import MEASURES
 from finlab.research.evaluation.method_specs import MethodSpec
 from finlab.research.evaluation.plots import candidates_picture
-from finlab.research.evaluation.scoring import joined, mean_interval, paper_sigma, score
+from finlab.research.evaluation.scoring import (
+    joined,
+    mean_interval,
+    means_by_layout,
+    paper_sigma,
+    score,
+)
 from finlab.research.evaluation.splits import SplitCase, make_split
 from finlab.research.evaluation.verdict import Comparison
 
@@ -94,6 +100,7 @@ def run(
                     "n": len(error),
                     "j_norm_mean": float(square.mean()),
                     "j_norm_mean_interval": list(mean_interval(square, scores["layout"])),
+                    "j_norm_mean_by_layout": means_by_layout(square, scores["layout"]),
                     "j_norm_std": float(square.std()),
                     "err_norm_mean": float(error.mean()),
                     "err_norm_median": float(np.median(error)),

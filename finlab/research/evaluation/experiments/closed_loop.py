@@ -191,6 +191,8 @@ OTHER_SIMULATOR = "The paper's runs took place in another simulator, on a path t
 """Why figures of paths cannot be compared."""
 POOL = "The paper's robot swam in a pool."
 """Why figures of the paper's own robot cannot be compared."""
+PRINTED_KEYS = {"ate": "ATE", "rte": "RTE", "depth_rmse": "depth RMSE"}
+"""Figures of paths that the paper prints, in words."""
 POWER = (
     Column("inertial_w", "inertial power", "three", unit="W"),
     Column("driving_w", "with motor losses", "three", unit="W"),

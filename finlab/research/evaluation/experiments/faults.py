@@ -15,6 +15,7 @@ from finlab.research.evaluation.experiments.closed_loop import (
     MEASURES,
     POOL,
     POWER,
+    PRINTED_KEYS,
     SwimCase,
     follow_row,
     mean_rows,
@@ -123,7 +124,7 @@ def _compared(rows: Sequence[Row]) -> list[Comparison]:
     for fault, some in (("healthy", healthy), ("one_fin", damaged)):
         row = some[0] if some else {}
         for key, printed in paper_figures()["fault_tolerance"][fault]["baseline"].items():
-            what = f"baseline, {fault.replace('_', ' ')}: {key} in m"
+            what = f"baseline, {fault.replace('_', ' ')}: {PRINTED_KEYS[key]} in m"
             interval = row.get(f"{key}_interval")
             compared.append(Comparison(what, printed, row.get(key), interval, POOL))
     return compared

@@ -13,7 +13,7 @@ from finlab.research.evaluation.experiments.ablation import PAPER
 from finlab.research.evaluation.experiments.wrench import MEASURES
 from finlab.research.evaluation.method_specs import MethodSpec
 from finlab.research.evaluation.plots import temperature_picture
-from finlab.research.evaluation.scoring import mean_interval, paper_sigma
+from finlab.research.evaluation.scoring import mean_interval, means_by_layout, paper_sigma
 from finlab.research.evaluation.splits import make_split
 from finlab.research.paper.pipeline import PaperSettings
 
@@ -68,6 +68,7 @@ def run(
                 "diversity": float(np.mean(spread)),
                 "best_j_mean": float(np.mean(best)),
                 "best_j_mean_interval": list(mean_interval(np.array(best), np.array(group))),
+                "best_j_mean_by_layout": means_by_layout(np.array(best), np.array(group)),
                 "best_j_median": float(np.median(best)),
             }
         )

@@ -18,6 +18,7 @@ from finlab.research.evaluation.experiments.closed_loop import (
     OTHER_SIMULATOR,
     POOL,
     POWER,
+    PRINTED_KEYS,
     SwimCase,
     SwimKey,
     follow_row,
@@ -133,8 +134,8 @@ def _compared(rows: Sequence[Row]) -> list[Comparison]:
         about = {"layout": layout, "lost": count, "controller": "waypoint", "method": "paper"}
         row = next((r for r in rows if about.items() <= r.items()), {})
         place = "in the pool" if obstacle == POOL else f"layout {layout}"
-        for key in ("ate", "rte", "depth_rmse"):
-            what = f"{place}, {count} lost: {key} in m"
+        for key, words in PRINTED_KEYS.items():
+            what = f"{place}, {count} lost: {words} in m"
             interval = row.get(f"{key}_interval")
             compared.append(Comparison(what, printed[key], row.get(key), interval, obstacle))
     return compared

@@ -102,6 +102,15 @@ def _printed(_: Sequence[Row]) -> list[Row]:
     ]
 
 
+PRINTED_WORDS = {
+    "inertial_w": "inertial power in W",
+    "inertial_w_std": "spread of the inertial power over runs in W",
+    "mae": "mean error of the speed in m/s",
+    "mae_std": "spread of the error of the speed over runs in m/s",
+}
+"""Figures of the paper's table, in words."""
+
+
 def _compared(rows: Sequence[Row]) -> list[Comparison]:
     """Each figure of the paper's table of power and speed beside those on layout A."""
     methods = {"baseline": BASELINE, "ours": "paper"}
@@ -112,7 +121,7 @@ def _compared(rows: Sequence[Row]) -> list[Comparison]:
         row = next((r for r in rows if about.items() <= r.items()), {})
         for key, printed in figures.items():
             interval = row.get(f"{key}_interval")
-            what = f"{name}: {key}"
+            what = f"{name}: {PRINTED_WORDS[key]}"
             compared.append(Comparison(what, printed, row.get(key), interval, closed_loop.POOL))
     return compared
 

@@ -23,6 +23,7 @@ from finlab.research.evaluation.scoring import (
     Columns,
     joined,
     mean_interval,
+    means_by_layout,
     quantile_interval,
     run_method,
     share_interval,
@@ -153,7 +154,8 @@ def _row(split: str, method: str, fins: int | None, scores: Columns) -> Row:
         **{f"success_{level}": share_interval(error <= level, group) for level in SUCCESS_LEVELS},
     }
     plain = {key: float(value) for key, value in row.items()}
-    return about | plain | {f"{key}_interval": list(ends) for key, ends in intervals.items()}
+    ends = {f"{key}_interval": list(ends) for key, ends in intervals.items()}
+    return about | plain | ends | {"err_norm_mean_by_layout": means_by_layout(error, group)}
 
 
 def _cases(

@@ -128,7 +128,13 @@ def train_surrogate(options: TrainingOptions) -> TrainedWeights:
         )
         std = torch.tensor(trained.normalization.std, dtype=torch.float32)
         error = float(modules.physics(surrogate_of(trained), batch, std).sqrt().mean())
-        return replace(trained, metrics={"surrogate": {"wrench_error_norm": error}})
+        scored = {
+            "wrench_error_norm": error,
+            "held_out_layouts": HELD_OUT.layouts,
+            "held_out_commands": HELD_OUT.commands,
+            "held_out_seed": HELD_OUT.seed,
+        }
+        return replace(trained, metrics={"surrogate": scored})
 
     begin = partial(modules.surrogate_weights, made.surrogate)
     terms_of = partial(surrogate_terms, made.surrogate)
