@@ -266,7 +266,7 @@ def test_both_stand_apart_left_and_right_in_each_view(view: str, left: str, righ
 def test_arrows_of_both_have_one_scale_that_fits() -> None:
     target = (40.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     answers = [Allocator(load_layout(name)).allocate(target) for name in ("ucat", "bluerov2_heavy")]
-    scale = pair_scale(target, [*answers, None], Scale(1.0, 1.0))
+    scale = pair_scale(target, [*answers, None], Scale(1.0, 1.0, 1.0))
     largest = max(float(np.linalg.norm(answer.wrench[:3])) for answer in answers)
     assert LENGTH * largest / scale.newtons <= ARROWS[1] + 1e-12
 
