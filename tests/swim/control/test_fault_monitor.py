@@ -13,7 +13,7 @@ from finlab.layout import Layout, load_layout
 from finlab.layout.damage import Damage
 from finlab.research.evaluation.experiments.hard_days import BUILT_OFF
 from finlab.swim.control import FaultMonitor, Measurement, MonitorSettings
-from finlab.swim.control.hypotheses import LOST
+from finlab.swim.control.jump_evidence import LOST
 from finlab.swim.simulation import (
     NOISE_ALONE,
     ClosedLoop,
@@ -169,10 +169,11 @@ def test_a_single_odd_sample_decides_nothing(layout_a: Layout) -> None:
     hypotheses = monitor._hypotheses
     hypotheses.age_s = monitor.settings.settle_s  # long enough under way to be believed
     hypotheses._begin_onset()
-    hypotheses.onset_age[:] = 1.0
+    hypotheses._age[:] = 1.0
     nothing = hypotheses.evidence()
-    sure = nothing._replace(log_odds=nothing.log_odds.copy())
+    sure = nothing._replace(log_odds=nothing.log_odds.copy(), by_kind=nothing.by_kind.copy())
     sure.log_odds[0, 2, LOST] = 20.0
+    sure.by_kind[2, LOST] = 20.0
     for evidence in (sure, nothing, sure):
         hypotheses.evidence = lambda evidence=evidence: evidence  # type: ignore[method-assign]
         monitor._decide(0.1)
