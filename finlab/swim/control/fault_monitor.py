@@ -12,6 +12,7 @@ import numpy as np
 
 from finlab.allocation.rates import Rates
 from finlab.arrays import Array
+from finlab.axes import wrapped_angle
 from finlab.layout import Layout
 from finlab.layout.damage import NO_DAMAGE, Damage
 from finlab.physics import plant_of
@@ -76,6 +77,9 @@ PERIOD_MAX_S = 0.25
 """Longest step of the model [s]; a longer period is cut."""
 GAP_MAX_S = 2.0
 """A pause between samples after which the motion is unknown [s]."""
+STEEP_COSINE = 0.3
+"""Cosine of the pitch below which roll and heading say too little of the attitude to tell
+anything."""
 
 
 class Finding(NamedTuple):
@@ -228,11 +232,18 @@ class FaultMonitor:
                 hypotheses.state, m.yaw, command, duration / parts, hypotheses.shared_covariance
             )
             hypotheses.predict(step, duration / parts)
-        if hypotheses.has_diverged or not self._correct(m, step) or hypotheses.has_diverged:
+        if not self._follow(m, step):
             hypotheses.restart(self._moving(m))
             return self.verdict()
         self._decide(duration)
         return self.verdict()
+
+    def _follow(self, m: Measurement, step: ModelStep) -> bool:
+        """Corrects the filter by a measurement; returns whether it can follow the motion."""
+        hypotheses = self._hypotheses
+        if abs(math.cos(m.pitch)) < STEEP_COSINE or hypotheses.has_diverged:
+            return False
+        return self._correct(m, step) and not hypotheses.has_diverged
 
     def _moving(self, m: Measurement) -> Array:
         """The moving part of the state (9,), as measured."""
@@ -255,6 +266,7 @@ class FaultMonitor:
         innovation = np.zeros(9)
         innovation[:5] = (*m.rates.tolist(), m.roll, m.pitch)
         innovation[:5] -= state[3:8]
+        innovation[3] = wrapped_angle(innovation[3])
         variance = self._variance_of_imu
         count = 5
         if self._is_new_velocity(m):
