@@ -5,6 +5,7 @@
     python -m tools.judge_monitor runs.jsonl --table                      # what the file says
 
 Seeds from 200000 on, and robots that they draw, are for judging alone: nothing is tuned on them.
+What was looked at to find a cause is no judge any more: `--first-seed 300000` begins afresh.
 """
 
 import argparse
