@@ -5,6 +5,7 @@
     python -m tools.judge_monitor runs.jsonl --table                      # what the file says
 
 Seeds from 200000 on, and robots that they draw, are for judging alone: nothing is tuned on them.
+What was looked at to find a cause is no judge any more: `--first-seed 300000` begins afresh.
 """
 
 import argparse
@@ -64,24 +65,31 @@ class Run(NamedTuple):
     sensors: str
     kind: str | None
     """None for no fault."""
+    first_seed: int = JUDGED_SEED
+    """Seed of the run of number 0, and of the first robot."""
+
+    @property
+    def seed(self) -> int:
+        """Of all that is drawn in the run."""
+        return self.first_seed + self.number
 
     @property
     def key(self) -> str:
         """A name by which a file of results knows it."""
-        return f"{self.number} {self.sensors} {self.kind}"
+        return f"{self.first_seed} {self.number} {self.sensors} {self.kind}"
 
     def robot(self) -> Layout:
         """The layout that is believed."""
         index = self.number % N_ROBOTS
         if index < len(SHIPPED):
             return load_layout(SHIPPED[index])
-        return random_frame(JUDGED_SEED + index)
+        return random_frame(self.first_seed + index)
 
     def fault(self, layout: Layout) -> TrueFault | None:
         """What breaks, and when."""
         if self.kind is None:
             return None
-        rng = np.random.default_rng([JUDGED_SEED + self.number, KINDS.index(self.kind), 7])
+        rng = np.random.default_rng([self.seed, KINDS.index(self.kind), 7])
         possible = range(layout.n)
         if self.kind == "reversed":  # a fin that turns about is stuck, or wired wrongly
             possible = [k for k in possible if not layout.is_fin[k]]
@@ -128,7 +136,7 @@ def damage_of(layout: Layout, fault: TrueFault, stuck_at: float) -> Damage:
 def judged(run: Run) -> dict[str, Any]:
     """Swims one run and returns what came of it."""
     layout = run.robot()
-    seed = JUDGED_SEED + run.number
+    seed = run.seed
     allocator = Allocator(layout)
     axes = axes_of(layout)
     completion = {(): Completion(layout, (), axes)}
@@ -299,14 +307,14 @@ def _wrong_names(result: dict[str, Any]) -> set[str]:
     return names
 
 
-def planned(n_faults: int, quiet_h: float) -> list[Run]:
+def planned(n_faults: int, quiet_h: float, first_seed: int) -> list[Run]:
     """The runs of a judgement: faults of all kinds with both sets of sensors, and hours without."""
     runs = []
     for number in range(math.ceil(n_faults / (len(KINDS) * len(SENSORS)))):
         for kind in KINDS:
-            runs += [Run(number, sensors, kind) for sensors in SENSORS]
+            runs += [Run(number, sensors, kind, first_seed) for sensors in SENSORS]
     for number in range(math.ceil(quiet_h * 3600.0 / QUIET_RUN_S / len(SENSORS))):
-        runs += [Run(5000 + number, sensors, None) for sensors in SENSORS]
+        runs += [Run(5000 + number, sensors, None, first_seed) for sensors in SENSORS]
     return runs
 
 
@@ -316,6 +324,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("results", type=Path)
     parser.add_argument("--faults", type=int, default=400)
     parser.add_argument("--quiet-h", type=float, default=10.0)
+    parser.add_argument("--first-seed", type=int, default=JUDGED_SEED)
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--table", action="store_true")
     options = parser.parse_args(arguments)
@@ -325,7 +334,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         results = [json.loads(line) for line in lines]
     if not options.table:
         done = {result["key"] for result in results}
-        runs = [run for run in planned(options.faults, options.quiet_h) if run.key not in done]
+        all_runs = planned(options.faults, options.quiet_h, options.first_seed)
+        runs = [run for run in all_runs if run.key not in done]
         with Pool(options.workers) as pool, options.results.open("a", encoding="utf-8") as file:
             for result in pool.imap_unordered(judged_or_failed, runs):
                 file.write(json.dumps(result) + "\n")

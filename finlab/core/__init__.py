@@ -50,6 +50,13 @@ SIGNATURES = {
     "fl_path_wrenches": "vpppiprrp",
     "fl_kalman_predict": "vppip",
     "fl_kalman_correct": "vppiiipp",
+    "fl_motion_step": "vpppiirrpppppp",
+    "fl_jumps_predict": "vppppiiiiipp",
+    "fl_jumps_update": "rpppirpiiiiippppp",
+    "fl_jumps_of_actuators": "vpppiipiipipppppprppp",
+    "fl_jumps_of_pairs": "vpppiiippprrp",
+    "fl_jumps_of_wrench": "vpppiipprrp",
+    "fl_log_sums": "vpiipipp",
     "fl_answer_coupled_into_row": "ipppprp",
     "fl_answer_coupled_many": "ipppppippppppp",
 }

@@ -522,6 +522,110 @@ void fl_kalman_predict(const fl_real *transition, const fl_real *noise, int size
    @param covariance  P (size, size), symmetric */
 void fl_kalman_correct(const fl_real *variance, const fl_real *innovation, int first, int last,
                        int size, fl_real *state, fl_real *covariance);
+
+/* Carries the state of the fault monitor's model on over a period, and says its derivatives.
+
+   @param body        numbers of the body; finlab/core/src/motion_model.c has their order, and that
+                      of a state of d = 46 + 4 strengths + held numbers
+   @param wrenches    of each actuator at full strength, then of each unit of what stuck ones give
+                      (strengths + held, 6), body frame [N, N m]
+   @param owners      actuator of each of these (strengths + held,)
+   @param strengths   how many actuators
+   @param held        how many numbers say what stuck ones give
+   @param yaw         heading [rad]
+   @param dt          length of the period [s]
+   @param covariance  of the state (d, d); 0 where none is known
+   @param state       (d,) becomes that at the end
+   @param transition  becomes the derivatives of its first 9 numbers by the state before (9, d)
+   @param rates       become the rates of change of these numbers at the beginning (9,)
+   @param slope       becomes their derivatives by the state (9, d)
+   @param terms       become squares of accelerations that the equation's terms come to, and of what
+                      is not linear in the errors of the state (2, 6) */
+void fl_motion_step(const fl_real *body, const fl_real *wrenches, const int *owners, int strengths,
+                    int held, fl_real yaw, fl_real dt, const fl_real *covariance, fl_real *state,
+                    fl_real *transition, fl_real *rates, fl_real *slope, fl_real *terms);
+
+/* Carries the covariance of the fault monitor's filter on over a period, and what jumps at several
+   moments have made of the state; finlab/core/src/jump_filter.c says what these are.
+
+   @param transition   derivatives of the first 9 numbers of the state by the state before (9, d)
+   @param noise        variances that the period adds (d,)
+   @param limit        largest variances (d,)
+   @param columns      numbers of the state that jump (c,)
+   @param most         moments that there is memory for
+   @param used         how many of them, the first, may count
+   @param d            numbers of the state
+   @param active       how many of them, the first, are in doubt
+   @param covariance   P (d, d), symmetric
+   @param sensitivity  what a jump of 1 of each column at each moment makes of the state
+                       (d, most, c) */
+void fl_jumps_predict(const fl_real *transition, const fl_real *noise, const fl_real *limit,
+                      const int *columns, int most, int used, int d, int active, int c,
+                      fl_real *covariance, fl_real *sensitivity);
+
+/* Corrects that filter by at most 9 measured numbers, and weighs the jumps by them. Nothing is
+   changed where the model says nothing of the measurement.
+
+   @param rows           derivatives of what is measured by the state (measured, d)
+   @param innovation     what was measured less what was expected (measured,)
+   @param variance       of the measurement's noise (measured,)
+   @param most_distance  squared innovation, in variances, from which on nothing is changed
+   @param state          (d,)
+   @param information    Lambda of the jumps at each moment (most, c, c)
+   @param score          eta of them (most, c)
+   @return squared innovation, in variances; -1 where nothing was changed */
+fl_real fl_jumps_update(const fl_real *rows, const fl_real *innovation, const fl_real *variance,
+                        int measured, fl_real most_distance, const int *columns, int most, int used,
+                        int d, int active, int c, fl_real *state, fl_real *covariance,
+                        fl_real *sensitivity, fl_real *information, fl_real *score);
+
+/* Says how likely it is that an actuator has come to each of several targets at each moment.
+
+   @param actuators  numbers of n of them; finlab/core/src/jump_evidence.c has their order, and that
+                     of `targets`, of which there are `kinds`, and of `spread`
+   @param h          numbers that say what stuck ones give
+   @param strength   what was believed at each moment (slots, n)
+   @param held       the same of what stuck ones give (slots, h)
+   @param moved      what each would have given on had it stuck (slots, h)
+   @param prior      logarithms of rates (n, kinds); -INFINITY for what cannot be
+   @param span       logarithms of the times that the moments stand for (count,)
+   @param temper     by what logarithms of likelihoods are divided
+   @param log_odds   become logarithms of the odds against none (count, n, kinds)
+   @param mean       become those of the jumps' priors where the odds are finite: of the strength,
+                     and of what it gives where it sticks (count, n, kinds, 3)
+   @param variance   the same of their variances (count, n, kinds, 3) */
+void fl_jumps_of_actuators(const fl_real *information, const fl_real *score, const int *slots,
+                           int count, int c, const fl_real *actuators, int n, int h,
+                           const fl_real *targets, int kinds, const fl_real *spread,
+                           const fl_real *strength, const fl_real *held, const fl_real *moved,
+                           const fl_real *prior, const fl_real *span, fl_real temper,
+                           fl_real *log_odds, fl_real *mean, fl_real *variance);
+
+/* The same of two actuators that are lost at one moment.
+
+   @param works     which actuators may be (n,)
+   @param log_odds  (count, n, n), -INFINITY where the first is not before the second */
+void fl_jumps_of_pairs(const fl_real *information, const fl_real *score, const int *slots,
+                       int count, int c, int n, const fl_real *strength, const int *works,
+                       const fl_real *span, fl_real log_rate, fl_real temper, fl_real *log_odds);
+
+/* The same of a wrench that no actuator gives, the last six columns of the jumps.
+
+   @param variance  of the wrench (6,)
+   @param log_odds  (count,) */
+void fl_jumps_of_wrench(const fl_real *information, const fl_real *score, const int *slots,
+                        int count, int c, const fl_real *variance, const fl_real *span,
+                        fl_real log_rate, fl_real temper, fl_real *log_odds);
+
+/* Logarithms of sums of exponentials, over all rows and over the columns of each group.
+
+   @param values  (rows, width)
+   @param groups  which one of `count` each column belongs to (width,)
+   @param tops    become the largest values of each group (count,)
+   @param sums    (count,) */
+void fl_log_sums(const fl_real *values, int rows, int width, const int *groups, int count,
+                 fl_real *tops, fl_real *sums);
+
 /* Features and vectors of the messages between actuators, and between each and the hull.
 
    @param constants    of the robot; finlab/core/src/messages.c has their order

@@ -55,7 +55,10 @@ FILES_LEFT_OUT = (
     "vehicle.c",
     "fin_motion.c",
     "first_order_lag.c",
+    "jump_evidence.c",
+    "jump_filter.c",
     "kalman_filter.c",
+    "motion_model.c",
     "path_wrench.c",
 )
 """Files of the core that an export does not need: judgement by formulas, `interaction`, attainable

@@ -18,6 +18,7 @@ typedef fl_wide wide;
 #define COS cosf
 #define ATAN2 atan2f
 #define EXP expf
+#define LOG logf
 #define POW powf
 #define TANH tanhf
 #define FLOOR floorf
@@ -37,6 +38,7 @@ typedef fl_wide wide;
 #define COS cos
 #define ATAN2 atan2
 #define EXP exp
+#define LOG log
 #define POW pow
 #define TANH tanh
 #define FLOOR floor
@@ -87,6 +89,12 @@ static inline real dot(const real *a, const real *b, int n) {
 }
 static inline real size_of(const real *force) {
   return SQRT(force[0] * force[0] + force[1] * force[1]);
+}
+
+static inline void cross(const real *a, const real *b, real *product) {
+  product[0] = a[1] * b[2] - a[2] * b[1];
+  product[1] = a[2] * b[0] - a[0] * b[2];
+  product[2] = a[0] * b[1] - a[1] * b[0];
 }
 
 /* Adds the wrench of a force at a position: f and r x f. */

@@ -24,12 +24,6 @@ enum { STATE_SIZE = 13 };
 
 typedef real vector[3];
 
-static void cross(const real *a, const real *b, real *product) {
-  product[0] = a[1] * b[2] - a[2] * b[1];
-  product[1] = a[2] * b[0] - a[0] * b[2];
-  product[2] = a[0] * b[1] - a[1] * b[0];
-}
-
 /* The body's axes x, y and z as the world sees them, of a quaternion of unit length. */
 static void axes_of(const real *quaternion, vector *axes) {
   const real w = quaternion[0];

@@ -18,7 +18,7 @@ from finlab.swim.control.contract import steers as steers
 from finlab.swim.control.fault_monitor import Diagnosis as Diagnosis
 from finlab.swim.control.fault_monitor import FaultMonitor as FaultMonitor
 from finlab.swim.control.fault_monitor import Finding as Finding
-from finlab.swim.control.hypotheses import MonitorSettings as MonitorSettings
+from finlab.swim.control.monitor_settings import MonitorSettings as MonitorSettings
 from finlab.swim.control.observer import MotionObserver as MotionObserver
 from finlab.swim.control.tracking_controller import TrackingController as TrackingController
 from finlab.swim.control.tracking_controller import gains_for as gains_for

@@ -12,12 +12,13 @@ import numpy as np
 
 from finlab.allocation.rates import Rates
 from finlab.arrays import Array
+from finlab.axes import wrapped_angle
 from finlab.layout import Layout
 from finlab.layout.damage import NO_DAMAGE, Damage
 from finlab.physics import plant_of
 from finlab.swim.control.contract import Measurement, asked_of_weak
-from finlab.swim.control.hypotheses import (
-    IS_OF_KIND,
+from finlab.swim.control.hypotheses import Hypotheses
+from finlab.swim.control.jump_evidence import (
     KINDS,
     LOST,
     OF_KIND,
@@ -26,9 +27,8 @@ from finlab.swim.control.hypotheses import (
     WEAK,
     WHOLE,
     Evidence,
-    Hypotheses,
-    MonitorSettings,
 )
+from finlab.swim.control.monitor_settings import MonitorSettings
 from finlab.swim.control.motion_model import DEPTH, N_MOVING, VELOCITY, ModelStep, MotionModel
 from finlab.swim.control.probe import Probe
 
@@ -77,6 +77,9 @@ PERIOD_MAX_S = 0.25
 """Longest step of the model [s]; a longer period is cut."""
 GAP_MAX_S = 2.0
 """A pause between samples after which the motion is unknown [s]."""
+STEEP_COSINE = 0.3
+"""Cosine of the pitch below which roll and heading say too little of the attitude to tell
+anything."""
 
 
 class Finding(NamedTuple):
@@ -147,6 +150,13 @@ class FaultMonitor:
         self._model = MotionModel(layout)
         self._hypotheses = Hypotheses(self._model, self.settings)
         self._probe = Probe(layout, self.settings, self.period_s)
+        # Rows of what is measured by the state, those of rates and tilt first, and variances.
+        self._rows = np.zeros((9, self._model.size))
+        self._rows[range(5), range(3, 8)] = 1.0
+        s = self.settings
+        self._variance_of_imu = np.square([s.rate_noise] * 3 + [s.tilt_noise] * 2 + [0.0] * 4)
+        self._variance_of_all = self._variance_of_imu.copy()
+        self._variance_of_all[5:8] = s.velocity_noise**2
         n = layout.n
         self._kind = np.full(n, WHOLE)
         """What each actuator is taken for, index in `KINDS`."""
@@ -156,6 +166,7 @@ class FaultMonitor:
         self._is_returning = np.zeros(n, dtype=bool)  # from a probe to what is commanded
         self._rates = Rates(plant_of(layout), layout.rates * self.period_s)
         self._sent = np.full((n, 3), np.nan)
+        self._no_direction = np.zeros(n)  # of actuators that are not tried
         self._suspect = (-1, -1)
         """Actuator and kind that are likeliest to be a new fault."""
         self._last_named_s = -math.inf
@@ -173,7 +184,7 @@ class FaultMonitor:
         self._tables = [fin for fin in layout.fins if fin.model.type == "table"]
         self._time = math.nan
         self._clock_s = 0.0  # time that has been watched, from 0
-        self._velocity: Array | None = None
+        self._velocity: tuple[float, ...] | None = None
         self._velocity_time = -math.inf
         self._depth = math.nan
         self.evidence: Evidence | None = None
@@ -209,22 +220,30 @@ class FaultMonitor:
         duration = m.time - self._time if m.time > self._time else self.period_s
         is_first = math.isnan(self._time)
         self._time = m.time
-        measured = self._moving(m)
         if is_first or command is None or duration > GAP_MAX_S:
-            hypotheses.state[:N_MOVING] = measured
+            hypotheses.state[:N_MOVING] = self._moving(m)
             self._is_new_velocity(m)
             self._depth = m.depth
             return self.verdict()
         self._clock_s += duration
         parts = math.ceil(duration / PERIOD_MAX_S - 1e-9)
         for _ in range(parts):
-            step = self._model.step(hypotheses.state, m.yaw, command, duration / parts)
+            step = self._model.step(
+                hypotheses.state, m.yaw, command, duration / parts, hypotheses.shared_covariance
+            )
             hypotheses.predict(step, duration / parts)
-        if hypotheses.has_diverged or not self._correct(m, step) or hypotheses.has_diverged:
-            hypotheses.restart(measured)
+        if not self._follow(m, step):
+            hypotheses.restart(self._moving(m))
             return self.verdict()
         self._decide(duration)
         return self.verdict()
+
+    def _follow(self, m: Measurement, step: ModelStep) -> bool:
+        """Corrects the filter by a measurement; returns whether it can follow the motion."""
+        hypotheses = self._hypotheses
+        if abs(math.cos(m.pitch)) < STEEP_COSINE or hypotheses.has_diverged:
+            return False
+        return self._correct(m, step) and not hypotheses.has_diverged
 
     def _moving(self, m: Measurement) -> Array:
         """The moving part of the state (9,), as measured."""
@@ -234,36 +253,36 @@ class FaultMonitor:
 
     def _is_new_velocity(self, m: Measurement) -> bool:
         """Whether there is a sample of the velocity that has not been seen."""
-        is_other = self._velocity is None or not np.array_equal(m.velocity, self._velocity)
-        self._velocity = np.array(m.velocity)
-        return is_other and bool(np.isfinite(m.velocity).all())
+        velocity = tuple(m.velocity.tolist())
+        is_other = velocity != self._velocity
+        self._velocity = velocity
+        return is_other and all(map(math.isfinite, velocity))
 
     def _correct(self, m: Measurement, step: ModelStep) -> bool:
         """Corrects the filter by the samples of a measurement; returns whether the model says
         anything of the motion."""
-        s = self.settings
         state = self._hypotheses.state
-        size = len(state)
-        rows = np.zeros((9, size))
-        rows[range(5), range(3, 8)] = 1.0
-        values = [*m.rates.tolist(), m.roll, m.pitch]
+        rows = self._rows
         innovation = np.zeros(9)
-        innovation[:5] = values - state[3:8]
-        variance = np.array([s.rate_noise**2] * 3 + [s.tilt_noise**2] * 2 + [0.0] * 4)
+        innovation[:5] = (*m.rates.tolist(), m.roll, m.pitch)
+        innovation[:5] -= state[3:8]
+        innovation[3] = wrapped_angle(innovation[3])
+        variance = self._variance_of_imu
         count = 5
         if self._is_new_velocity(m):
             age = m.ages[2]
             # v(t - age) = v - age v'
-            expected = state[VELOCITY] - age * step.acceleration[VELOCITY]
+            innovation[5:8] = m.velocity - (state[VELOCITY] - age * step.acceleration[VELOCITY])
             rows[5:8] = -age * step.acceleration_slope[VELOCITY]
-            rows[range(5, 8), range(3)] += 1.0
-            innovation[5:8] = m.velocity - expected
-            variance[5:8] = s.velocity_noise**2
+            rows[(5, 6, 7), (0, 1, 2)] += 1.0
+            variance = self._variance_of_all
             count = 8
         if math.isfinite(m.depth) and m.depth != self._depth:
+            rows[count] = 0.0
             rows[count, DEPTH] = 1.0
             innovation[count] = m.depth - state[DEPTH]
-            variance[count] = s.depth_noise**2
+            variance = variance.copy()
+            variance[count] = self.settings.depth_noise**2
             count += 1
         self._depth = m.depth
         return self._hypotheses.update(rows[:count], innovation[:count], variance[:count])
@@ -320,8 +339,11 @@ class FaultMonitor:
         back to what is commanded.
         """
         lost = self._is_lost & ~self._is_announced
-        direction = self._model.motion.direction
+        direction = self._model.motion.direction if lost.any() else self._no_direction
         probed = self._probe.added(command, lost, direction)
+        if probed is command and not self._is_returning.any():
+            self._sent = command
+            return command
         is_probed = (np.isfinite(probed[:, :1]) & ~(probed == command)).any(axis=1)
         is_limited = is_probed | self._is_returning
         result = probed
@@ -420,62 +442,60 @@ class FaultMonitor:
             return
         evidence = hypotheses.evidence()
         self.evidence = evidence
-        odds = evidence.log_odds
-        by_kind = _log_sum_of_kinds(odds)
-        if not hypotheses.settled:
-            by_kind[:, [LOST, WEAK, STUCK, WHOLE]] = -np.inf
-        by_actuator = _log_sum(by_kind, (1,))
-        pairs = _log_sum(evidence.both, (0,)) if hypotheses.settled else np.full((1, 1), -np.inf)
-        jolt = float(_log_sum(evidence.jolt, (0,)))
-        everything = float(np.logaddexp(0.0, _log_sum(by_actuator, (0,))))
-        pair = float(_log_sum(pairs, (0, 1)))
-        everything = float(np.logaddexp(np.logaddexp(everything, jolt), pair))
-        # One that is lost with another is no less lost.
-        with_pairs = by_actuator
-        if hypotheses.settled:
-            in_pairs = np.logaddexp(_log_sum(pairs, (0,)), _log_sum(pairs, (1,)))
-            with_pairs = np.logaddexp(by_actuator, in_pairs)
-        is_whole = np.exp(by_kind[:, WHOLE] - everything)
-        self._probability = np.where(
-            self._kind == WHOLE, np.exp(with_pairs - everything), 1.0 - is_whole
-        )
-        k = int(by_actuator.argmax())
-        kind = int(by_kind[k].argmax())
-        threshold = self.settings.threshold
-        share = math.exp(float(with_pairs[k]) - everything)
-        of_kind = math.exp(float(by_kind[k, kind] - by_actuator[k]))
-        is_calm = self._clock_s - self._last_named_s >= CAUTION_S
-        if is_calm and pair - everything > math.log(threshold):
-            self._hold((-2, int(pairs.argmax())), duration)
-            if self._certain_s >= CONFIRM_S - 1e-9:
-                self._adopt_pair(evidence, int(pairs.argmax()))
+        odds = _Odds(evidence, hypotheses.settled)
+        self._note_probability(odds)
+        if self._decide_on_pair(evidence, odds, duration):
             return
-        if share < threshold:
+        k = odds.actuator
+        share = math.exp(float(odds.with_pairs[k]) - odds.everything)
+        if share < self.settings.threshold:
             self._certain_s = 0.0
             self._doubtful_s = 0.0
-            self._watch_unexplained(evidence, everything, duration)
+            self._watch_unexplained(evidence, odds.everything, duration)
             return
         self._hold((k, -1), duration)
         self._doubtful_s += duration
+        if not self._is_confirmed(odds):
+            return
+        if odds.of_single < 0.5:
+            self._adopt_pair(evidence, int(odds.pairs.argmax()))
+            return
+        loses = odds.kind in (LOST, REVERSED) and self._kind[k] not in (LOST, REVERSED)
+        if loses and self._is_lost.sum() >= self.layout.n - 1:
+            return  # the last one that works
+        self._adopt(evidence, k, odds.kind, share * odds.of_kind)
+
+    def _note_probability(self, odds: "_Odds") -> None:
+        """The probabilities of actuators not being whole."""
+        is_whole = self._kind == WHOLE
+        logarithm = np.where(is_whole, odds.with_pairs, odds.by_kind[:, WHOLE])
+        share = np.exp(logarithm - odds.everything)
+        self._probability = np.where(is_whole, share, 1.0 - share)
+
+    def _decide_on_pair(self, evidence: Evidence, odds: "_Odds", duration: float) -> bool:
+        """Acts on two losses at one moment; returns whether they are all but certain."""
+        is_calm = self._clock_s - self._last_named_s >= CAUTION_S
+        if not is_calm or odds.pair - odds.everything <= math.log(self.settings.threshold):
+            return False
+        pair = int(odds.pairs.argmax())
+        self._hold((-2, pair), duration)
+        if self._certain_s >= CONFIRM_S - 1e-9:
+            self._adopt_pair(evidence, pair)
+        return True
+
+    def _is_confirmed(self, odds: "_Odds") -> bool:
+        """Whether the likeliest fault has been certain for long enough, and its kind is clear."""
+        k = odds.actuator
         waited = min(self._doubtful_s / KIND_WAIT_S, 1.0)
         odds_needed = KIND_ODDS + (1.0 - KIND_ODDS) * waited
         # What the likeliest explanation has of all those of this actuator.
-        of_single = math.exp(float(by_actuator[k] - with_pairs[k]))
-        of_best = max(of_kind * of_single, 1.0 - of_single)
+        of_best = max(odds.of_kind * odds.of_single, 1.0 - odds.of_single)
         is_clear = of_best > (1.0 - of_best) * odds_needed or waited == 1.0
         confirm_s = CONFIRM_S
         if self._clock_s - self._last_named_s < CAUTION_S and self._kind[k] == WHOLE:
             confirm_s = CAUTIOUS_CONFIRM_S
-            is_clear &= float(with_pairs[k]) > CAUTIOUS_LOG_ODDS
-        if self._certain_s < confirm_s - 1e-9 or not is_clear:
-            return
-        if of_single < 0.5:
-            self._adopt_pair(evidence, int(pairs.argmax()))
-            return
-        loses = kind in (LOST, REVERSED) and self._kind[k] not in (LOST, REVERSED)
-        if loses and self._is_lost.sum() >= self.layout.n - 1:
-            return  # the last one that works
-        self._adopt(evidence, k, kind, share * of_kind)
+            is_clear = is_clear and float(odds.with_pairs[k]) > CAUTIOUS_LOG_ODDS
+        return is_clear and self._certain_s >= confirm_s - 1e-9
 
     def _hold(self, suspect: tuple[int, int], duration: float) -> None:
         """Counts for how long one suspicion has been certain."""
@@ -568,20 +588,37 @@ class FaultMonitor:
         self._probability[k] = 0.0 if kind == WHOLE else 1.0
 
 
-def _log_sum_of_kinds(log_odds: Array) -> Array:
-    """Logarithm of the odds (n, 5) of each kind of fault, of those (o, n, t) of onsets and
-    targets."""
-    top = log_odds.max(axis=(0, 2))
-    top = np.where(np.isfinite(top), top, 0.0)
-    total = np.exp(log_odds - top[:, None]).sum(axis=0) @ IS_OF_KIND
-    with np.errstate(divide="ignore"):
-        return np.asarray(np.log(total) + top[:, None])
+class _Odds:
+    """Logarithms of odds against none, summed over all moments."""
 
-
-def _log_sum(values: Array, axes: tuple[int, ...]) -> Array:
-    """Logarithm of the sum of exponentials along axes."""
-    top = values.max(axis=axes, keepdims=True)
-    top = np.where(np.isfinite(top), top, 0.0)
-    total = np.exp(values - top).sum(axis=axes)
-    with np.errstate(divide="ignore"):
-        return np.asarray(np.log(total) + top.reshape(total.shape))
+    def __init__(self, evidence: Evidence, is_settled: bool) -> None:
+        """Takes what is known of the jumps; before all has settled only one that pushes the other
+        way counts."""
+        self.by_kind = evidence.by_kind
+        """Of each kind of each actuator (n, 5)."""
+        self.pairs = evidence.of_pairs
+        """Of two losses at one moment (n, n)."""
+        if not is_settled:
+            self.by_kind = evidence.by_kind.copy()
+            self.by_kind[:, [LOST, WEAK, STUCK, WHOLE]] = -np.inf
+            self.pairs = np.full_like(self.pairs, -np.inf)
+        by_actuator = np.logaddexp.reduce(self.by_kind, axis=1)
+        of_partners = np.logaddexp.reduce(self.pairs, axis=0)  # of each as the second of a pair
+        in_pairs = np.logaddexp(of_partners, np.logaddexp.reduce(self.pairs, axis=1))
+        self.with_pairs = np.logaddexp(by_actuator, in_pairs)
+        """Of each actuator (n,): one that is lost with another is no less lost."""
+        self.pair = float(np.logaddexp.reduce(of_partners))
+        """Of any two."""
+        jolt = float(np.logaddexp.reduce(evidence.jolt))
+        single = float(np.logaddexp.reduce(by_actuator))
+        self.everything = float(np.logaddexp.reduce([0.0, single, jolt, self.pair]))
+        """Of anything, or nothing."""
+        self.actuator = int(by_actuator.argmax())
+        """The likeliest."""
+        self.kind = int(self.by_kind[self.actuator].argmax())
+        """What it has become, index in `KINDS`."""
+        of_actuator = float(by_actuator[self.actuator])
+        self.of_kind = math.exp(float(self.by_kind[self.actuator, self.kind]) - of_actuator)
+        """Share of that kind in the odds of that actuator alone."""
+        self.of_single = math.exp(of_actuator - float(self.with_pairs[self.actuator]))
+        """Share of it alone in all its odds."""

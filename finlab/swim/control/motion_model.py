@@ -3,18 +3,19 @@ is unknown of it.
 
 Fossen's equations with the layout's body, actuators that lag, and a state z that holds, beside the
 motion, what nobody has measured: the current, a wrench that stays, how far inertia, damping and
-righting moment are from the layout's, the strength of each actuator, and what one that is stuck
-gives. `hypotheses.py` is the filter that runs on it.
+righting moment are from the layout's, the strength and the place of each actuator, and what one
+that is stuck gives. `hypotheses.py` is the filter that runs on it.
 """
 
 import math
-from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 
 from finlab.arrays import Array
-from finlab.layout import Layout
+from finlab.core import library
+from finlab.core.shared_array import SharedArray
+from finlab.layout import Actuator, Layout
 from finlab.physics import plant_of
 from finlab.swim.control.contract import LEVER_M
 from finlab.swim.vehicle.actuator_motion import ActuatorMotion
@@ -47,13 +48,8 @@ DAMPING = slice(39, 45)
 RIGHTING = 45
 """The same of the righting moment."""
 FIRST_ACTUATOR = 46
-"""The strength of the first actuator; after the strengths what stuck ones give."""
-SHARE_MIN = -0.7
-"""Least of those shares: what is beyond it is no body."""
-SHARE_MAX = 3.0
-"""Greatest of them."""
-NORM_MAX = 100.0
-"""Norm of A dt at which a motion is over within a thousandth of the period, or has no bounds."""
+"""The strength of the first actuator; after the strengths their places, and what stuck ones
+give."""
 TURN_ABOUT_COSINE = -0.9
 """Cosine of the angle to a direction below which an actuator that is to turn there may go either
 way round."""
@@ -61,10 +57,6 @@ QUICK_RATE = 20.0
 """Rate from which one turns about within two periods [rad/s]."""
 TURN_ABOUT_S = 1.2
 """How long its direction is unknown then [s]."""
-COUPLING_MAX = 0.15
-"""Greatest of the entries beside the diagonal: with all of them M still is positive definite."""
-EXPONENT_MAX = 0.5
-"""Norm of A dt up to which the series of the exponential is exact to 1e-7."""
 
 
 class ModelStep(NamedTuple):
@@ -75,9 +67,9 @@ class ModelStep(NamedTuple):
     transition: Array
     """Derivatives (9, d) of its moving part by the state at the beginning; the others stay."""
     noise: Array
-    """What the model may be wrong by, as squares of accelerations (3, 6): of all terms of the
-    equation of motion; of how much the actuators' wrench changed; and of the forces of those that
-    turn about, which way round is unknown."""
+    """What the model may be wrong by, as squares of accelerations (4, 6): of all terms of the
+    equation of motion; of what is not linear in the errors of the state; of how much the actuators'
+    wrench changed; and of the forces of those that turn about, which way round is unknown."""
     acceleration: Array
     """Rate of change (9,) of the moving part at the beginning."""
     acceleration_slope: Array
@@ -97,21 +89,18 @@ class MotionModel:
         self.dynamics = dynamics_of(complete_body(layout))
         self.inertia = np.array(self.dynamics.inertia)
         """Mass and moments (6,), those of the water that goes along included [kg, kg m^2]."""
-        self._linear_damping = np.array(self.dynamics.linear_damping)
-        self._quadratic_damping = np.array(self.dynamics.quadratic_damping)
-        self._center_of_buoyancy = self.dynamics.center_of_buoyancy
-        self._net_buoyancy = self.dynamics.buoyancy - self.dynamics.weight
-        # Entries of the inertia matrix (21, 6, 6), the diagonal first, then those beside it.
-        entries = []
-        for k in range(6):
-            entry = np.zeros((6, 6))
-            entry[k, k] = self.inertia[k]
-            entries.append(entry)
-        for i, j in combinations(range(6), 2):
-            entry = np.zeros((6, 6))
-            entry[i, j] = entry[j, i] = math.sqrt(self.inertia[i] * self.inertia[j])
-            entries.append(entry)
-        self._entries = np.array(entries)
+        self._inertia_squared = np.square(self.inertia)
+        # In the order of `body_numbers` in the core's motion_model.c.
+        self._body = SharedArray(
+            [
+                *self.dynamics.inertia,
+                *self.dynamics.linear_damping,
+                *self.dynamics.quadratic_damping,
+                self.dynamics.buoyancy - self.dynamics.weight,
+                self.dynamics.buoyancy,
+                *self.dynamics.center_of_buoyancy,
+            ]
+        )
         self._plant = plant_of(layout)
         self.motion = ActuatorMotion(layout)
         """What the actuators do, if they follow their commands."""
@@ -123,6 +112,9 @@ class MotionModel:
         """Which actuators (n,) may be stuck."""
         self.sticks_at_angle = self.sticks & self.motion.angles
         """Which of them keep an angle; the others keep a force."""
+        largest = [_largest_force(part) for part in parts]
+        self.force_max = np.array(largest)
+        """Largest forces (n,) of actuators whose command is a force [N]; 1 of others."""
         owners = []
         for k in range(n):
             if can_stick[k]:
@@ -132,9 +124,11 @@ class MotionModel:
         self.n_held = len(owners)
         self.strength = slice(FIRST_ACTUATOR, FIRST_ACTUATOR + n)
         """Strengths in the state."""
-        self.held = slice(FIRST_ACTUATOR + n, FIRST_ACTUATOR + n + self.n_held)
+        self.place = slice(self.strength.stop, self.strength.stop + 3 * n)
+        """How far actuators are from their places in the layout, three numbers of each [m]."""
+        self.held = slice(self.place.stop, self.place.stop + self.n_held)
         """What stuck ones give in the state."""
-        self.size = FIRST_ACTUATOR + n + self.n_held
+        self.size = self.held.stop
         """Numbers of the state, d."""
         self.held_of = [np.flatnonzero(self.held_owner == k) for k in range(n)]
         """Which of the held numbers belong to each actuator."""
@@ -147,33 +141,52 @@ class MotionModel:
         self._turning_s = np.zeros(n)
         rate = layout.rates[np.arange(n), [part.KIND.stuck_number for part in parts]]
         self._turns_slowly = self.motion.turns_fully & (rate < QUICK_RATE)
-        self._effect_of_unit = self._unit_wrenches(layout)
+        self._has_slow_ones = bool(self._turns_slowly.any())
+        angled = np.flatnonzero(self.sticks_at_angle)
+        self._angled = angled
+        self._held_angles = np.array([self.held_of[k] for k in angled]).reshape(-1, 2)
+        # Which of the held numbers are forces, and of which actuators.
+        keeps_force = ~self.sticks_at_angle[self.held_owner]
+        self._held_forces = np.flatnonzero(keeps_force)
+        self._force_owner = self.held_owner[keeps_force]
+        # Where the core reads the wrenches (n + h, 6) of a step, and writes what it returns.
+        self._wrenches = SharedArray(np.zeros((n + self.n_held, 6)))
+        self._owners = np.concatenate([np.arange(n), self.held_owner]).astype(np.int32)
+        self._transition = SharedArray(np.zeros((N_MOVING, self.size)))
+        self._slope = SharedArray(np.zeros((N_MOVING, self.size)))
+        self._rates = SharedArray(np.zeros(N_MOVING))
+        self._noise = SharedArray(np.zeros((4, 6)))
+        self._set_unit_wrenches()
 
-    def _unit_wrenches(self, layout: Layout) -> Array:
-        """Wrench (n, 6) of 1 N along the axis of each actuator whose command is a force."""
-        wrench = np.zeros((layout.n, 6))
-        for k in np.flatnonzero(self.sticks & ~self.sticks_at_angle):
-            wrench[k] = self._plant.effectiveness[k, 0]
-        return wrench
+    def _set_unit_wrenches(self) -> None:
+        """Takes the wrench of 1 N along the axis of each actuator whose command is a force."""
+        of_held = self._wrenches.array[self.n :]
+        of_held[self._held_forces] = self._plant.effectiveness[self._force_owner, 0]
 
     def adopt(self, layout: Layout) -> None:
         """From now on forces are those of another layout with the same body."""
         self._plant = plant_of(layout)
-        self._effect_of_unit = self._unit_wrenches(layout)
+        self._set_unit_wrenches()
 
     def held_now(self) -> Array:
         """What each actuator would give on if it stuck now, as in the state (h,)."""
         direction = self.motion.direction
-        result = np.zeros(self.n_held)
-        for k in range(self.n):
-            numbers = self.held_of[k]
-            if len(numbers) == 2:
-                result[numbers] = math.cos(direction[k]), math.sin(direction[k])
-            elif len(numbers):
-                result[numbers] = direction[k]
+        result = np.empty(self.n_held)
+        result[self._held_forces] = direction[self._force_owner]
+        if len(self._angled):
+            angle = direction[self._angled]
+            result[self._held_angles[:, 0]] = np.cos(angle)
+            result[self._held_angles[:, 1]] = np.sin(angle)
         return result
 
-    def step(self, state: Array, yaw: float, command: Array, dt: float) -> ModelStep:
+    def step(
+        self,
+        state: Array,
+        yaw: float,
+        command: Array,
+        dt: float,
+        covariance: SharedArray | None = None,
+    ) -> ModelStep:
         """Carries a state on over a period.
 
         By the exponential Euler rule for z' = f(z), which stays stable however strongly the water
@@ -186,182 +199,85 @@ class MotionModel:
             yaw: heading [rad].
             command: (n, 3) in force over the period; NaN rows rest.
             dt: its length [s].
+            covariance: of the state (d, d), where it is known.
         """
-        u, v, w, p, q, r, roll, pitch = state[:8].tolist()
-        rotation = rotation_of_quaternion(*quaternion_of(roll, pitch, yaw))
-        R = np.array(rotation).reshape(3, 3)  # rows: axes of the body in the world
-        up = rotation[2::3]
-        cu, cv, cw = to_body(rotation, *state[CURRENT].tolist())
-        nu_r = np.array([u - cu, v - cv, w - cw, p, q, r])
-        wrenches, held_wrenches, of_actuators = self._wrenches(command, nu_r, dt)
-        strength = state[self.strength]
-        tau = strength @ wrenches + state[self.held] @ held_wrenches + state[UNKNOWN]
-
-        # M nu_r' = tau - T M nu_r - D nu_r - g, T of the momentum: (omega x p, omega x h + v x p).
-        M = self._inertia_matrix(state)
-        M_inverse = np.linalg.inv(M)
-        momentum = M @ nu_r
-        v_cross = cross_matrix(*nu_r[:3].tolist())
-        omega_cross = cross_matrix(p, q, r)
-        T = np.zeros((6, 6))
-        T[:3, :3] = T[3:, 3:] = omega_cross
-        T[3:, :3] = v_cross
-        coriolis = T @ momentum
-        damping = np.clip(state[DAMPING], SHARE_MIN, SHARE_MAX) + 1.0
-        slowness = self._linear_damping + self._quadratic_damping * np.abs(nu_r)
-        drag = slowness * nu_r
-        righting_share = 1.0 + min(max(state[RIGHTING], SHARE_MIN), SHARE_MAX)
-        right = tau - coriolis - damping * drag
-        right[:3] += self._net_buoyancy * np.array(up)
-        righting = self._righting(up)
-        right[3:] += righting_share * righting
-        acc_r = M_inverse @ right
-        turning = (q * cw - r * cv, r * cu - p * cw, p * cv - q * cu)  # omega x c
-        sin_roll = math.sin(roll)
-        cos_roll = math.cos(roll)
-        cos_pitch = math.cos(pitch)
-        sin_pitch = math.sin(pitch)
-        tan_pitch = sin_pitch / math.copysign(max(abs(cos_pitch), 0.05), cos_pitch)
-        f = np.empty(N_MOVING)
-        f[:6] = acc_r
-        f[:3] -= turning
-        f[6] = p + tan_pitch * (q * sin_roll + r * cos_roll)
-        f[7] = q * cos_roll - r * sin_roll
-        f[8] = -(up[0] * u + up[1] * v + up[2] * w)
-
-        slope = np.zeros((N_MOVING, self.size))
-        # d(T m)/d nu of a momentum m = (p, h) that stays: -(p x omega', h x omega' + p x v').
-        by_turning = np.zeros((6, 6))
-        p_cross = cross_matrix(*momentum[:3].tolist())
-        by_turning[:3, 3:] = by_turning[3:, :3] = p_cross
-        by_turning[3:, 3:] = cross_matrix(*momentum[3:].tolist())
-        by_flow = by_turning - T @ M
-        drag_slope = self._linear_damping + 2.0 * self._quadratic_damping * np.abs(nu_r)
-        by_flow.ravel()[::7] -= damping * drag_slope
-        by_flow = M_inverse @ by_flow
-        slope[MOTION, MOTION] = by_flow
-        up_by_roll = (0.0, cos_pitch * cos_roll, -cos_pitch * sin_roll)
-        up_by_pitch = (-cos_pitch, -sin_pitch * sin_roll, -sin_pitch * cos_roll)
-        # Turned by a little about an axis, the body sees the current c as c x axis less of it.
-        current_cross = cross_matrix(cu, cv, cw)
-        about_roll = (1.0, 0.0, 0.0)
-        about_pitch = (0.0, cos_roll, -sin_roll)
-        for column, turned_up, about in (
-            (6, up_by_roll, about_roll),
-            (7, up_by_pitch, about_pitch),
-        ):
-            by_tilt = np.empty(6)
-            by_tilt[:3] = self._net_buoyancy * np.array(turned_up)
-            by_tilt[3:] = righting_share * self._righting(turned_up)
-            current_turned = current_cross @ about
-            by_tilt = M_inverse @ by_tilt - by_flow[:, :3] @ current_turned
-            by_tilt[:3] -= omega_cross @ current_turned
-            slope[MOTION, column] = by_tilt
-            slope[8, column] = -(turned_up[0] * u + turned_up[1] * v + turned_up[2] * w)
-        slope[VELOCITY, RATES] += current_cross
-        slope[6, 6] = tan_pitch * (q * cos_roll - r * sin_roll)
-        slope[6, 7] = (1.0 + tan_pitch**2) * (q * sin_roll + r * cos_roll)
-        slope[7, 6] = -q * sin_roll - r * cos_roll
-        slope[6, 3:6] = 1.0, tan_pitch * sin_roll, tan_pitch * cos_roll
-        slope[7, 4:6] = cos_roll, -sin_roll
-        slope[8, 0:3] = -up[0], -up[1], -up[2]
-        by_current = by_flow[:, :3] @ -R
-        by_current[:3] -= omega_cross @ R
-        slope[MOTION, CURRENT] = by_current
-        slope[MOTION, UNKNOWN] = M_inverse
-        # By an entry E of the inertia matrix: -M^-1 (E nu_r' + T E nu_r).
-        of_acceleration = self._entries @ acc_r
-        of_momentum = self._entries @ nu_r
-        by_inertia = -(of_acceleration + of_momentum @ T.T)
-        slope[MOTION, 18:39] = M_inverse @ by_inertia.T
-        slope[MOTION, DAMPING] = -M_inverse * drag
-        slope[MOTION, RIGHTING] = M_inverse[:, 3:] @ righting
-        slope[MOTION, self.strength] = M_inverse @ wrenches.T
-        slope[MOTION, self.held] = M_inverse @ held_wrenches.T
-
-        F, phi = exponential(slope[:, :N_MOVING], dt)
-        after = state.copy()
-        after[:N_MOVING] += phi @ f
-        transition = phi @ slope
-        transition[:, :N_MOVING] = F
-        # What the terms of the equation are worth: each is known to a share of its size.
-        terms = np.square(drag) + np.square(coriolis) + np.square(M @ acc_r)
-        terms += np.square(strength[:, None] * wrenches).sum(axis=0)
+        flow = None
+        if self._plant.feels_flow:
+            flow = motion_through_water(state, yaw)
+        of_changes, of_turning = self._push(command, flow, dt)
+        after = SharedArray(state)
+        library().fl_motion_step(
+            self._body.address,
+            self._wrenches.address,
+            self._owners.ctypes.data,
+            self.n,
+            self.n_held,
+            yaw,
+            dt,
+            None if covariance is None else covariance.address,
+            after.address,
+            self._transition.address,
+            self._rates.address,
+            self._slope.address,
+            self._noise.address,
+        )
+        noise = self._noise.array.copy()
+        noise[2] = of_changes / self._inertia_squared
+        noise[3] = of_turning / self._inertia_squared
         return ModelStep(
-            state=after,
-            transition=transition,
-            noise=np.array([terms, *of_actuators]) / np.square(self.inertia),
-            acceleration=f,
-            acceleration_slope=slope,
+            state=after.array,
+            transition=self._transition.array.copy(),
+            noise=noise,
+            acceleration=self._rates.array.copy(),
+            acceleration_slope=self._slope.array.copy(),
         )
 
-    def _inertia_matrix(self, state: Array) -> Array:
-        """M (6, 6) by a state."""
-        shares = state[18:39].copy()
-        shares[:6] = np.clip(shares[:6], SHARE_MIN, SHARE_MAX)
-        shares[6:] = np.clip(shares[6:], -COUPLING_MAX, COUPLING_MAX)
-        M = (shares @ self._entries.reshape(21, 36)).reshape(6, 6)
-        M.ravel()[::7] += self.inertia
-        return np.asarray(M)
-
-    def _righting(self, up: tuple[float, ...]) -> Array:
-        """The righting moment (3,) of the layout's body, b x B up."""
-        bx, by, bz = self._center_of_buoyancy
-        ax, ay, az = up
-        moment = np.array([by * az - bz * ay, bz * ax - bx * az, bx * ay - by * ax])
-        return np.asarray(self.dynamics.buoyancy * moment)
-
-    def _wrenches(
-        self, command: Array, flow: Array, dt: float
-    ) -> tuple[Array, Array, tuple[Array, Array]]:
-        """Moves the actuators on by a period.
+    def _push(self, command: Array, flow: Array | None, dt: float) -> tuple[Array, Array]:
+        """Moves the actuators on by a period, and notes their wrenches: of each at full strength,
+        mean over the period, and of each unit of what stuck ones give.
 
         Returns:
-            The wrench (n, 6) of each at full strength, mean over the period; that of each unit of
-            what stuck ones give (h, 6); and squares (6,) of how much all changed, and of what those
-            that turn about may give otherwise.
+            Squares (6,) of how much all wrenches changed, and of what those that turn about may
+            give otherwise.
         """
-        moves = self.motion
-        self._note_turning(command, dt)
-        moves.step(command, dt)
-        now = moves.command
-        effectiveness = self._plant.effectiveness
-        pushes = moves.pushes
-        if self.sticks_at_angle.any():
-            both = moves.turned_to(
-                np.array([now] * 3),
-                np.concatenate([np.full((1, self.n), np.nan), self._basis_angles]),
-            )
-            force = self._plant.force(both, flow=flow)
-            force *= pushes[:, None]
-        else:
-            force = self._plant.force(now, flow=flow)[None] * pushes[:, None]
-        offset = self._plant.offset(force[0], flow=flow) / self.n
-        wrench = np.matmul(force[:, :, None, :], effectiveness)[:, :, 0]
-        wrench[0] += offset
-        held = np.empty((self.n_held, 6))
-        place = 0
-        for k in range(self.n):
-            count = len(self.held_of[k])
-            if count == 2:
-                held[place] = wrench[1, k]
-                held[place + 1] = wrench[2, k]
-            elif count == 1:
-                held[place] = self._effect_of_unit[k]
-            place += count
+        if self._has_slow_ones:
+            self._note_turning(command, dt)
+        self.motion.step(command, dt)
+        force, wrench = self._pushed(flow)
         # What stops, stops at once.
         works = np.isfinite(command[:, :1])
-        mean = np.where(works, 0.5 * (self._wrench_before + wrench[0]), wrench[0])
-        change = np.square(wrench[0] - self._wrench_before).sum(axis=0)
-        self._wrench_before = wrench[0]
-        turning = np.zeros(6)
-        if self._turning_s.any():
+        change = wrench - self._wrench_before
+        self._wrenches.array[: self.n] = np.where(works, wrench - 0.5 * change, wrench)
+        self._wrench_before = wrench
+        of_turning = np.zeros(6)
+        if self._has_slow_ones and self._turning_s.any():
             about = self._turning_s > 0.0
             # One that points the other way changes the force by twice its size.
-            size = 2.0 * np.linalg.norm(force[0, about], axis=-1)
-            effect = np.square(size[:, None, None] * effectiveness[about, 1:])
-            turning = effect.sum(axis=(0, 1))
-        return mean, held, (change, turning)
+            size = 2.0 * np.linalg.norm(force[about], axis=-1)
+            effect = np.square(size[:, None, None] * self._plant.effectiveness[about, 1:])
+            of_turning = effect.sum(axis=(0, 1))
+        return np.square(change).sum(axis=0), of_turning
+
+    def _pushed(self, flow: Array | None) -> tuple[Array, Array]:
+        """Forces (n, 3) [N] in own frames and wrenches (n, 6) of what the actuators do now; of
+        those that stick at an angle, the wrenches at two angles are noted, too."""
+        moves = self.motion
+        plant = self._plant
+        now = moves.command
+        pushes = moves.pushes[:, None]
+        if len(self._angled):
+            angles = np.concatenate([np.full((1, self.n), np.nan), self._basis_angles])
+            forces = plant.force(moves.turned_to(np.array([now] * 3), angles), flow=flow) * pushes
+            force = forces[0]
+            at_angles = np.matmul(forces[1:, :, None, :], plant.effectiveness)[:, :, 0]
+            of_held = self._wrenches.array[self.n :]
+            of_held[self._held_angles.T] = at_angles[:, self._angled]
+        else:
+            force = plant.force(now, flow=flow) * pushes
+        wrench = np.matmul(force[:, None, :], plant.effectiveness)[:, 0]
+        if plant.interaction is not None:
+            wrench += plant.offset(force, flow=flow) / self.n
+        return force, wrench
 
     def _note_turning(self, command: Array, dt: float) -> None:
         """Notes which actuators are to turn about."""
@@ -372,35 +288,20 @@ class MotionModel:
         self._turning_s[turns_about] = TURN_ABOUT_S
 
 
-def cross_matrix(x: float, y: float, z: float) -> Array:
-    """Returns the matrix (3, 3) of the cross product with a vector."""
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+def motion_through_water(state: Array, yaw: float) -> Array:
+    """Velocity through the water and rates (6,) of a state (d,), body frame [m/s, rad/s]."""
+    roll, pitch = state[TILT].tolist()
+    rotation = rotation_of_quaternion(*quaternion_of(roll, pitch, yaw))
+    motion = state[MOTION].copy()
+    motion[:3] -= to_body(rotation, *state[CURRENT].tolist())
+    return np.asarray(motion)
 
 
-def exponential(A: Array, dt: float) -> tuple[Array, Array]:
-    """Returns e^(A dt) and dt phi_1(A dt), by their series and by doubling:
-
-    phi_1(2 X) = (e^X + 1) phi_1(X) / 2,    e^(2 X) = (e^X)^2
-    """
-    X = A * dt
-    norm = float(np.abs(X).sum(axis=1).max())
-    halvings = 0
-    if norm > NORM_MAX:
-        X *= NORM_MAX / norm
-        norm = NORM_MAX
-    if norm > EXPONENT_MAX:
-        halvings = min(math.ceil(math.log2(norm / EXPONENT_MAX)), 40)
-        X = X / 2.0**halvings
-    identity = np.eye(len(A))
-    # phi_1 = 1 + X/2 + X^2/6 + X^3/24 + X^4/120 + X^5/720
-    phi = identity + X / 6.0
-    for divisor in (5.0, 4.0, 3.0, 2.0):
-        phi = identity + (X @ phi) / divisor
-    F = identity + X @ phi
-    for _ in range(halvings):
-        phi = 0.5 * (F @ phi + phi)
-        F = F @ F
-    return F, dt * phi
+def _largest_force(part: Actuator) -> float:
+    """The largest force of an actuator whose command is a force [N]; 1 of others."""
+    if part.KIND.sticks_at_angle:
+        return 1.0
+    return max(abs(part.lower[0]), abs(part.upper[0]), 1e-9)
 
 
 def gyration_radius(inertia: Array) -> Array:

@@ -9,7 +9,7 @@ from finlab.arrays import Array
 from finlab.axes import is_full_turn
 from finlab.layout import Layout
 from finlab.physics import plant_of
-from finlab.swim.control.hypotheses import MonitorSettings
+from finlab.swim.control.monitor_settings import MonitorSettings
 
 PROBE_FORCE_N = 0.6
 """Force of a whole fin that is probed [N], or what it can give if that is less."""
@@ -52,6 +52,7 @@ class Probe:
         self._side = np.zeros(layout.n)
         self._parts = layout.actuators
         self._is_fin = layout.is_fin
+        self._has_fins = bool(layout.is_fin.any())
         self._count = 0
 
     def added(self, command: Array, lost: NDArray[np.bool_], direction: Array) -> Array:
@@ -62,7 +63,9 @@ class Probe:
             lost: fins (n,) that are probed, one at a time.
             direction: where the fins point (n,) [rad].
         """
-        result = self._with_min_force(command) if self._min_force > 0.0 else command
+        result = command
+        if self._min_force > 0.0 and self._has_fins:
+            result = self._with_min_force(command)
         if self._probe_every_ticks == 0 or not lost.any():
             self._count = 0
             return result

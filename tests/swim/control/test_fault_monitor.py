@@ -13,7 +13,7 @@ from finlab.layout import Layout, load_layout
 from finlab.layout.damage import Damage
 from finlab.research.evaluation.experiments.hard_days import BUILT_OFF
 from finlab.swim.control import FaultMonitor, Measurement, MonitorSettings
-from finlab.swim.control.hypotheses import LOST
+from finlab.swim.control.jump_evidence import LOST
 from finlab.swim.simulation import (
     NOISE_ALONE,
     ClosedLoop,
@@ -169,10 +169,11 @@ def test_a_single_odd_sample_decides_nothing(layout_a: Layout) -> None:
     hypotheses = monitor._hypotheses
     hypotheses.age_s = monitor.settings.settle_s  # long enough under way to be believed
     hypotheses._begin_onset()
-    hypotheses.onset_age[:] = 1.0
+    hypotheses._age[:] = 1.0
     nothing = hypotheses.evidence()
-    sure = nothing._replace(log_odds=nothing.log_odds.copy())
+    sure = nothing._replace(log_odds=nothing.log_odds.copy(), by_kind=nothing.by_kind.copy())
     sure.log_odds[0, 2, LOST] = 20.0
+    sure.by_kind[2, LOST] = 20.0
     for evidence in (sure, nothing, sure):
         hypotheses.evidence = lambda evidence=evidence: evidence  # type: ignore[method-assign]
         monitor._decide(0.1)
@@ -305,3 +306,35 @@ def test_a_robot_that_tumbles_leaves_the_monitor_finite() -> None:
         assert np.isfinite(verdict.probability).all() and np.isfinite(verdict.strength).all()
         assert len(verdict.damage.lost) < heavy.n
         Allocator(heavy).allocate(np.ones(6), damage=verdict.damage)
+
+
+def test_nothing_is_told_of_a_robot_that_stands_on_its_nose() -> None:
+    """There its roll is any number; it is watched again from when it lies level."""
+    heavy = load_layout("bluerov2_heavy")
+    rng = np.random.default_rng(2)
+    command = np.zeros((heavy.n, 3))
+    monitor = FaultMonitor(heavy)
+    for tick in range(120):
+        measurement = at_rest(0.1 * tick, np.zeros(3))
+        if 80 <= tick < 100:
+            roll = rng.uniform(-math.pi, math.pi)
+            measurement = measurement._replace(roll=roll, pitch=1.5)
+        verdict = monitor.step(measurement, command if tick else None)
+        assert verdict.findings == ()
+        if 80 <= tick < 100:
+            assert not verdict.unknown
+            assert monitor._hypotheses.state[6] == measurement.roll
+    assert len(monitor._hypotheses.onset_age) > 5
+    assert not monitor._hypotheses.settled
+
+
+def test_a_robot_on_its_back_may_roll_over_the_seam() -> None:
+    """Roll goes on at -pi from pi: no innovation of a whole turn."""
+    heavy = load_layout("bluerov2_heavy")
+    command = np.zeros((heavy.n, 3))
+    monitor = FaultMonitor(heavy)
+    for tick in range(10):
+        roll = math.pi - 0.002 if tick % 2 else -math.pi + 0.002
+        measurement = at_rest(0.1 * tick, np.zeros(3))._replace(roll=roll)
+        monitor.step(measurement, command if tick else None)
+        assert monitor._hypotheses.distance < 5.0

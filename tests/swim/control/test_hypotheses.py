@@ -8,13 +8,9 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.layout import load_layout
-from finlab.swim.control.hypotheses import (
-    LOST,
-    TARGETS,
-    Hypotheses,
-    MonitorSettings,
-    log_likelihood_ratio,
-)
+from finlab.swim.control.hypotheses import Hypotheses
+from finlab.swim.control.jump_evidence import LOST, PAIR_SHARE, TARGETS
+from finlab.swim.control.monitor_settings import MonitorSettings
 from finlab.swim.control.motion_model import FIRST_ACTUATOR, MotionModel
 
 PERIOD_S = 0.1
@@ -27,6 +23,19 @@ TICKS = 30
 """Of the whole record."""
 R = np.array([1e-4] * 3 + [1.4e-4] * 2)
 """Variance of a measurement of rates and tilt."""
+
+
+def log_likelihood_ratio(Lambda: Array, eta: Array, mean: Array, variance: Array) -> float:
+    """Of a jump with the prior N(m, C), C diagonal, to none, by the textbook:
+
+    eta^T m - m^T Lambda m / 2 + r^T (1 + C Lambda)^-1 C r / 2 - log det(1 + C Lambda) / 2
+    """
+    C = np.diag(variance)
+    r = eta - Lambda @ mean
+    inner = np.eye(len(eta)) + C @ Lambda
+    linear = eta @ mean - 0.5 * mean @ Lambda @ mean
+    quadratic = 0.5 * r @ np.linalg.solve(inner, C @ r)
+    return float(linear + quadratic - 0.5 * np.linalg.slogdet(inner)[1])
 
 
 class Record(NamedTuple):
@@ -87,8 +96,9 @@ def test_the_ratio_of_a_jump_is_that_of_two_filters() -> None:
     without, hypotheses = filtered(record, 0.0)
     onset = 0
     assert hypotheses.onset_age[onset] * (1.0 + 1e-9) >= PERIOD_S * (TICKS - ONSET) - 1e-9
-    eta = hypotheses._score[onset, JUMPED]
-    Lambda = hypotheses._information[onset, JUMPED, JUMPED]
+    slot = hypotheses._slots[onset]
+    eta = hypotheses._jumps.score.array[slot, JUMPED]
+    Lambda = hypotheses._jumps.information.array[slot, JUMPED, JUMPED]
     for jump in (-1.0, -0.3, 0.5):
         with_jump, _ = filtered(record, jump)
         expected = with_jump - without
@@ -122,14 +132,16 @@ def test_the_evidence_of_each_target_is_that_of_its_prior() -> None:
     _, hypotheses = filtered(recorded(), 0.0)
     hypotheses.misfit = 1.0  # else all ratios are divided by what the noise is more than assumed
     evidence = hypotheses.evidence()
-    own = hypotheses._own_columns
+    columns = hypotheses._own_columns[JUMPED]
     spans = -np.diff(np.append(hypotheses.onset_age, 0.0))
     for onset in (0, 3):
+        slot = hypotheses._slots[onset]
+        Lambda = hypotheses._jumps.information.array[slot]
+        eta = hypotheses._jumps.score.array[slot]
         for target in range(len(TARGETS)):
-            columns = own[JUMPED][own[JUMPED] < hypotheses._n_columns]
             ratio = log_likelihood_ratio(
-                hypotheses._information[onset][np.ix_(columns, columns)],
-                hypotheses._score[onset][columns],
+                Lambda[np.ix_(columns, columns)],
+                eta[columns],
                 evidence.mean[onset, JUMPED, target, : len(columns)],
                 evidence.variance[onset, JUMPED, target, : len(columns)],
             )
@@ -141,13 +153,48 @@ def test_the_evidence_of_each_target_is_that_of_its_prior() -> None:
             np.testing.assert_allclose(odds, expected, rtol=1e-9)
 
 
+def test_the_evidence_of_pairs_and_of_a_wrench_is_that_of_their_priors() -> None:
+    _, hypotheses = filtered(recorded(), 0.0)
+    hypotheses.misfit = 1.0
+    settings = hypotheses.settings
+    evidence = hypotheses.evidence()
+    onset = 2
+    slot = hypotheses._slots[onset]
+    Lambda = hypotheses._jumps.information.array[slot]
+    eta = hypotheses._jumps.score.array[slot]
+    span = evidence.span[onset]
+    two = [1, JUMPED]
+    lost = -hypotheses._jumps.strength.array[slot, two]
+    ratio = eta[two] @ lost - 0.5 * lost @ Lambda[np.ix_(two, two)] @ lost
+    rate = math.log(settings.failures * TARGETS[0].share * PAIR_SHARE)
+    np.testing.assert_allclose(evidence.both[onset, 1, JUMPED], ratio + rate + span, rtol=1e-9)
+    assert evidence.both[onset, JUMPED, 1] == -math.inf, "each pair counts once"
+    of_wrench = slice(hypotheses._n_columns - 6, None)
+    ratio = log_likelihood_ratio(
+        Lambda[of_wrench, of_wrench], eta[of_wrench], np.zeros(6), hypotheses._jolt_variance
+    )
+    expected = ratio + math.log(settings.jolts) + span
+    np.testing.assert_allclose(evidence.jolt[onset], expected, rtol=1e-9)
+
+
+def test_odds_of_kinds_and_pairs_are_sums_over_all_moments() -> None:
+    _, hypotheses = filtered(recorded(), 0.0)
+    evidence = hypotheses.evidence()
+    for kind in range(5):
+        of_kind = [j for j, target in enumerate(TARGETS) if target.kind == kind]
+        odds = evidence.log_odds[:, JUMPED][:, of_kind]
+        expected = np.logaddexp.reduce(odds, axis=None)
+        np.testing.assert_allclose(evidence.by_kind[JUMPED, kind], expected, rtol=1e-12)
+    expected = np.logaddexp.reduce(evidence.both[:, 0, JUMPED])
+    np.testing.assert_allclose(evidence.of_pairs[0, JUMPED], expected, rtol=1e-12)
+
+
 def test_a_jump_that_is_adopted_moves_state_and_covariance_to_those_who_knew() -> None:
     record = recorded()
     _, hypotheses = filtered(record, 0.0)
     evidence = hypotheses.evidence()
-    S = hypotheses._sensitivity.reshape(hypotheses.model.size, -1, hypotheses._n_columns)
     before = hypotheses.state.copy()
-    along = S[:, 0, JUMPED].copy()
+    along = hypotheses._sensitivity.array[:, hypotheses._slots[0], JUMPED].copy()
     hypotheses.adopt(0, JUMPED, evidence.mean[0, JUMPED, LOST], evidence.variance[0, JUMPED, LOST])
     moved = hypotheses.state - before
     np.testing.assert_allclose(moved, along * (moved @ along) / (along @ along), atol=1e-6)

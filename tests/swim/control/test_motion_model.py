@@ -1,10 +1,13 @@
 """Where the model expects the robot to go, against the simulated body, and its slopes against
 differences."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from finlab.arrays import Array
+from finlab.core.shared_array import SharedArray
 from finlab.layout import Layout, load_layout
 from finlab.physics import plant_of
 from finlab.swim.control.motion_model import (
@@ -13,12 +16,10 @@ from finlab.swim.control.motion_model import (
     DAMPING,
     INERTIA,
     MOTION,
-    N_MOVING,
     RIGHTING,
     TILT,
     UNKNOWN,
     MotionModel,
-    exponential,
 )
 from finlab.swim.vehicle.attitude import euler
 from finlab.swim.vehicle.fossen import complete_body
@@ -41,6 +42,7 @@ def any_state(model: MotionModel, seed: int) -> Array:
     z[DAMPING] = 0.1 * rng.normal(size=6)
     z[RIGHTING] = 0.1
     z[model.strength] = 1.0 + 0.1 * rng.normal(size=model.n)
+    z[model.place] = 0.01 * rng.normal(size=3 * model.n)
     z[model.held] = 0.5 * rng.normal(size=model.n_held)
     return z
 
@@ -124,25 +126,78 @@ def test_a_fin_that_is_told_to_turn_about_may_go_either_way(layout_a: Layout) ->
     ahead = np.tile([0.5, 1.5, 0.0], (4, 1))
     for _ in range(20):
         step = model.step(z, 0.0, ahead, PERIOD_S)
-    assert not step.noise[2].any()
+    assert not step.noise[3].any()
     about = ahead.copy()
     about[1, 2] = 3.1
     step = model.step(z, 0.0, about, PERIOD_S)
     of_one = model._wrench_before[1] / model.inertia
-    assert (np.sqrt(step.noise[2]) >= 1.9 * np.abs(of_one)).all()
+    assert (np.sqrt(step.noise[3]) >= 1.9 * np.abs(of_one)).all()
     for _ in range(15):
         step = model.step(z, 0.0, about, PERIOD_S)
-    assert not step.noise[2].any()
+    assert not step.noise[3].any()
 
 
-@pytest.mark.parametrize("size", [1e-3, 1.0, 30.0])
-def test_the_exponential_and_its_integral(size: float) -> None:
-    """Against an eigenvalue decomposition: e^(A t) and A^-1 (e^(A t) - 1)."""
-    rng = np.random.default_rng(0)
-    A = size * (rng.normal(size=(N_MOVING, N_MOVING)) - 3.0 * np.eye(N_MOVING))
-    F, phi = exponential(A, PERIOD_S)
+@pytest.mark.parametrize("dt", [0.001, 0.1, 3.0])
+def test_a_step_is_that_of_the_exponential_of_its_slopes(dt: float) -> None:
+    """Against an eigenvalue decomposition: F = e^(A dt), z <- z + A^-1 (F - 1) f, and the same of
+    derivatives by what only drifts."""
+    model, command = settled(load_layout("bluerov2_heavy"), 4)
+    z = any_state(model, 5)
+    step = model.step(z, 0.3, command, dt)
+    A = step.acceleration_slope[:8, :8]  # the depth moves nothing: without it A has an inverse
     values, vectors = np.linalg.eig(A)
-    expected = (vectors * np.exp(values * PERIOD_S)) @ np.linalg.inv(vectors)
-    np.testing.assert_allclose(F, expected.real, rtol=1e-6, atol=1e-9)
-    integral = np.linalg.solve(A, expected.real - np.eye(N_MOVING))
-    np.testing.assert_allclose(phi, integral, rtol=1e-6, atol=1e-9)
+    F = ((vectors * np.exp(values * dt)) @ np.linalg.inv(vectors)).real
+    integral = np.linalg.solve(A, F - np.eye(8))
+    np.testing.assert_allclose(step.transition[:8, :8], F, rtol=1e-6, atol=1e-9)
+    moved = z[:8] + integral @ step.acceleration[:8]
+    np.testing.assert_allclose(step.state[:8], moved, rtol=1e-6, atol=1e-9)
+    by_drifting = integral @ step.acceleration_slope[:8, 9:]
+    np.testing.assert_allclose(step.transition[:8, 9:], by_drifting, rtol=1e-6, atol=1e-9)
+    np.testing.assert_array_equal(step.state[9:], z[9:])
+
+
+def test_an_actuator_beside_its_place_pushes_from_there() -> None:
+    """Against a layout in which it stands there."""
+    layout = load_layout("bluerov2_heavy")
+    offset = np.array([0.03, -0.02, 0.05])
+    part = layout.actuators[2]
+    moved_part = replace(part, position=tuple((np.array(part.position) + offset).tolist()))
+    actuators = (*layout.actuators[:2], moved_part, *layout.actuators[3:])
+    elsewhere = replace(layout, actuators=actuators)
+    model, command = settled(layout, 6)
+    other, _ = settled(elsewhere, 6)
+    z = any_state(model, 7)
+    z[model.place] = 0.0
+    z_beside = z.copy()
+    z_beside[model.place.start + 6 : model.place.start + 9] = offset
+    beside = model.step(z_beside, 0.3, command, PERIOD_S)
+    there = other.step(z, 0.3, command, PERIOD_S)
+    np.testing.assert_allclose(beside.acceleration, there.acceleration, atol=1e-10)
+
+
+def test_what_is_not_linear_in_errors_counts_as_noise() -> None:
+    """Variances of the angular accelerations beyond their linear part, against samples of states
+    whose velocity, current and inertia are in doubt."""
+    rng = np.random.default_rng(8)
+    layout = load_layout("bluerov2_heavy")
+    model, command = settled(layout, 9)
+    z = np.zeros(model.size)
+    z[model.strength] = 1.0
+    z[:3] = 0.3, -0.2, 0.1
+    deviation = np.zeros(model.size)
+    deviation[:3] = 0.1
+    deviation[CURRENT] = 0.05
+    deviation[INERTIA][:3] = 0.13
+    deviation[COUPLING] = 0.04
+    step = model.step(z, 0.3, command, PERIOD_S, SharedArray(np.diag(deviation**2)))
+    beyond = []
+    for _ in range(3000):
+        error = deviation * rng.normal(size=model.size)
+        exact = model.step(z + error, 0.3, command, PERIOD_S).acceleration
+        beyond.append(exact - step.acceleration - step.acceleration_slope @ error)
+    found = np.mean(np.square(beyond), axis=0)[3:6]
+    assert (step.noise[1, :3] == 0.0).all()
+    ratio = step.noise[1, 3:] / found
+    assert (ratio > 0.5).all(), ratio
+    assert (ratio < 2.0).all(), ratio
+    assert not model.step(z, 0.3, command, PERIOD_S).noise[1].any(), "nothing is in doubt"

@@ -8,7 +8,7 @@ import pytest
 from finlab.layout import Layout
 from finlab.physics import plant_of
 from finlab.swim.control import FaultMonitor, MonitorSettings
-from finlab.swim.control.hypotheses import LOST
+from finlab.swim.control.jump_evidence import LOST
 from finlab.swim.control.probe import PROBE_FORCE_N, Probe
 
 LEAST_PUSH = MonitorSettings().least_push
