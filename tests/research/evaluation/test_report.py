@@ -97,7 +97,7 @@ def test_the_stored_report_has_all_experiments_and_no_other() -> None:
     assert [name.lower() for name, _ in sections] == list(EXPERIMENTS)
     for name, section in sections:
         ((command, commits),) = re.findall(
-            r"^The command `finlab eval (.*)` prints the table\. Made at (.*) on ", section, re.M
+            r"^The command `finlab eval (.*)` prints the table\. Made at (.*?) on ", section, re.M
         )
         verb, *words = shlex.split(command)
         experiment = load_experiment(name.lower())
