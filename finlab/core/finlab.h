@@ -417,6 +417,14 @@ void fl_jets(const fl_real *constants, const fl_real *force, int count, const fl
 int fl_line_jets_length(const fl_coupled_robot *robot);
 void fl_prepare_line_jets(const fl_coupled_robot *robot, fl_real *numbers);
 
+/* The wrench offset of an interaction that is linear in its weights, an fl_offset_at.
+
+   @param constants  of the formula of jets, of messages and of their weights;
+                     finlab/core/src/linear_interaction.c has their order */
+void fl_linear_interaction(const fl_real *constants, const fl_real *force, int count,
+                           const fl_real *inflow, fl_real *change, fl_real *offset,
+                           fl_real *slope);
+
 /* A body that swims, and fins that follow their commands: what a simulation steps many times, and
    no allocation needs. finlab/swim/vehicle has the equations; a state of a body is position (3) in
    the world, quaternion (4), velocity and angular rates (6) in the body frame. */

@@ -67,8 +67,9 @@ class Messages:
         self.counts = {"pair": len(self.source), "hull": n if has_hull else 0}
         """How many messages there are of each kind."""
         self._n = n
-        self._table = self._table_of(geometry, diameter, has_hull)
-        self._table_address = self._table.ctypes.data
+        self.table = self._table_of(geometry, diameter, has_hull)
+        """The numbers that finlab/core/src/messages.c reads."""
+        self._table_address = self.table.ctypes.data
 
     def _table_of(self, geometry: JetGeometry, diameter: Array, has_hull: bool) -> Array:
         """The numbers that finlab/core/src/messages.c reads."""

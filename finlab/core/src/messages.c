@@ -315,13 +315,14 @@ static void message_slope(const real *vectors, const real *slopes, int features,
   }
 }
 
-/* How many numbers the messages of a kind have, and of how many numbers of forces they depend. */
+/* How many numbers the messages of a kind have, of how many numbers of forces they depend, and
+   which of their ends receives them. */
 typedef struct {
-  int features, vectors, forces;
+  int features, vectors, forces, receiver;
 } message_form;
 
-static const message_form PAIR_FORM = {PAIR_FEATURES, PAIR_VECTORS, PAIR_FORCES};
-static const message_form HULL_FORM = {HULL_FEATURES, HULL_VECTORS, 3};
+static const message_form PAIR_FORM = {PAIR_FEATURES, PAIR_VECTORS, PAIR_FORCES, 1};
+static const message_form HULL_FORM = {HULL_FEATURES, HULL_VECTORS, 3, 0};
 
 /* Adds the wrench of the next message, at the position of who receives it, and its derivatives by
    the forces of `ends`; goes on to the one behind it. */
@@ -343,6 +344,43 @@ static void add_message(const message_form *form, const real *position, const in
   if (!slope) return;
   next->slopes += form->forces * numbers;
   next->jacobians += form->vectors * form->features;
+}
+
+/* Adds the message of a row, by the factors that a model gives. */
+static void add_modelled(const message_form *form, const fl_message_model *model, int kind,
+                         const real *position, const int *ends, const real *row,
+                         const real *slopes, real *change, real *offset, real *slope) {
+  real factors[PAIR_VECTORS];
+  real jacobian[PAIR_VECTORS * PAIR_FEATURES];
+  model->factors_of(model->weights, kind, row, factors, slope ? jacobian : 0);
+  real message[3];
+  message_of(row + form->features, form->vectors, factors, message);
+  for (int b = 0; b < 3; b++) change[3 * ends[form->receiver] + b] += message[b];
+  fl_messages one = {row, slopes, factors, jacobian};
+  add_message(form, position, ends, &one, offset, slope);
+}
+
+void fl_add_messages(const real *constants, const fl_message_model *model, const real *force,
+                     real *change, real *offset, real *slope) {
+  const crowd *robot = (const crowd *)constants;
+  const member *members = members_of(robot);
+  const pair *pairs = pairs_of(robot);
+  const int n = (int)robot->n;
+  real row[PAIR_NUMBERS];
+  real slopes[PAIR_FORCES * PAIR_NUMBERS];
+  real *slopes_wanted = slope ? slopes : 0;
+  for (int p = 0; p < (int)robot->pairs; p++) {
+    const int ends[2] = {(int)pairs[p].source, (int)pairs[p].receiver};
+    pair_row(pairs + p, members + ends[0], members + ends[1], force + 3 * ends[0],
+             force + 3 * ends[1], row, slopes_wanted);
+    add_modelled(&PAIR_FORM, model, FL_PAIR_MESSAGE, members[ends[1]].position, ends, row, slopes,
+                 change, offset, slope);
+  }
+  for (int i = 0; i < n && robot->has_hull > 0; i++) {
+    hull_row(robot, members + i, force + 3 * i, row, slopes_wanted);
+    add_modelled(&HULL_FORM, model, FL_HULL_MESSAGE, members[i].position, &i, row, slopes, change,
+                 offset, slope);
+  }
 }
 
 void fl_message_wrench(const real *constants, int count, const fl_messages *pair_messages,
