@@ -642,9 +642,9 @@ void fl_log_sums(const fl_real *values, int rows, int width, const int *groups, 
    @param pair_rows    becomes 11 features and 4 vectors of each pair (count, p, 23)
    @param pair_slopes  becomes their derivatives by the forces of source and receiver
                        (count, p, 6, 23); 0 for none
-   @param hull_rows    becomes 6 features and 2 vectors of each actuator (count, n, 12), where there
+   @param hull_rows    becomes 7 features and 3 vectors of each actuator (count, n, 16), where there
                        is a hull
-   @param hull_slopes  becomes their derivatives by its force (count, n, 3, 12); 0 for none */
+   @param hull_slopes  becomes their derivatives by its force (count, n, 3, 16); 0 for none */
 void fl_message_rows(const fl_real *constants, const fl_real *force, int count, fl_real *pair_rows,
                      fl_real *pair_slopes, fl_real *hull_rows, fl_real *hull_slopes);
 

@@ -43,7 +43,7 @@ class RowSizes(NamedTuple):
         return self.features + 3 * self.vectors
 
 
-ROW_SIZES = {"pair": RowSizes(11, 4, 6), "hull": RowSizes(6, 2, 3)}
+ROW_SIZES = {"pair": RowSizes(11, 4, 6), "hull": RowSizes(7, 3, 3)}
 """Rows of pairs of actuators, and of an actuator and the hull; a pair depends on the forces of
 source and receiver."""
 

@@ -4,8 +4,6 @@
    finlab/interaction/linear.py says what the weights are, and makes the constants. */
 #include "internal.h"
 
-#define MOST_FEATURES 11
-
 /* The polynomials of a kind of message, factor by factor: the constant, the linear coefficients (f,)
    and a symmetric matrix (f, f), and of degree 3 a symmetric array (f, f, f) as well. */
 typedef struct {
@@ -14,7 +12,7 @@ typedef struct {
 
 static const polynomial_form FORMS[2] = {
     [FL_PAIR_MESSAGE] = {4, 11, 2},
-    [FL_HULL_MESSAGE] = {2, 6, 3},
+    [FL_HULL_MESSAGE] = {3, 7, 3},
 };
 
 /* Constants of a robot. Behind them are `formulas` times a weight and the constants of fl_jets, the

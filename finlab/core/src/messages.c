@@ -9,13 +9,14 @@
 #define PAIR_VECTORS 4
 #define PAIR_NUMBERS (PAIR_FEATURES + 3 * PAIR_VECTORS)
 #define PAIR_FORCES 6 /* numbers of two forces: of the source, of the receiver */
-#define HULL_FEATURES 6
-#define HULL_VECTORS 2
+#define HULL_FEATURES 7
+#define HULL_VECTORS 3
 #define HULL_NUMBERS (HULL_FEATURES + 3 * HULL_VECTORS)
 
 /* As in finlab/interaction/messages.py: */
 #define SOFTENING R(1e-4)
 #define HULL_SOFTENING R(1e-9)
+#define GRAZING R(0.2) /* squared offset over which a jet comes off the hull */
 #define FAR 4 /* diameters at which a receiver counts as far */
 
 /* Numbers of a robot: a `crowd`, then a `member` for each of its n actuators, then a `pair` for
@@ -226,6 +227,36 @@ static void pair_row(const pair *p, const member *source, const member *receiver
   }
 }
 
+/* Normal of the hull where a jet meets it, or passes nearest: at towards - depth along the jet. The
+   depth below the surface there is the root of 1 - offset, smoothed to a number above 0. */
+static dual_vector normal_where_met(const crowd *robot, const member *a, const dual_vector *course,
+                                    const dual *per_length, const dual *from,
+                                    const dual *squared_offset) {
+  const real below = 1 - squared_offset->value;
+  const real size = SQRT(below * below + GRAZING * GRAZING);
+  const real smoothed = (below + size) / 2;
+  const real depth = SQRT(smoothed);
+  const real by_below = (1 + below / size) / 2;
+  const real by_offset = -by_below / (2 * depth);
+  /* -from - depth */
+  const dual way =
+      chain_two(from, squared_offset, -from->value - depth, -1, -by_offset);
+  const dual step = product(&way, per_length);
+  dual_vector gradient;
+  for (int b = 0; b < 3; b++) {
+    const dual moved = product(&course->c[b], &step);
+    const real half = robot->half[b];
+    gradient.c[b] = chain(&moved, (a->hull_position[b] + moved.value) / half, 1 / half);
+  }
+  const dual squared_length = dot_duals(&gradient, &gradient);
+  const real length = SQRT(squared_length.value + HULL_SOFTENING);
+  const dual per_gradient =
+      chain(&squared_length, 1 / length, -1 / (2 * length * length * length));
+  dual_vector normal;
+  for (int b = 0; b < 3; b++) normal.c[b] = product(&gradient.c[b], &per_gradient);
+  return normal;
+}
+
 /* The row of an actuator and the hull, and its slopes (3, HULL_NUMBERS); 0 for none. */
 static void hull_row(const crowd *robot, const member *a, const real *force, real *row,
                      real *slopes) {
@@ -260,11 +291,16 @@ static void hull_row(const crowd *robot, const member *a, const real *force, rea
   feature[5] = constant(a->size_on_hull);
   dual_vector normal;
   for (int b = 0; b < 3; b++) normal.c[b] = constant(a->normal[b]);
+  const dual_vector met =
+      normal_where_met(robot, a, &course, &per_length, &from, &squared_offset);
+  feature[6] = dot_duals(&met, &ahead);
   for (int k = 0; k < HULL_FEATURES; k++) {
     write_number(feature + k, k, HULL_NUMBERS, 3, row, slopes);
   }
-  write_vector(&ahead, &thrust, HULL_FEATURES, HULL_NUMBERS, 3, row, slopes);
-  write_vector(&normal, &thrust, HULL_FEATURES + 3, HULL_NUMBERS, 3, row, slopes);
+  const dual_vector *vector[HULL_VECTORS] = {&ahead, &normal, &met};
+  for (int k = 0; k < HULL_VECTORS; k++) {
+    write_vector(vector[k], &thrust, HULL_FEATURES + 3 * k, HULL_NUMBERS, 3, row, slopes);
+  }
 }
 
 static const member *members_of(const crowd *robot) { return (const member *)(robot + 1); }

@@ -30,7 +30,7 @@ LEAST_ROBOTS = 10
 """Fewest robots to learn from."""
 RIDGE = 1e-5
 """Penalty of the regression, over the mean square of the terms."""
-LATENTS = 128
+LATENTS = 200
 """Latent numbers that are kept."""
 ROBOTS_OF_DEVIATIONS = 40
 """Robots by which the few deviations are found."""
