@@ -113,11 +113,12 @@ class Interaction(ABC):
         return None
 
     @abstractmethod
-    def deviation(self, force: Array) -> Array:
+    def deviation(self, force: Array, inflow: Array | None = None) -> Array:
         """Returns how uncertain the wrench offset is.
 
         Args:
-            force: forces of the actuators (..., n, 3), body frame [N].
+            force: as for `offset`.
+            inflow: as for `offset`.
 
         Returns:
             Standard deviation (..., 6) of the wrench offset [N, N m], from what is uncertain of the

@@ -96,7 +96,7 @@ class JetInteraction(PointInteraction):
     def effect(self, force: Array, inflow: Array | None = None) -> tuple[Array, Array]:
         return self.compute_in_core(force, inflow, True)[1:]
 
-    def deviation(self, force: Array) -> Array:
+    def deviation(self, force: Array, inflow: Array | None = None) -> Array:
         modelled = np.einsum("...ib,ibw->...iw", self.at_rest(force), self.lever)
         # A jet may meet an actuator that it misses by the formula. In which direction that force
         # goes is unknown: each axis of the body has a third of its variance.

@@ -8,6 +8,9 @@ The wrench that comes beside the forces of a robot is a sum of
   (`finlab.interaction.messages`), whose factors are polynomials of their features: of degree 2 for
   pairs, of degree 3 for the hull,
 
+- what a flow takes from each actuator: a share of its force by the speed along it over that of its
+  jet, and by the square of this ratio, and a force across it by the momentum of the water taken in,
+
 each times a weight. Robots differ, so the weights w of one robot are normal about those of all:
 `w = m + L z`, where the latent numbers z of a robot are independent and of variance 1. Training
 estimates m and L from many robots (empirical Bayes; `finlab.research.interaction.linear_prior`).
@@ -32,11 +35,24 @@ from finlab.arrays import Array
 from finlab.bundle_files import file_stamp, read_named_file
 from finlab.core import library
 from finlab.errors import CheckpointError, DataError
-from finlab.interaction.interaction import InteractionModel, JetGeometry, PointInteraction
+from finlab.interaction.interaction import (
+    DENSITY,
+    MIN_DISC_AREA,
+    MIN_JET_SPEED,
+    InteractionModel,
+    JetGeometry,
+    PointInteraction,
+    jets_of,
+)
 from finlab.interaction.jets import JetInteraction, Jets
 from finlab.interaction.messages import ROW_SIZES, Messages, unpack_rows
 from finlab.whole_file import write_whole
 
+FLOW_TERMS = ("propeller", "propeller_squared", "fin", "fin_squared", "side")
+"""Terms of the flow: loss of thrust by the ratio of speeds and by its square, of actuators with an
+open-water line and of others, and the force across."""
+SMALL_RATIO = 1e-2
+"""Ratio of speeds to which its size is rounded off [1]."""
 DEGREES = {"pair": 2, "hull": 3}
 """Degrees of the polynomials of features that are factors of messages."""
 FORMULAS: tuple[Jets, ...] = (
@@ -71,10 +87,17 @@ def monomials(kind: str) -> list[tuple[int, ...]]:
 
 MONOMIALS = {kind: monomials(kind) for kind in ROW_SIZES}
 """Monomials by kind of message."""
-WEIGHT_COUNT = len(FORMULAS) + sum(
+FIRST_MESSAGE = len(FORMULAS) + len(FLOW_TERMS)
+"""Index of the first weight of a message."""
+WEIGHT_COUNT = FIRST_MESSAGE + sum(
     len(MONOMIALS[kind]) * size.vectors for kind, size in ROW_SIZES.items()
 )
-"""How many weights there are: of the formulas, then by kind of message, by vector, by monomial."""
+"""How many weights there are: of the formulas, of the flow, then by kind of message, by vector, by
+monomial."""
+USUAL_WEIGHTS = np.zeros(WEIGHT_COUNT)
+"""Weights of which nothing is learned: of the usual formula of jets, with the loss of the
+open-water line."""
+USUAL_WEIGHTS[[0, len(FORMULAS)]] = 1.0
 
 
 class Weights(NamedTuple):
@@ -149,9 +172,11 @@ class LinearInteraction(PointInteraction):
     def effect(self, force: Array, inflow: Array | None = None) -> tuple[Array, Array]:
         return self._in_core(force, inflow, True)[1:]
 
-    def deviation(self, force: Array) -> Array:
+    def deviation(self, force: Array, inflow: Array | None = None) -> Array:
         shape = force.shape[:-2]
-        rows = self.terms.rows(force.reshape(-1, *force.shape[-2:]))
+        if inflow is not None:
+            inflow = np.broadcast_to(inflow, force.shape).reshape(-1, *force.shape[-2:])
+        rows = self.terms.rows(force.reshape(-1, *force.shape[-2:]), inflow)
         by_latent = rows.by_weight @ self.weights.factor
         variance = (by_latent**2).sum(axis=-1)
         for kind, share in self.weights.noise.items():
@@ -173,10 +198,26 @@ class LinearInteraction(PointInteraction):
         # Of terms that are differences to the first formula, the weights of the formulas.
         of_formulas = mean[: len(formulas)].copy()
         of_formulas[0] -= of_formulas[1:].sum()
-        parts: list[Any] = [[len(self.lever), len(formulas), len(self.table), len(messages)]]
+        of_flow = mean[len(formulas) : FIRST_MESSAGE]
+        flow = self.terms.flow
+        propeller, propeller_squared, fin, fin_squared, side = of_flow
+        discs = np.column_stack(
+            [
+                self.geometry.position,
+                flow.area,
+                flow.thrust_still,
+                propeller * flow.advance + fin * flow.is_fin,
+                propeller_squared * flow.advance + fin_squared * flow.is_fin,
+                side * flow.momentum,
+            ]
+        )
+        parts: list[Any] = [
+            [len(self.lever), len(formulas), len(self.table), len(messages), DENSITY],
+            discs.ravel(),
+        ]
         for weight, formula in zip(of_formulas, formulas, strict=True):
             parts += [[weight], formula.table]
-        parts += [self.table, messages]
+        parts.append(messages)
         for kind, weights in by_vector(mean):
             parts += [coefficients(kind, one) for one in weights]
         return np.concatenate(parts, dtype=np.float64)
@@ -192,6 +233,53 @@ class TermRows(NamedTuple):
     its vectors, independently [N^2, ...]."""
 
 
+class FlowTerms:
+    """What a flow takes from the actuators of one robot, by weight."""
+
+    def __init__(self, geometry: JetGeometry) -> None:
+        """Takes points and jets of the n actuators."""
+        disc = 0.25 * np.pi * geometry.diameter**2
+        self.area = disc + MIN_DISC_AREA
+        """Areas of the jets (n,) [m^2]."""
+        self.thrust_still = 0.5 * DENSITY * self.area * MIN_JET_SPEED**2
+        """Thrusts (n,) [N] that are left where there is no force."""
+        self.advance = geometry.advance
+        """Loss of thrust per ratio of speeds by the open-water lines (n,) [1]."""
+        self.is_fin = (geometry.advance == 0.0) & (geometry.diameter > 0.0)
+        """Actuators (n,) with a jet of which no loss is known."""
+        self.momentum = DENSITY * disc
+        """Mass (n,) of the water in a metre of a jet [kg/m]."""
+
+    def forces(self, force: Array, inflow: Array, diameter: Array) -> Array:
+        """Returns what the terms take.
+
+        Args:
+            force: (K, n, 3) [N], body frame.
+            inflow: velocities of the points through the water (K, n, 3) [m/s].
+            diameter: of the jets (n,) [m].
+
+        Returns:
+            Forces (K, n, 3, terms) [N], body frame.
+        """
+        jets = jets_of(force, diameter)
+        along = (inflow * jets.ahead).sum(axis=-1)
+        ratio = along / jets.speed
+        squared = ratio * np.sqrt(ratio**2 + SMALL_RATIO**2)
+        across = inflow - along[..., None] * jets.ahead
+        shares = np.stack(
+            [
+                self.advance * ratio,
+                self.advance * squared,
+                self.is_fin * ratio,
+                self.is_fin * squared,
+            ],
+            axis=-1,
+        )
+        lost = shares[..., None, :] * force[..., None]
+        side = (self.momentum * jets.speed)[..., None] * across
+        return -np.concatenate([lost, side[..., None]], axis=-1)
+
+
 class Terms:
     """The terms of one robot, to which the model gives weights."""
 
@@ -199,17 +287,29 @@ class Terms:
         """Takes points and jets of the n actuators, and the hull."""
         self.formulas = [JetInteraction(jets, geometry) for jets in FORMULAS]
         self.messages = Messages(geometry)
+        self.flow = FlowTerms(geometry)
+        self._geometry = geometry
         lever = self.formulas[0].lever
         hull_count = self.messages.counts["hull"]
         self._levers = {"pair": lever[self.messages.receiver], "hull": lever[:hull_count]}
 
-    def rows(self, force: Array) -> TermRows:
-        """Returns the terms at forces (K, n, 3) [N], body frame."""
+    def rows(self, force: Array, inflow: Array | None = None) -> TermRows:
+        """Returns the terms.
+
+        Args:
+            force: (K, n, 3) [N], body frame.
+            inflow: velocities of the points through the water (K, n, 3) [m/s]; None at rest.
+        """
         # The terms of doubled constants are differences to the first one: with a weight of 1 for
         # that and 0 for all others the model is the usual formula.
         wrenches = [formula.offset(force) for formula in self.formulas]
         usual = wrenches[0]
         terms = [np.stack([usual, *(wrench - usual for wrench in wrenches[1:])], axis=-1)]
+        taken = np.zeros((len(force), 6, len(FLOW_TERMS)))
+        if inflow is not None:
+            by_flow = self.flow.forces(force, inflow, self._geometry.diameter)
+            taken = np.einsum("kibt,ibw->kwt", by_flow, self.formulas[0].lever)
+        terms.append(taken)
         covariance = {}
         for kind, packed in self.messages.rows(force).items():
             features, vectors = unpack_rows(kind, packed)
@@ -239,7 +339,7 @@ def _values(kind: str, features: Array) -> Array:
 
 def by_vector(weights: Array) -> Iterator[tuple[str, Array]]:
     """Yields each kind of message with its weights (vectors, monomials)."""
-    start = len(FORMULAS)
+    start = FIRST_MESSAGE
     for kind, size in ROW_SIZES.items():
         count = size.vectors * len(MONOMIALS[kind])
         yield kind, weights[start : start + count].reshape(size.vectors, -1)

@@ -54,8 +54,8 @@ class FittedWeights(NamedTuple):
 
 def terms_of(samples: Samples) -> RobotTerms:
     """Returns the terms of samples of a robot."""
-    force, missed, scale = left_by_laws(samples)
-    rows = Terms(jet_geometry_of(samples.layout)).rows(force)
+    force, missed, scale, inflow = left_by_laws(samples)
+    rows = Terms(jet_geometry_of(samples.layout)).rows(force, inflow)
     by_scale = scale[:, None] * scale
     return RobotTerms(
         rows.by_weight / scale[:, None],

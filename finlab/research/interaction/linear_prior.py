@@ -23,7 +23,14 @@ from finlab.fit.interaction.own_samples import (
     whitened,
 )
 from finlab.fit.interaction.samples import Samples
-from finlab.interaction.linear import FORMULAS, MONOMIALS, WEIGHT_COUNT, Weights
+from finlab.interaction.linear import (
+    FLOW_TERMS,
+    FORMULAS,
+    MONOMIALS,
+    USUAL_WEIGHTS,
+    WEIGHT_COUNT,
+    Weights,
+)
 from finlab.interaction.messages import ROW_SIZES
 
 LEAST_ROBOTS = 10
@@ -44,6 +51,8 @@ HELD_OUT_SHARE = 0.1
 """Share of the robots by which intervals are calibrated."""
 FIRST_DEVIATION = 0.02
 """First guess of the part of a wrench that a term is uncertain by, over the wrench scale."""
+FIRST_DEVIATION_OF_FORMULAS = 0.3
+"""First guess of the deviation of the weights of formulas and of the flow [1]."""
 FIRST_NOISE = 0.02
 """First guess of the noise of messages."""
 FACTORS = (3.0, 2.0, 1.4)
@@ -81,7 +90,9 @@ def train_weights(samples: Sequence[Samples], seed: int = 0) -> tuple[Weights, f
     unit = np.sqrt(np.diag(gram) / len(known) + 1e-12)
     scaled = gram / unit / unit[:, None]
     ridge = RIDGE * len(known) * np.eye(WEIGHT_COUNT)
-    mean = np.linalg.solve(scaled + ridge, moment / unit) / unit
+    # What data do not say stays as usual: the ridge is about these weights.
+    left = (moment - gram @ USUAL_WEIGHTS) / unit
+    mean = USUAL_WEIGHTS + np.linalg.solve(scaled + ridge, left) / unit
 
     noise = dict.fromkeys(ROW_SIZES, FIRST_NOISE)
     start = Weights(mean, np.zeros((WEIGHT_COUNT, 0)), noise, 1.0)
@@ -111,15 +122,16 @@ def _normal_equations(robots: Sequence[RobotTerms]) -> tuple[Array, Array]:
 
 
 def _groups() -> Array:
-    """Which deviation each weight has: of formulas, of the hull, and of pairs by degree."""
-    groups = [0] * len(FORMULAS)
+    """Which deviation each weight has: of formulas, of the flow, of the hull, and of pairs by
+    degree."""
+    groups = [0] * len(FORMULAS) + [1] * len(FLOW_TERMS)
     for kind, size in ROW_SIZES.items():
         for _ in range(size.vectors):
             for monomial in MONOMIALS[kind]:
                 if kind == "hull":
-                    groups.append(1)
+                    groups.append(2)
                 else:
-                    groups.append(2 + (len(monomial) == 2))
+                    groups.append(3 + (len(monomial) == 2))
     return np.array(groups)
 
 
@@ -128,16 +140,17 @@ def _fit_deviations(
 ) -> tuple[Array, Weights]:
     """Standard deviations (w,) of independent weights, and the noise, of the largest likelihood."""
     groups = _groups()
-    numbers = np.full(4 + len(ROW_SIZES), FIRST_NOISE)
-    numbers[0] = 0.3  # of the formulas, absolute
-    numbers[1:4] = FIRST_DEVIATION
+    group_count = int(groups.max()) + 1
+    numbers = np.full(group_count + len(ROW_SIZES), FIRST_NOISE)
+    numbers[:2] = FIRST_DEVIATION_OF_FORMULAS
+    numbers[2:group_count] = FIRST_DEVIATION
     kinds = list(ROW_SIZES)
 
     def model(numbers: Array) -> tuple[Array, Weights]:
         deviations = numbers[groups]
-        is_message = groups > 0
+        is_message = groups >= 2
         deviations[is_message] /= unit[is_message] + 1e-3 * unit[is_message].max()
-        noise = dict(zip(kinds, numbers[4:].tolist(), strict=True))
+        noise = dict(zip(kinds, numbers[group_count:].tolist(), strict=True))
         return deviations, start._replace(noise=noise)
 
     def likelihood(numbers: Array) -> float:

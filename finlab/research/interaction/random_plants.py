@@ -97,7 +97,7 @@ class RandomPlant:
         plant = Plant(layout)
         own = plant.force(command)
         force = body_force(own, layout.frames)
-        velocity = None if flow is None else plant._point_velocity(flow)
+        velocity = None if flow is None else plant.point_velocity(flow)
         geometry = jet_geometry_of(layout)
         change = self.further_force(
             force, geometry.position, geometry.diameter, geometry.advance, geometry.hull, velocity

@@ -119,7 +119,7 @@ def _models(
 
 def _some(samples: Samples, count: int) -> Samples:
     """The first `count` samples of a robot."""
-    return samples._replace(command=samples.command[:count], wrench=samples.wrench[:count])
+    return samples.some(slice(count))
 
 
 def _row(
@@ -207,7 +207,7 @@ class _ByDifferences(Interaction):
         ) / step
         return here.reshape(*force.shape[:-2], 6), slope.reshape(*force.shape, 6)
 
-    def deviation(self, force: Array) -> Array:
+    def deviation(self, force: Array, inflow: Array | None = None) -> Array:
         """No deviation (..., 6): the function is taken to be exact."""
         return np.zeros((*force.shape[:-2], 6))
 
@@ -218,7 +218,7 @@ class Ridge(_ByDifferences):
 
     def __init__(self, count: int, samples: Samples) -> None:
         """Takes how many of the samples count, and the samples."""
-        force, left, scale = left_by_laws(_some(samples, count))
+        force, left, scale, _ = left_by_laws(_some(samples, count))
         unit = float(np.abs(force).max())
 
         def features(force: Array) -> Array:
