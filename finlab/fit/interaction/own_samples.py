@@ -12,7 +12,6 @@ The noise of a sample is that of the measurement and that of the messages, which
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import cholesky, solve_triangular
 
 from finlab.arrays import Array
 from finlab.errors import DataError
@@ -24,6 +23,11 @@ MEASUREMENT_NOISE = 0.02
 """Standard deviation of a measured wrench, as a share of the robot's root mean square."""
 LEAST_NOISE = 1e-4
 """The same of an axis on which there is next to nothing, over the wrench scale."""
+
+SHARES = np.geomspace(1.0 / 64.0, 64.0, 25)
+"""Factors of the variances of latent numbers and of noise, of which a robot has one each [1]."""
+SHARE_DEVIATION = 1.5
+"""Standard deviation of their logarithms [1]."""
 
 
 class RobotTerms(NamedTuple):
@@ -117,14 +121,45 @@ def fit_weights(samples: Samples, prior: Weights) -> FittedWeights:
 def posterior(terms: RobotTerms, prior: Weights) -> Weights:
     """Returns the weights after samples of a robot, whose terms are given."""
     by_noise, left, _ = whitened(terms, prior)
-    by_latent = by_noise @ prior.factor
-    information = np.eye(by_latent.shape[1]) + by_latent.T @ by_latent
-    root = cholesky(information, lower=True)
-    projected = solve_triangular(root, by_latent.T @ left, lower=True)
-    # With the information R R^T, V = R^-T R^-1: L R^-T is a factor of the weights' covariance.
-    factor = solve_triangular(root, prior.factor.T, lower=True).T
-    mean = prior.mean + factor @ projected
-    return Weights(mean, factor, prior.noise, 1.0)
+    values, vectors = np.linalg.eigh((by_noise @ prior.factor).T @ (by_noise @ prior.factor))
+    values = np.maximum(values, 0.0)
+    projected = vectors.T @ ((by_noise @ prior.factor).T @ left)
+    weight_share, noise_share = _likeliest_shares(values, projected, left)
+    # V = (I / alpha + H^T H / beta)^-1, in the basis of the eigenvectors of H^T H.
+    variance = 1.0 / (1.0 / weight_share + values / noise_share)
+    by_vector = prior.factor @ vectors
+    mean = prior.mean + by_vector @ (variance * projected / noise_share)
+    root = float(np.sqrt(noise_share))
+    noise = {kind: root * share for kind, share in prior.noise.items()}
+    return Weights(mean, by_vector * np.sqrt(variance), noise, 1.0)
+
+
+def _likeliest_shares(values: Array, projected: Array, left: Array) -> tuple[float, float]:
+    """The factors alpha and beta of the variances of latent numbers and of noise that make the
+    samples of a robot most likely: robots differ more or less from others, and are explained more
+    or less well. Their logarithms are normal with the deviation `SHARE_DEVIATION`.
+
+    Args:
+        values: eigenvalues (r,) of H^T H.
+        projected: H^T y (r,) in the basis of its eigenvectors.
+        left: y (6 K,).
+    """
+    total = float(left @ left)
+    best = -np.inf
+    shares = (1.0, 1.0)
+    for weight_share in SHARES:
+        for noise_share in SHARES:
+            # y ~ N(0, beta I + alpha H H^T); the lemmas of Sylvester and Woodbury.
+            ratio = weight_share / noise_share
+            grown = 1.0 + ratio * values
+            explained = float((ratio * projected**2 / grown).sum())
+            cost = (total - explained) / noise_share
+            cost += len(left) * np.log(noise_share) + np.log(grown).sum()
+            cost += (np.log([weight_share, noise_share]) ** 2).sum() / SHARE_DEVIATION**2
+            if -cost > best:
+                best = -cost
+                shares = (float(weight_share), float(noise_share))
+    return shares
 
 
 def _root_mean_square(rows: Array) -> float:
