@@ -33,6 +33,8 @@ from finlab.interaction.linear import (
 )
 from finlab.interaction.messages import ROW_SIZES
 
+LINEAR_FILE = "interaction_linear.safetensors"
+"""File of the weights in the folder of a training."""
 LEAST_ROBOTS = 10
 """Fewest robots to learn from."""
 RIDGE = 1e-5
