@@ -55,12 +55,15 @@ SMALL_RATIO = 1e-2
 """Ratio of speeds to which its size is rounded off [1]."""
 DEGREES = {"pair": 2, "hull": 3}
 """Degrees of the polynomials of features that are factors of messages."""
+DOUBLED = ("length", "width", "spread", "lag", "most", "side", "housing", "hull")
+"""Constants of the formula of jets of which there is a term with twice the usual value."""
+LINEAR_CONSTANTS = ("side", "housing", "hull")
+"""Those of them in which the formula is linear."""
+LEAST_WEIGHT = 1e-6
+"""Least weight of a formula that others are merged into [1]."""
 FORMULAS: tuple[Jets, ...] = (
     Jets(),
-    *(
-        replace(Jets(), **{name: 2.0 * getattr(Jets(), name)})
-        for name in ("length", "width", "spread", "lag", "most", "side", "housing", "hull")
-    ),
+    *(replace(Jets(), **{name: 2.0 * getattr(Jets(), name)}) for name in DOUBLED),
 )
 """The formulas of jets that are terms: with usual constants, and with each of these doubled."""
 WEIGHTS_SUFFIX = ".safetensors"
@@ -193,12 +196,9 @@ class LinearInteraction(PointInteraction):
 
     def _constants_of(self, mean: Array) -> Array:
         """The numbers that finlab/core/src/linear_interaction.c reads."""
-        formulas = self.terms.formulas
         messages = self.terms.messages.table
-        # Of terms that are differences to the first formula, the weights of the formulas.
-        of_formulas = mean[: len(formulas)].copy()
-        of_formulas[0] -= of_formulas[1:].sum()
-        of_flow = mean[len(formulas) : FIRST_MESSAGE]
+        of_formulas, formulas = _merged(mean[: len(FORMULAS)], self.geometry)
+        of_flow = mean[len(FORMULAS) : FIRST_MESSAGE]
         flow = self.terms.flow
         propeller, propeller_squared, fin, fin_squared, side = of_flow
         discs = np.column_stack(
@@ -219,7 +219,7 @@ class LinearInteraction(PointInteraction):
             parts += [[weight], formula.table]
         parts.append(messages)
         for kind, weights in by_vector(mean):
-            parts += [coefficients(kind, one) for one in weights]
+            parts.append(coefficients(kind, weights))
         return np.concatenate(parts, dtype=np.float64)
 
 
@@ -337,6 +337,32 @@ def _values(kind: str, features: Array) -> Array:
     return values
 
 
+def _merged(weights: Array, geometry: JetGeometry) -> tuple[Array, list[JetInteraction]]:
+    """Formulas whose sum is that of `FORMULAS`, of which all but the first are differences to the
+    first one: fewer, since a formula is linear in some of its constants.
+
+    Args:
+        weights: of `FORMULAS`.
+        geometry: of the robot.
+
+    Returns:
+        Weights of the formulas, and the formulas.
+    """
+    is_linear = np.array([name in LINEAR_CONSTANTS for name in (None, *DOUBLED)])
+    others = [k for k in range(1, len(weights)) if not is_linear[k]]
+    first = float(weights[0] - weights[others].sum())
+    if abs(first) < LEAST_WEIGHT:
+        first = LEAST_WEIGHT  # the others are so large that this is nothing beside them
+    changed = {}
+    for name in LINEAR_CONSTANTS:
+        # The formulas not doubled in it have this constant too, once each.
+        weight = float(weights[1 + DOUBLED.index(name)])
+        changed[name] = getattr(FORMULAS[0], name) * (1.0 + weight / first)
+    base = JetInteraction(FORMULAS[0], geometry, changed)
+    merged = [base, *(JetInteraction(FORMULAS[k], geometry) for k in others)]
+    return np.array([first, *weights[others]]), merged
+
+
 def by_vector(weights: Array) -> Iterator[tuple[str, Array]]:
     """Yields each kind of message with its weights (vectors, monomials)."""
     start = FIRST_MESSAGE
@@ -347,22 +373,30 @@ def by_vector(weights: Array) -> Iterator[tuple[str, Array]]:
 
 
 def coefficients(kind: str, weights: Array) -> Array:
-    """Returns the coefficients of a polynomial as symmetric arrays, which the core reads.
+    """Returns the coefficients of the polynomials of a kind of message, as the core reads them.
 
     Args:
-        kind: of the message.
-        weights: of its monomials (t,).
+        kind: of the messages.
+        weights: of the vectors' monomials (k, t).
 
     Returns:
-        The constant, the linear coefficients (f,), a symmetric matrix (f, f) and so on, flat.
+        The constants (k,), and for each degree d from 1 on, by the first d - 1 factors of a
+        monomial in order, an array (k, f): with x their product, x times it adds up to the
+        polynomials' gradients over d. Flat.
     """
-    f = ROW_SIZES[kind].features
-    arrays = [np.zeros((f,) * degree) for degree in range(DEGREES[kind] + 1)]
-    for monomial, weight in zip(MONOMIALS[kind], weights, strict=True):
-        places = set(permutations(monomial))
-        for place in places:
-            arrays[len(monomial)][place] = weight / len(places)
-    return np.concatenate([array.ravel() for array in arrays])
+    vectors, features = ROW_SIZES[kind].vectors, ROW_SIZES[kind].features
+    result = [weights[:, 0]]
+    index = {monomial: k for k, monomial in enumerate(MONOMIALS[kind])}
+    for degree in range(1, DEGREES[kind] + 1):
+        for first in combinations_with_replacement(range(features), degree - 1):
+            array = np.zeros((vectors, features))
+            for last in range(features):
+                monomial = tuple(sorted((*first, last)))
+                # The share of the monomial's derivative that falls to this order of its factors.
+                share = len(set(permutations(first))) / len(set(permutations(monomial)))
+                array[:, last] = share * weights[:, index[monomial]]
+            result.append(array.ravel())
+    return np.concatenate(result)
 
 
 @lru_cache(maxsize=16)

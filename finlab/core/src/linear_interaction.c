@@ -4,11 +4,17 @@
    finlab/interaction/linear.py says what the weights are, and makes the constants. */
 #include "internal.h"
 
-/* The polynomials of a kind of message, factor by factor: the constant, the linear coefficients (f,)
-   and a symmetric matrix (f, f), and of degree 3 a symmetric array (f, f, f) as well. */
+/* The polynomials of the k factors of a kind of message in its f features x:
+
+     value = c + x.g1 + x.g2 + x.g3,  gradient = g1 + 2 g2 + 3 g3,
+
+   where g1 (k, f) is constant, g2 = sum_j x_j A_j and g3 = sum_{j <= l} x_j x_l C_jl. Constants are
+   c (k,), g1, the A_j (f, k, f) and, of degree 3, the C_jl (f (f + 1) / 2, k, f). */
 typedef struct {
   int factors, features, degree;
 } polynomial_form;
+
+#define MOST_ENTRIES 44 /* factors times features */
 
 static const polynomial_form FORMS[2] = {
     [FL_PAIR_MESSAGE] = {4, 11, 2},
@@ -41,49 +47,50 @@ typedef struct {
 
 static int coefficient_count(const polynomial_form *form) {
   const int f = form->features;
-  int count = 1 + f + f * f;
-  if (form->degree == 3) count += f * f * f;
+  const int entries = form->factors * f;
+  int count = form->factors + entries + f * entries;
+  if (form->degree == 3) count += f * (f + 1) / 2 * entries;
   return count;
 }
 
-/* c + b.x + x.Ax + C[x, x, x] and its gradient b + 2 Ax + 3 C[x, x], of symmetric A and C. */
-static real polynomial(const polynomial_form *form, const real *coefficients, const real *x,
-                       real *gradient) {
+/* Adds a multiple of numbers to others. */
+static inline void add_multiple(real weight, const real *numbers, int count, real *sum) {
+  for (int k = 0; k < count; k++) sum[k] += weight * numbers[k];
+}
+
+/* Values (k,) and gradients (k, f) of the polynomials. Sums run over entries side by side, which
+   compilers do several at a time. */
+static inline void evaluate(const polynomial_form *form, const real *coefficients, const real *x,
+                            real *values, real *gradients) {
   const int f = form->features;
-  const real *linear = coefficients + 1;
-  const real *quadratic = linear + f;
-  const real *cubic = quadratic + f * f;
-  real value = coefficients[0];
-  for (int i = 0; i < f; i++) {
-    const real once = dot(quadratic + i * f, x, f); /* (Ax)_i */
-    real twice = 0;                                 /* C[x, x]_i */
-    for (int j = 0; j < f && form->degree == 3; j++) {
-      twice += x[j] * dot(cubic + (i * f + j) * f, x, f);
-    }
-    value += x[i] * (linear[i] + once + twice);
-    if (gradient) gradient[i] = linear[i] + 2 * once + 3 * twice;
+  const int entries = form->factors * f;
+  const real *linear = coefficients + form->factors;
+  const real *next = linear + entries;
+  real once[MOST_ENTRIES] = {0};
+  real twice[MOST_ENTRIES] = {0};
+  for (int j = 0; j < f; j++, next += entries) add_multiple(x[j], next, entries, once);
+  for (int j = 0; j < f && form->degree == 3; j++) {
+    for (int l = j; l < f; l++, next += entries) add_multiple(x[j] * x[l], next, entries, twice);
   }
-  return value;
+  for (int k = 0; k < form->factors; k++) {
+    values[k] = coefficients[k];
+    for (int i = 0; i < f; i++) {
+      const int m = k * f + i;
+      values[k] += x[i] * (linear[m] + once[m] + twice[m]);
+      if (gradients) gradients[m] = linear[m] + 2 * once[m] + 3 * twice[m];
+    }
+  }
 }
 
 /* An fl_factors_of. */
 static void factors_of(const real *weights, int kind, const real *features, real *factors,
                        real *jacobian) {
-  const polynomial_form *form = FORMS + kind;
-  const int count = coefficient_count(form);
-  if (kind == FL_HULL_MESSAGE) {
-    weights += FORMS[FL_PAIR_MESSAGE].factors * coefficient_count(FORMS + FL_PAIR_MESSAGE);
+  if (kind == FL_PAIR_MESSAGE) {
+    evaluate(FORMS + FL_PAIR_MESSAGE, weights, features, factors, jacobian);
+    return;
   }
-  for (int k = 0; k < form->factors; k++) {
-    real *gradient = 0;
-    if (jacobian) gradient = jacobian + k * form->features;
-    factors[k] = polynomial(form, weights + k * count, features, gradient);
-  }
-}
-
-/* Adds a multiple of numbers to others. */
-static void add_multiple(real weight, const real *numbers, int count, real *sum) {
-  for (int k = 0; k < count; k++) sum[k] += weight * numbers[k];
+  weights += coefficient_count(FORMS + FL_PAIR_MESSAGE);
+  evaluate(FORMS + FL_HULL_MESSAGE, weights, features, factors, jacobian);
 }
 
 /* Adds what a velocity v [m/s] through the water takes of an actuator. */

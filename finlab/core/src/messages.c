@@ -56,13 +56,13 @@ typedef struct {
   dual c[3];
 } dual_vector;
 
-static dual constant(real value) {
+static inline dual constant(real value) {
   dual result = {value, {0}};
   return result;
 }
 
 /* f(x), given its value and derivative at x. */
-static dual chain(const dual *x, real value, real slope) {
+static inline dual chain(const dual *x, real value, real slope) {
   dual result;
   result.value = value;
   for (int k = 0; k < PAIR_FORCES; k++) result.by[k] = slope * x->by[k];
@@ -70,18 +70,18 @@ static dual chain(const dual *x, real value, real slope) {
 }
 
 /* f(x, y), given its value and derivatives there. */
-static dual chain_two(const dual *x, const dual *y, real value, real by_x, real by_y) {
+static inline dual chain_two(const dual *x, const dual *y, real value, real by_x, real by_y) {
   dual result;
   result.value = value;
   for (int k = 0; k < PAIR_FORCES; k++) result.by[k] = by_x * x->by[k] + by_y * y->by[k];
   return result;
 }
 
-static dual product(const dual *x, const dual *y) {
+static inline dual product(const dual *x, const dual *y) {
   return chain_two(x, y, x->value * y->value, y->value, x->value);
 }
 
-static dual dot_duals(const dual_vector *x, const dual_vector *y) {
+static inline dual dot_duals(const dual_vector *x, const dual_vector *y) {
   dual sum = product(&x->c[0], &y->c[0]);
   for (int b = 1; b < 3; b++) {
     const dual more = product(&x->c[b], &y->c[b]);
@@ -91,7 +91,7 @@ static dual dot_duals(const dual_vector *x, const dual_vector *y) {
 }
 
 /* Product of a vector of constants and one of such numbers. */
-static dual dot_constant(const real *x, const dual_vector *y) {
+static inline dual dot_constant(const real *x, const dual_vector *y) {
   dual sum = constant(0);
   for (int b = 0; b < 3; b++) {
     sum.value += x[b] * y->c[b].value;
@@ -131,7 +131,7 @@ static void write_vector(const dual_vector *x, const dual *strength, int at, int
   }
 }
 
-static dual_vector cross_product(const dual_vector *x, const dual_vector *y) {
+static inline dual_vector cross_product(const dual_vector *x, const dual_vector *y) {
   dual_vector result;
   for (int b = 0; b < 3; b++) {
     const int l = (b + 1) % 3;
@@ -144,7 +144,7 @@ static dual_vector cross_product(const dual_vector *x, const dual_vector *y) {
 }
 
 /* exp(-a s / (b + c x^2)) of two numbers. */
-static dual bell(const dual *s, const dual *x, real a, real b, real c) {
+static inline dual bell(const dual *s, const dual *x, real a, real b, real c) {
   const real width = b + c * x->value * x->value;
   const real value = EXP(-a * s->value / width);
   const real by_s = -a / width * value;
@@ -229,7 +229,7 @@ static void pair_row(const pair *p, const member *source, const member *receiver
 
 /* Normal of the hull where a jet meets it, or passes nearest: at towards - depth along the jet. The
    depth below the surface there is the root of 1 - offset, smoothed to a number above 0. */
-static dual_vector normal_where_met(const crowd *robot, const member *a, const dual_vector *course,
+static inline dual_vector normal_where_met(const crowd *robot, const member *a, const dual_vector *course,
                                     const dual *per_length, const dual *from,
                                     const dual *squared_offset) {
   const real below = 1 - squared_offset->value;
@@ -382,18 +382,54 @@ static void add_message(const message_form *form, const real *position, const in
   next->jacobians += form->vectors * form->features;
 }
 
-/* Adds the message of a row, by the factors that a model gives. */
+/* Exponent of a message's window below which the message is left out: 2e-12 of its size. */
+#define NOTHING_OF_WINDOW R(-27)
+
+/* Whether a pair's window is next to nothing at forces of source and receiver: the logarithm of it,
+   as in pair_row, is at most that of the onset's end and of the profile. */
+static int is_out_of_window(const pair *p, const member *source, const real *force) {
+  const real still = source->thrust_still;
+  const real squared_thrust = dot(force, force, 3) + still * still;
+  const real against = dot(p->way, force, 3);
+  const real along = -against / SQRT(squared_thrust);
+  const real share = dot(force, force, 3) / squared_thrust; /* |ahead|^2 */
+  const real squared_radius = dot(p->way, p->way, 3) - along * along * (2 - share);
+  const real onset = smaller(0, 2 * (2 * along + 1));
+  return onset - squared_radius / (3 + R(0.15) * along * along) < NOTHING_OF_WINDOW;
+}
+
+/* Adds the message of a row, by the factors that a model gives, as add_message does. */
 static void add_modelled(const message_form *form, const fl_message_model *model, int kind,
                          const real *position, const int *ends, const real *row,
                          const real *slopes, real *change, real *offset, real *slope) {
+  const int features = form->features;
+  const int numbers = features + 3 * form->vectors;
+  const real *vectors = row + features;
   real factors[PAIR_VECTORS];
   real jacobian[PAIR_VECTORS * PAIR_FEATURES];
   model->factors_of(model->weights, kind, row, factors, slope ? jacobian : 0);
   real message[3];
-  message_of(row + form->features, form->vectors, factors, message);
+  message_of(vectors, form->vectors, factors, message);
   for (int b = 0; b < 3; b++) change[3 * ends[form->receiver] + b] += message[b];
-  fl_messages one = {row, slopes, factors, jacobian};
-  add_message(form, position, ends, &one, offset, slope);
+  add_wrench(position, message, offset);
+  if (!slope) return;
+  /* The message's derivatives (3, f) by the features: sum_k v_k df_k. */
+  real by_feature[3 * PAIR_FEATURES] = {0};
+  for (int k = 0; k < form->vectors; k++) {
+    for (int b = 0; b < 3; b++) {
+      const real component = vectors[3 * k + b];
+      for (int f = 0; f < features; f++) {
+        by_feature[b * features + f] += component * jacobian[k * features + f];
+      }
+    }
+  }
+  for (int c = 0; c < form->forces; c++) {
+    const real *by_force = slopes + c * numbers;
+    real by[3];
+    message_of(by_force + features, form->vectors, factors, by);
+    for (int b = 0; b < 3; b++) by[b] += dot(by_feature + b * features, by_force, features);
+    add_wrench(position, by, slope + 18 * ends[c / 3] + 6 * (c % 3));
+  }
 }
 
 void fl_add_messages(const real *constants, const fl_message_model *model, const real *force,
@@ -407,6 +443,7 @@ void fl_add_messages(const real *constants, const fl_message_model *model, const
   real *slopes_wanted = slope ? slopes : 0;
   for (int p = 0; p < (int)robot->pairs; p++) {
     const int ends[2] = {(int)pairs[p].source, (int)pairs[p].receiver};
+    if (is_out_of_window(pairs + p, members + ends[0], force + 3 * ends[0])) continue;
     pair_row(pairs + p, members + ends[0], members + ends[1], force + 3 * ends[0],
              force + 3 * ends[1], row, slopes_wanted);
     add_modelled(&PAIR_FORM, model, FL_PAIR_MESSAGE, members[ends[1]].position, ends, row, slopes,
