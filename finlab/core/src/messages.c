@@ -413,22 +413,27 @@ static void add_modelled(const message_form *form, const fl_message_model *model
   for (int b = 0; b < 3; b++) change[3 * ends[form->receiver] + b] += message[b];
   add_wrench(position, message, offset);
   if (!slope) return;
-  /* The message's derivatives (3, f) by the features: sum_k v_k df_k. */
-  real by_feature[3 * PAIR_FEATURES] = {0};
+  /* The message's derivatives (f, 3) by the features: sum_k v_k df_k. */
+  real by_feature[PAIR_FEATURES][3] = {{0}};
   for (int k = 0; k < form->vectors; k++) {
-    for (int b = 0; b < 3; b++) {
-      const real component = vectors[3 * k + b];
-      for (int f = 0; f < features; f++) {
-        by_feature[b * features + f] += component * jacobian[k * features + f];
-      }
+    for (int f = 0; f < features; f++) {
+      const real factor_slope = jacobian[k * features + f];
+      for (int b = 0; b < 3; b++) by_feature[f][b] += vectors[3 * k + b] * factor_slope;
+    }
+  }
+  /* All sums grow side by side, so that none waits for its last term. */
+  real by[PAIR_FORCES][3];
+  for (int c = 0; c < form->forces; c++) {
+    message_of(slopes + c * numbers + features, form->vectors, factors, by[c]);
+  }
+  for (int f = 0; f < features; f++) {
+    for (int c = 0; c < form->forces; c++) {
+      const real feature_slope = slopes[c * numbers + f];
+      for (int b = 0; b < 3; b++) by[c][b] += by_feature[f][b] * feature_slope;
     }
   }
   for (int c = 0; c < form->forces; c++) {
-    const real *by_force = slopes + c * numbers;
-    real by[3];
-    message_of(by_force + features, form->vectors, factors, by);
-    for (int b = 0; b < 3; b++) by[b] += dot(by_feature + b * features, by_force, features);
-    add_wrench(position, by, slope + 18 * ends[c / 3] + 6 * (c % 3));
+    add_wrench(position, by[c], slope + 18 * ends[c / 3] + 6 * (c % 3));
   }
 }
 
