@@ -149,9 +149,7 @@ def interaction(
         weights, error = train_weights(samples, seed)
         output.mkdir(parents=True, exist_ok=True)
         write_weights(file, weights)
-    print(
-        f"{file}: error {error:.3g} of the wrench scale on robots held out, noise included"
-    )
+    print(f"{file}: error {error:.3g} of the wrench scale on robots held out, noise included")
 
 
 def _report(output: Path, made: TrainedWeights) -> None:

@@ -74,10 +74,7 @@ class JetInteraction(PointInteraction):
     """The formula of jets for one robot, which the core computes."""
 
     def __init__(
-        self,
-        constants: Jets,
-        geometry: JetGeometry,
-        changed: Mapping[str, float] | None = None,
+        self, constants: Jets, geometry: JetGeometry, changed: Mapping[str, float] | None = None
     ) -> None:
         """Prepares one robot.
 

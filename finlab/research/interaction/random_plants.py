@@ -55,7 +55,9 @@ class RandomPlant:
         side: share of the momentum taken in from the side.
         housing: drag coefficient of what stands in a jet.
         push: share of the thrust with which a jet pushes the hull along itself.
-        lift: the same along the normal of the hull.
+        turned: share of that push which is only the part along the hull's normal where the jet
+            meets it, since the jet goes on along the hull.
+        lift: share of the thrust along the normal of the hull.
         cling: share of the thrust with which a jet that passes by is drawn to the hull.
         rim: width of a jet's rim on the hull.
         bend: how far a cross flow takes a jet along, over what it would without a jet's speed.
@@ -76,6 +78,7 @@ class RandomPlant:
     side: float
     housing: float
     push: float
+    turned: float
     lift: float
     cling: float
     rim: float
@@ -210,7 +213,12 @@ class RandomPlant:
         passing = ahead * np.exp(-(((miss - 1.15) / 0.2) ** 2))
         normal = place / half
         normal = normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), TINY)
-        pushed = (share * self.push)[..., None] * jets.course
+        depth = np.sqrt(np.maximum(1.0 - miss**2, 0.0))
+        met = (place + (towards - depth)[..., None] * heading) / half
+        met = met / np.maximum(np.linalg.norm(met, axis=-1, keepdims=True), TINY)
+        onto = (jets.course * met).sum(axis=-1, keepdims=True) * met
+        momentum = (1.0 - self.turned) * jets.course + self.turned * onto
+        pushed = (share * self.push)[..., None] * momentum
         lifted = (share * self.lift + passing * self.cling)[..., None] * normal
         return np.asarray(jets.thrust[..., None] * (pushed - lifted))
 
@@ -251,7 +259,8 @@ def random_plant(rng: np.random.Generator) -> RandomPlant:
         limit=log_uniform(rng, 0.7, 1.6),
         side=float(rng.uniform(0.1, 0.5)),
         housing=log_uniform(rng, 0.02, 0.25),
-        push=float(rng.uniform(0.3, 0.75)),
+        push=float(rng.uniform(0.3, 0.9)),
+        turned=float(rng.uniform(0.0, 1.0)),
         lift=float(rng.uniform(-0.1, 0.3)),
         cling=float(rng.uniform(0.0, 0.15)),
         rim=log_uniform(rng, 0.08, 0.25),

@@ -73,8 +73,9 @@ def run(
         robots: of each group.
         targets: on each robot, wrenches of random commands by the plant.
         layouts: that the networks learn from, 20 samples each with 2 % noise.
-        steps: of the training of the network; 0 for no networks.
-        network: file of `finlab train interaction` in place of one that is trained now.
+        steps: of the training of the network.
+        network: file of `finlab train interaction` in place of one that is trained now;
+            `none` for no networks, which need torch.
         own: samples of each robot that a ridge regression is given.
         speed: of the robots through the water [m/s], at which a plant has to take a flow as third
             argument; what is learned is learned at speeds up to it.
@@ -122,9 +123,7 @@ def _moving(oracle: WrenchOracle, flow: Array) -> WrenchOracle:
     """The plant in a flow (6,) [m/s, rad/s], which it is not told of at rest."""
     if not flow.any():
         return oracle
-    return lambda layout, command: oracle(
-        layout, command, np.broadcast_to(flow, (len(command), 6))
-    )
+    return lambda layout, command: oracle(layout, command, np.broadcast_to(flow, (len(command), 6)))
 
 
 Model = Callable[[Samples], Interaction | None]
@@ -167,7 +166,7 @@ def _models(
     shipped = read_weights(str(SHIPPED_PRIOR))
     for count in (0, *OWN_SAMPLES):
         models[f"linear, shipped prior, {count} own samples"] = linear(shipped, count)
-    if steps > 0 or network is not None:
+    if network != "none":
         models |= _network_models(samples, steps, network, seed, folder)
     for count in own:
         models[f"ridge, {count} own samples"] = partial(Ridge, count)
@@ -363,11 +362,11 @@ experiment = Experiment(
     run=run,
     note=(
         "Forward: root mean square of what the model misses of the plant's wrenches at random "
-        "commands, at which the targets are. Error: what the plant's wrench misses of the target, over the robot's wrench scale. "
-        "Targets are wrenches of random commands by the plant. The oracle goes on from the "
-        "linear model's answer by the plant itself. Within 50 and 90 %: share of the misses, axis by "
-        "axis, that lie in the intervals of `expected_miss`. ms: processor time of one of a "
-        "robot's answers."
+        "commands, at which the targets are. Error: what the plant's wrench misses of the "
+        "target, over the robot's wrench scale. Targets are wrenches of random commands by the "
+        "plant. The oracle goes on from the linear model's answer by the plant itself. Within 50 "
+        "and 90 %: share of the misses, axis by axis, that lie in the intervals of "
+        "`expected_miss`. ms: processor time of one of a robot's answers."
     ),
     measures=(
         "finlab/interaction",
