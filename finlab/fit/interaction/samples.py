@@ -3,9 +3,11 @@
 An NPZ file holds `layouts`, JSON text of a list of layout files, `command` (L, K, n, 3) in SI
 units, NaN where a robot has no more actuators, and `wrench` (L, K, 6) [N, N m] in the body frame,
 NaN where it was not measured; and, of robots that moved, `flow` (L, K, 6), the velocity of the
-body through the water [m/s, rad/s]. A CSV file holds the samples of one robot:
-`NAME.number` for each actuator, such as `bow.force`, or `left.A`, `left.f`, `left.phi`, and Fx, Fy, Fz, Tx, Ty, Tz, and
-may hold vx, vy, vz, wx, wy, wz. A folder holds a CSV file for each robot, beside its layout file of the same name.
+body through the water [m/s, rad/s].
+
+A CSV file holds the samples of one robot: `NAME.number` for each actuator, such as `bow.force`, or
+`left.A`, `left.f`, `left.phi`, and Fx, Fy, Fz, Tx, Ty, Tz, and may hold vx, vy, vz, wx, wy, wz. A
+folder holds a CSV file for each robot, beside its layout file of the same name.
 """
 
 import json
