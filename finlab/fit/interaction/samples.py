@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -103,7 +103,7 @@ def write_samples(path: Path, samples: Sequence[Samples]) -> None:
             flow[k, : len(robot_samples.flow)] = robot_samples.flow
     text = json.dumps([layout_to_dict(robot_samples.layout) for robot_samples in samples])
     content = BytesIO()
-    arrays = {"layouts": np.array(text), "command": command, "wrench": wrench}
+    arrays: dict[str, Any] = {"layouts": np.array(text), "command": command, "wrench": wrench}
     if any(robot_samples.flow is not None for robot_samples in samples):
         arrays["flow"] = flow
     np.savez_compressed(content, **arrays)
@@ -188,8 +188,8 @@ def read_table(layout: Layout, path: Path) -> Samples:
     columns += AXES
     units = {"": 1.0, "n": 1.0, "rad": 1.0, "hz": 1.0, "nm": 1.0, "deg": TURNS["deg"]}
     units |= {"m/s": 1.0, "rad/s": 1.0, "deg/s": TURNS["deg"]}
-    names = {name: name for name in (*columns, *FLOW)}
-    table = read_columns(path, names, columns, ", ".join(columns), units).values
+    known = {name: name for name in (*columns, *FLOW)}
+    table = read_columns(path, known, columns, ", ".join(columns), units).values
     wrench = np.stack([table[axis] for axis in AXES], axis=-1)
     flow = None
     if any(name in table for name in FLOW):
