@@ -1,4 +1,6 @@
-"""A second plant of another family, of which no prior has learned and for which nothing was chosen.
+"""A second plant of another family, of which the shipped prior has no sample.
+
+The terms of the hull, and that hulls of random plants turn jets, were chosen after errors on it.
 
 Jets fall off as Schlichting's round jet does, add up by their momentum, turn each other aside, and
 take in water from all around their discs; thrust falls by a quadratic of the advance ratio; the
