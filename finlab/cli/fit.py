@@ -1,11 +1,17 @@
 """`finlab fit thruster|fin|interaction`: fits models of actuators to measurements."""
 
+from __future__ import annotations
+
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, arg
 
 from finlab.cli.shared_options import Robot, open_robot, tell
+
+if TYPE_CHECKING:
+    from finlab.fit.interaction.samples import Samples
+    from finlab.layout.layout import Layout
 
 
 def fin(
@@ -71,29 +77,38 @@ def interaction(
     layout: Robot,
     samples: Annotated[Positional[Path], arg(metavar="SAMPLES.csv")],
     output: Annotated[Path | None, arg(metavar="LAYOUT2", aliases=["-o"])] = None,
+    prior: Annotated[str | None, arg(metavar="NAME|FILE")] = None,
 ) -> None:
-    """Fit the formula of jets to samples of one robot: what its actuators do to each other and to
-    its hull.
+    """Fit what a robot's actuators do to each other and to its hull to samples of this robot.
 
     The file has a column for each number of a command, NAME.A, NAME.f, NAME.phi of a fin,
     NAME.force of a thruster, NAME.angle and NAME.force of an azimuth, and the wrench Fx, Fy, Fz,
     Tx, Ty, Tz [N, N m], body frame, measured with the robot held. Twenty samples at random commands
-    do.
+    do. Of a robot that is towed, vx, vy, vz, wx, wy, wz [m/s, rad/s] are its velocity through the
+    water, body frame; what is not there is 0.
 
     Args:
         layout: layout file or the name of a shipped layout.
         samples: the CSV file.
-        output: the layout with the fitted interaction.
+        output: the layout with the fitted interaction, and beside it the file of its weights.
+        prior: what is known of other robots: `several_plants`, the shipped one, or a file of
+            `finlab train interaction`. The samples change it by as much as they say. Without it,
+            the eight constants of the formula of jets are fitted.
     """
     from dataclasses import replace
 
     from finlab.files.worker import in_worker
-    from finlab.fit.interaction.constants import fit_constants
     from finlab.fit.interaction.samples import read_table
     from finlab.layout.save import plain, save_layout
 
     robot = open_robot(layout)[0]
-    fit = fit_constants(in_worker(read_table, robot, samples))
+    measured = in_worker(read_table, robot, samples)
+    if prior is not None:
+        _fit_to_prior(robot, measured, output, prior)
+        return
+    from finlab.fit.interaction.constants import fit_constants
+
+    fit = fit_constants(measured)
     print(
         f"laws alone miss {fit.laws:.3g} of the wrench scale (root mean square), with jets "
         f"{fit.left:.3g}"
@@ -102,3 +117,31 @@ def interaction(
     if output is not None:
         save_layout(replace(robot, interaction=fit.jets), output)
         print(f"{output}: the robot with these jets")
+
+
+def _fit_to_prior(robot: Layout, measured: Samples, output: Path | None, prior: str) -> None:
+    """Fits weights of a linear interaction, says what they leave, and writes robot and weights."""
+    from dataclasses import replace
+
+    from finlab.fit.interaction.own_samples import fit_weights
+    from finlab.interaction.linear import (
+        SHIPPED_PRIOR,
+        WEIGHTS_SUFFIX,
+        Linear,
+        read_weights,
+        write_weights,
+    )
+    from finlab.layout.save import save_layout
+
+    known = read_weights(str(SHIPPED_PRIOR) if prior == SHIPPED_PRIOR.stem else prior)
+    fit = fit_weights(measured, known)
+    print(
+        f"laws alone miss {fit.laws:.3g} of the wrench scale (root mean square), the prior "
+        f"{fit.before:.3g}, with these samples {fit.after:.3g}"
+    )
+    if output is None:
+        return
+    file = output.with_suffix(WEIGHTS_SUFFIX)
+    write_weights(file, fit.weights)
+    save_layout(replace(robot, interaction=Linear(str(file.resolve()))), output)
+    print(f"{output}, {file}: the robot with this interaction, and its weights")

@@ -100,9 +100,12 @@ def allocator(
 
 
 def interaction(
-    data: Annotated[Positional[Path], arg(metavar="DATA")],
+    data: Annotated[Positional[Path | None], arg(metavar="DATA")] = None,
+    *,
     output: _Output,
     seed: Count = 0,
+    robots: Count = 1500,
+    network: bool = False,
     steps: Count = 1800,
     minutes: _Count = None,
     resume: bool = False,
@@ -110,26 +113,43 @@ def interaction(
     """Learn what actuators do to each other from forward data of many robots, for robots never
     seen.
 
-    A layout names the network: interaction: {type: learned, path: FILE}.
+    What is learned are the weights of a model that is linear in them, and how they differ from
+    robot to robot, in closed form and in half a minute. A layout names them: interaction: {type:
+    linear, path: FILE}. With --network it is a network in place of that: {type: learned, path:
+    FILE}.
 
     Args:
         data: NPZ file of `finlab data interaction`, or a folder with a layout file and a CSV file
-            of the same name for each robot (docs/tutorials/tank.md).
-        output: folder for the network, log, curves and state.
-        seed: of the first weights and the order of the data.
-        steps: optimizer steps.
-        minutes: time after which the run ends.
-        resume: go on from the last state in the folder.
+            of the same name for each robot (docs/tutorials/tank.md); without it, random robots with
+            random plants of several families, 20 samples each, of which the shipped weights are
+            learned.
+        output: folder for the weights; of a network also log, curves and state.
+        seed: which robots are held out, of drawn robots, and of a network's first weights.
+        robots: number of random robots, where there is no DATA.
+        network: learn a network; needs torch.
+        steps: of a network, optimizer steps.
+        minutes: of a network, time after which the run ends.
+        resume: of a network, go on from the last state in the folder.
     """
     from finlab.fit.interaction.samples import read_samples
-    from finlab.research.interaction.train import WEIGHTS_FILE, recipe, train
+    from finlab.research.interaction.random_samples import samples_of_families
 
-    check_positive(steps=steps, minutes=minutes)
-    error = train(read_samples(data), output, recipe(steps, minutes=minutes), seed, resume)
-    print(
-        f"{output / WEIGHTS_FILE}: error {error:.3g} of the wrench scale on robots held out, noise "
-        "included"
-    )
+    check_positive(steps=steps, minutes=minutes, robots=robots)
+    samples = samples_of_families(robots, 20, seed) if data is None else read_samples(data)
+    if network:
+        from finlab.research.interaction.train import WEIGHTS_FILE, recipe, train
+
+        file = output / WEIGHTS_FILE
+        error = train(samples, output, recipe(steps, minutes=minutes), seed, resume)
+    else:
+        from finlab.interaction.linear import write_weights
+        from finlab.research.interaction.linear_prior import LINEAR_FILE, train_weights
+
+        file = output / LINEAR_FILE
+        weights, error = train_weights(samples, seed)
+        output.mkdir(parents=True, exist_ok=True)
+        write_weights(file, weights)
+    print(f"{file}: error {error:.3g} of the wrench scale on robots held out, noise included")
 
 
 def _report(output: Path, made: TrainedWeights) -> None:

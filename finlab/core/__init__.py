@@ -36,6 +36,7 @@ SIGNATURES = {
     "fl_jets": "vppipppp",
     "fl_line_jets_length": "ip",
     "fl_prepare_line_jets": "vpp",
+    "fl_linear_interaction": "vppipppp",
     "fl_message_rows": "vppipppp",
     "fl_message_wrench": "vpipppp",
     "fl_outer_iterations": "ipppppppp",

@@ -55,7 +55,7 @@ class WrenchOffset(NamedTuple):
     """Velocities (n, 3) [m/s] of the actuators' positions through the water, body frame; None at
     rest."""
     core_constants: Array | None
-    """What the core's own formula `fl_jets` works with; None where `effect` is asked."""
+    """What `core_function` works with; None where `effect` is asked."""
     effect: Callable[[Array, Array | None], tuple[Array, Array]]
     """For forces (n, 3) [N], body frame, and `inflow`: the offset (6,) [N, N m], and its
     derivatives (n, 3, 6) by the forces."""
@@ -64,6 +64,8 @@ class WrenchOffset(NamedTuple):
     starts: Array | None = None
     """Where iterations begin anew (K, n, 2): real and imaginary parts of factors, by which the
     forces by the laws alone are multiplied as complex numbers. None for nowhere."""
+    core_function: str = "fl_jets"
+    """Name of the core's function that gives the offset, where there are `core_constants`."""
 
 
 class OuterResult(NamedTuple):
@@ -112,7 +114,7 @@ class CoupledCore:
         self._wrench_offset = wrench_offset
         self._raised: BaseException | None = None
         """Raised by the callback, to be raised again when C returns."""
-        callback: Any = library().fl_jets
+        callback: Any = getattr(library(), wrench_offset.core_function)
         if wrench_offset.core_constants is None:
             callback = _OFFSET_CALLBACK(self._effect)
         frames = np.ascontiguousarray(wrench_offset.frames)

@@ -417,6 +417,14 @@ void fl_jets(const fl_real *constants, const fl_real *force, int count, const fl
 int fl_line_jets_length(const fl_coupled_robot *robot);
 void fl_prepare_line_jets(const fl_coupled_robot *robot, fl_real *numbers);
 
+/* The wrench offset of an interaction that is linear in its weights, an fl_offset_at.
+
+   @param constants  of the formula of jets, of messages and of their weights;
+                     finlab/core/src/linear_interaction.c has their order */
+void fl_linear_interaction(const fl_real *constants, const fl_real *force, int count,
+                           const fl_real *inflow, fl_real *change, fl_real *offset,
+                           fl_real *slope);
+
 /* A body that swims, and fins that follow their commands: what a simulation steps many times, and
    no allocation needs. finlab/swim/vehicle has the equations; a state of a body is position (3) in
    the world, quaternion (4), velocity and angular rates (6) in the body frame. */
@@ -634,9 +642,9 @@ void fl_log_sums(const fl_real *values, int rows, int width, const int *groups, 
    @param pair_rows    becomes 11 features and 4 vectors of each pair (count, p, 23)
    @param pair_slopes  becomes their derivatives by the forces of source and receiver
                        (count, p, 6, 23); 0 for none
-   @param hull_rows    becomes 6 features and 2 vectors of each actuator (count, n, 12), where there
+   @param hull_rows    becomes 7 features and 3 vectors of each actuator (count, n, 16), where there
                        is a hull
-   @param hull_slopes  becomes their derivatives by its force (count, n, 3, 12); 0 for none */
+   @param hull_slopes  becomes their derivatives by its force (count, n, 3, 16); 0 for none */
 void fl_message_rows(const fl_real *constants, const fl_real *force, int count, fl_real *pair_rows,
                      fl_real *pair_slopes, fl_real *hull_rows, fl_real *hull_slopes);
 

@@ -37,6 +37,7 @@ FILES_LEFT_OUT = (
     "jets.c",
     "jets.h",
     "line_jets.c",
+    "linear_interaction.c",
     "messages.c",
     "outer_iterations.c",
     "outer_newton.c",

@@ -10,8 +10,8 @@ derivatives are by the forces, not by the commands.
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -78,6 +78,10 @@ def jets_of(force: AnyArray, diameter: Array) -> Jet:
 class Interaction(ABC):
     """The interaction of one robot's n actuators, as its plant uses it."""
 
+    CORE_FUNCTION: ClassVar[str] = "fl_jets"
+    """The core's function (`fl_offset_at` of finlab/core/finlab.h) that gives the whole offset, of
+    a model with `core_constants`."""
+
     @abstractmethod
     def offset(self, force: Array, inflow: Array | None = None) -> Array:
         """Returns the wrench offset.
@@ -105,16 +109,16 @@ class Interaction(ABC):
 
     @property
     def core_constants(self) -> Array | None:
-        """What the core's function `fl_jets` works with, where it gives the whole offset; None
-        where the core has to ask `effect`."""
+        """What `CORE_FUNCTION` works with; None where the core has to ask `effect`."""
         return None
 
     @abstractmethod
-    def deviation(self, force: Array) -> Array:
+    def deviation(self, force: Array, inflow: Array | None = None) -> Array:
         """Returns how uncertain the wrench offset is.
 
         Args:
-            force: forces of the actuators (..., n, 3), body frame [N].
+            force: as for `offset`.
+            inflow: as for `offset`.
 
         Returns:
             Standard deviation (..., 6) of the wrench offset [N, N m], from what is uncertain of the
@@ -181,6 +185,25 @@ class PointInteraction(Interaction):
             Further forces (..., n, 3) [N], their wrench (..., 6) [N, N m], and its derivatives
             (..., n, 3, 6) by the forces, an empty array without `with_slope`.
         """
+        return self.call_core(library().fl_jets, self.table, force, inflow, with_slope)
+
+    def call_core(
+        self,
+        function: Callable[..., None],
+        constants: Array,
+        force: Array,
+        inflow: Array | None,
+        with_slope: bool,
+    ) -> tuple[Array, Array, Array]:
+        """Returns what a function of the core gives; as `compute_in_core`.
+
+        Args:
+            function: an `fl_offset_at` of finlab/core/finlab.h.
+            constants: that it works with.
+            force: as for `compute_in_core`, as are the next two.
+            inflow: velocities.
+            with_slope: whether derivatives are needed.
+        """
         shape = force.shape if inflow is None else np.broadcast_shapes(force.shape, inflow.shape)
         count = math.prod(shape[:-2])
         force = np.ascontiguousarray(np.broadcast_to(force, shape))
@@ -188,8 +211,8 @@ class PointInteraction(Interaction):
         change = np.empty(shape)
         wrench = np.empty((*shape[:-2], 6))
         slope = np.empty((*shape, 6) if with_slope else 0)
-        library().fl_jets(
-            self.table.ctypes.data,
+        function(
+            constants.ctypes.data,
             force.ctypes.data,
             count,
             None if velocity is None else velocity.ctypes.data,

@@ -11,7 +11,8 @@ distances from 2 to 16 D, turned by up to 30 degrees. The formula is given in
 docs/theory/interaction.md and computed in finlab/core/src/jets.c; here are its constants.
 """
 
-from dataclasses import astuple, dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -72,14 +73,19 @@ class Jets(InteractionModel):
 class JetInteraction(PointInteraction):
     """The formula of jets for one robot, which the core computes."""
 
-    def __init__(self, constants: Jets, geometry: JetGeometry) -> None:
+    def __init__(
+        self, constants: Jets, geometry: JetGeometry, changed: Mapping[str, float] | None = None
+    ) -> None:
         """Prepares one robot.
 
         Args:
             constants: of the formula.
             geometry: points and jets of its n actuators, and its hull.
+            changed: constants by name that the formula has in place of these; they need not be
+                such as a layout may name.
         """
-        *formula_constants, _uncertain = astuple(constants)
+        values = asdict(constants) | dict(changed or {})
+        *formula_constants, _uncertain = values.values()
         super().__init__(geometry, (*formula_constants, ONSET_LENGTH, RIM_WIDTH))
         self.constants = constants
 
@@ -96,7 +102,7 @@ class JetInteraction(PointInteraction):
     def effect(self, force: Array, inflow: Array | None = None) -> tuple[Array, Array]:
         return self.compute_in_core(force, inflow, True)[1:]
 
-    def deviation(self, force: Array) -> Array:
+    def deviation(self, force: Array, inflow: Array | None = None) -> Array:
         modelled = np.einsum("...ib,ibw->...iw", self.at_rest(force), self.lever)
         # A jet may meet an actuator that it misses by the formula. In which direction that force
         # goes is unknown: each axis of the body has a third of its variance.

@@ -105,7 +105,7 @@ class LearnedInteraction(PointInteraction):
         _, loss, loss_slope = self.compute_in_core(force, inflow, True)
         return offset + loss, by_force + loss_slope
 
-    def deviation(self, force: Array) -> Array:
+    def deviation(self, force: Array, inflow: Array | None = None) -> Array:
         each = np.einsum("m...ib,ibw->m...w", self._by_network(force), self.lever)
         return np.asarray(self._trust * each.std(axis=0, ddof=1))
 

@@ -43,7 +43,7 @@ class RowSizes(NamedTuple):
         return self.features + 3 * self.vectors
 
 
-ROW_SIZES = {"pair": RowSizes(11, 4, 6), "hull": RowSizes(6, 2, 3)}
+ROW_SIZES = {"pair": RowSizes(11, 4, 6), "hull": RowSizes(7, 3, 3)}
 """Rows of pairs of actuators, and of an actuator and the hull; a pair depends on the forces of
 source and receiver."""
 
@@ -67,8 +67,9 @@ class Messages:
         self.counts = {"pair": len(self.source), "hull": n if has_hull else 0}
         """How many messages there are of each kind."""
         self._n = n
-        self._table = self._table_of(geometry, diameter, has_hull)
-        self._table_address = self._table.ctypes.data
+        self.table = self._table_of(geometry, diameter, has_hull)
+        """The numbers that finlab/core/src/messages.c reads."""
+        self._table_address = self.table.ctypes.data
 
     def _table_of(self, geometry: JetGeometry, diameter: Array, has_hull: bool) -> Array:
         """The numbers that finlab/core/src/messages.c reads."""

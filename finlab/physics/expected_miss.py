@@ -170,7 +170,8 @@ def sources_of_miss(plant: Plant, command: Array) -> list[Source]:
         names = tuple(layout.names[i] for i in indices)
         sources.append(Source(names, (correlated**2).sum(axis=1) + independent))
     if plant.interaction is not None:
-        deviation = plant.interaction.deviation(body_force(forces, layout.frames))
+        in_body = body_force(forces, layout.frames)
+        deviation = plant.interaction.deviation(in_body, plant.met_by_all(None))
         sources.append(Source(("what the jets take",), deviation**2))
     return sources
 

@@ -106,11 +106,11 @@ class Plant:
         if not self.feels_flow:
             return None
         velocity: Array = np.einsum(
-            "...nb,nab->...na", self._point_velocity(flow), self.layout.frames
+            "...nb,nab->...na", self.point_velocity(flow), self.layout.frames
         )
         return velocity
 
-    def _point_velocity(self, flow: Array) -> Array:
+    def point_velocity(self, flow: Array) -> Array:
         """Velocity (..., n, 3) of each actuator's point through the water, body frame [m/s]."""
         body_velocity = np.asarray(flow, np.float64)[..., None, :]
         linear = body_velocity[..., :3]
@@ -199,7 +199,7 @@ class Plant:
         """Returns the velocity (..., n, 3) of each actuator's point through the water, body frame
         [m/s]; of the plant's own flow when `flow` is None, and None at rest."""
         flow = self.flow if flow is None else flow
-        return None if flow is None else self._point_velocity(flow)
+        return None if flow is None else self.point_velocity(flow)
 
     def forces(self, command: ArrayLike, *, flow: Array | None = None) -> Array:
         """Returns the forces of a command.

@@ -12,6 +12,7 @@ from finlab.interaction.interaction import JetGeometry, jets_of
 MIN_DIAMETER = 1e-3
 SOFTENING = 1e-4
 HULL_SOFTENING = 1e-9
+GRAZING = 0.2
 FAR = 4.0
 IMAGINARY_STEP = 1e-30
 
@@ -82,7 +83,7 @@ def pack_hull_rows(geometry: JetGeometry, force: AnyArray) -> Any:
         force: forces (..., n, 3), body frame [N].
 
     Returns:
-        Rows (..., n, 6 + 2 * 3).
+        Rows (..., n, 7 + 3 * 3).
     """
     center = geometry.hull[0]
     half_axes = np.maximum(geometry.hull[1], MIN_DIAMETER)
@@ -96,6 +97,13 @@ def pack_hull_rows(geometry: JetGeometry, force: AnyArray) -> Any:
     squared_offset = squared_radius - towards * towards  # of the jet's axis from the centre
     gradient = position / half_axes
     normal = gradient / np.sqrt((gradient**2).sum(-1, keepdims=True) + HULL_SOFTENING)
+    # Where the jet meets the hull, or passes nearest: the depth below the surface is smoothed.
+    below = 1.0 - squared_offset
+    depth = np.sqrt(0.5 * (below + np.sqrt(below * below + GRAZING * GRAZING)))
+    way = (towards - depth) / length
+    gradient_met = (position + way[..., None] * direction) / half_axes
+    size = np.sqrt((gradient_met * gradient_met).sum(-1) + HULL_SOFTENING)
+    met = gradient_met / size[..., None]
     features = [
         np.tanh(2.0 * (squared_offset - 1.0)),
         np.exp(-squared_offset),
@@ -103,8 +111,9 @@ def pack_hull_rows(geometry: JetGeometry, force: AnyArray) -> Any:
         np.tanh(squared_radius - 1.0),
         (normal * ahead).sum(-1),
         np.tanh(2.0 * geometry.diameter / half_axes.mean()),
+        (met * ahead).sum(-1),
     ]
-    return _pack_rows(features, [ahead, normal], thrust)
+    return _pack_rows(features, [ahead, normal, met], thrust)
 
 
 def _pack_rows(features: list[Any], vectors: list[Any], strength: Any) -> Any:

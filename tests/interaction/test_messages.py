@@ -59,7 +59,7 @@ def test_rows_and_slopes_are_those_of_the_formulas(seed: int) -> None:
 def test_without_a_hull_there_are_messages_of_pairs_alone() -> None:
     messages = Messages(geometry_of(4, with_hull=False))
     force = some_forces(geometry_of(4), 4, 2)
-    assert messages.rows(force)["hull"].shape == (2, 0, 12)
+    assert messages.rows(force)["hull"].shape == (2, 0, 16)
     assert messages.counts["hull"] == 0
 
 

@@ -52,6 +52,7 @@ def coupled_core(plant: Plant, compiled: Compiled) -> CoupledCore:
             frames=compiled.axes @ plant.layout.frames,
             counts=plant.counts,
             inflow=plant.met_by_all(None),
+            core_function=interaction.CORE_FUNCTION,
             core_constants=interaction.core_constants,
             effect=interaction.effect,
             offset=interaction.offset,

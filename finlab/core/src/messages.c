@@ -9,13 +9,14 @@
 #define PAIR_VECTORS 4
 #define PAIR_NUMBERS (PAIR_FEATURES + 3 * PAIR_VECTORS)
 #define PAIR_FORCES 6 /* numbers of two forces: of the source, of the receiver */
-#define HULL_FEATURES 6
-#define HULL_VECTORS 2
+#define HULL_FEATURES 7
+#define HULL_VECTORS 3
 #define HULL_NUMBERS (HULL_FEATURES + 3 * HULL_VECTORS)
 
 /* As in finlab/interaction/messages.py: */
 #define SOFTENING R(1e-4)
 #define HULL_SOFTENING R(1e-9)
+#define GRAZING R(0.2) /* squared offset over which a jet comes off the hull */
 #define FAR 4 /* diameters at which a receiver counts as far */
 
 /* Numbers of a robot: a `crowd`, then a `member` for each of its n actuators, then a `pair` for
@@ -55,13 +56,13 @@ typedef struct {
   dual c[3];
 } dual_vector;
 
-static dual constant(real value) {
+static inline dual constant(real value) {
   dual result = {value, {0}};
   return result;
 }
 
 /* f(x), given its value and derivative at x. */
-static dual chain(const dual *x, real value, real slope) {
+static inline dual chain(const dual *x, real value, real slope) {
   dual result;
   result.value = value;
   for (int k = 0; k < PAIR_FORCES; k++) result.by[k] = slope * x->by[k];
@@ -69,18 +70,18 @@ static dual chain(const dual *x, real value, real slope) {
 }
 
 /* f(x, y), given its value and derivatives there. */
-static dual chain_two(const dual *x, const dual *y, real value, real by_x, real by_y) {
+static inline dual chain_two(const dual *x, const dual *y, real value, real by_x, real by_y) {
   dual result;
   result.value = value;
   for (int k = 0; k < PAIR_FORCES; k++) result.by[k] = by_x * x->by[k] + by_y * y->by[k];
   return result;
 }
 
-static dual product(const dual *x, const dual *y) {
+static inline dual product(const dual *x, const dual *y) {
   return chain_two(x, y, x->value * y->value, y->value, x->value);
 }
 
-static dual dot_duals(const dual_vector *x, const dual_vector *y) {
+static inline dual dot_duals(const dual_vector *x, const dual_vector *y) {
   dual sum = product(&x->c[0], &y->c[0]);
   for (int b = 1; b < 3; b++) {
     const dual more = product(&x->c[b], &y->c[b]);
@@ -90,7 +91,7 @@ static dual dot_duals(const dual_vector *x, const dual_vector *y) {
 }
 
 /* Product of a vector of constants and one of such numbers. */
-static dual dot_constant(const real *x, const dual_vector *y) {
+static inline dual dot_constant(const real *x, const dual_vector *y) {
   dual sum = constant(0);
   for (int b = 0; b < 3; b++) {
     sum.value += x[b] * y->c[b].value;
@@ -130,7 +131,7 @@ static void write_vector(const dual_vector *x, const dual *strength, int at, int
   }
 }
 
-static dual_vector cross_product(const dual_vector *x, const dual_vector *y) {
+static inline dual_vector cross_product(const dual_vector *x, const dual_vector *y) {
   dual_vector result;
   for (int b = 0; b < 3; b++) {
     const int l = (b + 1) % 3;
@@ -143,7 +144,7 @@ static dual_vector cross_product(const dual_vector *x, const dual_vector *y) {
 }
 
 /* exp(-a s / (b + c x^2)) of two numbers. */
-static dual bell(const dual *s, const dual *x, real a, real b, real c) {
+static inline dual bell(const dual *s, const dual *x, real a, real b, real c) {
   const real width = b + c * x->value * x->value;
   const real value = EXP(-a * s->value / width);
   const real by_s = -a / width * value;
@@ -226,6 +227,36 @@ static void pair_row(const pair *p, const member *source, const member *receiver
   }
 }
 
+/* Normal of the hull where a jet meets it, or passes nearest: at towards - depth along the jet. The
+   depth below the surface there is the root of 1 - offset, smoothed to a number above 0. */
+static inline dual_vector normal_where_met(const crowd *robot, const member *a, const dual_vector *course,
+                                    const dual *per_length, const dual *from,
+                                    const dual *squared_offset) {
+  const real below = 1 - squared_offset->value;
+  const real size = SQRT(below * below + GRAZING * GRAZING);
+  const real smoothed = (below + size) / 2;
+  const real depth = SQRT(smoothed);
+  const real by_below = (1 + below / size) / 2;
+  const real by_offset = -by_below / (2 * depth);
+  /* -from - depth */
+  const dual way =
+      chain_two(from, squared_offset, -from->value - depth, -1, -by_offset);
+  const dual step = product(&way, per_length);
+  dual_vector gradient;
+  for (int b = 0; b < 3; b++) {
+    const dual moved = product(&course->c[b], &step);
+    const real half = robot->half[b];
+    gradient.c[b] = chain(&moved, (a->hull_position[b] + moved.value) / half, 1 / half);
+  }
+  const dual squared_length = dot_duals(&gradient, &gradient);
+  const real length = SQRT(squared_length.value + HULL_SOFTENING);
+  const dual per_gradient =
+      chain(&squared_length, 1 / length, -1 / (2 * length * length * length));
+  dual_vector normal;
+  for (int b = 0; b < 3; b++) normal.c[b] = product(&gradient.c[b], &per_gradient);
+  return normal;
+}
+
 /* The row of an actuator and the hull, and its slopes (3, HULL_NUMBERS); 0 for none. */
 static void hull_row(const crowd *robot, const member *a, const real *force, real *row,
                      real *slopes) {
@@ -260,11 +291,16 @@ static void hull_row(const crowd *robot, const member *a, const real *force, rea
   feature[5] = constant(a->size_on_hull);
   dual_vector normal;
   for (int b = 0; b < 3; b++) normal.c[b] = constant(a->normal[b]);
+  const dual_vector met =
+      normal_where_met(robot, a, &course, &per_length, &from, &squared_offset);
+  feature[6] = dot_duals(&met, &ahead);
   for (int k = 0; k < HULL_FEATURES; k++) {
     write_number(feature + k, k, HULL_NUMBERS, 3, row, slopes);
   }
-  write_vector(&ahead, &thrust, HULL_FEATURES, HULL_NUMBERS, 3, row, slopes);
-  write_vector(&normal, &thrust, HULL_FEATURES + 3, HULL_NUMBERS, 3, row, slopes);
+  const dual_vector *vector[HULL_VECTORS] = {&ahead, &normal, &met};
+  for (int k = 0; k < HULL_VECTORS; k++) {
+    write_vector(vector[k], &thrust, HULL_FEATURES + 3 * k, HULL_NUMBERS, 3, row, slopes);
+  }
 }
 
 static const member *members_of(const crowd *robot) { return (const member *)(robot + 1); }
@@ -315,13 +351,14 @@ static void message_slope(const real *vectors, const real *slopes, int features,
   }
 }
 
-/* How many numbers the messages of a kind have, and of how many numbers of forces they depend. */
+/* How many numbers the messages of a kind have, of how many numbers of forces they depend, and
+   which of their ends receives them. */
 typedef struct {
-  int features, vectors, forces;
+  int features, vectors, forces, receiver;
 } message_form;
 
-static const message_form PAIR_FORM = {PAIR_FEATURES, PAIR_VECTORS, PAIR_FORCES};
-static const message_form HULL_FORM = {HULL_FEATURES, HULL_VECTORS, 3};
+static const message_form PAIR_FORM = {PAIR_FEATURES, PAIR_VECTORS, PAIR_FORCES, 1};
+static const message_form HULL_FORM = {HULL_FEATURES, HULL_VECTORS, 3, 0};
 
 /* Adds the wrench of the next message, at the position of who receives it, and its derivatives by
    the forces of `ends`; goes on to the one behind it. */
@@ -343,6 +380,85 @@ static void add_message(const message_form *form, const real *position, const in
   if (!slope) return;
   next->slopes += form->forces * numbers;
   next->jacobians += form->vectors * form->features;
+}
+
+/* Exponent of a message's window below which the message is left out: 2e-12 of its size. */
+#define NOTHING_OF_WINDOW R(-27)
+
+/* Whether a pair's window is next to nothing at forces of source and receiver: the logarithm of it,
+   as in pair_row, is at most that of the onset's end and of the profile. */
+static int is_out_of_window(const pair *p, const member *source, const real *force) {
+  const real still = source->thrust_still;
+  const real squared_thrust = dot(force, force, 3) + still * still;
+  const real against = dot(p->way, force, 3);
+  const real along = -against / SQRT(squared_thrust);
+  const real share = dot(force, force, 3) / squared_thrust; /* |ahead|^2 */
+  const real squared_radius = dot(p->way, p->way, 3) - along * along * (2 - share);
+  const real onset = smaller(0, 2 * (2 * along + 1));
+  return onset - squared_radius / (3 + R(0.15) * along * along) < NOTHING_OF_WINDOW;
+}
+
+/* Adds the message of a row, by the factors that a model gives, as add_message does. */
+static void add_modelled(const message_form *form, const fl_message_model *model, int kind,
+                         const real *position, const int *ends, const real *row,
+                         const real *slopes, real *change, real *offset, real *slope) {
+  const int features = form->features;
+  const int numbers = features + 3 * form->vectors;
+  const real *vectors = row + features;
+  real factors[PAIR_VECTORS];
+  real jacobian[PAIR_VECTORS * PAIR_FEATURES];
+  model->factors_of(model->weights, kind, row, factors, slope ? jacobian : 0);
+  real message[3];
+  message_of(vectors, form->vectors, factors, message);
+  for (int b = 0; b < 3; b++) change[3 * ends[form->receiver] + b] += message[b];
+  add_wrench(position, message, offset);
+  if (!slope) return;
+  /* The message's derivatives (f, 3) by the features: sum_k v_k df_k. */
+  real by_feature[PAIR_FEATURES][3] = {{0}};
+  for (int k = 0; k < form->vectors; k++) {
+    for (int f = 0; f < features; f++) {
+      const real factor_slope = jacobian[k * features + f];
+      for (int b = 0; b < 3; b++) by_feature[f][b] += vectors[3 * k + b] * factor_slope;
+    }
+  }
+  /* All sums grow side by side, so that none waits for its last term. */
+  real by[PAIR_FORCES][3];
+  for (int c = 0; c < form->forces; c++) {
+    message_of(slopes + c * numbers + features, form->vectors, factors, by[c]);
+  }
+  for (int f = 0; f < features; f++) {
+    for (int c = 0; c < form->forces; c++) {
+      const real feature_slope = slopes[c * numbers + f];
+      for (int b = 0; b < 3; b++) by[c][b] += by_feature[f][b] * feature_slope;
+    }
+  }
+  for (int c = 0; c < form->forces; c++) {
+    add_wrench(position, by[c], slope + 18 * ends[c / 3] + 6 * (c % 3));
+  }
+}
+
+void fl_add_messages(const real *constants, const fl_message_model *model, const real *force,
+                     real *change, real *offset, real *slope) {
+  const crowd *robot = (const crowd *)constants;
+  const member *members = members_of(robot);
+  const pair *pairs = pairs_of(robot);
+  const int n = (int)robot->n;
+  real row[PAIR_NUMBERS];
+  real slopes[PAIR_FORCES * PAIR_NUMBERS];
+  real *slopes_wanted = slope ? slopes : 0;
+  for (int p = 0; p < (int)robot->pairs; p++) {
+    const int ends[2] = {(int)pairs[p].source, (int)pairs[p].receiver};
+    if (is_out_of_window(pairs + p, members + ends[0], force + 3 * ends[0])) continue;
+    pair_row(pairs + p, members + ends[0], members + ends[1], force + 3 * ends[0],
+             force + 3 * ends[1], row, slopes_wanted);
+    add_modelled(&PAIR_FORM, model, FL_PAIR_MESSAGE, members[ends[1]].position, ends, row, slopes,
+                 change, offset, slope);
+  }
+  for (int i = 0; i < n && robot->has_hull > 0; i++) {
+    hull_row(robot, members + i, force + 3 * i, row, slopes_wanted);
+    add_modelled(&HULL_FORM, model, FL_HULL_MESSAGE, members[i].position, &i, row, slopes, change,
+                 offset, slope);
+  }
 }
 
 void fl_message_wrench(const real *constants, int count, const fl_messages *pair_messages,

@@ -52,7 +52,7 @@ def fit_constants(samples: Samples) -> FittedJets:
     """
     if len(samples.wrench) < MIN_SAMPLES:
         raise DataError(f"expected at least {MIN_SAMPLES} samples, got {len(samples.wrench)}")
-    force, missed, scale = left_by_laws(samples)
+    force, missed, scale, inflow = left_by_laws(samples)
     geometry = jet_geometry_of(samples.layout)
     start = np.log([getattr(Jets(), name) for name in FITTED_CONSTANTS])
 
@@ -62,7 +62,7 @@ def fit_constants(samples: Samples) -> FittedJets:
 
     def residuals(logarithms: Array) -> Array:
         interaction = jets_at(logarithms).of(geometry)
-        return np.asarray(missed - interaction.offset(force) / scale)
+        return np.asarray(missed - interaction.offset(force, inflow) / scale)
 
     def with_prior(logarithms: Array) -> Array:
         data = (residuals(logarithms) / noise).ravel()

@@ -2,8 +2,11 @@
 
 An NPZ file holds `layouts`, JSON text of a list of layout files, `command` (L, K, n, 3) in SI
 units, NaN where a robot has no more actuators, and `wrench` (L, K, 6) [N, N m] in the body frame,
-NaN where it was not measured. A CSV file holds the samples of one robot: `NAME.number` for each
-actuator, such as `bow.force`, or `left.A`, `left.f`, `left.phi`, and Fx, Fy, Fz, Tx, Ty, Tz. A
+NaN where it was not measured; and, of robots that moved, `flow` (L, K, 6), the velocity of the
+body through the water [m/s, rad/s].
+
+A CSV file holds the samples of one robot: `NAME.number` for each actuator, such as `bow.force`, or
+`left.A`, `left.f`, `left.phi`, and Fx, Fy, Fz, Tx, Ty, Tz, and may hold vx, vy, vz, wx, wy, wz. A
 folder holds a CSV file for each robot, beside its layout file of the same name.
 """
 
@@ -12,7 +15,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -30,6 +33,9 @@ from finlab.whole_file import write_whole
 
 MAX_BYTES = 1_000_000_000
 """Largest file of samples that is read [bytes]."""
+FLOW = ("vx", "vy", "vz", "wx", "wy", "wz")
+"""Columns of the velocity of the body through the water [m/s, rad/s]; those that are not there are
+0."""
 EXPECTED = "samples of wrenches (.npz)"
 """What a sentence says was expected."""
 
@@ -42,6 +48,13 @@ class Samples(NamedTuple):
     """(K, n, 3), of fins [rad, Hz, rad]."""
     wrench: Array
     """(K, 6) [N, N m]."""
+    flow: Array | None = None
+    """Velocities (K, 6) of the body through the water, body frame [m/s, rad/s]; None at rest."""
+
+    def some(self, chosen: slice) -> "Samples":
+        """Returns some of the samples."""
+        flow = None if self.flow is None else self.flow[chosen]
+        return Samples(self.layout, self.command[chosen], self.wrench[chosen], flow)
 
 
 class LawResiduals(NamedTuple):
@@ -53,6 +66,8 @@ class LawResiduals(NamedTuple):
     """Measured wrenches (K, 6) less those of these forces, over the wrench scale."""
     scale: Array
     """The wrench scale (6,) [N, N m]."""
+    inflow: Array | None
+    """Velocities (K, n, 3) of the points through the water, body frame [m/s]; None at rest."""
 
 
 def left_by_laws(samples: Samples) -> LawResiduals:
@@ -60,10 +75,10 @@ def left_by_laws(samples: Samples) -> LawResiduals:
     layout = replace(samples.layout, interaction=None)
     plant = Plant(layout)
     scale = wrench_scale_of(layout)
-    force = plant.force(samples.command)
-    return LawResiduals(
-        body_force(force, layout.frames), (samples.wrench - plant.wrench_of(force)) / scale, scale
-    )
+    force = plant.force(samples.command, flow=samples.flow)
+    missed = (samples.wrench - plant.wrench_of(force)) / scale
+    inflow = None if samples.flow is None else plant.point_velocity(samples.flow)
+    return LawResiduals(body_force(force, layout.frames), missed, scale, inflow)
 
 
 def write_samples(path: Path, samples: Sequence[Samples]) -> None:
@@ -80,12 +95,18 @@ def write_samples(path: Path, samples: Sequence[Samples]) -> None:
     n_samples = max(len(robot_samples.command) for robot_samples in samples)
     command = np.full((len(samples), n_samples, n, 3), np.nan)
     wrench = np.full((len(samples), n_samples, 6), np.nan)
+    flow = np.zeros((len(samples), n_samples, 6))
     for k, robot_samples in enumerate(samples):
         command[k, : len(robot_samples.command), : robot_samples.layout.n] = robot_samples.command
         wrench[k, : len(robot_samples.wrench)] = robot_samples.wrench
+        if robot_samples.flow is not None:
+            flow[k, : len(robot_samples.flow)] = robot_samples.flow
     text = json.dumps([layout_to_dict(robot_samples.layout) for robot_samples in samples])
     content = BytesIO()
-    np.savez_compressed(content, layouts=np.array(text), command=command, wrench=wrench)
+    arrays: dict[str, Any] = {"layouts": np.array(text), "command": command, "wrench": wrench}
+    if any(robot_samples.flow is not None for robot_samples in samples):
+        arrays["flow"] = flow
+    np.savez_compressed(content, **arrays)
     write_whole(path, content.getvalue(), DataError)
 
 
@@ -102,7 +123,10 @@ def read_samples(path: Path) -> list[Samples]:
             return [_read_with_layout(table) for table in tables]
         expected = "expected for each robot a layout file and a CSV file of one name"
         raise DataError(f"{path}: {expected}, got no CSV file")
-    arrays = read_arrays(path, ("layouts", "command", "wrench"), MAX_BYTES, EXPECTED)
+    arrays = read_arrays(path, None, MAX_BYTES, EXPECTED)
+    for name in ("layouts", "command", "wrench"):
+        if name not in arrays:
+            raise DataError(f"{path}: expected {EXPECTED}, but it holds no {name}")
     values = json_of(arrays["layouts"], f"{path}: layouts")
     if not isinstance(values, list) or not values:
         raise DataError(f"{path}: layouts: expected JSON text of a list of layout files")
@@ -113,9 +137,13 @@ def read_samples(path: Path) -> list[Samples]:
     count, n = (arrays["command"].shape + (0, 0, 0))[1:3]
     n_actuators = max(n, max(robot.n for robot in robots))
     shapes = {"command": (len(robots), count, n_actuators, 3), "wrench": (len(robots), count, 6)}
+    if "flow" in arrays:
+        shapes["flow"] = (len(robots), count, 6)
     check_shapes(arrays, shapes, str(path))
     result = []
-    for layout, command, wrench in zip(robots, arrays["command"], arrays["wrench"], strict=True):
+    for k, layout in enumerate(robots):
+        command = arrays["command"][k]
+        wrench = arrays["wrench"][k]
         is_measured = np.isfinite(wrench).all(axis=1)
         robot_command = command[is_measured][:, : layout.n].astype(np.float64)
         if not np.isfinite(robot_command).all():
@@ -123,7 +151,13 @@ def read_samples(path: Path) -> list[Samples]:
                 f"{path}: command: NaN or infinity for an actuator of {layout.name}, expected "
                 "numbers"
             )
-        result.append(Samples(layout, robot_command, wrench[is_measured].astype(np.float64)))
+        flow = None
+        if "flow" in arrays:
+            flow = arrays["flow"][k][is_measured].astype(np.float64)
+            if not np.isfinite(flow).all():
+                raise DataError(f"{path}: flow: NaN or infinity, expected numbers")
+        robot_wrench = wrench[is_measured].astype(np.float64)
+        result.append(Samples(layout, robot_command, robot_wrench, flow))
     return result
 
 
@@ -153,9 +187,12 @@ def read_table(layout: Layout, path: Path) -> Samples:
         columns += names
     columns += AXES
     units = {"": 1.0, "n": 1.0, "rad": 1.0, "hz": 1.0, "nm": 1.0, "deg": TURNS["deg"]}
-    table = read_columns(
-        path, {name: name for name in columns}, columns, ", ".join(columns), units
-    ).values
-    return Samples(
-        layout, commands_in(table, layout), np.stack([table[axis] for axis in AXES], axis=-1)
-    )
+    units |= {"m/s": 1.0, "rad/s": 1.0, "deg/s": TURNS["deg"]}
+    known = {name: name for name in (*columns, *FLOW)}
+    table = read_columns(path, known, columns, ", ".join(columns), units).values
+    wrench = np.stack([table[axis] for axis in AXES], axis=-1)
+    flow = None
+    if any(name in table for name in FLOW):
+        still = np.zeros(len(wrench))
+        flow = np.stack([table.get(name, still) for name in FLOW], axis=-1)
+    return Samples(layout, commands_in(table, layout), wrench, flow)

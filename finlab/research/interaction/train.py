@@ -84,7 +84,7 @@ def data_set(samples: Sequence[Samples]) -> InteractionSamples:
     sizes = []
     robots = []
     for k, of_robot in enumerate(samples):
-        force, residual, scale = left_by_laws(of_robot)
+        force, residual, scale, _ = left_by_laws(of_robot)
         residuals.append(residual)
         size = np.sqrt((of_robot.wrench**2).mean(axis=0)) / scale
         sizes.append(np.broadcast_to(size, residual.shape))

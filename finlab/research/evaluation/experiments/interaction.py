@@ -2,11 +2,12 @@
 told."""
 
 import tempfile
+import time
 from collections.abc import Callable, Iterator
 from copy import copy
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,10 +15,12 @@ from finlab.allocation.dual.method import Dual, DualSettings
 from finlab.allocation.question import MethodQuestion
 from finlab.arrays import NEARLY, ROUNDS, Array
 from finlab.fit.interaction.constants import fit_constants
+from finlab.fit.interaction.own_samples import posterior, terms_of
 from finlab.fit.interaction.samples import Samples, left_by_laws
 from finlab.interaction.interaction import Interaction
 from finlab.interaction.jets import Jets
 from finlab.interaction.learned import Learned
+from finlab.interaction.linear import SHIPPED_PRIOR, LinearInteraction, Weights, read_weights
 from finlab.layout import Layout
 from finlab.layout.effectiveness import body_force
 from finlab.layout.jet_geometry import jet_geometry_of
@@ -26,7 +29,14 @@ from finlab.physics.objective import wrench_scale_of
 from finlab.research.evaluation.document import Column, Row
 from finlab.research.evaluation.experiment import Experiment, progress
 from finlab.research.evaluation.method_specs import own_function
-from finlab.research.interaction.random_samples import WrenchOracle, random_samples, with_jets
+from finlab.research.interaction.linear_prior import train_weights
+from finlab.research.interaction.random_samples import (
+    JETS,
+    WrenchOracle,
+    random_flows,
+    random_samples,
+    with_jets,
+)
 from finlab.research.random_layouts import random_jet_robot, random_shaft_fin
 
 GROUPS = {
@@ -37,6 +47,8 @@ GROUPS = {
 """Robots that no training has seen: their actuators, least to most, and kinds."""
 OTHER = Jets(2.2, 2.6, 30.0, 0.75, 0.95, 0.22, 0.12, 0.48)
 """Constants of the plant where none is given; those of no method."""
+OWN_SAMPLES = (20, 100)
+"""Own samples that the linear model is given."""
 FITTED = 20
 """Own samples that the formula is fitted to."""
 
@@ -49,6 +61,7 @@ def run(
     steps: int = 1800,
     network: str | None = None,
     own: tuple[int, ...] = (30, 100, 300, 1000),
+    speed: float = 0.0,
     seed: int = 0,
 ) -> Iterator[Row]:
     """One row for each group of robots and each model of what actuators do to each other.
@@ -61,25 +74,56 @@ def run(
         targets: on each robot, wrenches of random commands by the plant.
         layouts: that the networks learn from, 20 samples each with 2 % noise.
         steps: of the training of the network.
-        network: file of `finlab train interaction` in place of one that is trained now.
+        network: file of `finlab train interaction` in place of one that is trained now;
+            `none` for no networks, which need torch.
         own: samples of each robot that a ridge regression is given.
+        speed: of the robots through the water [m/s], at which a plant has to take a flow as third
+            argument; what is learned is learned at speeds up to it.
         seed: of all draws.
     """
     oracle = partial(with_jets, jets=OTHER) if plant is None else own_function(plant)
     with tempfile.TemporaryDirectory() as folder:
-        models = _models(oracle, layouts, steps, network, own, seed, Path(folder))
+        models = _models(oracle, layouts, steps, network, own, speed, seed, Path(folder))
         for group, (count, kinds) in GROUPS.items():
             cases = []
             for k in range(robots):
                 rng = np.random.default_rng([32_000, seed, k])
                 layout = random_jet_robot(rng, f"robot_{k + 1}", count, kinds)
-                wrench = oracle(layout, Plant(layout).sample(rng, (targets,)))
-                command = Plant(layout).sample(rng, (max(own, default=0) + 1 or 1,))
+                tested = Plant(layout).sample(rng, (targets,))
+                # A row of targets is one question in one flow: all have the same.
+                flow = random_flows(rng, 1, 1.0)[0]
+                flow *= speed / np.linalg.norm(flow)
+                moving = _moving(oracle, flow)
+                wrench = moving(layout, tested)
+                command = Plant(layout).sample(rng, (max(*own, *OWN_SAMPLES),))
                 noise = 0.02 * np.sqrt((wrench**2).mean(axis=0))
-                measured = oracle(layout, command) + noise * rng.normal(size=(len(command), 6))
-                cases.append((layout, wrench, Samples(layout, command, measured)))
+                measured = moving(layout, command) + noise * rng.normal(size=(len(command), 6))
+                flows = np.broadcast_to(flow, (len(command), 6)) if speed > 0.0 else None
+                cases.append(
+                    Case(layout, flow, tested, wrench, Samples(layout, command, measured, flows))
+                )
             for name, model in models.items():
                 yield {"robots": group, "model": name} | _row(oracle, model, cases, name)
+
+
+class Case(NamedTuple):
+    """A robot, and what it is asked."""
+
+    layout: Layout
+    flow: Array
+    """Its velocity through the water (6,) [m/s, rad/s]."""
+    command: Array
+    """Commands (K, n, 3) that give the wrenches."""
+    wrench: Array
+    """Targets (K, 6) [N, N m]."""
+    own: Samples
+
+
+def _moving(oracle: WrenchOracle, flow: Array) -> WrenchOracle:
+    """The plant in a flow (6,) [m/s, rad/s], which it is not told of at rest."""
+    if not flow.any():
+        return oracle
+    return lambda layout, command: oracle(layout, command, np.broadcast_to(flow, (len(command), 6)))
 
 
 Model = Callable[[Samples], Interaction | None]
@@ -92,69 +136,120 @@ def _models(
     steps: int,
     network: str | None,
     own: tuple[int, ...],
+    speed: float,
     seed: int,
     folder: Path,
 ) -> dict[str, Model]:
     """All models by their names in the table; without `network` one is trained, in `folder`."""
+    samples = random_samples(oracle, layouts, 20, seed, 0.02, (4, 8), speed)
+    weights, _ = train_weights(samples, seed)
+
+    def linear(prior: Weights, count: int) -> Model:
+        """The linear model, after some own samples."""
+
+        def of(own: Samples) -> Interaction:
+            known = posterior(terms_of(_some(own, count)), prior) if count else prior
+            return LinearInteraction(known, jet_geometry_of(own.layout))
+
+        return of
+
+    models: dict[str, Model] = {
+        "laws alone": lambda _: None,
+        "formula": lambda own: JETS.of(jet_geometry_of(own.layout)),
+        f"formula, {FITTED} own samples": lambda own: fit_constants(_some(own, FITTED)).jets.of(
+            jet_geometry_of(own.layout)
+        ),
+        "linear, no own samples": linear(weights, 0),
+    }
+    for count in OWN_SAMPLES:
+        models[f"linear, {count} own samples"] = linear(weights, count)
+    shipped = read_weights(str(SHIPPED_PRIOR))
+    for count in (0, *OWN_SAMPLES):
+        models[f"linear, shipped prior, {count} own samples"] = linear(shipped, count)
+    if network != "none":
+        models |= _network_models(samples, steps, network, seed, folder)
+    for count in own:
+        models[f"ridge, {count} own samples"] = partial(Ridge, count)
+    return models | {"oracle": linear(weights, 0)}
+
+
+def _network_models(
+    samples: list[Samples], steps: int, network: str | None, seed: int, folder: Path
+) -> dict[str, Model]:
+    """The models by networks, by their names in the table."""
     from finlab.research.interaction.surrogate_form import trained_surrogate
     from finlab.research.interaction.train import WEIGHTS_FILE, recipe, train
 
-    samples = random_samples(oracle, layouts, 20, seed, 0.02, (4, 8))
     if network is None:
         train(samples, folder, recipe(steps), seed)
     file = network or str(folder / WEIGHTS_FILE)
     node = trained_surrogate(samples, seed)
-    models: dict[str, Model] = {
-        "laws alone": lambda _: None,
-        f"formula, {FITTED} own samples": lambda own: fit_constants(_some(own, FITTED)).jets.of(
-            jet_geometry_of(own.layout)
-        ),
+    return {
         "network, no own samples": lambda own: Learned(file).of(jet_geometry_of(own.layout)),
         "the paper's surrogate form": lambda own: _ByDifferences(node(own.layout)),
     }
-    for count in own:
-        models[f"ridge, {count} own samples"] = partial(Ridge, count)
-    return models | {"oracle": lambda own: Learned(file).of(jet_geometry_of(own.layout))}
 
 
 def _some(samples: Samples, count: int) -> Samples:
     """The first `count` samples of a robot."""
-    return samples._replace(command=samples.command[:count], wrench=samples.wrench[:count])
+    return samples.some(slice(count))
 
 
-def _row(
-    oracle: WrenchOracle, model: Model, cases: list[tuple[Layout, Array, Samples]], name: str
-) -> Row:
+def _row(oracle: WrenchOracle, model: Model, cases: list[Case], name: str) -> Row:
     """Errors, by the oracle, of what `dual` answers with a model, over all robots."""
-    each = list[tuple[float, float, float]]()
-    for layout, wrenches, samples in progress(cases, "robot", name):
+    misses = []
+    deviations = []
+    forwards = []
+    watts = []
+    milliseconds = []
+    for case in progress(cases, "robot", name):
+        layout = case.layout
         scale = wrench_scale_of(layout)
+        moving = _moving(oracle, case.flow)
+        told: Any = model(case.own)
         method = Dual(layout, DualSettings(), scale)
-        told: Any = model(samples)
-        method.plant = copy(method.plant)
-        method.plant.interaction = told
-        command = method.solve(MethodQuestion(wrenches)).command
+        plant = copy(method.plant)
+        plant.interaction = told
+        plant.feels_flow = plant.feels_flow or told is not None
+        method.plant = plant.at(case.flow if case.flow.any() else None)
+        begun = time.thread_time()
+        command = method.solve(MethodQuestion(case.wrench)).command
+        milliseconds.append(1e3 * (time.thread_time() - begun) / len(command))
         if name == "oracle":
             command = np.array(
-                [_exact(oracle, method, w, u) for w, u in zip(wrenches, command, strict=True)]
+                [_exact(moving, method, w, u) for w, u in zip(case.wrench, command, strict=True)]
             )
-        missed = (oracle(layout, command) - wrenches) / scale
+        misses.append((moving(layout, command) - case.wrench) / scale)
         force = body_force(method.plant.force(command), layout.frames)
-        deviation = np.zeros_like(missed) if told is None else told.deviation(force) / scale
-        watts = method.plant.power(command).sum(axis=1)
-        each += zip(
-            *(np.linalg.norm(part, axis=-1) for part in (missed, deviation)), watts, strict=True
-        )
-    error, expected, power = (np.array(column) for column in zip(*each, strict=True))
-    known = float(np.sqrt((expected**2).mean()))
+        inflow = method.plant.met_by_all(None)
+        deviation = np.zeros_like(misses[-1])
+        if told is not None:
+            deviation = told.deviation(force, inflow) / scale
+        deviations.append(deviation)
+        known = method.plant.wrench_of(method.plant.force(case.command))
+        forwards.append((known - case.wrench) / scale)
+        watts.append(method.plant.power(command).sum(axis=1))
+    missed = np.concatenate(misses)
+    error = np.linalg.norm(missed, axis=1)
+    forward = np.linalg.norm(np.concatenate(forwards), axis=1)
+    deviation = np.concatenate(deviations)
+    is_uncertain = bool(deviation.any()) and name != "oracle"
     return {
-        "n": len(each),
+        "n": len(error),
+        "forward_rms": float(np.sqrt((forward**2).mean())),
         "error_mean": float(error.mean()),
         "error_median": float(np.median(error)),
         "error_p95": float(np.percentile(error, 95)),
-        "expected_over_true": known / float(np.sqrt((error**2).mean())) if known else None,
-        "power_mean": float(power.mean()),
+        "inside_50": _inside(missed, deviation, 0.674) if is_uncertain else None,
+        "inside_90": _inside(missed, deviation, 1.645) if is_uncertain else None,
+        "power_mean": float(np.concatenate(watts).mean()),
+        "ms": float(np.median(milliseconds)),
     }
+
+
+def _inside(missed: Array, deviation: Array, half_width: float) -> float:
+    """Share of the errors (N, 6) that lie within so many of their standard deviations."""
+    return float((np.abs(missed) <= half_width * deviation + NEARLY).mean())
 
 
 def _exact(oracle: WrenchOracle, method: Dual, wrench: Array, command: Array) -> Array:
@@ -207,7 +302,7 @@ class _ByDifferences(Interaction):
         ) / step
         return here.reshape(*force.shape[:-2], 6), slope.reshape(*force.shape, 6)
 
-    def deviation(self, force: Array) -> Array:
+    def deviation(self, force: Array, inflow: Array | None = None) -> Array:
         """No deviation (..., 6): the function is taken to be exact."""
         return np.zeros((*force.shape[:-2], 6))
 
@@ -218,7 +313,7 @@ class Ridge(_ByDifferences):
 
     def __init__(self, count: int, samples: Samples) -> None:
         """Takes how many of the samples count, and the samples."""
-        force, left, scale = left_by_laws(_some(samples, count))
+        force, left, scale, _ = left_by_laws(_some(samples, count))
         unit = float(np.abs(force).max())
 
         def features(force: Array) -> Array:
@@ -255,17 +350,23 @@ experiment = Experiment(
         Column("robots", "robots", "text"),
         Column("model", "told", "text"),
         Column("n", "targets", "count"),
+        Column("forward_rms", "forward", "error"),
         Column("error_mean", "error, mean", "error"),
         Column("error_median", "median", "error"),
         Column("error_p95", "95 %", "error"),
-        Column("expected_over_true", "expected / true", "three"),
+        Column("inside_50", "within 50 %", "three"),
+        Column("inside_90", "within 90 %", "three"),
         Column("power_mean", "power [W]", "three"),
+        Column("ms", "ms", "three"),
     ),
     run=run,
     note=(
-        "Error: what the plant's wrench misses of the target, over the robot's wrench scale. "
-        "Targets are wrenches of random commands by the plant. The oracle goes on from the "
-        "network's answer by the plant itself."
+        "Forward: root mean square of what the model misses of the plant's wrenches at random "
+        "commands, at which the targets are. Error: what the plant's wrench misses of the "
+        "target, over the robot's wrench scale. Targets are wrenches of random commands by the "
+        "plant. The oracle goes on from the linear model's answer by the plant itself. Within 50 "
+        "and 90 %: share of the misses, axis by axis, that lie in the intervals of "
+        "`expected_miss`. ms: processor time of one of a robot's answers."
     ),
     measures=(
         "finlab/interaction",
