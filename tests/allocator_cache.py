@@ -21,9 +21,9 @@ from finlab.allocation.methods import (
     method_class,
 )
 from finlab.assets import shipped_layouts
+from finlab.files.checkpoint_config import WrenchNormalization, read_normalization
 from finlab.layout import Layout, load_layout
-from finlab.research.networks.checkpoint import read_normalization, resolve_checkpoint
-from finlab.research.networks.trained import WrenchNormalization
+from finlab.research.networks.checkpoint import resolve_checkpoint
 
 
 class AllocatorCache:

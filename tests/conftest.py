@@ -30,8 +30,9 @@ def untrained_checkpoint(tmp_path_factory: pytest.TempPathFactory) -> Path:
     # Here, so that tests of layouts do not wait for torch.
     import numpy as np
 
+    from finlab.files.checkpoint_config import WrenchNormalization
     from finlab.research.networks.checkpoint import write_checkpoint
-    from finlab.research.networks.trained import TrainedWeights, WrenchNormalization, sizes_for_file
+    from finlab.research.networks.trained import TrainedWeights, sizes_for_file
     from finlab.research.paper.network import NetworkConfig
     from finlab.research.paper.surrogate import SurrogateConfig
     from finlab.research.training.loop import first_weights
@@ -59,12 +60,9 @@ def untrained_checkpoint(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def untrained_mdn(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Folder of a checkpoint for method `mdn`, preset `smoke`, with random weights."""
+    from finlab.files.checkpoint_config import read_normalization
     from finlab.research.mdn.training.train_mdn import RECIPES
-    from finlab.research.networks.checkpoint import (
-        read_normalization,
-        resolve_checkpoint,
-        write_checkpoint,
-    )
+    from finlab.research.networks.checkpoint import resolve_checkpoint, write_checkpoint
     from finlab.research.networks.trained import TrainedWeights, sizes_for_file
     from finlab.research.training.loop import first_weights
     from tests.torch_weights import arrays_of

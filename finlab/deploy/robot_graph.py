@@ -15,6 +15,7 @@ from finlab.arrays import Array
 from finlab.assets import checkpoint_path
 from finlab.axes import AXES
 from finlab.errors import LayoutError
+from finlab.files.checkpoint_config import read_normalization
 from finlab.layout import Actuator, Fin, Layout
 from finlab.layout.graph_file import (
     COMMAND_SCALES,
@@ -29,7 +30,6 @@ from finlab.layout.graph_file import (
 from finlab.layout.load import FORMAT as LAYOUT_FORMAT
 from finlab.layout.save import layout_to_dict, plain
 from finlab.physics.objective import wrench_scale_of
-from finlab.research.networks.checkpoint import read_normalization
 from finlab.whole_file import write_whole
 
 

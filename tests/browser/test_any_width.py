@@ -108,3 +108,23 @@ def test_a_lesson_is_opened_from_the_menu_of_a_phone_and_closed_by_a_key(resized
     page.key("Escape")
     page.until(lambda: page.session.guide.stop is None)
     assert page.problems == []
+
+
+def test_a_phone_reaches_list_and_drawer(resized: Any) -> None:
+    page = resized
+    tab = page.page
+    tab.set_viewport_size({"width": 390, "height": 844})
+    page.tab("Design")
+    for word, shown in (("List", "left"), ("Reach", "drawer"), ("Improve", "drawer")):
+        tab.locator(".fl-strip").get_by_role("button", name=word, exact=True).click()
+        region = tab.locator(f".mantine-Paper-root[data-fl~={shown}]").first
+        page.rest(300)
+        box = region.bounding_box()
+        assert box["height"] > 200.0 and box["y"] + box["height"] <= 844.5, word
+        at = {"x": box["x"] + 195.0, "y": box["y"] + 0.6 * box["height"]}
+        name = "({x, y}) => document.elementFromPoint(x, y).closest('[data-fl~=region]').dataset.fl"
+        assert shown in tab.evaluate(name, at), f"nothing lies over what {word} brings"
+    tab.locator(".fl-strip").get_by_role("button", name="Values", exact=True).click()
+    page.rest(300)
+    assert tab.locator(".mantine-Paper-root[data-fl~=drawer]").first.bounding_box()["height"] < 50.0
+    assert page.problems == []

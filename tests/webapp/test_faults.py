@@ -21,7 +21,7 @@ from finlab.layout import load_layout
 from tests.sampled_cases import sampled
 from tests.webapp.stand_in import SilentClient, load_stand_in
 from webapp.session import Display, Session
-from webapp.session.looking import DRAWERS
+from webapp.session.looking import CANDIDATES, DRAWERS
 from webapp.tasks import analysing
 from webapp.tasks.slot import Pools
 from webapp.tasks.solver import Solver
@@ -31,6 +31,8 @@ from webapp.viser_internals import start_server, stop_server, uuid_of
 BEFORE, OPENED, AFTER = (load_layout(shipped_layouts()[name]) for name in ("A", "B", "ucat"))
 DISPLAY = Display(frozen=True, drawn="forces")
 """Switches of a page that draws most."""
+STEP_OF_HISTORY = r"<button[^>]*>(Undo|Redo)(: [^<]*)?</button>"
+"""Entry of the menu that names what was done before, which no fresh page has."""
 FAULT_TEXT = "out of order"
 """Text of the exception that is raised."""
 
@@ -92,10 +94,15 @@ class Tab:
         """To all that can be seen: each task with each drawer, with a fin selected and without."""
         session = self.view.session
         acts: list[Callable[[], object]] = [lambda: session.select(session.state.layout.names[0])]
+        # What stands there unless one is chosen was opened before, which no fresh page has; each
+        # robot has another one beside it, so that its answer is no earlier one.
+        beside = "octo" if session.state.layout == OPENED else "ucat"
+        acts.append(partial(session.two_robots.choose, "right", f"Shipped: {beside}"))
         for names in DRAWERS.values():
             acts += [partial(session.show_drawer, name) for name in names]
         acts += [partial(session.show_task, task) for task in ("Export", "Design")]
-        return [*acts, partial(session.select, None), partial(session.show_task, "Allocate")]
+        acts += [partial(session.select, None), partial(session.show_task, "Allocate")]
+        return [*acts, partial(session.show_drawer, CANDIDATES)]  # of one robot, as it was opened
 
     def meet_all(self) -> None:
         """Let the page build each panel."""
@@ -130,7 +137,8 @@ class Tab:
             root = self.server.gui._container_handle_from_uuid["root"]
             hidden = [s.whole for s in self.view.frame.sections if not s.group.is_visible]
             markup += list(_html(root, hidden))
-        return [re.sub(r"[\d.]+(e.?\d+)? ms", "ms", text) for text in markup]
+        timeless = [re.sub(r"[\d.]+(e.?\d+)? ms", "ms", text) for text in markup]
+        return [re.sub(STEP_OF_HISTORY, "", text) for text in timeless]
 
     def nodes(self) -> dict[str, str]:
         """The meshes that can be seen, and marks of their shapes."""

@@ -272,15 +272,28 @@ def _drawer_height(
 
 
 def _tab_strip(desk: Desk, drawer: str | None, layout: Layout) -> str:
-    """The upper edge of the drawer: its tabs, and the button that folds it."""
-    buttons = []
+    """The upper edge of the drawer: its tabs, and the button that folds it.
+
+    A phone has room for one region: two more buttons bring the inspector and the list there, and a
+    tab brings the drawer.
+    """
+    buttons = [
+        html("<button class='sheet' {}>{}</button>", _brings(region), word)
+        for region, word in ((RIGHT, "Values"), (LEFT, "List"))
+    ]
     for name in DRAWERS[desk.task]:
         if name == CANDIDATES and not layout.is_of_fins:
             continue
         is_pressed = str(name == drawer).lower()
-        buttons.append(button(name, "drawer", name, html("aria-pressed='{}'", is_pressed)))
+        attributes = html("aria-pressed='{}' {}", is_pressed, _brings(DRAWER))
+        buttons.append(button(name, "drawer", name, attributes))
     is_folded = drawer is None
     words = "Open the drawer" if is_folded else "Fold the drawer"
     attributes = html("class='fold' aria-label='{}' title='{}'", words, words)
     buttons.append(button("▴" if is_folded else "▾", "fold", "", attributes))
     return html("<nav class='fl-strip' aria-label='Drawer'>{}</nav>", buttons)
+
+
+def _brings(region: str) -> str:
+    """Attributes of a button by which a phone shows a region (`frame.css`)."""
+    return html("onclick='document.documentElement.dataset.flSheet = \"{}\"'", region)

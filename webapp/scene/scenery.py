@@ -52,7 +52,11 @@ class Scenery:
         self._camera = (np.zeros(3), np.zeros(3))
         """Where the camera stood before the tour or lesson, and looked at."""
         self._fault = intents.fault
-        self._scale = self._swam = INITIAL_SCALE
+        self._scale = self._swam = self._of_pair = INITIAL_SCALE
+        self._robot: tuple[str, tuple[str, ...]] | None = None
+        """Name of the robot that the scale is of, and those of its actuators."""
+        self._is_answered = False
+        """Whether the scale fits an answer of that robot."""
         self._is_fixed = False
         """Whether the scale is that of the most that the robot can give."""
         self._fitted: tuple[Sequence[float], Allocation | None] | None = None
@@ -116,14 +120,24 @@ class Scenery:
             return self._swam
         self._swam = INITIAL_SCALE
         if pair_allocations:
+            self._of_pair = pair_scale(target, pair_allocations, self._of_pair)
+            return self._of_pair
+        self._of_pair = INITIAL_SCALE
+        layout = self._session.state.layout
+        robot = layout.name, layout.names
+        if robot != self._robot:  # what fits another robot says nothing of this one
+            self._robot = robot
             self._fitted = None
-            self._scale = pair_scale(target, pair_allocations, self._scale)
-            return self._scale
+            self._scale = INITIAL_SCALE
+            self._is_answered = False
         if self._is_fixed != self._session.display.fixed_scale:
             self._is_fixed = self._session.display.fixed_scale
             self._fitted = None
         fitted = self._fitted
         if fitted is None or fitted[0] != target or fitted[1] is not shown_allocation:
+            if not self._is_answered:  # what fits the first answer is not what fitted before it
+                self._scale = INITIAL_SCALE
+                self._is_answered = shown_allocation is not None
             try:
                 self._scale = self._fitting(target, shown_allocation)
                 self._fitted = (target, shown_allocation)

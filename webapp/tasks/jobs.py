@@ -117,7 +117,13 @@ class Jobs:
         """Whether anything about the present state is still to come."""
         return self.answering.searching or any(
             slot.busy
-            for slot in (*self.beside, self.analyst, *self.pairing.slots, self.pairing.cards)
+            for slot in (
+                *self.beside,
+                self.analyst,
+                self.offers,
+                *self.pairing.slots,
+                self.pairing.cards,
+            )
         )
 
     def stop(self) -> None:

@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 from scipy.stats import binomtest, bootstrap
 
 from finlab.arrays import AnyArray, Array
+from finlab.files.checkpoint_config import read_normalization
 from finlab.physics import plant_of
 from finlab.physics.objective import command_effort
 from finlab.research.evaluation.method_specs import MethodSpec
 from finlab.research.evaluation.splits import SplitCase
-from finlab.research.networks.checkpoint import read_normalization, resolve_checkpoint
+from finlab.research.networks.checkpoint import resolve_checkpoint
 
 Columns = dict[str, AnyArray]
 """Scores of N answers: name of a column -> array (N,)."""

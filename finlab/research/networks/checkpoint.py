@@ -16,27 +16,19 @@ import numpy as np
 
 from finlab.assets import checkpoint_path, shipped_checkpoints
 from finlab.errors import CheckpointError, DataError, LayoutError
-from finlab.files import parse_json
-from finlab.files.guarded import decoded, read_file
-from finlab.layout import FinModelSpec
-from finlab.research.networks.trained import (
-    ArraysByName,
-    TrainedWeights,
+from finlab.files.checkpoint_config import (
+    CONFIG_FILE,
+    FORMAT,
+    VERSION,
+    WEIGHTS_FILE,
     WrenchNormalization,
-    check_arrays,
+    config_of,
+    files_in,
 )
+from finlab.layout import FinModelSpec
+from finlab.research.networks.trained import ArraysByName, TrainedWeights, check_arrays
 from finlab.whole_file import make_folder, write_whole
 
-FORMAT = "finlab-checkpoint"
-"""Value of the key `format` in `config.json`."""
-VERSION = 1
-"""Version of checkpoints; a reader knows exactly one."""
-WEIGHTS_FILE = "model.safetensors"
-"""Weights, with the prefixes `surrogate.` and `network.`."""
-CONFIG_FILE = "config.json"
-"""Everything else: sizes, normalization, fin model, settings, metrics, checksum."""
-MAX_FILE_BYTES = {CONFIG_FILE: 1_000_000, WEIGHTS_FILE: 50_000_000}
-"""Largest size of each file [bytes]."""
 PREFIXES = ("surrogate", "network")
 """What the names of weights begin with in the file, before a dot: the network that has them."""
 
@@ -50,7 +42,7 @@ def read_checkpoint(folder: Path) -> TrainedWeights:
     Raises:
         CheckpointError: as for `parse_checkpoint`.
     """
-    return parse_checkpoint(_files(folder), str(folder), folder.name)
+    return parse_checkpoint(files_in(folder), str(folder), folder.name)
 
 
 def parse_checkpoint(files: Mapping[str, bytes], source: str, name: str) -> TrainedWeights:
@@ -67,7 +59,7 @@ def parse_checkpoint(files: Mapping[str, bytes], source: str, name: str) -> Trai
     from safetensors import SafetensorError
     from safetensors.numpy import load
 
-    config = _config(files, source, (CONFIG_FILE, WEIGHTS_FILE))
+    config = config_of(files, source, (CONFIG_FILE, WEIGHTS_FILE))
     sha256 = hashlib.sha256(files[WEIGHTS_FILE]).hexdigest()
     if sha256 != config.get("sha256"):
         raise CheckpointError(
@@ -142,21 +134,6 @@ def write_checkpoint(folder: Path, weights: TrainedWeights) -> TrainedWeights:
     return read_checkpoint(folder)
 
 
-def read_normalization(folder: Path) -> WrenchNormalization:
-    """Returns the wrench statistics of a checkpoint alone, for those that need no network.
-
-    Raises:
-        CheckpointError: as for `parse_checkpoint`.
-    """
-    config = _config(_files(folder, (CONFIG_FILE,)), str(folder), (CONFIG_FILE,))
-    try:
-        return WrenchNormalization.parse(config.get("normalization"))
-    except ValueError as error:
-        raise CheckpointError(
-            f"{folder}/{CONFIG_FILE}: normalization is missing or malformed"
-        ) from error
-
-
 def network_features(folder: Path) -> str | None:
     """Returns what the network of a checkpoint is fed, such as "raw" of the paper's; None where it
     holds none.
@@ -164,7 +141,9 @@ def network_features(folder: Path) -> str | None:
     Raises:
         CheckpointError: as for `parse_checkpoint`.
     """
-    network = _config(_files(folder, (CONFIG_FILE,)), str(folder), (CONFIG_FILE,)).get("network")
+    network = config_of(files_in(folder, (CONFIG_FILE,)), str(folder), (CONFIG_FILE,)).get(
+        "network"
+    )
     return str(network.get("features")) if isinstance(network, dict) else None
 
 
@@ -185,42 +164,6 @@ def resolve_checkpoint(checkpoint: str | os.PathLike[str]) -> Path:
     if not path.is_dir():
         raise CheckpointError(f"{path}: no such checkpoint folder")
     return path
-
-
-def _files(folder: Path, names: tuple[str, ...] = tuple(MAX_FILE_BYTES)) -> dict[str, bytes]:
-    """Contents of those of a checkpoint's files that are there, by name."""
-    contents = {}
-    for name in names:
-        file = folder / name
-        if os.path.lexists(file):
-            contents[name] = read_file(
-                file, MAX_FILE_BYTES[name], "a checkpoint's file", CheckpointError
-            )
-    return contents
-
-
-def _config(files: Mapping[str, bytes], source: str, needed: tuple[str, ...]) -> dict[str, Any]:
-    """Plain values of `config.json`, with the format and version that this module reads. Raises
-    CheckpointError: they are others, or one of the files `needed` is missing."""
-    config_source = f"{source}/{CONFIG_FILE}"
-    for name in needed:
-        if name not in files:
-            raise CheckpointError(
-                f"{source}/{name}: no such file; a checkpoint folder holds {CONFIG_FILE} and "
-                f"{WEIGHTS_FILE}"
-            )
-    text = decoded(files[CONFIG_FILE], config_source, "JSON", CheckpointError)
-    config = parse_json(text, config_source, CheckpointError)
-    if not isinstance(config, dict) or config.get("format") != FORMAT:
-        raise CheckpointError(
-            f"{config_source}: not a finlab checkpoint (expected format {FORMAT!r})"
-        )
-    if type(config.get("version")) is not int or config["version"] != VERSION:
-        raise CheckpointError(
-            f"{config_source}: checkpoint version {config.get('version')!r}, this finlab reads "
-            f"version {VERSION}; use the finlab that made it, or train again"
-        )
-    return config
 
 
 def _weights_of(prefix: str, tensors: ArraysByName) -> dict[str, Any]:

@@ -10,8 +10,8 @@ from finlab.actuators.fin.fin_model import FinModelSpec
 from finlab.allocation.method import Checkpoint, Method, Networks
 from finlab.assets import checkpoint_path, shipped_checkpoints
 from finlab.errors import CheckpointError
+from finlab.files.checkpoint_config import WEIGHTS_FILE
 from finlab.research.networks.checkpoint import (
-    WEIGHTS_FILE,
     checkpoint_files,
     parse_checkpoint,
     read_checkpoint,

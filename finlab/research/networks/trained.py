@@ -10,12 +10,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar, NamedTuple, Protocol, TypeVar
+from typing import Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
 
-from finlab.arrays import AnyArray, Array, Values
+from finlab.arrays import AnyArray, Values
 from finlab.errors import CheckpointError
+from finlab.files.checkpoint_config import WrenchNormalization
 from finlab.research.networks.layers import single_precision
 
 ArraysByName = Mapping[str, AnyArray]
@@ -28,37 +29,6 @@ MAX_SIZE = 4096
 MAX_WEIGHT = 1e6
 """Largest magnitude of a weight; training stays below 100, and far beyond this answers would be
 NaN."""
-
-
-class WrenchNormalization(NamedTuple):
-    """Mean and standard deviation of the wrench over a data set, each of shape (6,) [N, N m]."""
-
-    mean: Array
-    """Mean (6,) of each axis [N, N m]."""
-    std: Array
-    """Standard deviation (6,) of each axis [N, N m]; `sigma` in the error measure."""
-
-    @classmethod
-    def parse(cls, values: Any) -> WrenchNormalization:
-        """Returns the statistics in plain values of a file.
-
-        Args:
-            values: six numbers under each of the keys `mean` and `std`.
-
-        Raises:
-            ValueError: there are no such numbers.
-        """
-        message = "normalization must be six means and six standard deviations above 0"
-        try:
-            mean = np.asarray(values["mean"], dtype=np.float64)
-            std = np.asarray(values["std"], dtype=np.float64)
-        except (KeyError, TypeError, ValueError):
-            raise ValueError(message) from None
-        if mean.shape != (6,) or std.shape != (6,):
-            raise ValueError(message)
-        if not (np.isfinite(mean).all() and (std > 0.0).all()):
-            raise ValueError(message)
-        return cls(mean, std)
 
 
 def to_normalized(command: Values, lower: Values, upper: Values) -> Values:

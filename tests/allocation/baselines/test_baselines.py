@@ -11,10 +11,10 @@ from finlab.allocation import Allocator
 from finlab.allocation.baselines.linear import PaperSqp, PaperSqpSettings, box_qp
 from finlab.allocation.question import MethodQuestion
 from finlab.errors import LayoutError
+from finlab.files.checkpoint_config import WrenchNormalization
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout
 from finlab.physics import Plant, plant_of
 from finlab.physics.objective import wrench_scale_of
-from finlab.research.networks.trained import WrenchNormalization
 from finlab.research.random_layouts import random_layout
 from tests.allocator_cache import AllocatorCache, normalized_error
 

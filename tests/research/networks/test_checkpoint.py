@@ -20,6 +20,7 @@ from safetensors.torch import load_file, save_file
 
 from finlab.assets import checkpoint_path, shipped_checkpoints
 from finlab.errors import CheckpointError
+from finlab.files import checkpoint_config
 from finlab.layout import load_layout
 from finlab.research.networks import checkpoint
 from finlab.research.networks.trained import to_command, to_normalized
@@ -285,10 +286,10 @@ def test_a_checkpoint_of_an_earlier_finlab_is_refused(folder: Path) -> None:
 def test_normalization_alone_is_read_without_the_weights(folder: Path) -> None:
     expected = checkpoint.read_checkpoint(folder).normalization
     (folder / "model.safetensors").unlink()
-    np.testing.assert_array_equal(checkpoint.read_normalization(folder).std, expected.std)
+    np.testing.assert_array_equal(checkpoint_config.read_normalization(folder).std, expected.std)
     change_config(folder, lambda config: config["normalization"].pop("std"))
     with pytest.raises(CheckpointError, match="normalization is missing or malformed"):
-        checkpoint.read_normalization(folder)
+        checkpoint_config.read_normalization(folder)
 
 
 def test_names_and_folders_are_told_apart(folder: Path) -> None:

@@ -12,12 +12,12 @@ import torch
 from finlab.assets import shipped_layouts
 from finlab.axes import is_full_turn
 from finlab.errors import AllocationError, CheckpointError
+from finlab.files.checkpoint_config import WrenchNormalization
 from finlab.layout import Fin, Layout, Limits, load_layout
 from finlab.physics import Plant
 from finlab.physics.objective import command_effort
 from finlab.research.networks.trained import (
     TrainedWeights,
-    WrenchNormalization,
     sizes_for_file,
     to_command,
     to_normalized,

@@ -5,9 +5,10 @@ import pytest
 import torch
 
 from finlab.errors import CheckpointError
+from finlab.files.checkpoint_config import WrenchNormalization
 from finlab.layout import Layout, Limits
 from finlab.research.networks.checkpoint import read_checkpoint, resolve_checkpoint
-from finlab.research.networks.trained import TrainedWeights, WrenchNormalization
+from finlab.research.networks.trained import TrainedWeights
 from finlab.research.paper.surrogate import BLOCK, LayoutSurrogate, SurrogateConfig
 from finlab.research.random_layouts import random_layout
 from tests.research.paper.surrogate_in_torch import wrench_in_torch

@@ -19,6 +19,7 @@ import torch
 from torch import Tensor
 
 from finlab.errors import DataError
+from finlab.files.checkpoint_config import read_normalization
 from finlab.research.executor import cores, map_parts
 from finlab.research.mdn.network import ForceMixture, ForceNetworkConfig
 from finlab.research.mdn.training.teacher import (
@@ -29,7 +30,6 @@ from finlab.research.mdn.training.teacher import (
 )
 from finlab.research.networks.checkpoint import (
     read_checkpoint,
-    read_normalization,
     resolve_checkpoint,
     write_checkpoint,
 )

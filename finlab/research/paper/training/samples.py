@@ -23,11 +23,12 @@ from torch import Tensor
 from finlab.arrays import AnyArray
 from finlab.errors import DataError
 from finlab.files import parse_json
+from finlab.files.checkpoint_config import WrenchNormalization
 from finlab.files.guarded import decoded, read_file
 from finlab.layout import FinModelSpec, Layout
 from finlab.physics import Plant
 from finlab.research.executor import cores, map_parts
-from finlab.research.networks.trained import WrenchNormalization, to_normalized
+from finlab.research.networks.trained import to_normalized
 from finlab.research.paper.network import raw_features
 from finlab.research.random_layouts import TRAINING_FINS, random_layout
 from finlab.research.training.loop import seeded_generator

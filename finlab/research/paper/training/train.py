@@ -11,10 +11,10 @@ import torch
 from torch import Tensor
 
 from finlab.errors import DataError
+from finlab.files.checkpoint_config import read_normalization
 from finlab.layout import FinModelSpec
 from finlab.research.networks.checkpoint import (
     read_checkpoint,
-    read_normalization,
     resolve_checkpoint,
     write_checkpoint,
 )

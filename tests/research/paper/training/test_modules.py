@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 import torch
 
+from finlab.files.checkpoint_config import WrenchNormalization
 from finlab.layout import Layout
-from finlab.research.networks.trained import TrainedWeights, WrenchNormalization, to_command
+from finlab.research.networks.trained import TrainedWeights, to_command
 from finlab.research.paper.network import Mixture, NetworkConfig, raw_features
 from finlab.research.paper.surrogate import LayoutSurrogate, SurrogateConfig
 from finlab.research.paper.training import modules

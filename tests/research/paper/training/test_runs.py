@@ -13,11 +13,8 @@ import numpy as np
 import pytest
 
 from finlab.cli import main
-from finlab.research.networks.checkpoint import (
-    read_checkpoint,
-    read_normalization,
-    resolve_checkpoint,
-)
+from finlab.files.checkpoint_config import read_normalization
+from finlab.research.networks.checkpoint import read_checkpoint, resolve_checkpoint
 from tests.terminal import refused
 
 PATIENT = (
