@@ -11,18 +11,17 @@ DP capability number (Beaufort's), and finds the highest number up to which all 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from finlab.analysis.dnv_loads import WEATHER, total_load
-from finlab.analysis.dnv_thrust import LOSSES, ship_sets, ship_thrusters, thrust_left
+from finlab.analysis.dnv_thrust import CONSTANT_LOSS, LOSSES, ship_sets, ship_thrusters, thrust_left
 from finlab.analysis.ship_file import Ship
 from finlab.analysis.split_sets import Leaf, SplitSet, largest_shares, split_set
-from finlab.arrays import Array
-from finlab.axes import AXES
+from finlab.arrays import NEARLY, NOTHING, Array
 from finlab.errors import LayoutError
 from finlab.forces.force_sets import shapes_of
 from finlab.layout import Layout
@@ -88,6 +87,9 @@ class Capability:
     """Largest share (C, H, K) of each that can be held [1]; infinite without a load."""
     refusals: tuple[Refusal, ...]
     """Certificates of all loads that cannot be held; of a plot of shares, of all loads."""
+    loss_costs: dict[str, Array]
+    """By each loss of thrust that counts, the share (H,) that it costs of the load that the intact
+    robot can hold, at the heading's limiting condition [1]."""
 
     @property
     def held(self) -> NDArray[np.bool_]:
@@ -105,7 +107,9 @@ class Capability:
         """What the plot shows (C, H): the highest number up to which all loads are held, or the
         largest share of the only load."""
         if self.standard is None:
-            return np.asarray(self.share[..., 0])
+            share = self.share[..., 0]
+            # What is left of a plot's largest value by rounding is nothing.
+            return np.where(share > NOTHING * share.max(initial=0.0), share, 0.0)
         # Held up to the condition before the first that is not; the calm is always held.
         return np.asarray(np.logical_and.accumulate(self.held, axis=-1).sum(axis=-1) - 1.0)
 
@@ -124,8 +128,9 @@ class Capability:
 
     @property
     def notation(self) -> tuple[int, int, int, int] | None:
-        """The four numbers of the standard's notation: the least within 30 degrees of the bow and
-        of all headings, as the ship is and after the worst loss ([2.3]); None without a standard."""
+        """The four numbers of the standard's notation ([2.5.1]): the least within 30 degrees of the
+        bow and of all headings, as the ship is and after the worst loss; None without a
+        standard."""
         if self.standard is None:
             return None
         heading = np.array(self.headings) % 360.0
@@ -142,7 +147,9 @@ class Capability:
         share = np.where(np.isfinite(self.share), self.share, np.nan)
         refusals = []
         for refusal in self.refusals:
-            leaves = [{"parts": leaf.parts, "price": leaf.price.tolist()} for leaf in refusal.leaves]
+            leaves = [
+                {"parts": leaf.parts, "price": leaf.price.tolist()} for leaf in refusal.leaves
+            ]
             refusals.append(refusal._asdict() | {"leaves": leaves})
         return {
             "layout": self.layout,
@@ -156,6 +163,7 @@ class Capability:
             "worst_case": list(self.worst_case),
             "held": self.held.tolist(),
             "share": _without_nan(share.tolist()),
+            "loss_costs": {name: cost.tolist() for name, cost in self.loss_costs.items()},
             "loads": self.loads.tolist(),
             "cases": [
                 {
@@ -205,7 +213,8 @@ def capability(
         layout: the robot.
         loads: wrench (H, 6) on the robot of each heading [N, N m], body frame; None for 1 N
             horizontally from the heading, so that the values are the largest forces, in newton.
-            All other axes that the robot commands are held at 0.
+            All other axes that the robot commands are held at 0; those that it does not command
+            are free, unless a load is about them.
         headings: where the loads come from (H,) [deg], clockwise from ahead.
         lost: names of actuators that do not work already.
         flow: velocity of the robot relative to the water (6,) [m/s, rad/s]; None at rest.
@@ -227,18 +236,12 @@ def capability(
             f"loads: expected {len(angles)} x 6 finite numbers, a wrench for each heading, got an "
             f"array of shape {wrench.shape}"
         )
-    uncommanded = np.array(AXES)[~layout.commanded & (wrench != 0.0).any(axis=0)]
-    if len(uncommanded):
-        raise LayoutError(
-            f"loads: {', '.join(uncommanded.tolist())}: {layout.name} does not command this axis; "
-            "set it to 0 in the loads, or name it under `axes` of the layout"
-        )
+    # An axis that a load is about counts, whether the robot commands it or not.
+    counted = layout.commanded | (wrench != 0.0).any(axis=0)
     layout.indices(tuple(lost), "lost")
-    effectiveness = own_effectiveness(layout) * layout.commanded
+    effectiveness = own_effectiveness(layout) * counted
     shapes = shapes_of(layout, flow)
-    every = [
-        split_set(*each) for each in zip(layout.names, effectiveness, shapes, strict=True)
-    ]
+    every = [split_set(*each) for each in zip(layout.names, effectiveness, shapes, strict=True)]
     working = [name for name in layout.names if name not in lost]
     cases = []
     for name, taken in [("intact", ()), *((name, (name,)) for name in working)]:
@@ -301,7 +304,7 @@ def dp_capability(
         cases.append(Case(name, taken, sets))
         working = [i for i, each in enumerate(thrusters) if each.name not in without]
         scales.append(np.moveaxis(left[working], 0, -1))
-    return _answered(
+    answered = _answered(
         layout=layout.name,
         standard=DNV,
         unit="BF",
@@ -311,6 +314,23 @@ def dp_capability(
         loads=loads,
         scales=scales,
     )
+    # The first condition that is not held, or the last of all.
+    limiting = np.minimum(answered.values[0].astype(np.intp) + 1, len(WEATHER) - 1)
+    each_heading = np.arange(len(angles))
+    asked = -loads[each_heading, limiting]
+    with_all = answered.share[0, each_heading, limiting]
+    costs = {}
+    for loss in losses:
+        others = [name for name in losses if name != loss]
+        working = [i for i, each in enumerate(thrusters) if each.name not in lost]
+        scale = np.moveaxis(left[working][:, each_heading, limiting], 0, -1)
+        if loss == "ventilation":
+            scale = np.full_like(scale, CONSTANT_LOSS)
+        sets = ship_sets(thrusters, ship, lost, others)
+        share_without = largest_shares(sets, asked, scale).share
+        cost = 1.0 - with_all / np.maximum(share_without, np.finfo(float).tiny)
+        costs[loss] = np.where(cost > NEARLY, cost, 0.0)
+    return replace(answered, loss_costs=costs)
 
 
 def _failures(
@@ -379,4 +399,5 @@ def _answered(
         loads=loads,
         share=share,
         refusals=tuple(refusals),
+        loss_costs={},
     )

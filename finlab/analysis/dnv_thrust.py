@@ -122,7 +122,7 @@ def ship_thrusters(layout: Layout, ship: Ship) -> tuple[ShipThruster, ...]:
         else:
             raise LayoutError(
                 f"{actuator.name}: DNV-ST-0111 level 1 is computed of thrusters and azimuths, got "
-                f"a {actuator.KIND.name}; ask without --standard"
+                f"a {type(actuator).__name__.lower()}; ask without --standard"
             )
         actuator_type = known_type if data.type is None else data.type
         turns = arc is None or arc[0] < arc[1]
@@ -271,7 +271,7 @@ class Notch:
         """Returns the share that is left in directions [rad]."""
         turned = self.angle[0] + (angle - self.angle[0]) % TURN
         if not self.straight:
-            return np.interp(turned, self.angle, self.left, right=1.0)
+            return np.asarray(np.interp(turned, self.angle, self.left, right=1.0))
         share = np.ones(np.shape(angle))
         for k in range(len(self.angle) - 1):
             begin, end = self.angle[k : k + 2]

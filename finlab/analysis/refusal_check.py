@@ -15,7 +15,7 @@ from typing import Any
 def support(piece: dict[str, Any], pull: tuple[float, float]) -> float:
     """Returns the most that a force of a convex set earns at a pull (2,) [1/N]."""
     if "corners_n" in piece:
-        return max(x * pull[0] + y * pull[1] for x, y in piece["corners_n"])
+        return float(max(x * pull[0] + y * pull[1] for x, y in piece["corners_n"]))
     center = piece["center_rad"]
     half_angle = piece["half_angle_rad"]
     turn = math.remainder(math.atan2(pull[1], pull[0]) - center, 2.0 * math.pi)

@@ -59,7 +59,8 @@ class Piece(NamedTuple):
         # Beyond the ends of the arc, the distance to the nearer radius counts.
         beyond = np.maximum(np.abs(turn) - self.half_angle, 0.0)
         distance = size * np.sin(np.minimum(beyond, 0.5 * np.pi))
-        return (size <= self.radius + margin) & (distance <= margin)
+        is_within: NDArray[np.bool_] = (size <= self.radius + margin) & (distance <= margin)
+        return is_within
 
     def to_dict(self) -> dict[str, Any]:
         """Returns what a file holds of it."""
