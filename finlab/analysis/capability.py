@@ -17,11 +17,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from finlab.analysis.capability_text import capability_blocks, capability_picture
 from finlab.analysis.dnv_loads import WEATHER, total_load
 from finlab.analysis.dnv_thrust import CONSTANT_LOSS, LOSSES, ship_sets, ship_thrusters, thrust_left
 from finlab.analysis.ship_file import Ship
 from finlab.analysis.split_sets import Leaf, SplitSet, largest_shares, split_set
 from finlab.arrays import NEARLY, NOTHING, Array
+from finlab.display import html, text
 from finlab.errors import LayoutError
 from finlab.forces.force_sets import shapes_of
 from finlab.layout import Layout
@@ -31,7 +33,7 @@ HEADINGS = tuple(10.0 * k for k in range(36))
 """Headings of a plot [deg]; the standard asks for steps of at most ten degrees ([2.4.6])."""
 MAX_HEADINGS = 3600
 """Most headings of a plot."""
-ROUNDING = 1e-9
+HELD_MARGIN = 1e-9
 """Share by which a load may exceed what can be held and still counts as held [1]."""
 BOW_SECTOR = 30.0
 """Headings on either side of the bow that the first number of a notation is about [deg]."""
@@ -94,7 +96,7 @@ class Capability:
     @property
     def held(self) -> NDArray[np.bool_]:
         """Whether each load can be held (C, H, K)."""
-        return np.asarray(self.share >= 1.0 - ROUNDING)
+        return np.asarray(self.share >= 1.0 - HELD_MARGIN)
 
     @property
     def utilisation(self) -> Array:
@@ -187,10 +189,10 @@ class Capability:
         return "\n".join(lines) + "\n"
 
     def __str__(self) -> str:
-        from finlab.analysis.capability_text import capability_blocks
-        from finlab.display import text
-
         return text(capability_blocks(self))
+
+    def _repr_html_(self) -> str:
+        return html(capability_blocks(self), lambda: capability_picture(self))
 
 
 def _without_nan(values: Any) -> Any:
@@ -376,7 +378,7 @@ def _answered(
         answer = largest_shares(case.sets, -loads.reshape(-1, 6), flat_scale)
         share[c] = answer.share.reshape(n_headings, n_conditions)
         for q, leaves in enumerate(answer.leaves):
-            is_held = standard is not None and answer.share[q] >= 1.0 - ROUNDING
+            is_held = standard is not None and answer.share[q] >= 1.0 - HELD_MARGIN
             if leaves and not is_held:
                 heading, condition = divmod(q, n_conditions)
                 refusals.append(

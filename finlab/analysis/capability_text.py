@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -14,10 +15,8 @@ if TYPE_CHECKING:
 
 Capability = Any
 """`finlab.analysis.Capability`, which shows itself by what is here."""
-UNIT_WORDS = {"N": "largest force [N]", "1": "share of the load", "BF": "DP capability number"}
-"""What the values of a plot are, by their unit."""
-PLAIN_UNITS = {"1": "", "BF": ""}
-"""Units that no heading of a column has: a share, and a number of Beaufort."""
+LARGE_FORCE = 1e4
+"""Force from which a plot is in kN [N]."""
 FEW_HEADINGS = 4
 """Most headings that a sentence names."""
 
@@ -59,17 +58,37 @@ def heading_rows(capability: Capability) -> list[HeadingRow]:
     return rows
 
 
+class Shown(NamedTuple):
+    """How the values of a plot are shown."""
+
+    words: str
+    """What they are."""
+    unit: str
+    """Their unit; empty of shares and numbers of Beaufort."""
+    scale: float
+    """Factor from the plot's unit to that one."""
+    digits: Callable[[float], str]
+    """Scaled value -> its text."""
+
+
+def shown_values(capability: Capability) -> Shown:
+    """Returns how the values of a plot are shown, by its unit and its largest value."""
+    if capability.standard is not None:
+        return Shown("DP capability number", "", 1.0, lambda value: f"{value:.0f}")
+    if capability.unit == "1":
+        return Shown("share of the load", "", 1.0, three_digits)
+    if float(capability.values.max(initial=0.0)) >= LARGE_FORCE:
+        return Shown("largest force", "kN", 1e-3, three_digits)
+    return Shown("largest force", "N", 1.0, three_digits)
+
+
 def capability_columns(capability: Capability) -> tuple[Column, ...]:
     """Returns the columns of the table; a row is a `HeadingRow`."""
-    unit = PLAIN_UNITS.get(capability.unit, capability.unit)
-
-    def number(value: float) -> str:
-        return f"{value:.0f}" if capability.standard else three_digits(value)
-
+    _, unit, scale, digits = shown_values(capability)
     columns = [
         Column("heading", lambda row: row.heading, "deg", digits=lambda value: f"{value:g}"),
-        Column("intact", lambda row: row.value, unit, digits=number),
-        Column("one lost", lambda row: row.worst, unit, digits=number),
+        Column("intact", lambda row: scale * row.value, unit, digits=digits),
+        Column("one lost", lambda row: scale * row.worst, unit, digits=digits),
         Column("worst without", lambda row: row.worst_case, is_text=True),
     ]
     for name in capability.loss_costs:
@@ -97,12 +116,13 @@ def capability_remarks(capability: Capability) -> list[str]:
     names = [f"{capability.headings[h]:g}" for h in weakest[:FEW_HEADINGS]]
     if len(weakest) > FEW_HEADINGS:
         names.append("others")
-    value = f"{least:.0f}" if capability.standard else three_digits(least)
+    shown = shown_values(capability)
+    value = " ".join([shown.digits(shown.scale * least), shown.unit]).rstrip()
     case = capability.worst_case[weakest[0]]
     lost = "intact" if len(capability.cases) == 1 else f"without {case}"
     sentences.append(
-        f"{capability.layout}{words}: the least {UNIT_WORDS[capability.unit]} is {value}, from "
-        f"{listed(names)} deg, {lost}."
+        f"{capability.layout}{words} is weakest from {listed(names)} deg: {shown.words} {value}, "
+        f"{lost}."
     )
     n_refused = int((~capability.held).sum()) if capability.unit != "N" else 0
     if n_refused:
@@ -122,10 +142,13 @@ def capability_picture(capability: Capability) -> Figure:
     """Returns the polar plot."""
     from finlab.display.pictures import polar_picture
 
-    curves = {case.name: capability.values[c] for c, case in enumerate(capability.cases)}
+    shown = shown_values(capability)
+    values = shown.scale * capability.values
+    curves = {case.name: values[c] for c, case in enumerate(capability.cases)}
     title = capability.layout
     if capability.notation is not None:
         numbers = ", ".join(str(number) for number in capability.notation)
         title = f"{capability.layout}: DP capability-L1({numbers})"
-    worst = capability.worst if len(capability.cases) > 1 else None
-    return polar_picture(title, UNIT_WORDS[capability.unit], capability.headings, curves, worst)
+    worst = shown.scale * capability.worst if len(capability.cases) > 1 else None
+    words = f"{shown.words} [{shown.unit}]" if shown.unit else shown.words
+    return polar_picture(title, words, capability.headings, curves, worst)

@@ -66,7 +66,7 @@ SKEG_REACH = {False: 15.0, True: 8.0}
 """Diameters within which a skeg costs thrust, open and ducted ([3.11.5])."""
 SKEG_WIDTH = 0.6
 """Of the race at a skeg, half the width over the diameter."""
-CORNER_STEP = math.radians(1.0)
+CORNER_STEP = math.pi / 180.0
 """Steps of direction of a polygon: within its arc by at most 4e-5 of the radius."""
 SAME_DIRECTION = 1e-9
 """Difference of direction that is rounding [rad]."""
