@@ -1,5 +1,5 @@
 """Abilities of a layout, and their improvement: authority, attainable sets, power, score cards,
-optimization.
+capability plots, optimization.
 
 It works from the actuators' own laws with numpy and scipy.
 """
@@ -9,6 +9,9 @@ from finlab.analysis.authority import Authority as Authority
 from finlab.analysis.authority import Loss as Loss
 from finlab.analysis.authority import authority as authority
 from finlab.analysis.authority import losses as losses
+from finlab.analysis.capability import Capability as Capability
+from finlab.analysis.capability import capability as capability
+from finlab.analysis.capability import dp_capability as dp_capability
 from finlab.analysis.goals import GOALS as GOALS
 from finlab.analysis.moves import Bounds as Bounds
 from finlab.analysis.moves import mirror_pairs as mirror_pairs
@@ -20,6 +23,8 @@ from finlab.analysis.score_card import least_power as least_power
 from finlab.analysis.score_card import score_card as score_card
 from finlab.analysis.second_losses import SecondLoss as SecondLoss
 from finlab.analysis.second_losses import second_losses as second_losses
+from finlab.analysis.ship_file import Ship as Ship
+from finlab.analysis.ship_file import read_ship as read_ship
 from finlab.forces.attainable import AttainableSet as AttainableSet
 from finlab.forces.attainable import attainable_set as attainable_set
 
@@ -29,17 +34,22 @@ __all__ = [
     "AttainableSet",
     "Authority",
     "Bounds",
+    "Capability",
     "Improvement",
     "Loss",
     "Progress",
     "ScoreCard",
     "SecondLoss",
+    "Ship",
     "attainable_set",
     "authority",
+    "capability",
+    "dp_capability",
     "least_power",
     "losses",
     "mirror_pairs",
     "optimize_layout",
+    "read_ship",
     "score_card",
     "second_losses",
 ]

@@ -34,6 +34,10 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "finlab layout show A --lost front_right",
         "finlab layout show A --json card.json",
     ),
+    "layout capability": (
+        "finlab layout capability bluerov2_heavy --plot polar.png",
+        "finlab layout capability catamaran --headings 72 --csv polar.csv",
+    ),
     "layout optimize": (
         "finlab layout optimize A --actuators front_right front_left -o better.yaml",
         "finlab layout optimize bluerov2 --actuators front_left --goal worst_single_failure -o "
@@ -132,6 +136,7 @@ VERBS = {
     "allocate": "finlab.cli.robot_verbs:allocate",
     "layout check": "finlab.cli.layout_verbs:check",
     "layout show": "finlab.cli.layout_verbs:show",
+    "layout capability": "finlab.cli.layout_verbs:capability",
     "layout convert": "finlab.cli.layout_verbs:convert_layout",
     "layout optimize": "finlab.cli.layout_verbs:optimize",
     "data generate": "finlab.cli.train_verbs:generate",

@@ -1,4 +1,5 @@
-"""`finlab layout check|show|optimize|convert`: checks, shows, improves and converts layouts."""
+"""`finlab layout check|show|capability|optimize|convert`: checks, shows, improves and converts
+layouts."""
 
 from __future__ import annotations
 
@@ -72,6 +73,77 @@ def show(
     values = card.to_dict() | {"second_losses": [asdict(pair) for pair in pairs]}
     pair_text = text(pair_blocks(pairs, card.n_actuators))
     shared_options.put_json(values, json, f"{robot}\n\n{card}\n\n{pair_text}")
+
+
+def capability(
+    layout: shared_options.Robot,
+    standard: Literal["dnv"] | None = None,
+    ship: Annotated[Path | None, arg(metavar="FILE.yaml")] = None,
+    loads: Annotated[Path | None, arg(metavar="FILE.csv")] = None,
+    headings: Annotated[int, arg(metavar="N")] = 36,
+    lost: shared_options.Lost = (),
+    flow: shared_options.Flow = None,
+    losses: Annotated[
+        tuple[Literal["ventilation", "flushing", "skeg"], ...] | None, arg(metavar="LOSS...")
+    ] = None,
+    plot: Annotated[Path | None, arg(metavar="FILE")] = None,
+    csv: Annotated[Path | None, arg(metavar="FILE.csv")] = None,
+    json: shared_options.JsonFile = None,
+) -> None:
+    """Print by heading the largest steady load that a robot or ship can hold, with all actuators
+    and after each single loss.
+
+    Without further options it is the largest force from each heading, all other axes held at 0.
+
+    Args:
+        standard: dnv for DP capability numbers by DNV-ST-0111, level 1; it takes --ship.
+        ship: file of a ship's particulars, with a block `ship:`.
+        loads: table with the load of each heading: columns heading_deg and Fx to Tz [N, N m]; the
+            result is the share of it that can be held.
+        headings: how many headings, evenly spaced around the robot.
+        lost: name of an actuator that does not work already.
+        losses: losses of thrust that count besides the constant one; all of the standard's by
+            default.
+        plot: file for the polar plot, .png, .svg or .pdf (needs matplotlib, extra plot).
+        csv: file for a table with a column for each loss.
+    """
+    from finlab.analysis.capability import MAX_HEADINGS, dp_capability
+    from finlab.analysis.capability import capability as capability_by_loads
+    from finlab.analysis.capability_text import capability_picture
+    from finlab.analysis.dnv_thrust import LOSSES
+    from finlab.analysis.load_file import read_loads
+    from finlab.analysis.ship_file import read_ship
+    from finlab.display.figures import check_figure_file, write_figure
+    from finlab.errors import CommandError, DataError
+    from finlab.files.worker import in_worker
+    from finlab.whole_file import write_whole
+
+    shared_options.check_json_file(json)
+    shared_options.check_json_file(csv, "csv")
+    check_figure_file(plot)
+    if (standard is None) != (ship is None):
+        raise CommandError("expected --standard dnv and --ship FILE together, got one of them")
+    if standard is not None and (loads is not None or flow is not None):
+        raise CommandError("--standard dnv has loads of its own: leave out --loads and --flow")
+    if standard is None and losses is not None:
+        raise CommandError("--losses are those of a standard: expected --standard dnv, too")
+    if not 1 <= headings <= MAX_HEADINGS:
+        raise CommandError(f"headings: expected 1 to {MAX_HEADINGS} of them, got {headings}")
+    robot, lost_names = shared_options.open_robot(layout, lost)
+    angles = tuple(360.0 * k / headings for k in range(headings))
+    if ship is not None:
+        known = LOSSES if losses is None else losses
+        answer = dp_capability(robot, in_worker(read_ship, ship), angles, lost_names, known)
+    elif loads is not None:
+        angles, wrench = in_worker(read_loads, loads)
+        answer = capability_by_loads(robot, wrench, angles, lost_names, flow)
+    else:
+        answer = capability_by_loads(robot, None, angles, lost_names, flow)
+    if csv is not None:
+        write_whole(csv, answer.to_csv(), DataError)
+    if plot is not None:
+        write_figure(lambda: capability_picture(answer), plot)
+    shared_options.put_json(answer.to_dict(), json, str(answer))
 
 
 def convert_layout(

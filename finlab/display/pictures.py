@@ -22,6 +22,9 @@ ARROW_SHARE = 0.35
 HULL_EXPONENT = {"box": 0.2}
 """Exponent of the superellipsoid that stands for a hull; 1 is an ellipsoid."""
 
+MAX_LABELED = 16
+"""Most single losses of a polar figure that have names and colors of their own."""
+
 
 def robot_picture(layout: Any, forces: Array | None = None) -> Figure:
     """Returns a figure of a robot in the body frame, with an arrow at each actuator.
@@ -115,4 +118,53 @@ def ranges_picture(title: str, names: Sequence[str], low: Array, high: Array) ->
         side.set(xlabel=unit)
         side.invert_yaxis()
     figure.suptitle(title)
+    return figure
+
+
+def polar_picture(
+    title: str,
+    words: str,
+    headings: Sequence[float],
+    curves: Mapping[str, Array],
+    worst: Array | None,
+) -> Figure:
+    """Returns a polar figure by heading, ahead at the top, clockwise.
+
+    Args:
+        title: the figure's title.
+        words: what the values are.
+        headings: directions (H,) [deg].
+        curves: values (H,) of each case; the first is the main one, the others are single losses.
+        worst: the least of these (H,), which is filled; None where there are none.
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7.6, 5.6), layout="constrained")
+    axes: Any = figure.add_subplot(projection="polar")
+    axes.set_theta_zero_location("N")
+    axes.set_theta_direction(-1)
+    order = np.argsort(np.asarray(headings) % 360.0)
+    closed = np.append(order, order[:1])
+    angle = np.deg2rad(np.asarray(headings)[closed])
+    names = list(curves)
+    if worst is not None:
+        axes.fill(angle, worst[closed], color=COLORS[1], alpha=0.18)
+    for k, name in enumerate(names[1:]):
+        if len(names) - 1 > MAX_LABELED:
+            axes.plot(angle, curves[name][closed], color="0.6", lw=0.7)
+            continue
+        # Further losses than colors have other dashes.
+        color = COLORS[2 + k % (len(COLORS) - 2)]
+        style = ("-", "--", ":", "-.")[k // (len(COLORS) - 2) % 4]
+        axes.plot(angle, curves[name][closed], style, color=color, lw=1.0, label=f"without {name}")
+    if worst is not None:
+        axes.plot(angle, worst[closed], color=COLORS[1], lw=2.2, label="worst single loss")
+    axes.plot(angle, curves[names[0]][closed], color=COLORS[0], lw=2.2, label=names[0])
+    highest = max(float(np.max(values)) for values in curves.values())
+    axes.set_ylim(0.0, highest * 1.05 if highest > 0.0 else 1.0)
+    axes.set_thetagrids(np.arange(0, 360, 30))
+    axes.set_rlabel_position(15)
+    axes.grid(alpha=0.35)
+    axes.set_title(f"{title}\n{words}, by where the load comes from", fontsize="medium")
+    figure.legend(loc="outside right upper", frameon=False, fontsize="small")
     return figure

@@ -358,7 +358,7 @@ def _gauge_shape(
     gauge_angle = TURN / len(gauge) * np.arange(len(gauge) + 1)
     closed_gauge = np.append(gauge, gauge[0])
     arcs = [(-1.0, 1.0)]
-    if _is_wide(half_angle):
+    if is_wide(half_angle):
         arcs += [(0.0, 1.0), (-1.0, 0.0)]  # its upper and its lower half, see `convex_parts`
     hulls = []
     for begin, end in arcs:
@@ -402,8 +402,8 @@ def _polygon(directions: Array, points: Array, half_angle: float, sides: int) ->
     return Shape(directions, radius, angle, half_angle, (corners,))
 
 
-def _is_wide(half_angle: Any) -> Any:
-    """Whether arcs of half angles [rad] are wider than half a turn and no full circle."""
+def is_wide(half_angle: Any) -> Any:
+    """Returns whether arcs of half angles [rad] are wider than half a turn and no full circle."""
     return (half_angle > np.pi / 2 + HALF_TURN_TOLERANCE) & (half_angle < np.pi)
 
 
@@ -411,7 +411,7 @@ def wide_arcs(sets: ForceSets) -> NDArray[np.intp]:
     """Returns the indices of working actuators whose arcs are wider than half a turn and no full
     circle."""
     is_working = (sets.radius > 0.0).any(axis=0)
-    return np.flatnonzero(_is_wide(sets.sector_half_angle[0]) & is_working)
+    return np.flatnonzero(is_wide(sets.sector_half_angle[0]) & is_working)
 
 
 def convex_parts(sets: ForceSets) -> ForceSets:

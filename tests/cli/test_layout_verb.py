@@ -1,4 +1,4 @@
-"""`finlab layout check|show|optimize`, through `main` in this process."""
+"""`finlab layout check|show|capability|optimize`, through `main` in this process."""
 
 import json
 import re
@@ -8,9 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from finlab.analysis.refusal_check import faults
 from finlab.assets import shipped_layouts
 from finlab.cli import main
 from finlab.layout import load_layout
+from tests.analysis.supply_vessel import write_vessel
 from tests.terminal import refused
 
 
@@ -157,10 +159,44 @@ def test_optimize_within_reach(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert np.abs(moved).max() <= 0.03 + 1e-9
 
 
+def test_capability_writes_its_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    layout, ship = write_vessel(tmp_path, retractable=False)
+    json_file, csv, plot = (tmp_path / f"polar.{end}" for end in ("json", "csv", "svg"))
+    files = ["--json", str(json_file), "--csv", str(csv), "--plot", str(plot)]
+    question = ["--standard", "dnv", "--ship", str(ship), "--headings", "4"]
+    assert main(["layout", "capability", str(layout), *question, *files]) == 0
+    told = capsys.readouterr().out
+    assert "DP capability-L1(" in told and "worst without" in told
+    values = json.loads(json_file.read_text())
+    assert faults(values) == []
+    rows = [line.split(",") for line in csv.read_text().splitlines()]
+    assert rows[0][:2] == ["heading_deg", "intact"]
+    assert [float(row[1]) for row in rows[1:]] == values["values"][0]
+    assert plot.read_text().lstrip().startswith("<?xml")
+
+
+def test_capability_by_a_table_of_loads(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    loads = tmp_path / "loads.csv"
+    loads.write_text("heading_deg,Fx,Tz\n0,-10,0\n90,0,2\n")
+    arguments = ["--loads", str(loads), "--json"]
+    assert main(["layout", "capability", "catamaran", *arguments]) == 0
+    values = json.loads(capsys.readouterr().out)
+    assert values["headings_deg"] == [0.0, 90.0]
+    assert values["loads"][1] == [[0.0, 0.0, 0.0, 0.0, 0.0, 2.0]]
+    # Both azimuths push ahead at most 65.92 N each; the bow thruster cannot.
+    assert values["values"][0][0] == pytest.approx(2 * 65.92 / 10.0, rel=1e-6)
+    assert faults(values) == []
+
+
 @pytest.mark.parametrize(
     ("argv", "message"),
     [
         ("check", "expected at least one file"),
+        ("capability A --standard dnv", "expected --standard dnv and --ship FILE together"),
+        ("capability A --headings 0", "headings: expected 1 to"),
+        ("capability A --losses skeg", "expected --standard dnv, too"),
+        ("capability A --loads nowhere.csv", "no such file"),
+        ("capability A --plot OUT", "expected a file in an existing folder that ends in"),
         ("show A --lost nobody", "has no fin 'nobody'"),
         ("show turtle_hybrid --lost bow", "has no actuator 'bow'"),
         ("optimize A -o OUT --fins nobody", "has no fin 'nobody'"),

@@ -1,0 +1,115 @@
+"""Checks the certificates of a capability plot, by its JSON file and Python's `math` alone.
+
+A load is refused by prices of its axes. At a price, the actuators together can earn no more than
+the sum of what each one can earn by itself, its support function; a load that would earn more is
+out of reach. Actuators whose sets are not convex are covered by several prices: one for each leaf
+of a tree that chooses among their parts.
+
+This file imports nothing of finlab, so that it can be read, and trusted, by itself.
+"""
+
+import math
+from typing import Any
+
+
+def support(piece: dict[str, Any], pull: tuple[float, float]) -> float:
+    """Returns the most that a force of a convex set earns at a pull (2,) [1/N]."""
+    if "corners_n" in piece:
+        return float(max(x * pull[0] + y * pull[1] for x, y in piece["corners_n"]))
+    center = piece["center_rad"]
+    half_angle = piece["half_angle_rad"]
+    turn = math.remainder(math.atan2(pull[1], pull[0]) - center, 2.0 * math.pi)
+    if abs(turn) <= half_angle:
+        return float(piece["radius_n"] * math.hypot(*pull))
+    ends = []
+    for end in (center - half_angle, center + half_angle):
+        ends.append(math.cos(end) * pull[0] + math.sin(end) * pull[1])
+    return float(piece["radius_n"] * max(0.0, *ends))
+
+
+def proven_share(
+    sets: list[dict[str, Any]], scales: list[float], leaf: dict[str, Any], load: list[float]
+) -> float:
+    """Returns the share of a load that forces of a leaf cannot exceed, by the leaf's price.
+
+    Args:
+        sets: the actuators' sets.
+        scales: what is left of each actuator's forces [1].
+        leaf: `parts` by name, and `price`.
+        load: wrench (6,) that is to be held [N, N m]; the forces together oppose it.
+
+    Returns:
+        The bound; infinity where the price proves nothing.
+    """
+    price = leaf["price"]
+    earned = 0.0
+    for actuator, scale in zip(sets, scales, strict=True):
+        first, second = (
+            sum(p * w for p, w in zip(price, column, strict=True))
+            for column in actuator["wrench_per_newton"]
+        )
+        part = leaf["parts"].get(actuator["name"])
+        piece = actuator["cover"] if part is None else actuator["parts"][part]
+        earned += scale * support(piece, (first, second))
+    asked = -sum(p * w for p, w in zip(price, load, strict=True))
+    return earned / asked if asked > 0.0 else math.inf
+
+
+def covers(leaves: list[dict[str, Any]], sets: list[dict[str, Any]]) -> bool:
+    """Returns whether leaves leave out no choice among the parts of the actuators."""
+    if not leaves:
+        return False
+    names = {name for leaf in leaves for name in leaf["parts"]}
+    if any(not leaf["parts"] for leaf in leaves):
+        return True
+    for actuator in sets:
+        if actuator["name"] not in names or not actuator["parts"]:
+            continue
+        for part in range(len(actuator["parts"])):
+            chosen = []
+            for leaf in leaves:
+                if leaf["parts"].get(actuator["name"], part) == part:
+                    others = {k: v for k, v in leaf["parts"].items() if k != actuator["name"]}
+                    chosen.append({"parts": others})
+            if not covers(chosen, sets):
+                return False
+        return True
+    return False
+
+
+def faults(capability: dict[str, Any]) -> list[str]:
+    """Returns what is wrong with the certificates of a capability plot: nothing, if all hold.
+
+    Args:
+        capability: content of the JSON file.
+
+    Returns:
+        A sentence for each "no" without a certificate, and for each certificate that proves less
+        than it claims.
+    """
+    found = []
+    proved = set()
+    for refusal in capability["refusals"]:
+        case = capability["cases"][refusal["case"]]
+        heading = capability["headings_deg"][refusal["heading"]]
+        condition = capability["conditions"][refusal["condition"]]["name"]
+        where = f"{case['name']}, {heading:g} deg, {condition}"
+        load = capability["loads"][refusal["heading"]][refusal["condition"]]
+        leaves = refusal["leaves"]
+        if not covers(leaves, case["sets"]):
+            found.append(f"{where}: the leaves leave out a choice among parts")
+            continue
+        bounds = [proven_share(case["sets"], refusal["scales"], leaf, load) for leaf in leaves]
+        limit = refusal["share"] * (1.0 + 1e-9) + 1e-9
+        if not all(bound <= limit for bound in bounds):
+            found.append(f"{where}: the prices prove {max(bounds):g}, not {refusal['share']:g}")
+            continue
+        if refusal["share"] < 1.0:
+            proved.add((refusal["case"], refusal["heading"], refusal["condition"]))
+    for c, of_case in enumerate(capability["held"]):
+        for h, of_heading in enumerate(of_case):
+            for k, is_held in enumerate(of_heading):
+                if not is_held and (c, h, k) not in proved:
+                    name = capability["cases"][c]["name"]
+                    found.append(f"{name}, heading {h}, condition {k}: no certificate")
+    return found
