@@ -34,7 +34,7 @@ from finlab.analysis.proof_premises import (
 from finlab.arrays import Array
 from finlab.axes import AXES
 from finlab.errors import CommandError
-from finlab.forces.force_sets import SCALE, ForceSets, Shape, assembled
+from finlab.forces.force_sets import SCALE, ForceSets, Shape, assembled, force_sets
 from finlab.forces.reach import FINE, axis_ranges
 from finlab.layout import Layout
 
@@ -51,7 +51,7 @@ WRENCH_TOLERANCE = 1e-9
 """How near to a corner a wrench has to be where the robot has no authority over some direction, so
 that rounded axes leave no exact answer [N, N m]."""
 NO_REACH = 1e-6
-"""Share of the largest reach of any axis below which an axis counts as out of reach [1]."""
+"""Share of the strongest actuator's wrench below which an axis counts as out of reach [1]."""
 RIM_POINTS = 97
 """Points on the rim of a sector that the search takes for a polygon."""
 SMALL_LEAST = 0.01
@@ -111,6 +111,9 @@ def box_share(layout: Layout, share: float, free: Sequence[str] = ()) -> tuple[f
         layout: the robot.
         share: of the reach of each axis [1].
         free: axes that may take any wrench.
+
+    Raises:
+        CommandError: all axes are free, or the robot can push along none alone.
     """
     counted = [axis for axis in layout.axes if axis not in free]
     if not counted:
@@ -119,7 +122,12 @@ def box_share(layout: Layout, share: float, free: Sequence[str] = ()) -> tuple[f
     ranges = axis_ranges(layout, np.zeros(6))
     reach = np.nan_to_num(np.minimum(-ranges.low, ranges.high), nan=0.0, posinf=0.0, neginf=0.0)
     reach = np.where(layout.commanded, np.maximum(reach, 0.0), 0.0)
-    is_nothing = reach / SCALE < NO_REACH * (reach / SCALE).max()
+    strongest = float(force_sets(layout).unit[0])
+    is_nothing = reach / SCALE < NO_REACH * strongest
+    if is_nothing.all():
+        raise CommandError(
+            f"box-share: {layout.name} can push along no axis alone; give the half widths by --box"
+        )
     half_widths = np.where(is_nothing, 0.0, share * reach)
     return tuple(float(f"{half:.6g}") for half in half_widths)
 
