@@ -7,10 +7,12 @@ these to the safe side. Read it, then trust it. It takes from the file, as they 
 Proved: in each case (who is lost) every actuator has a convex set of forces, and each corner of the
 box is the wrench of forces out of these sets, whose power, a convex function, is within the budget.
 A wrench of the box is a weighted mean of corners, so the same mean of their forces gives it. Where
-a set is not convex, the case names a convex part, the same for all its corners.
+a set is not convex, a convex part is named, the same for all corners; a box may be split in two,
+each with parts of its own.
 
 Refuted: in one case, of one corner w, for a price y per newton and l per watt, no force of any
 actuator has a profit y.Bf - l.P(f) above a bound, and all bounds together are below y.w - l.budget.
+Where arcs are cut in two, there is such a price for each choice of halves.
 """
 
 import json
@@ -18,6 +20,7 @@ import sys
 from fractions import Fraction
 from itertools import combinations, product
 from math import isqrt
+from typing import Any
 
 AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
 FINE = 10**30  # square roots are rounded to this part of one
@@ -27,34 +30,36 @@ class WrongProof(Exception):
     """The file does not prove what it says."""
 
 
-def need(condition, words):
+def need(condition: Any, words: Any) -> None:
     if not condition:
         raise WrongProof(words)
 
 
-def number(text):
+def number(text: Any) -> Fraction:
     exponent = text.lower().partition("e")[2]
     need(len(text) < 5000 and abs(int(exponent or 0)) < 40, f"a number is out of range: {text:.40}")
     return Fraction(text)
 
 
-def dot(a, b):
-    return sum((x * y for x, y in zip(a, b, strict=True)), Fraction(0))
+def dot(a: Any, b: Any) -> Fraction:
+    return Fraction(sum(x * y for x, y in zip(a, b, strict=True)))
 
 
-def cross(a, b):  # of vectors in a plane: positive where b lies to the left of a
+def cross(
+    a: Any, b: Any
+) -> Fraction:  # of vectors in a plane: positive where b lies to the left of a
     return a[0] * b[1] - a[1] * b[0]
 
 
-def root_below(x):
+def root_below(x: Any) -> Fraction:
     return Fraction(isqrt(x.numerator * FINE**2 // x.denominator), FINE)
 
 
-def root_above(x):
+def root_above(x: Any) -> Fraction:
     return root_below(x) + Fraction(1, FINE)
 
 
-def raised(size, exponent, root, leftover):
+def raised(size: Any, exponent: Any, root: Any, leftover: Any) -> Fraction:
     """size^exponent by repeated square roots, rounded as `root` and `leftover` (min or max) are."""
     result = size ** int(exponent)
     rest = exponent - int(exponent)
@@ -69,7 +74,7 @@ def raised(size, exponent, root, leftover):
     return result * leftover(Fraction(1), size)
 
 
-def columns(actuator):
+def columns(actuator: Any) -> Any:
     """The wrench of 1 N along each axis a of an actuator at r: a, then r x a + k a."""
     x, y, z = actuator["position_m"]
     k = actuator["torque_per_newton_m"]
@@ -78,13 +83,13 @@ def columns(actuator):
         yield [*a, *(t + k * along for t, along in zip(torque, a, strict=True))]
 
 
-def turns_left(arc):
+def turns_left(arc: Any) -> bool:
     """Whether the arc from its first to its second direction is at most half a turn: convex."""
     a, b = arc
     return cross(a, b) >= 0
 
 
-def in_arc(arc, p):
+def in_arc(arc: Any, p: Any) -> bool:
     if arc is None:
         return True
     a, b = arc
@@ -93,7 +98,7 @@ def in_arc(arc, p):
     return cross(a, p) >= 0 and cross(p, b) >= 0 and dot(a, p) + dot(b, p) >= 0
 
 
-def check_actuator(actuator):
+def check_actuator(actuator: Any) -> None:
     name = actuator["name"]
     axes = actuator["axes"]
     need(len(axes) in (1, 2), f"{name}: one or two axes")
@@ -111,7 +116,7 @@ def check_actuator(actuator):
     if "points" in power:
         points = power["points"]
         slopes = []
-        for (x0, p0), (x1, p1) in zip(points, points[1:]):
+        for (x0, p0), (x1, p1) in zip(points, points[1:], strict=False):
             need(x0 < x1, f"{name}: the points of its power do not rise")
             slopes.append((p1 - p0) / (x1 - x0))
         need(slopes == sorted(slopes), f"{name}: its power is not convex")
@@ -125,7 +130,7 @@ def check_actuator(actuator):
         need(1 <= power["exponent"] <= 4, f"{name}: its power is not convex")
 
 
-def convex_part(actuator, part):
+def convex_part(actuator: Any, part: Any) -> Any:
     """The arc, largest force and least force ahead of the convex part of an actuator's forces."""
     name = actuator["name"]
     least, most = actuator["force_n"]
@@ -149,7 +154,7 @@ def convex_part(actuator, part):
     return arc, most, (part["ahead"], least)  # |p| >= ahead.p >= least
 
 
-def in_part(actuator, part, force):
+def in_part(actuator: Any, part: Any, force: Any) -> bool:
     if len(actuator["axes"]) == 1:
         least, most = actuator["force_n"]
         return least <= force[0] <= most
@@ -158,7 +163,7 @@ def in_part(actuator, part, force):
     return in_arc(arc, force) and dot(force, force) <= most**2 and is_ahead
 
 
-def most_watts(actuator, force):
+def most_watts(actuator: Any, force: Any) -> Fraction:
     """An upper bound of the power of a force."""
     power = actuator["power"]
     is_plane = len(force) == 2
@@ -173,7 +178,7 @@ def most_watts(actuator, force):
     return p0 + (p1 - p0) / (x1 - x0) * (x - x0)
 
 
-def most_gain(actuator, price):
+def most_gain(actuator: Any, price: Any) -> Fraction:
     """An upper bound of price.d over the directions d in which an actuator can push."""
     arc = actuator["arc"]
     if in_arc(arc, price):
@@ -181,7 +186,7 @@ def most_gain(actuator, price):
     return max(Fraction(0), dot(price, arc[0]), dot(price, arc[1]))
 
 
-def most_profit(actuator, price, watt_price, touch):
+def most_profit(actuator: Any, price: Any, watt_price: Any, touch: Any) -> Fraction:
     """An upper bound of price.f - watt_price P(f) over all forces f of an actuator."""
     least, most = actuator["force_n"]
     power = actuator["power"]
@@ -208,12 +213,13 @@ def most_profit(actuator, price, watt_price, touch):
     return best
 
 
-def corner_wrench(box, signs):
-    need(set(signs) <= set("+-0") and len(signs) == len(box), f"corner {signs}: no such corner")
-    return [half * ("-0+".index(sign) - 1) for half, sign in zip(box, signs, strict=True)]
+def corner_wrench(low: Any, high: Any, signs: Any) -> list[Fraction]:
+    need(set(signs) <= set("+-0") and len(signs) == len(low), f"corner {signs}: no such corner")
+    ends = [{"-": a, "0": (a + b) / 2, "+": b} for a, b in zip(low, high, strict=True)]
+    return [end[sign] for end, sign in zip(ends, signs, strict=True)]
 
 
-def checked_premises(proof):
+def checked_premises(proof: Any) -> Any:
     """The actuators with their columns, and the statement with the half widths of its box."""
     need(proof["format"] == "finlab-proof" and proof["version"] == 1, "no proof of version 1")
     statement = proof["statement"]
@@ -234,7 +240,7 @@ def checked_premises(proof):
     return actuators, {**statement, "half_widths": half_widths}
 
 
-def check(text):
+def check(text: Any) -> str:
     """Returns the verdict of a file, in a sentence; raises WrongProof where it proves nothing."""
     proof = numbers_in(json.loads(text, parse_float=str, parse_int=str))
     actuators, statement = premises = checked_premises(proof)
@@ -247,7 +253,9 @@ def check(text):
         for n_lost in range(count + 1):
             for lost in combinations(actuators, n_lost):
                 need(frozenset(lost) in cases, f"no case in which {lost or 'nobody'} is lost")
-                check_case(cases[frozenset(lost)], premises)
+                case = cases[frozenset(lost)]
+                high = statement["half_widths"]
+                check_box(case, case["lost"], [-half for half in high], high, premises)
     box = ", ".join(f"{axis} +-{float(half):g}" for axis, half in statement["box"].items())
     free = f", {', '.join(statement['free'])} free" if statement["free"] else ""
     power = statement["power_w"]
@@ -259,21 +267,26 @@ def check(text):
     return f"{proof['verdict']}: any wrench of {box}{free}, any {count} lost{budget}{near}{mean}"
 
 
-def check_case(case, premises):
+def check_box(case: Any, lost: Any, low: Any, high: Any, premises: Any) -> None:
     actuators, statement = premises
-    lost = case["lost"]
+    if "axis" in case:
+        i, at = list(statement["box"]).index(case["axis"]), case["at"]
+        need(low[i] < at < high[i], "a box is split outside of it")
+        check_box(case["below"], lost, low, [*high[:i], at, *high[i + 1 :]], premises)
+        check_box(case["above"], lost, [*low[:i], at, *low[i + 1 :]], high, premises)
+        return
     budget = statement["power_w"]
     parts = {}
     for name, actuator in actuators.items():
         if len(actuator["axes"]) == 2 and name not in lost:
             parts[name] = convex_part(actuator, case["parts"].get(name, {}))
-    for signs in product(*("+-" if half else "0" for half in statement["half_widths"])):
+    for signs in product(*("+-" if a < b else "0" for a, b in zip(low, high, strict=True))):
         corner = "".join(signs)
         where = f"lost {', '.join(lost) or 'nobody'}, corner {corner}"
         need(corner in case["corners"], f"{where}: is missing")
         forces = case["corners"][corner]
         need(set(forces) == set(actuators) - set(lost), f"{where}: not the forces of those left")
-        missing = corner_wrench(statement["half_widths"], corner)
+        missing = corner_wrench(low, high, corner)
         watts = Fraction(0)
         for name, force in forces.items():
             actuator = actuators[name]
@@ -288,30 +301,44 @@ def check_case(case, premises):
         need(budget is None or watts <= budget, f"{where}: takes more power")
 
 
-def check_counterexample(example, premises):
+def check_counterexample(example: Any, premises: Any) -> None:
     actuators, statement = premises
     lost = example["lost"]
-    price = example["price"]
-    watt_price = example["watt_price"]
-    budget = statement["power_w"]
     few = len(set(lost)) <= statement["lost"] and set(lost) <= set(actuators)
     need(few, "others are lost than the statement says")
-    need(watt_price == 0 if budget is None else watt_price >= 0, "no such price per watt")
-    wrench = corner_wrench(statement["half_widths"], example["corner"])
-    value = dot(price, wrench) - statement["wrench_tolerance"] * sum(map(abs, price))
-    profit = watt_price * (budget or 0)
-    for name, actuator in actuators.items():
-        if name not in lost:
-            own_price = [dot(price, column) for column in actuator["columns"]]
-            touch = example["touch"].get(name, Fraction(0))
-            profit += most_profit(actuator, own_price, watt_price, touch)
+    high = statement["half_widths"]
+    wrench = corner_wrench([-half for half in high], high, example["corner"])
+    cuts = example["cuts"]
+    halves = []
+    for name, middle in cuts.items():
+        first, last = actuators[name]["arc"]
+        need(actuators[name]["force_n"][0] >= 0, f"{name}: pushes astern")
+        halves.append(((first, middle), (middle, last)))
+        inside = in_arc((first, last), middle) and dot(middle, middle) >= 1
+        need(inside and all(map(turns_left, halves[-1])), f"{name}: is not cut in two halves")
+    need(len(example["prices"]) == 2 ** len(cuts), "a price for each choice of halves is missing")
+    for chosen, price in zip(product(*halves), example["prices"], strict=True):
+        arcs = dict(zip(cuts, chosen, strict=True))
+        in_halves = [{**a, "arc": arcs.get(name, a["arc"])} for name, a in actuators.items()]
+        check_price(price, wrench, [a for a in in_halves if a["name"] not in lost], statement)
+
+
+def check_price(price: Any, wrench: Any, actuators: Any, statement: Any) -> None:
+    per_wrench, per_watt, budget = price["price"], price["watt_price"], statement["power_w"]
+    need(per_watt == 0 if budget is None else per_watt >= 0, "no such price per watt")
+    value = dot(per_wrench, wrench) - statement["wrench_tolerance"] * sum(map(abs, per_wrench))
+    profit = per_watt * (budget or 0)
+    for actuator in actuators:
+        own_price = [dot(per_wrench, column) for column in actuator["columns"]]
+        touch = price["touch"].get(actuator["name"], Fraction(0))
+        profit += most_profit(actuator, own_price, per_watt, touch)
     need(profit < value, "the price does not separate the corner")
 
 
-NAMES = ("format", "name", "type", "free", "verdict", "layout", "corner", "remarks", "mean")
+NAMES = ("format", "name", "type", "free", "verdict", "layout", "corner", "axis", "remarks", "mean")
 
 
-def numbers_in(value, key=""):
+def numbers_in(value: Any, key: Any = "") -> Any:
     """The values of a file, with fractions in place of the numbers."""
     if isinstance(value, dict):
         inner = {}
@@ -324,7 +351,7 @@ def numbers_in(value, key=""):
     return number(value) if isinstance(value, str) and key not in NAMES else value
 
 
-def main(path):
+def main(path: Any) -> int:
     try:
         with open(path, encoding="utf-8") as file:
             print(check(file.read()))

@@ -44,7 +44,7 @@ HALF_TURN_TOLERANCE = 1e-9
 INNER_SHARE = 0.3
 """Where a sector's inner point lies between its tip and its rim [1]."""
 MAX_CUT = 3
-"""Most actuators whose wide arcs are cut in several ways: each has three parts to choose from."""
+"""Most actuators whose wide arcs have several parts to choose from, three each."""
 
 
 class NotSettledError(FinlabError):
@@ -80,6 +80,8 @@ class ProofActuator:
     """Convex parts to choose from, at least one."""
     hull: Part
     """The whole set, convex or not."""
+    halves: tuple[Part, ...] = ()
+    """Both halves of a wide arc, which together are the whole set; none of others."""
 
     @property
     def name(self) -> str:
@@ -285,7 +287,8 @@ def _points(x: Array, y: Array) -> list[list[float]]:
     # A parabola far below the margin keeps slopes apart that rounding would bring out of order.
     span = x[-1] - x[0]
     curved = curved + 1e-9 * (curved.max() + 1e-12) * ((x - x[0]) / span) ** 2
-    return np.stack([x, curved], axis=-1).tolist()
+    points: list[list[float]] = np.stack([x, curved], axis=-1).tolist()
+    return points
 
 
 def _plane(
@@ -308,7 +311,19 @@ def _plane(
         part = _part(values, radius, part_center, quarter)
         part.values["arc"] = _edges(part_center, quarter)
         parts.append(part)
-    return ProofActuator(values, radius, outer, tuple(parts), hull)
+    halves = []
+    for share in (-0.5, 0.5):
+        half = Part({}, center + share * half_angle, 0.5 * half_angle, 0.0, np.zeros(2))
+        halves.append(half)
+    can_cut = values["force_n"][0] >= 0.0
+    return ProofActuator(
+        values, radius, outer, tuple(parts), hull, tuple(halves) if can_cut else ()
+    )
+
+
+def middle_of(part: Part) -> list[float]:
+    """Returns the direction in the middle of an arc, as a file has it."""
+    return _direction(part.sector_center)
 
 
 def _part(values: dict[str, Any], radius: float, center: float, half_angle: float) -> Part:

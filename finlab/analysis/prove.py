@@ -20,7 +20,7 @@ from itertools import combinations, product
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from finlab.analysis import check_proof
 from finlab.analysis.proof_premises import (
@@ -28,6 +28,7 @@ from finlab.analysis.proof_premises import (
     Part,
     ProofActuator,
     decimals,
+    middle_of,
     part_choices,
     proof_actuators,
 )
@@ -52,6 +53,10 @@ WRENCH_TOLERANCE = 1e-9
 that rounded axes leave no exact answer [N, N m]."""
 NO_REACH = 1e-6
 """Share of the strongest actuator's wrench below which an axis counts as out of reach [1]."""
+MAX_SPLITS = 6
+"""Most times that a box is split where arcs are wide, one split in the other."""
+MAX_CUT_ARCS = 5
+"""Most wide arcs that are cut in halves for a counterexample: each doubles the number of prices."""
 RIM_POINTS = 97
 """Points on the rim of a sector that the search takes for a polygon."""
 SMALL_LEAST = 0.01
@@ -177,7 +182,7 @@ def _checked_box(layout: Layout, box: ArrayLike, free: Sequence[str]) -> dict[st
     unknown = [name for name in free if name not in AXES]
     if unknown:
         raise CommandError(f"free: expected axes among {', '.join(AXES)}, got {unknown[0]!r:.60}")
-    half_widths = {}
+    half_widths: dict[str, float] = {}
     for axis, half, is_commanded in zip(AXES, values.tolist(), layout.commanded, strict=True):
         if is_commanded and axis not in free:
             half_widths[axis] = half
@@ -201,6 +206,21 @@ def _statement(layout: Layout, box: dict[str, float], lost: int, power: float | 
     return f"{layout.name} gives any wrench of {', '.join(parts)}{freed}, {who}{limit}."
 
 
+class _Corners(NamedTuple):
+    """A box and its corners."""
+
+    low: list[Fraction]
+    """Least value along each axis that counts [N, N m]."""
+    high: list[Fraction]
+    """Largest value along each [N, N m]."""
+    names: list[str]
+    """Of each corner (C) the signs along these axes, 0 where the box has no width."""
+    exact: list[list[Fraction]]
+    """Wrenches (C) along these axes [N, N m]."""
+    wrench: Array
+    """The same (C, 6)."""
+
+
 class _Search:
     """The search for a proof of one statement."""
 
@@ -208,7 +228,7 @@ class _Search:
         self, layout: Layout, box: dict[str, float], lost: int, power: float | None
     ) -> None:
         """Takes the robot and the statement. Raises NotSettledError: no premises are certain."""
-        self._layout = replace(layout, axes=tuple(box)) if len(box) < 6 else layout
+        self._layout = replace(layout, axes=tuple(axis for axis in AXES if axis in box))
         self._box = box
         self._lost = lost
         self._power = power
@@ -217,13 +237,8 @@ class _Search:
             raise NotSettledError("no actuator gives a force at rest")
         self._names = [actuator.name for actuator in self._actuators]
         self._rows = [AXES.index(axis) for axis in box]
-        signs = [("+", "-") if half else ("0",) for half in box.values()]
-        self._corners = ["".join(corner) for corner in product(*signs)]
         half_widths = list(map(_fraction, box.values()))
-        self._exact_wrench = [check_proof.corner_wrench(half_widths, c) for c in self._corners]
-        wrench = np.zeros((len(self._corners), 6))
-        wrench[:, self._rows] = np.array(self._exact_wrench, np.float64)
-        self._wrench = wrench
+        self._whole = self._corners_of([-half for half in half_widths], half_widths)
         self._columns = self._exact_columns()
         self._effectiveness = np.zeros((len(self._actuators), 2, 6))
         for i, columns in enumerate(self._columns):
@@ -231,6 +246,15 @@ class _Search:
                 self._effectiveness[i, k, self._rows] = np.array(column, np.float64)
         self._tolerance = 0.0
         self._allocator: Any = None
+
+    def _corners_of(self, low: list[Fraction], high: list[Fraction]) -> _Corners:
+        """The corners of a box."""
+        signs = [("+", "-") if a < b else ("0",) for a, b in zip(low, high, strict=True)]
+        names = ["".join(corner) for corner in product(*signs)]
+        exact = [check_proof.corner_wrench(low, high, name) for name in names]
+        wrench = np.zeros((len(names), 6))
+        wrench[:, self._rows] = np.array(exact, np.float64)
+        return _Corners(low, high, names, exact, wrench)
 
     def _exact_columns(self) -> list[list[list[Fraction]]]:
         """Wrench of 1 N along each axis of each actuator, of the axes that count."""
@@ -253,16 +277,16 @@ class _Search:
                 return self._refuted(statement, found, share)
         written = []
         for lost in cases:
-            found = self._case(lost)
-            if "price" in found:
-                return self._refuted(statement, found, share)
-            written.append(found)
+            try:
+                written.append({"lost": list(lost), **self._box_of(lost, self._whole, MAX_SPLITS)})
+            except _CounterexampleError as error:
+                return self._refuted(statement, error.example, share)
         proof = self._file("proved", cases=written)
         return ProofResult(
             verdict="proved",
             statement=statement,
             n_cases=len(written),
-            n_corners=len(self._corners),
+            n_corners=len(self._whole.names),
             largest_share=self._shown(share),
             proof=proof,
         )
@@ -275,14 +299,14 @@ class _Search:
         for axis, sign in signs.items():
             corner.append(f"{axis} {self._box[axis] * ('-0+'.index(sign) - 1):g}")
         without = f"without {lost}" if lost else "with everything working"
-        limit = "" if example["watt_price"] == "0" else f" within {self._power:g} W"
+        limit = "" if example["prices"][0]["watt_price"] == "0" else f" within {self._power:g} W"
         reason = f"{without} there is no wrench {', '.join(corner)}{limit}."
         return ProofResult(
             verdict="refuted",
             statement=statement,
             reason=reason[0].upper() + reason[1:],
             n_cases=1,
-            n_corners=len(self._corners),
+            n_corners=len(self._whole.names),
             largest_share=self._shown(share),
             proof=self._file("refuted", counterexample=example),
         )
@@ -314,103 +338,140 @@ class _Search:
             **settled,
         }
 
-    def _sets(self, lost: Sequence[str], parts: Sequence[Part] | None) -> ForceSets:
-        """The sets of forces of a case, once for each corner: of chosen parts, or where these are
-        None the hulls, which hold all that is possible."""
+    def _sets(self, lost: Sequence[str], parts: Sequence[Part], *, is_outer: bool) -> ForceSets:
+        """The sets of forces of a case, of certain parts, or of the least that holds all that is
+        possible in these parts (`is_outer`)."""
         shapes = []
-        for i, actuator in enumerate(self._actuators):
-            part = actuator.hull if parts is None else parts[i]
-            radius = actuator.outer_radius if parts is None else actuator.radius
-            shapes.append(_shape(actuator, part, radius, is_hull=parts is None))
+        for actuator, part in zip(self._actuators, parts, strict=True):
+            radius = actuator.outer_radius if is_outer else actuator.radius
+            shapes.append(_shape(actuator, part, radius, is_hull=is_outer))
         effectiveness = np.zeros((1, len(shapes), 3, 6))
         effectiveness[0, :, :2] = self._effectiveness
         sets = assembled([shapes], effectiveness)
         gone = [self._names.index(name) for name in lost]
         sets.lose(0, gone)
-        return sets.repeat(len(self._corners))
+        return sets
+
+    @property
+    def _hulls(self) -> list[Part]:
+        """The whole set of each actuator."""
+        return [actuator.hull for actuator in self._actuators]
 
     def _largest_share(self, cases: list[tuple[str, ...]]) -> tuple[float, tuple[str, ...], int]:
         """About the share of the box that holds in all cases, and the case and corner that bound
         it."""
         best = (math.inf, cases[0], 0)
         for lost in cases:
-            sets = self._sets(lost, None)
-            ray = self._wrench / SCALE
+            ray = self._whole.wrench / SCALE
+            sets = self._sets(lost, self._hulls, is_outer=True).repeat(len(ray))
             share = sets.reach(np.zeros_like(ray), ray, FINE)[0]
             corner = int(share.argmin())
             if share[corner] < best[0]:
                 best = (float(share[corner]), lost, corner)
         return best
 
-    def _inside(self, lost: Sequence[str], parts: Sequence[Part]) -> tuple[Array, Array]:
+    def _inside(
+        self, lost: Sequence[str], parts: Sequence[Part], corners: _Corners
+    ) -> tuple[Array, Array]:
         """The forces of each corner of a case that lie well inside chosen parts.
 
         Returns:
             Lengths (C,) of rays from an inner wrench to the end of what is attainable, over the
             distance of the corner [1]: at least 1 within reach; and forces (C, n, 2) [N].
         """
-        sets = self._sets(lost, parts)
+        count = len(corners.names)
+        sets = self._sets(lost, parts, is_outer=False).repeat(count)
         inner = np.zeros((len(parts), 2))
         for i, part in enumerate(parts):
             if self._names[i] not in lost:
                 inner[i, : len(part.inner_point)] = part.inner_point
-        inner_forces = np.broadcast_to(inner, (len(self._corners), *inner.shape))
+        inner_forces = np.broadcast_to(inner, (count, *inner.shape))
         origin = sets.wrench(inner_forces)
-        share, _, forces = sets.reach(origin, self._wrench / SCALE - origin, FINE)
+        share, _, forces = sets.reach(origin, corners.wrench / SCALE - origin, FINE)
         # From the end of the ray back to the corner: a mean with the inner forces.
         weight = np.where(share >= 1.0, 1.0 / np.maximum(share, 1.0), 1.0)[:, None, None]
         return share, inner_forces + weight * (forces - inner_forces)
 
-    def _case(self, lost: tuple[str, ...]) -> dict[str, Any]:
-        """A case as the file has it, or a counterexample. Raises NotSettledError: a corner is
-        neither."""
+    def _box_of(self, lost: tuple[str, ...], corners: _Corners, splits: int) -> dict[str, Any]:
+        """A box of a case as the file has it, split at most so often. Raises _CounterexampleError:
+        a corner is out of reach; NotSettledError: neither is known."""
         reason = ""
+        shares = []
         for parts in part_choices(self._actuators):
-            share, forces = self._inside(lost, parts)
-            worst = int(share.argmin())
-            if share[worst] < 1.0:
-                where = self._where(lost, worst)
-                reason = reason or f"{where}: out of reach of the convex parts that were tried"
+            share, forces = self._inside(lost, parts, corners)
+            shares.append(share)
+            if share.min() < 1.0:
                 continue
             try:
-                return self._written_case(lost, parts, forces)
-            except _CounterexampleError as found:
-                return found.example
+                return self._written_box(lost, parts, corners, forces)
             except check_proof.WrongProof as error:
                 reason = str(error)
-        for corner in range(len(self._corners)):
-            found = self._separated(lost, corner)
-            if found is not None:
-                return found
-        raise NotSettledError(reason)
+        is_reached = np.array(shares) >= 1.0
+        for index in np.flatnonzero(~is_reached.any(axis=0)).tolist():
+            reason = f"{self._where(lost, corners, index)}: out of reach of the convex parts tried"
+            if corners is self._whole:
+                found = self._separated(lost, index)
+                if found is not None:
+                    raise _CounterexampleError(found)
+            raise NotSettledError(reason)
+        if len(shares) == 1 or not splits:
+            where = self._where(lost, corners, int(np.array(shares).max(axis=0).argmin()))
+            raise NotSettledError(reason or f"{where}: no parts reach all corners together")
+        return self._split(lost, corners, is_reached, splits)
 
-    def _where(self, lost: Sequence[str], corner: int) -> str:
-        """A case and a corner, in words."""
-        return f"lost {', '.join(lost) or 'nobody'}, corner {self._corners[corner]}"
-
-    def _written_case(
-        self, lost: tuple[str, ...], parts: Sequence[Part], forces: Array
+    def _split(
+        self, lost: tuple[str, ...], corners: _Corners, is_reached: NDArray[np.bool_], splits: int
     ) -> dict[str, Any]:
-        """A case of forces (C, n, 2) that the checker accepts. Raises WrongProof: it does not."""
+        """A box in two halves, along the axis whose corners on either side want other parts."""
+        best = (-1, 0.0, 0)
+        for k, (low, high) in enumerate(zip(corners.low, corners.high, strict=True)):
+            above = np.array([name[k] == "+" for name in corners.names])
+            if low == high:
+                continue
+            most_above = int(is_reached[:, above].sum(axis=1).max())
+            most_below = int(is_reached[:, ~above].sum(axis=1).max())
+            width = float((high - low) / self._whole.high[k])
+            best = max(best, (most_above + most_below, width, k))
+        axis = best[2]
+        middle = (corners.low[axis] + corners.high[axis]) / 2
+        high_below = [*corners.high]
+        high_below[axis] = middle
+        low_above = [*corners.low]
+        low_above[axis] = middle
+        below = self._corners_of(corners.low, high_below)
+        above_corners = self._corners_of(low_above, corners.high)
+        return {
+            "axis": [*self._box][axis],
+            "at": _text(middle),
+            "below": self._box_of(lost, below, splits - 1),
+            "above": self._box_of(lost, above_corners, splits - 1),
+        }
+
+    def _where(self, lost: Sequence[str], corners: _Corners, index: int) -> str:
+        """A case and a corner, in words."""
+        wrench = []
+        for axis, value in zip(self._box, corners.exact[index], strict=True):
+            wrench.append(f"{axis} {float(value):g}")
+        return f"lost {', '.join(lost) or 'nobody'}, {', '.join(wrench)}"
+
+    def _written_box(
+        self, lost: tuple[str, ...], parts: Sequence[Part], corners: _Corners, forces: Array
+    ) -> dict[str, Any]:
+        """A box with forces (C, n, 2) that the checker accepts. Raises WrongProof: it does not."""
         basis = self._basis(lost, parts)
-        corners = {}
-        for index, name in enumerate(self._corners):
-            inside = self._least_power(lost, index, forces[index])
-            corners[name] = self._exact(lost, basis, index, inside)
+        written = {}
+        for index, name in enumerate(corners.names):
+            affordable = self._within_budget(lost, corners, index, forces[index])
+            written[name] = self._exact(lost, basis, corners.exact[index], affordable)
         own_parts = {}
         for actuator, part in zip(self._actuators, parts, strict=True):
             if part.values and actuator.name not in lost:
                 own_parts[actuator.name] = part.values
-        case = {"lost": list(lost), "parts": own_parts, "corners": corners}
-        self._check(case)
-        return case
-
-    def _check(self, case: dict[str, Any]) -> None:
-        """Has the checker look at a case. Raises WrongProof."""
-        proof = self._file("proved", cases=[case])
-        checked = check_proof.numbers_in(_as_text(proof))
-        premises = check_proof.checked_premises(checked)
-        check_proof.check_case(checked["cases"][0], premises)
+        box = {"parts": own_parts, "corners": written}
+        proof = check_proof.numbers_in(_as_text(self._file("proved", cases=[box])))
+        premises = check_proof.checked_premises(proof)
+        check_proof.check_box(proof["cases"][0], lost, corners.low, corners.high, premises)
+        return box
 
     def _basis(self, lost: Sequence[str], parts: Sequence[Part]) -> _Basis:
         """As many axes of working actuators as there are independent axes of the wrench."""
@@ -439,11 +500,11 @@ class _Search:
         return _Basis([labels[column] for column in chosen], rows, _inverse(matrix))
 
     def _exact(
-        self, lost: Sequence[str], basis: _Basis, index: int, forces: Array
+        self, lost: Sequence[str], basis: _Basis, wrench: list[Fraction], forces: Array
     ) -> dict[str, list[str]]:
-        """Forces (n, 2) as fractions whose wrench is the corner exactly, by name."""
+        """Forces (n, 2) as fractions that give a wrench exactly, by name."""
         exact = []
-        missing = list(self._exact_wrench[index])
+        missing = [*wrench]
         for i, actuator in enumerate(self._actuators):
             own = []
             for k in range(actuator.n_axes):
@@ -462,21 +523,23 @@ class _Search:
                 result[actuator.name] = [_text(size) for size in own]
         return result
 
-    def _least_power(self, lost: tuple[str, ...], index: int, inside: Array) -> Array:
+    def _within_budget(
+        self, lost: tuple[str, ...], corners: _Corners, index: int, inside: Array
+    ) -> Array:
         """Forces (n, 2) of a corner within the power budget, as far inside as it allows; those
         inside where there is no budget. Raises _CounterexampleError: no forces are within it."""
         if self._power is None:
             return inside
         if self._watts(lost, inside) <= self._power:
             return inside
-        result = self._answer(lost, index)
+        result = self._answer(lost, corners.wrench[index])
         cheapest = np.zeros_like(inside)
         body = np.nan_to_num(result.forces)
         for i, actuator in enumerate(self._actuators):
             row = self._layout.names.index(actuator.name)
             for k, axis in enumerate(actuator.values["axes"]):
                 cheapest[i, k] = body[row] @ axis
-        if self._watts(lost, cheapest) > self._power:
+        if corners is self._whole and self._watts(lost, cheapest) > self._power:
             example = self._too_dear(lost, index, result.multipliers, cheapest)
             if example is not None:
                 raise _CounterexampleError(example)
@@ -485,17 +548,17 @@ class _Search:
             if self._watts(lost, mixed) <= self._power * (1.0 - 1e-9):
                 return mixed
         raise check_proof.WrongProof(
-            f"{self._where(lost, index)}: takes about {self._watts(lost, cheapest):.6g} W, which "
-            "is too near to the budget"
+            f"{self._where(lost, corners, index)}: takes about "
+            f"{self._watts(lost, cheapest):.6g} W, which is too near to the budget"
         )
 
-    def _answer(self, lost: tuple[str, ...], index: int) -> Any:
-        """The dual's answer of a corner."""
+    def _answer(self, lost: tuple[str, ...], wrench: Array) -> Any:
+        """The dual's answer to a wrench (6,)."""
         from finlab.allocation import Allocator
 
         if self._allocator is None:
             self._allocator = Allocator(self._layout)
-        return self._allocator.allocate(self._wrench[index], lost=lost)
+        return self._allocator.allocate(wrench, lost=lost)
 
     def _watts(self, lost: Sequence[str], forces: Array) -> float:
         """Power of forces (n, 2), rounded up as the checker does [W]."""
@@ -517,48 +580,86 @@ class _Search:
         for actuator, own in zip(self._actuators, forces, strict=True):
             touch[actuator.name] = decimals(np.hypot(*own))
         price = decimals(np.asarray(multipliers)[self._rows])
-        return self._accepted(lost, index, price, "1", touch)
+        prices = [{"price": price, "watt_price": "1", "touch": touch}]
+        return self._accepted(lost, index, {}, prices)
 
     def _separated(self, lost: Sequence[str], index: int) -> dict[str, Any] | None:
-        """A counterexample by a plane that bounds all wrenches of a case; None: no plane is known
-        that separates the corner."""
-        sets = self._sets(lost, None).take(np.array([index]))
-        wrench = self._wrench[index] / SCALE
+        """A counterexample by planes that bound all wrenches of a case; None: none is known that
+        separates the corner. Where hulls are not enough, wide arcs are cut in halves."""
+        found = self._separated_by(lost, index, [])
+        cut = []
+        for i, actuator in enumerate(self._actuators):
+            if actuator.halves and actuator.name not in lost:
+                cut.append(i)
+        if found is None and 0 < len(cut) <= MAX_CUT_ARCS:
+            found = self._separated_by(lost, index, cut)
+        return found
+
+    def _separated_by(
+        self, lost: Sequence[str], index: int, cut: list[int]
+    ) -> dict[str, Any] | None:
+        """A counterexample with the arcs of some actuators cut in halves, None where there is
+        none."""
+        cuts = {}
+        for i in cut:
+            actuator = self._actuators[i]
+            cuts[actuator.name] = middle_of(actuator.hull)
+        prices: list[dict[str, Any]] = []
+        for chosen in product(*(self._actuators[i].halves for i in cut)):
+            parts = self._hulls
+            for i, half in zip(cut, chosen, strict=True):
+                parts[i] = half
+            candidates = self._prices(lost, index, parts)
+            if not cut:
+                for price in candidates:
+                    found = self._accepted(lost, index, {}, [price])
+                    if found is not None:
+                        return found
+                return None
+            if not candidates:
+                return None
+            prices.append(candidates[-1])
+        return self._accepted(lost, index, cuts, prices)
+
+    def _prices(
+        self, lost: Sequence[str], index: int, parts: Sequence[Part]
+    ) -> list[dict[str, Any]]:
+        """Prices that may separate a corner from all wrenches of chosen parts."""
+        sets = self._sets(lost, parts, is_outer=True)
+        wrench = self._whole.wrench[index] / SCALE
+        normals = []
         # What no actuator pushes at all comes first, then the plane at the end of a ray.
         columns = sets.full_effectiveness()[0]
-        prices = []
         solution = np.linalg.lstsq(columns.T, wrench, rcond=RANK_TOLERANCE)[0]
         left = wrench - columns.T @ solution
         if np.linalg.norm(left) > RANK_TOLERANCE * np.linalg.norm(wrench):
-            prices.append(left)
+            normals.append(left)
         inner = np.zeros((1, len(self._actuators), 2))
-        for i, actuator in enumerate(self._actuators):
-            point = actuator.parts[0].inner_point
-            if actuator.name not in lost:
-                inner[0, i, : len(point)] = point
-        for origin in (np.zeros(6), sets.wrench(inner)[0]):
+        for i, part in enumerate(parts):
+            if self._names[i] not in lost:
+                inner[0, i, : len(part.inner_point)] = part.inner_point
+        for origin in (sets.wrench(inner)[0], np.zeros(6)):
             share, normal, _ = sets.reach(origin[None], (wrench - origin)[None], FINE)
             if share[0] < 1.0:
-                prices.append(normal[0])
-        for scaled_price in prices:
-            price = (scaled_price / SCALE)[self._rows]
+                normals.append(normal[0])
+        prices = []
+        for normal in normals:
+            price = (normal / SCALE)[self._rows]
             largest = np.abs(price).max()
             if largest > 0.0 and np.isfinite(largest):
-                found = self._accepted(lost, index, decimals(price / largest), "0", {})
-                if found is not None:
-                    return found
-        return None
+                scaled = decimals(price / largest)
+                prices.append({"price": scaled, "watt_price": "0", "touch": {}})
+        return prices
 
     def _accepted(
-        self, lost: Sequence[str], index: int, price: list[float], watt_price: str, touch: Any
+        self, lost: Sequence[str], index: int, cuts: dict[str, Any], prices: list[dict[str, Any]]
     ) -> dict[str, Any] | None:
         """A counterexample that the checker accepts, None where it does not."""
         example = {
             "lost": list(lost),
-            "corner": self._corners[index],
-            "price": price,
-            "watt_price": watt_price,
-            "touch": touch,
+            "corner": self._whole.names[index],
+            "cuts": cuts,
+            "prices": prices,
         }
         try:
             _verify(self._file("refuted", counterexample=example))

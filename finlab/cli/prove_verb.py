@@ -54,7 +54,9 @@ def prove_layout(
         raise CommandError("expected either --box with six half widths, or --box-share")
     if box_share is not None and not 0.0 < box_share <= 1.0:
         raise CommandError(f"box-share: expected a share above 0, at most 1, got {box_share:g}")
-    half_widths = box if box_share is None else proofs.box_share(robot, box_share, free)
+    half_widths: tuple[float, ...] = box or ()
+    if box_share is not None:
+        half_widths = proofs.box_share(robot, box_share, free)
     shared_options.tell(f"proving {robot.name}")
     result = proofs.prove(robot, half_widths, lost, power, free)
     words = str(result)
