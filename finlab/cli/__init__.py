@@ -43,6 +43,10 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "finlab layout optimize bluerov2 --actuators front_left --goal worst_single_failure -o "
         "better.yaml",
     ),
+    "layout prove": (
+        "finlab layout prove bluerov2_heavy --box 20 20 20 1 1 2 --lost 1 -o proof.json",
+        "finlab layout prove hexa --box-share 0.15 --power 200",
+    ),
     "layout convert": (
         "finlab layout convert robot.urdf my_robot.yaml",
         "finlab layout convert my_robot.yaml robot.params --to px4",
@@ -137,6 +141,7 @@ VERBS = {
     "layout check": "finlab.cli.layout_verbs:check",
     "layout show": "finlab.cli.layout_verbs:show",
     "layout capability": "finlab.cli.layout_verbs:capability",
+    "layout prove": "finlab.cli.prove_verb:prove_layout",
     "layout convert": "finlab.cli.layout_verbs:convert_layout",
     "layout optimize": "finlab.cli.layout_verbs:optimize",
     "data generate": "finlab.cli.train_verbs:generate",
@@ -160,7 +165,7 @@ VERBS = {
 """Functions of the verbs by name, as `module:function`; only the one that runs is imported. `eval`
 makes its verbs from the registered experiments."""
 GROUPS = {
-    "layout": "Check, show and optimize layout files.",
+    "layout": "Check, show, optimize layout files, and prove what they can.",
     "data": "Generate what the paper's networks learn from.",
     "train": "Train the networks of methods `mdn` and `paper`.",
     "eval": "Measure methods by the fins' own models.",

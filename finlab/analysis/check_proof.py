@@ -1,0 +1,365 @@
+"""Checks a file of `finlab layout prove`: `python check_proof.py FILE`.
+
+It needs Python alone, and computes with fractions, so that nothing is rounded but square roots, and
+these to the safe side. Read it, then trust it. It takes from the file, as they are, the positions
+[m], axes, limits [N] and power laws [W] of the actuators: compare these with the robot.
+
+Proved: in each case (who is lost) every actuator has a convex set of forces, and each corner of the
+box is the wrench of forces out of these sets, whose power, a convex function, is within the budget.
+A wrench of the box is a weighted mean of corners, so the same mean of their forces gives it. Where
+a set is not convex, a convex part is named, the same for all corners; a box may be split in two,
+each with parts of its own.
+
+Refuted: in one case, of one corner w, for a price y per newton and l per watt, no force of any
+actuator has a profit y.Bf - l.P(f) above a bound, and all bounds together are below y.w - l.budget.
+Where arcs are cut in two, there is such a price for each choice of halves.
+"""
+
+import json
+import sys
+from fractions import Fraction
+from itertools import combinations, product
+from math import isqrt
+from typing import Any
+
+AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
+FINE = 10**30  # square roots are rounded to this part of one
+
+
+class WrongProof(Exception):
+    """The file does not prove what it says."""
+
+
+def need(condition: Any, words: Any) -> None:
+    if not condition:
+        raise WrongProof(words)
+
+
+def number(text: Any) -> Fraction:
+    exponent = text.lower().partition("e")[2]
+    need(len(text) < 5000 and abs(int(exponent or 0)) < 40, f"a number is out of range: {text:.40}")
+    return Fraction(text)
+
+
+def dot(a: Any, b: Any) -> Fraction:
+    return Fraction(sum(x * y for x, y in zip(a, b, strict=True)))
+
+
+def cross(
+    a: Any, b: Any
+) -> Fraction:  # of vectors in a plane: positive where b lies to the left of a
+    return a[0] * b[1] - a[1] * b[0]
+
+
+def root_below(x: Any) -> Fraction:
+    return Fraction(isqrt(x.numerator * FINE**2 // x.denominator), FINE)
+
+
+def root_above(x: Any) -> Fraction:
+    return root_below(x) + Fraction(1, FINE)
+
+
+def raised(size: Any, exponent: Any, root: Any, leftover: Any) -> Fraction:
+    """size^exponent by repeated square roots, rounded as `root` and `leftover` (min or max) are."""
+    result = size ** int(exponent)
+    rest = exponent - int(exponent)
+    for _ in range(20):
+        if rest == 0:
+            return result
+        size = root(size)
+        rest *= 2
+        if rest >= 1:
+            result *= size
+            rest -= 1
+    return result * leftover(Fraction(1), size)
+
+
+def columns(actuator: Any) -> Any:
+    """The wrench of 1 N along each axis a of an actuator at r: a, then r x a + k a."""
+    x, y, z = actuator["position_m"]
+    k = actuator["torque_per_newton_m"]
+    for a in actuator["axes"]:
+        torque = (y * a[2] - z * a[1], z * a[0] - x * a[2], x * a[1] - y * a[0])
+        yield [*a, *(t + k * along for t, along in zip(torque, a, strict=True))]
+
+
+def turns_left(arc: Any) -> bool:
+    """Whether the arc from its first to its second direction is at most half a turn: convex."""
+    a, b = arc
+    return cross(a, b) >= 0
+
+
+def in_arc(arc: Any, p: Any) -> bool:
+    if arc is None:
+        return True
+    a, b = arc
+    if not turns_left(arc):
+        return cross(a, p) >= 0 or cross(p, b) >= 0
+    return cross(a, p) >= 0 and cross(p, b) >= 0 and dot(a, p) + dot(b, p) >= 0
+
+
+def check_actuator(actuator: Any) -> None:
+    name = actuator["name"]
+    axes = actuator["axes"]
+    need(len(axes) in (1, 2), f"{name}: one or two axes")
+    for a in axes:
+        need(abs(dot(a, a) - 1) < Fraction(1, 10**9), f"{name}: its axes are no unit vectors")
+    need(len(axes) == 1 or abs(dot(*axes)) < Fraction(1, 10**9), f"{name}: its axes are skew")
+    least, most = actuator["force_n"]
+    need(least <= most and most >= 0, f"{name}: limits of the force are in no order")
+    for edge in actuator["arc"] or ():
+        need(1 <= dot(edge, edge) < 2, f"{name}: a direction of the arc is too short")
+    need(actuator["outer_force_n"] >= max(most, -least), f"{name}: the outer force is too small")
+    power = actuator["power"]
+    if power is None:
+        return
+    if "points" in power:
+        points = power["points"]
+        slopes = []
+        for (x0, p0), (x1, p1) in zip(points, points[1:], strict=False):
+            need(x0 < x1, f"{name}: the points of its power do not rise")
+            slopes.append((p1 - p0) / (x1 - x0))
+        need(slopes == sorted(slopes), f"{name}: its power is not convex")
+        rises = len(axes) == 1 or (slopes[0] >= 0 and points[0][0] == 0)
+        need(rises and min(p for _, p in points) >= 0, f"{name}: its power falls with the force")
+        need(points[0][0] <= min(least, 0) or len(axes) == 2, f"{name}: its power is not known")
+        need(points[-1][0] >= actuator["outer_force_n"] or len(axes) == 1, f"{name}: no power")
+        need(points[-1][0] >= most and power["error_w"] >= 0, f"{name}: its power is not known")
+    else:
+        need(power["forward"] >= 0 and power["reverse"] >= 0, f"{name}: its power is negative")
+        need(1 <= power["exponent"] <= 4, f"{name}: its power is not convex")
+
+
+def convex_part(actuator: Any, part: Any) -> Any:
+    """The arc, largest force and least force ahead of the convex part of an actuator's forces."""
+    name = actuator["name"]
+    least, most = actuator["force_n"]
+    whole = actuator["arc"]
+    arc = part.get("arc", whole)
+    if arc is not None:
+        need(turns_left(arc), f"{name}: its arc is not convex")
+        ends_inside = in_arc(whole, arc[0]) and in_arc(whole, arc[1])
+        goes_outside = False
+        if whole is not None and not turns_left(whole):
+            middle_outside = (whole[0][0] + whole[1][0], whole[0][1] + whole[1][1])
+            goes_outside = in_arc(arc, middle_outside)
+        need(ends_inside and not goes_outside, f"{name}: the part is not within its arc")
+    if least <= 0:
+        return arc, most, None
+    is_half = arc is not None and cross(*arc) == 0 and dot(*arc) < 0
+    if actuator["mean"] and (arc is None or is_half):
+        return arc, most, None  # less than the least force is a mean of opposite directions
+    need("ahead" in part, f"{name}: cannot push less than {float(least):g} N, and has no part")
+    need(dot(part["ahead"], part["ahead"]) <= 1, f"{name}: ahead is longer than 1")
+    return arc, most, (part["ahead"], least)  # |p| >= ahead.p >= least
+
+
+def in_part(actuator: Any, part: Any, force: Any) -> bool:
+    if len(actuator["axes"]) == 1:
+        least, most = actuator["force_n"]
+        return least <= force[0] <= most
+    arc, most, ahead = part
+    is_ahead = ahead is None or dot(ahead[0], force) >= ahead[1]
+    return in_arc(arc, force) and dot(force, force) <= most**2 and is_ahead
+
+
+def most_watts(actuator: Any, force: Any) -> Fraction:
+    """An upper bound of the power of a force."""
+    power = actuator["power"]
+    is_plane = len(force) == 2
+    size = root_above(dot(force, force)) if is_plane else abs(force[0])
+    if "points" not in power:
+        factor = power["reverse" if force[0] < 0 and not is_plane else "forward"]
+        return factor * raised(size, power["exponent"], root_above, max)
+    x = size if is_plane else force[0]
+    points = power["points"]
+    i = max([1, *(j + 1 for j in range(1, len(points) - 1) if points[j][0] <= x)])
+    (x0, p0), (x1, p1) = points[i - 1 : i + 1]
+    return p0 + (p1 - p0) / (x1 - x0) * (x - x0)
+
+
+def most_gain(actuator: Any, price: Any) -> Fraction:
+    """An upper bound of price.d over the directions d in which an actuator can push."""
+    arc = actuator["arc"]
+    if in_arc(arc, price):
+        return root_above(dot(price, price))
+    return max(Fraction(0), dot(price, arc[0]), dot(price, arc[1]))
+
+
+def most_profit(actuator: Any, price: Any, watt_price: Any, touch: Any) -> Fraction:
+    """An upper bound of price.f - watt_price P(f) over all forces f of an actuator."""
+    least, most = actuator["force_n"]
+    power = actuator["power"]
+    if len(actuator["axes"]) == 1:
+        sides = [(price[0], most, "forward"), (-price[0], -least, "reverse")]
+    else:
+        sides = [(most_gain(actuator, price), actuator["outer_force_n"], "forward")]
+        if least < 0:
+            sides.append((most_gain(actuator, [-c for c in price]), -least, "reverse"))
+    if watt_price == 0:
+        return max(gain * largest for gain, largest, _ in sides)
+    if "points" in power:
+        along = price[0] if len(actuator["axes"]) == 1 else max(gain for gain, *_ in sides)
+        return max(along * x - watt_price * (p - power["error_w"]) for x, p in power["points"])
+    best = Fraction(0)
+    for gain, largest, side in sides:
+        at_rest, slope = Fraction(0), Fraction(0)
+        if touch > 0:  # P(s) is above its tangent where s = touch
+            e = power["exponent"]
+            watts = power[side] * raised(touch, e, root_below, min)
+            at_rest, slope = (1 - e) * watts, e * watts / touch
+        at_most = (gain - watt_price * slope) * largest if largest > 0 else Fraction(0)
+        best = max(best, max(Fraction(0), at_most) - watt_price * at_rest)
+    return best
+
+
+def corner_wrench(low: Any, high: Any, signs: Any) -> list[Fraction]:
+    need(set(signs) <= set("+-0") and len(signs) == len(low), f"corner {signs}: no such corner")
+    ends = [{"-": a, "0": (a + b) / 2, "+": b} for a, b in zip(low, high, strict=True)]
+    return [end[sign] for end, sign in zip(ends, signs, strict=True)]
+
+
+def checked_premises(proof: Any) -> Any:
+    """The actuators with their columns, and the statement with the half widths of its box."""
+    need(proof["format"] == "finlab-proof" and proof["version"] == 1, "no proof of version 1")
+    statement = proof["statement"]
+    rows = [i for i, axis in enumerate(AXES) if axis in statement["box"]]
+    free = [axis for axis in AXES if axis not in statement["box"]]
+    half_widths = [statement["box"][AXES[i]] for i in rows]
+    need(free == statement["free"] and len(rows) == len(statement["box"]), "free axes are others")
+    need(half_widths and min(half_widths) >= 0, "the box has no size")
+    need(statement["wrench_tolerance"] >= 0, "the tolerance is negative")
+    actuators = {actuator["name"]: actuator for actuator in proof["actuators"]}
+    need(len(actuators) == len(proof["actuators"]), "two actuators have one name")
+    need(statement["lost"] in range(len(actuators) + 1), "more are lost than there are")
+    for actuator in actuators.values():
+        check_actuator(actuator)
+        known = statement["power_w"] is None or actuator["power"] is not None
+        need(known, f"{actuator['name']}: its power is not known")
+        actuator["columns"] = [[c[i] for i in rows] for c in columns(actuator)]
+    return actuators, {**statement, "half_widths": half_widths}
+
+
+def check(text: Any) -> str:
+    """Returns the verdict of a file, in a sentence; raises WrongProof where it proves nothing."""
+    proof = numbers_in(json.loads(text, parse_float=str, parse_int=str))
+    actuators, statement = premises = checked_premises(proof)
+    count = int(statement["lost"])
+    if proof["verdict"] == "refuted":
+        check_counterexample(proof["counterexample"], premises)
+    else:
+        need(proof["verdict"] == "proved", "no verdict")
+        cases = {frozenset(case["lost"]): case for case in proof["cases"]}
+        for n_lost in range(count + 1):
+            for lost in combinations(actuators, n_lost):
+                need(frozenset(lost) in cases, f"no case in which {lost or 'nobody'} is lost")
+                case = cases[frozenset(lost)]
+                high = statement["half_widths"]
+                check_box(case, case["lost"], [-half for half in high], high, premises)
+    box = ", ".join(f"{axis} +-{float(half):g}" for axis, half in statement["box"].items())
+    free = f", {', '.join(statement['free'])} free" if statement["free"] else ""
+    power = statement["power_w"]
+    budget = "" if power is None else f", within {float(power):g} W"
+    tolerance = statement["wrench_tolerance"]
+    near = f", to within {float(tolerance):g}" if tolerance else ""
+    means = [name for name, actuator in actuators.items() if actuator["mean"]]
+    mean = f"; small forces as means over time: {', '.join(means)}" if means else ""
+    return f"{proof['verdict']}: any wrench of {box}{free}, any {count} lost{budget}{near}{mean}"
+
+
+def check_box(case: Any, lost: Any, low: Any, high: Any, premises: Any) -> None:
+    actuators, statement = premises
+    if "axis" in case:
+        i, at = list(statement["box"]).index(case["axis"]), case["at"]
+        need(low[i] < at < high[i], "a box is split outside of it")
+        check_box(case["below"], lost, low, [*high[:i], at, *high[i + 1 :]], premises)
+        check_box(case["above"], lost, [*low[:i], at, *low[i + 1 :]], high, premises)
+        return
+    budget = statement["power_w"]
+    parts = {}
+    for name, actuator in actuators.items():
+        if len(actuator["axes"]) == 2 and name not in lost:
+            parts[name] = convex_part(actuator, case["parts"].get(name, {}))
+    for signs in product(*("+-" if a < b else "0" for a, b in zip(low, high, strict=True))):
+        corner = "".join(signs)
+        where = f"lost {', '.join(lost) or 'nobody'}, corner {corner}"
+        need(corner in case["corners"], f"{where}: is missing")
+        forces = case["corners"][corner]
+        need(set(forces) == set(actuators) - set(lost), f"{where}: not the forces of those left")
+        missing = corner_wrench(low, high, corner)
+        watts = Fraction(0)
+        for name, force in forces.items():
+            actuator = actuators[name]
+            need(len(force) == len(actuator["axes"]), f"{where}: {name} has other axes")
+            need(in_part(actuator, parts.get(name), force), f"{where}: {name} cannot push so")
+            for size, column in zip(force, actuator["columns"], strict=True):
+                missing = [w - size * c for w, c in zip(missing, column, strict=True)]
+            if budget is not None:
+                watts += most_watts(actuator, force)
+        near = max(map(abs, missing)) <= statement["wrench_tolerance"]
+        need(near, f"{where}: the wrench is another")
+        need(budget is None or watts <= budget, f"{where}: takes more power")
+
+
+def check_counterexample(example: Any, premises: Any) -> None:
+    actuators, statement = premises
+    lost = example["lost"]
+    few = len(set(lost)) <= statement["lost"] and set(lost) <= set(actuators)
+    need(few, "others are lost than the statement says")
+    high = statement["half_widths"]
+    wrench = corner_wrench([-half for half in high], high, example["corner"])
+    cuts = example["cuts"]
+    halves = []
+    for name, middle in cuts.items():
+        first, last = actuators[name]["arc"]
+        need(actuators[name]["force_n"][0] >= 0, f"{name}: pushes astern")
+        halves.append(((first, middle), (middle, last)))
+        inside = in_arc((first, last), middle) and dot(middle, middle) >= 1
+        need(inside and all(map(turns_left, halves[-1])), f"{name}: is not cut in two halves")
+    need(len(example["prices"]) == 2 ** len(cuts), "a price for each choice of halves is missing")
+    for chosen, price in zip(product(*halves), example["prices"], strict=True):
+        arcs = dict(zip(cuts, chosen, strict=True))
+        in_halves = [{**a, "arc": arcs.get(name, a["arc"])} for name, a in actuators.items()]
+        check_price(price, wrench, [a for a in in_halves if a["name"] not in lost], statement)
+
+
+def check_price(price: Any, wrench: Any, actuators: Any, statement: Any) -> None:
+    per_wrench, per_watt, budget = price["price"], price["watt_price"], statement["power_w"]
+    need(per_watt == 0 if budget is None else per_watt >= 0, "no such price per watt")
+    value = dot(per_wrench, wrench) - statement["wrench_tolerance"] * sum(map(abs, per_wrench))
+    profit = per_watt * (budget or 0)
+    for actuator in actuators:
+        own_price = [dot(per_wrench, column) for column in actuator["columns"]]
+        touch = price["touch"].get(actuator["name"], Fraction(0))
+        profit += most_profit(actuator, own_price, per_watt, touch)
+    need(profit < value, "the price does not separate the corner")
+
+
+NAMES = ("format", "name", "type", "free", "verdict", "layout", "corner", "axis", "remarks", "mean")
+
+
+def numbers_in(value: Any, key: Any = "") -> Any:
+    """The values of a file, with fractions in place of the numbers."""
+    if isinstance(value, dict):
+        inner = {}
+        for name, item in value.items():
+            inner[name] = numbers_in(item, name)
+        return inner
+    if isinstance(value, list):
+        is_names = key in ("lost", *NAMES)
+        return value if is_names else [numbers_in(item) for item in value]
+    return number(value) if isinstance(value, str) and key not in NAMES else value
+
+
+def main(path: Any) -> int:
+    try:
+        with open(path, encoding="utf-8") as file:
+            print(check(file.read()))
+    except (WrongProof, OSError, LookupError, TypeError, ValueError, ArithmeticError) as error:
+        print(f"refused: {type(error).__name__}: {error}")
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(*sys.argv[1:]))
