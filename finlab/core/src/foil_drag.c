@@ -19,8 +19,8 @@
 #define STALLED_MORE R(0.1)
 
 /* Remembers what commands and multipliers lead to, where it costs less than the best so far. */
-static void improve_from(const real *block, fl_work *work, const real *target_reduced,
-                         const real *lambda, real command[][3], real *best_cost) {
+void fl_improve_from(const real *block, fl_work *work, const real *target_reduced,
+                     const real *lambda, real command[][3], real *best_cost) {
   const real most_error = fl_error_allowed(block, work, &work->box);
   real force[FL_MOST][2];
   real lambda_near[6];
@@ -41,7 +41,7 @@ void fl_improve_commands(const real *block, fl_work *work, const real *target_re
   real command[FL_MOST][3];
   fl_commands_for_forces(block, &work->box, work->state_found->force, work->command_previous,
                          command);
-  improve_from(block, work, target_reduced, work->state_found->lambda_reduced, command, best_cost);
+  fl_improve_from(block, work, target_reduced, work->state_found->lambda_reduced, command, best_cost);
 }
 
 /* Whether a foil may stall at one end (0, 1) of its angles, which is then the command. */
@@ -55,7 +55,7 @@ static int may_stall(const real *block, const fl_work *work, int i, int end, rea
 }
 
 /* Whether some foil may stall within its limits: it then gives more than its table. */
-static int may_any_stall(const real *block, const fl_work *work) {
+int fl_may_any_stall(const real *block, const fl_work *work) {
   real unused;
   for (int i = 0; i < COUNT(block); i++) {
     if (may_stall(block, work, i, 0, &unused) || may_stall(block, work, i, 1, &unused)) return 1;
@@ -142,7 +142,7 @@ static void improve_from_lattice(const real *block, fl_work *work, const real *t
                                  real *best_cost) {
   const real most_error = fl_error_allowed(block, work, &work->box);
   /* Foils that stall may lead steps to other branches. */
-  const int has_bounds = *best_cost < INFEASIBLE_COST && !may_any_stall(block, work);
+  const int has_bounds = *best_cost < INFEASIBLE_COST && !fl_may_any_stall(block, work);
   foil_lattice lattice;
   foil_choices choices;
   lattice_point points[FL_LATTICE_STARTS];
@@ -172,7 +172,7 @@ static void improve_from_lattice(const real *block, fl_work *work, const real *t
     if (!next || !(next->cost < smaller(*best_cost * WITHIN_BEST, INFEASIBLE_COST))) return;
     last_cost = next->cost;
     begin_at(block, work, &lattice, target_reduced, next, command);
-    improve_from(block, work, target_reduced, lambda, command, best_cost);
+    fl_improve_from(block, work, target_reduced, lambda, command, best_cost);
   }
 }
 
@@ -189,7 +189,7 @@ static void improve_from_stalls(const real *block, fl_work *work, const real *ta
       else
         copy_commands(block, start, command);
       command[i][0] = angle;
-      improve_from(block, work, target_reduced, lambda, command, best_cost);
+      fl_improve_from(block, work, target_reduced, lambda, command, best_cost);
     }
   }
 }
@@ -219,7 +219,7 @@ static void improve_from_vertices(const real *block, fl_work *work, const real *
       box.command_max[i][0] = command[i][0];
     }
     fl_approach(block, work, &box, command);
-    improve_from(block, work, target_reduced, lambda, command, best_cost);
+    fl_improve_from(block, work, target_reduced, lambda, command, best_cost);
   }
   memset(is_spread, 0, (size_t)COUNT(block));
   for (int f = 0; f < vertices.foils && vertices.directions > 0; f++) {
@@ -242,7 +242,7 @@ void fl_improve_from_starts(const real *block, fl_work *work, const real *target
   real most_cost;
   const real proved = proved_value(block, work, &most_cost);
   const real enough = proved * (1 + CLOSE);
-  const int stalls = may_any_stall(block, work);
+  const int stalls = fl_may_any_stall(block, work);
   unsigned char is_spread[FL_MOST];
   real start[FL_MOST][3];
   real lambda[6];
@@ -315,7 +315,7 @@ void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, 
   /* how far below the most a share is tried, over it, until one is found */
   real below_most = NEARLY;
   real start[FL_MOST][3];
-  if (may_any_stall(block, work)) most = smaller(most_by_dual * (1 + STALLED_MORE), 1);
+  if (fl_may_any_stall(block, work)) most = smaller(most_by_dual * (1 + STALLED_MORE), 1);
   fl_commands_for_forces(block, &work->box, out->force, work->command_previous, start);
   for (int k = 0; k < FL_RAY_SHARES; k++) {
     if (!(below_most < 1 && most - found > NEARLY / 4 * most_by_dual)) return;
