@@ -9,6 +9,7 @@
 #include "internal.h"
 
 #define REACH_PARTS 96     /* parts that a policy may look at, of any robot */
+#define REACH_PARTS_ARC 64 /* the same, for each foil that may stall */
 #define REACH_PARTS_EACH 8 /* the same, for each of its actuators */
 
 /* Distance, over the wrench scale, up to which the point of a part is the nearest one. */
@@ -423,7 +424,10 @@ static void better_side(const real *block, fl_work *work, const real *wrench,
 
 /* How many parts of sets with gaps a policy may look at: each takes a nearest point. */
 static int most_parts_of_policy(const real *block, const fl_work *work) {
-  const int most = REACH_PARTS + REACH_PARTS_EACH * COUNT(block);
+  int most = REACH_PARTS + REACH_PARTS_EACH * COUNT(block);
+  for (int i = 0; i < COUNT(block); i++) {
+    if (work->set[i].arc) most += REACH_PARTS_ARC;
+  }
   if (most < work->settings.most_parts) return most;
   return work->settings.most_parts;
 }
@@ -514,34 +518,38 @@ static void come_closer(const real *block, fl_work *work, const real *wrench,
   for (int round = 0; round < CLOSER_ROUNDS; round++) {
     const real width = fl_lay_closer_arcs(block, work, round == 0, force);
     serve(block, work, wrench, policy, force, score);
-    if (width < NOTHING) break;
+    if (width < NEARLY) break;
   }
 }
 
-/* Makes an answer the cheapest commands for the wrench of commands `near`, with their multipliers;
-   these themselves where none are cheaper. */
-static void cheapest_commands(const real *block, fl_work *work, real near[][3], fl_answer *out) {
+/* Makes an answer the cheapest commands for the wrench of some commands: these themselves made
+   cheaper by steps, or what a search from other starts comes to. */
+static void cheapest_commands(const real *block, fl_work *work, real command[][3],
+                              fl_answer *out) {
   real force[FL_MOST][2];
   real target_reduced[6];
   real with_offset[6]; /* wrench that the commands are to give [N, N m] */
-  const real cost_near = fl_power_of_commands(block, work, near, force);
+  const real cost_before = fl_power_of_commands(block, work, command, force);
   fl_wrench_of_forces(block, work, force, out->wrench_served);
   fl_reduce_wrench(work, out->wrench_served, target_reduced);
   for (int k = 0; k < 6; k++) with_offset[k] = out->wrench_served[k] + work->span.wrench_offset[k];
-  memcpy(work->wrench_wanted, with_offset, sizeof with_offset);
   const int status = fl_dual_newton(block, work, target_reduced, 0, FL_STEPS_AT_KINK);
-  real lambda[6];
-  memcpy(lambda, work->state_found->lambda_reduced, sizeof lambda);
-  real best_cost = INFEASIBLE_COST;
-  fl_improve_from(block, work, target_reduced, lambda, near, &best_cost);
-  if (best_cost < cost_near) {
-    copy_commands(block, work->best_command, near);
-    memcpy(out->lambda_reduced, work->best_lambda, sizeof out->lambda_reduced);
+  const int is_met = fl_answer_with_drag(block, work, with_offset, target_reduced, status, out);
+  real best_cost = cost_before;
+  if (is_met) {
+    const real cost = fl_power_of_commands(block, work, out->command, force);
+    if (cost < best_cost) {
+      best_cost = cost;
+      copy_commands(block, out->command, command);
+    }
   }
-  copy_commands(block, near, out->command);
-  fl_power_of_commands(block, work, near, out->force);
+  real lambda[6];
+  memcpy(lambda, out->lambda_reduced, sizeof lambda);
+  fl_improve_from(block, work, target_reduced, lambda, command, &best_cost);
+  if (best_cost < cost_before) copy_commands(block, work->best_command, command);
+  copy_commands(block, command, out->command);
+  fl_power_of_commands(block, work, command, out->force);
   out->has_foil_commands = 1;
-  (void)status;
 }
 
 /* The same as below where foils may stall. */
