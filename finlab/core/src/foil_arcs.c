@@ -39,11 +39,6 @@ void fl_lay_arcs(const real *block, fl_work *work) {
   }
 }
 
-/* Makes the sets of foils those of their tables again. */
-void fl_forget_arcs(const real *block, fl_work *work) {
-  for (int i = 0; i < COUNT(block); i++) work->set[i].arc = 0;
-}
-
 /* The force of an arc that is worth most at a price. */
 void fl_farthest_on_arc(const fl_set *set, const real *price, wide *force) {
   int farthest = set->arc_first;

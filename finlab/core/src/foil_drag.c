@@ -15,8 +15,6 @@
 #define STALL_SAMPLES 12 /* angles of a stalled foil that are looked at for its worth */
 /* commands that cost more than this times the best are left alone */
 #define WITHIN_BEST R(1.5)
-/* share of a ray that stalled foils may add to what tables give */
-#define STALLED_MORE R(0.1)
 
 /* Remembers what commands and multipliers lead to, where it costs less than the best so far. */
 void fl_improve_from(const real *block, fl_work *work, const real *target_reduced,
@@ -307,20 +305,17 @@ int fl_take_sure_forces(const real *block, fl_work *work) {
 }
 
 /* Commands that give the largest share of a wrench that steps come to, Eq. 14: between the
-   share that commands are `found` for, 0 without any, and the `most` that the dual allows.
-   `out` has forces near to it. */
-void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, real found,
-                          real most, fl_answer *out) {
-  const real most_by_dual = most;
+   share that commands are `found` for, 0 without any, and the `most` that there may be. Steps go
+   from the last commands found, and from a start (n, 3). */
+void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, real start[][3],
+                          real found, real most, fl_answer *out) {
+  const real most_of_all = most;
   /* how far below the most a share is tried, over it, until one is found */
   real below_most = NEARLY;
-  real start[FL_MOST][3];
-  if (fl_may_any_stall(block, work)) most = smaller(most_by_dual * (1 + STALLED_MORE), 1);
-  fl_commands_for_forces(block, &work->box, out->force, work->command_previous, start);
   for (int k = 0; k < FL_RAY_SHARES; k++) {
-    if (!(below_most < 1 && most - found > NEARLY / 4 * most_by_dual)) return;
+    if (!(below_most < 1 && most - found > NEARLY / 4 * most_of_all)) return;
     const int has_found = found > 0;
-    real ray_share = most_by_dual * (1 - below_most);
+    real ray_share = most_of_all * (1 - below_most);
     if (has_found) ray_share = (found + most) / 2;
     real wrench_served[6]; /* by forces */
     real target_reduced[6];

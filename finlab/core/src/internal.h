@@ -388,7 +388,6 @@ void fl_commands_of_point(const real *block, const fl_work *work, const foil_lat
 
 /* foil_arcs.c: foils that may stall, beyond reach */
 void fl_lay_arcs(const real *block, fl_work *work);
-void fl_forget_arcs(const real *block, fl_work *work);
 void fl_farthest_on_arc(const fl_set *set, const real *price, wide *force);
 real fl_gap_of_arc(const fl_actuator *a, const fl_set *set, const real *force);
 int fl_nearer_side_of_arc(const fl_set *set, const real *force);
@@ -447,8 +446,8 @@ int fl_take_sure_forces(const real *block, fl_work *work);
 int fl_may_any_stall(const real *block, const fl_work *work);
 void fl_improve_from(const real *block, fl_work *work, const real *target_reduced,
                      const real *lambda, real command[][3], real *best_cost);
-void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, real found,
-                          real most, fl_answer *out);
+void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, real start[][3],
+                          real found, real most, fl_answer *out);
 
 /* nearest_point.c: points near to a wrench beyond reach */
 /* Rounding of shares and misses, which are in double precision always. */

@@ -523,7 +523,8 @@ static void come_closer(const real *block, fl_work *work, const real *wrench,
 }
 
 /* Makes an answer the cheapest commands for the wrench of some commands: these themselves made
-   cheaper by steps, or what a search from other starts comes to. */
+   cheaper by steps, or what a search from other starts comes to, where the tables of foils have
+   that wrench. */
 static void cheapest_commands(const real *block, fl_work *work, real command[][3],
                               fl_answer *out) {
   real force[FL_MOST][2];
@@ -534,21 +535,18 @@ static void cheapest_commands(const real *block, fl_work *work, real command[][3
   fl_reduce_wrench(work, out->wrench_served, target_reduced);
   for (int k = 0; k < 6; k++) with_offset[k] = out->wrench_served[k] + work->span.wrench_offset[k];
   const int status = fl_dual_newton(block, work, target_reduced, 0, FL_STEPS_AT_KINK);
-  const int is_met = fl_answer_with_drag(block, work, with_offset, target_reduced, status, out);
+  memcpy(work->wrench_wanted, with_offset, sizeof with_offset);
+  memcpy(out->lambda_reduced, work->state_found->lambda_reduced, sizeof out->lambda_reduced);
   real best_cost = cost_before;
-  if (is_met) {
-    const real cost = fl_power_of_commands(block, work, out->command, force);
-    if (cost < best_cost) {
-      best_cost = cost;
-      copy_commands(block, out->command, command);
-    }
+  real cost_searched = INFEASIBLE_COST;
+  if (status == FL_MET &&
+      fl_answer_with_drag(block, work, with_offset, target_reduced, status, out)) {
+    cost_searched = fl_power_of_commands(block, work, out->command, force);
   }
-  real lambda[6];
-  memcpy(lambda, out->lambda_reduced, sizeof lambda);
-  fl_improve_from(block, work, target_reduced, lambda, command, &best_cost);
+  fl_improve_from(block, work, target_reduced, out->lambda_reduced, command, &best_cost);
   if (best_cost < cost_before) copy_commands(block, work->best_command, command);
-  copy_commands(block, command, out->command);
-  fl_power_of_commands(block, work, command, out->force);
+  if (!(cost_searched < best_cost)) copy_commands(block, command, out->command);
+  fl_power_of_commands(block, work, out->command, out->force);
   out->has_foil_commands = 1;
 }
 
@@ -568,6 +566,8 @@ static void serve_on_arcs(const real *block, fl_work *work, const real *wrench,
   fl_commands_on_arcs(block, work, force, command);
   fl_restore_sets(block, work, work->set_before);
   cheapest_commands(block, work, command, out);
+  if (policy->kind != FL_DIRECTION) return;
+  fl_largest_ray_share(block, work, wrench, command, 0, 1 - score[MISSING_RAY_SHARE], out);
 }
 
 void fl_out_of_reach(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,
@@ -577,7 +577,7 @@ void fl_out_of_reach(const real *block, fl_work *work, const real *wrench, const
   real score[FL_SCORES];
   memcpy(work->rim_normal, work->state_found->lambda_reduced, sizeof work->rim_normal);
   work->distance_enough = SAME_POINT;
-  if (!keeps_direction && work->has_drag && fl_may_any_stall(block, work)) {
+  if (work->has_drag && fl_may_any_stall(block, work)) {
     serve_on_arcs(block, work, wrench, policy, out);
     return;
   }
@@ -619,5 +619,7 @@ void fl_out_of_reach(const real *block, fl_work *work, const real *wrench, const
   const int is_met = fl_answer_with_drag(block, work, with_offset, target_reduced, status, out);
   if (!keeps_direction) return;
   const real found = (real)is_met * ray_share;
-  fl_largest_ray_share(block, work, wrench, found, most_ray_share, out);
+  real start[FL_MOST][3];
+  fl_commands_for_forces(block, &work->box, out->force, work->command_previous, start);
+  fl_largest_ray_share(block, work, wrench, start, found, most_ray_share, out);
 }
