@@ -24,6 +24,22 @@ typedef struct {
   fl_real curvature;      /* of the cost less what the force is worth [W/rad^2] */
 } fl_tangent;
 
+/* Angles of a foil that may stall, and its forces there: what it gives where a wrench beyond reach is
+   looked for. */
+#define FL_ARC_POINTS 96 /* intervals of all its angles */
+#define FL_ARCS_MOST 16  /* foils that have an arc; others count as in their tables of lift */
+#if FL_MOST < FL_ARCS_MOST
+#define FL_ARCS FL_MOST
+#else
+#define FL_ARCS FL_ARCS_MOST
+#endif
+typedef struct {
+  fl_real angle[FL_ARC_POINTS + 1];    /* ascending [rad] */
+  fl_real force[FL_ARC_POINTS + 1][2]; /* lift and drag there [N] */
+  fl_real middle;                      /* angle around which they lie closer [rad] */
+  fl_real half_width;                  /* of these angles [rad] */
+} fl_arc;
+
 /* What one actuator may give now. Forces of a plane are sizes, from 0 on. */
 typedef struct {
   fl_real force_min;           /* least force [N] */
@@ -48,6 +64,10 @@ typedef struct {
   int has_jumped;              /* whether its response jumps where Newton's method stood still */
   /* of a foil near to a command, whose limits are angles from there; else 0 */
   const fl_tangent *tangent;
+  /* of a foil that may stall, while points beyond reach are looked for; else 0 */
+  const fl_arc *arc;
+  int arc_first; /* its first point */
+  int arc_last;  /* its last one */
 } fl_set;
 
 /* A table of force over price as it is asked most. */
@@ -209,6 +229,8 @@ struct fl_work {
   int has_lambda_begin;            /* whether there are such multipliers */
   fl_real power_max[FL_MOST];      /* of each actuator [W] */
   fl_real slope_max[FL_MOST];      /* of each pod: largest slope T' [N^2/W] */
+
+  fl_arc arc[FL_ARCS]; /* of foils that may stall */
 };
 
 /* How Newton's method ended: fl_answer.newton_status. */

@@ -80,6 +80,7 @@ STUBS = Path(__file__).with_name("c_stubs")
 """Files that stand in place of those of foils, in exports of robots without them: a tenth of the
 code."""
 FILES_OF_FOILS = (
+    "foil_arcs.c",
     "foil_choices.c",
     "foil_drag.c",
     "foil_jump.c",

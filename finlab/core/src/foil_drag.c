@@ -15,12 +15,10 @@
 #define STALL_SAMPLES 12 /* angles of a stalled foil that are looked at for its worth */
 /* commands that cost more than this times the best are left alone */
 #define WITHIN_BEST R(1.5)
-/* share of a ray that stalled foils may add to what tables give */
-#define STALLED_MORE R(0.1)
 
 /* Remembers what commands and multipliers lead to, where it costs less than the best so far. */
-static void improve_from(const real *block, fl_work *work, const real *target_reduced,
-                         const real *lambda, real command[][3], real *best_cost) {
+void fl_improve_from(const real *block, fl_work *work, const real *target_reduced,
+                     const real *lambda, real command[][3], real *best_cost) {
   const real most_error = fl_error_allowed(block, work, &work->box);
   real force[FL_MOST][2];
   real lambda_near[6];
@@ -41,7 +39,7 @@ void fl_improve_commands(const real *block, fl_work *work, const real *target_re
   real command[FL_MOST][3];
   fl_commands_for_forces(block, &work->box, work->state_found->force, work->command_previous,
                          command);
-  improve_from(block, work, target_reduced, work->state_found->lambda_reduced, command, best_cost);
+  fl_improve_from(block, work, target_reduced, work->state_found->lambda_reduced, command, best_cost);
 }
 
 /* Whether a foil may stall at one end (0, 1) of its angles, which is then the command. */
@@ -55,7 +53,7 @@ static int may_stall(const real *block, const fl_work *work, int i, int end, rea
 }
 
 /* Whether some foil may stall within its limits: it then gives more than its table. */
-static int may_any_stall(const real *block, const fl_work *work) {
+int fl_may_any_stall(const real *block, const fl_work *work) {
   real unused;
   for (int i = 0; i < COUNT(block); i++) {
     if (may_stall(block, work, i, 0, &unused) || may_stall(block, work, i, 1, &unused)) return 1;
@@ -142,7 +140,7 @@ static void improve_from_lattice(const real *block, fl_work *work, const real *t
                                  real *best_cost) {
   const real most_error = fl_error_allowed(block, work, &work->box);
   /* Foils that stall may lead steps to other branches. */
-  const int has_bounds = *best_cost < INFEASIBLE_COST && !may_any_stall(block, work);
+  const int has_bounds = *best_cost < INFEASIBLE_COST && !fl_may_any_stall(block, work);
   foil_lattice lattice;
   foil_choices choices;
   lattice_point points[FL_LATTICE_STARTS];
@@ -172,7 +170,7 @@ static void improve_from_lattice(const real *block, fl_work *work, const real *t
     if (!next || !(next->cost < smaller(*best_cost * WITHIN_BEST, INFEASIBLE_COST))) return;
     last_cost = next->cost;
     begin_at(block, work, &lattice, target_reduced, next, command);
-    improve_from(block, work, target_reduced, lambda, command, best_cost);
+    fl_improve_from(block, work, target_reduced, lambda, command, best_cost);
   }
 }
 
@@ -189,7 +187,7 @@ static void improve_from_stalls(const real *block, fl_work *work, const real *ta
       else
         copy_commands(block, start, command);
       command[i][0] = angle;
-      improve_from(block, work, target_reduced, lambda, command, best_cost);
+      fl_improve_from(block, work, target_reduced, lambda, command, best_cost);
     }
   }
 }
@@ -219,7 +217,7 @@ static void improve_from_vertices(const real *block, fl_work *work, const real *
       box.command_max[i][0] = command[i][0];
     }
     fl_approach(block, work, &box, command);
-    improve_from(block, work, target_reduced, lambda, command, best_cost);
+    fl_improve_from(block, work, target_reduced, lambda, command, best_cost);
   }
   memset(is_spread, 0, (size_t)COUNT(block));
   for (int f = 0; f < vertices.foils && vertices.directions > 0; f++) {
@@ -242,7 +240,7 @@ void fl_improve_from_starts(const real *block, fl_work *work, const real *target
   real most_cost;
   const real proved = proved_value(block, work, &most_cost);
   const real enough = proved * (1 + CLOSE);
-  const int stalls = may_any_stall(block, work);
+  const int stalls = fl_may_any_stall(block, work);
   unsigned char is_spread[FL_MOST];
   real start[FL_MOST][3];
   real lambda[6];
@@ -307,20 +305,17 @@ int fl_take_sure_forces(const real *block, fl_work *work) {
 }
 
 /* Commands that give the largest share of a wrench that steps come to, Eq. 14: between the
-   share that commands are `found` for, 0 without any, and the `most` that the dual allows.
-   `out` has forces near to it. */
-void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, real found,
-                          real most, fl_answer *out) {
-  const real most_by_dual = most;
+   share that commands are `found` for, 0 without any, and the `most` that there may be. Steps go
+   from the last commands found, and from a start (n, 3). */
+void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, real start[][3],
+                          real found, real most, fl_answer *out) {
+  const real most_of_all = most;
   /* how far below the most a share is tried, over it, until one is found */
   real below_most = NEARLY;
-  real start[FL_MOST][3];
-  if (may_any_stall(block, work)) most = smaller(most_by_dual * (1 + STALLED_MORE), 1);
-  fl_commands_for_forces(block, &work->box, out->force, work->command_previous, start);
   for (int k = 0; k < FL_RAY_SHARES; k++) {
-    if (!(below_most < 1 && most - found > NEARLY / 4 * most_by_dual)) return;
+    if (!(below_most < 1 && most - found > NEARLY / 4 * most_of_all)) return;
     const int has_found = found > 0;
-    real ray_share = most_by_dual * (1 - below_most);
+    real ray_share = most_of_all * (1 - below_most);
     if (has_found) ray_share = (found + most) / 2;
     real wrench_served[6]; /* by forces */
     real target_reduced[6];

@@ -394,6 +394,16 @@ void fl_commands_of_point(const real *block, const fl_work *work, const foil_lat
                           const real *target_reduced, const lattice_point *point, fl_box *box,
                           real command[][3]);
 
+/* foil_arcs.c: foils that may stall, beyond reach */
+void fl_lay_arcs(const real *block, fl_work *work);
+void fl_farthest_on_arc(const fl_set *set, const real *price, wide *force);
+real fl_gap_of_arc(const fl_actuator *a, const fl_set *set, const real *force);
+int fl_nearer_side_of_arc(const fl_set *set, const real *force);
+void fl_narrow_arc(fl_set *set, const real *force, int side);
+real fl_lay_closer_arcs(const real *block, fl_work *work, int is_first, real force[][2]);
+void fl_commands_on_arcs(const real *block, const fl_work *work, real force[][2],
+                         real command[][3]);
+
 /* foil_choices.c: branches of foils' lifts on which cheaper commands may be */
 enum { ANY_BRANCH = -1 };
 typedef struct foil_choices {
@@ -441,8 +451,11 @@ void fl_improve_from_starts(const real *block, fl_work *work, const real *target
                             real *best_cost);
 int fl_is_done_by_foils(const real *block, const fl_work *work, real best_cost);
 int fl_take_sure_forces(const real *block, fl_work *work);
-void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, real found,
-                          real most, fl_answer *out);
+int fl_may_any_stall(const real *block, const fl_work *work);
+void fl_improve_from(const real *block, fl_work *work, const real *target_reduced,
+                     const real *lambda, real command[][3], real *best_cost);
+void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, real start[][3],
+                          real found, real most, fl_answer *out);
 
 /* nearest_point.c: points near to a wrench beyond reach */
 /* Rounding of shares and misses, which are in double precision always. */

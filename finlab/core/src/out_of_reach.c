@@ -9,10 +9,12 @@
 #include "internal.h"
 
 #define REACH_PARTS 96     /* parts that a policy may look at, of any robot */
+#define REACH_PARTS_ARC 64 /* the same, for each foil that may stall */
 #define REACH_PARTS_EACH 8 /* the same, for each of its actuators */
 
 /* Distance, over the wrench scale, up to which the point of a part is the nearest one. */
 #define ROUGHLY (NEARLY / 10)
+#define CLOSER_ROUNDS 24 /* of shorter arcs around angles of foils, at most */
 #define HELD 1e3 /* weight of an axis that is held over one of the group that is served */
 #define HOLDS 16 /* rounds that look for the axes at an end of what they may get */
 #define TURNED (CLOSE / 10) /* pull at a held axis from which on it is let go */
@@ -422,7 +424,10 @@ static void better_side(const real *block, fl_work *work, const real *wrench,
 
 /* How many parts of sets with gaps a policy may look at: each takes a nearest point. */
 static int most_parts_of_policy(const real *block, const fl_work *work) {
-  const int most = REACH_PARTS + REACH_PARTS_EACH * COUNT(block);
+  int most = REACH_PARTS + REACH_PARTS_EACH * COUNT(block);
+  for (int i = 0; i < COUNT(block); i++) {
+    if (work->set[i].arc) most += REACH_PARTS_ARC;
+  }
   if (most < work->settings.most_parts) return most;
   return work->settings.most_parts;
 }
@@ -506,6 +511,65 @@ static void cheapen_by_parts(const real *block, fl_work *work, const real *targe
   out->gap_power_bound = fl_gap_power_bound(work, bound);
 }
 
+/* Comes closer to what a policy wants where foils may stall, from the forces of the best part on:
+   arcs around their angles become shorter and shorter, until forces are on the curves of foils. */
+static void come_closer(const real *block, fl_work *work, const real *wrench,
+                        const fl_policy *policy, real force[][2], real *score) {
+  for (int round = 0; round < CLOSER_ROUNDS; round++) {
+    const real width = fl_lay_closer_arcs(block, work, round == 0, force);
+    serve(block, work, wrench, policy, force, score);
+    if (width < NEARLY) break;
+  }
+}
+
+/* Makes an answer the cheapest commands for the wrench of some commands: these themselves made
+   cheaper by steps, or what a search from other starts comes to, where the tables of foils have
+   that wrench. */
+static void cheapest_commands(const real *block, fl_work *work, real command[][3],
+                              fl_answer *out) {
+  real force[FL_MOST][2];
+  real target_reduced[6];
+  real with_offset[6]; /* wrench that the commands are to give [N, N m] */
+  const real cost_before = fl_power_of_commands(block, work, command, force);
+  fl_wrench_of_forces(block, work, force, out->wrench_served);
+  fl_reduce_wrench(work, out->wrench_served, target_reduced);
+  for (int k = 0; k < 6; k++) with_offset[k] = out->wrench_served[k] + work->span.wrench_offset[k];
+  const int status = fl_dual_newton(block, work, target_reduced, 0, FL_STEPS_AT_KINK);
+  memcpy(work->wrench_wanted, with_offset, sizeof with_offset);
+  memcpy(out->lambda_reduced, work->state_found->lambda_reduced, sizeof out->lambda_reduced);
+  real best_cost = cost_before;
+  real cost_searched = INFEASIBLE_COST;
+  if (status == FL_MET &&
+      fl_answer_with_drag(block, work, with_offset, target_reduced, status, out)) {
+    cost_searched = fl_power_of_commands(block, work, out->command, force);
+  }
+  fl_improve_from(block, work, target_reduced, out->lambda_reduced, command, &best_cost);
+  if (best_cost < cost_before) copy_commands(block, work->best_command, command);
+  if (!(cost_searched < best_cost)) copy_commands(block, command, out->command);
+  fl_power_of_commands(block, work, out->command, out->force);
+  out->has_foil_commands = 1;
+}
+
+/* The same as below where foils may stall. */
+static void serve_on_arcs(const real *block, fl_work *work, const real *wrench,
+                          const fl_policy *policy, fl_answer *out) {
+  real force[FL_MOST][2];
+  real score[FL_SCORES];
+  copy_sets(block, work->set, work->set_before);
+  fl_lay_arcs(block, work);
+  work->distance_enough = SAME_POINT;
+  serve(block, work, wrench, policy, force, score);
+  const int gap = fl_worst_gap(block, work, force, 0);
+  if (gap >= 0) best_part(block, work, wrench, policy, gap, force, score);
+  come_closer(block, work, wrench, policy, force, score);
+  real command[FL_MOST][3];
+  fl_commands_on_arcs(block, work, force, command);
+  fl_restore_sets(block, work, work->set_before);
+  cheapest_commands(block, work, command, out);
+  if (policy->kind != FL_DIRECTION) return;
+  fl_largest_ray_share(block, work, wrench, command, 0, 1 - score[MISSING_RAY_SHARE], out);
+}
+
 void fl_out_of_reach(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,
                      fl_answer *out) {
   const int keeps_direction = policy->kind == FL_DIRECTION;
@@ -513,6 +577,10 @@ void fl_out_of_reach(const real *block, fl_work *work, const real *wrench, const
   real score[FL_SCORES];
   memcpy(work->rim_normal, work->state_found->lambda_reduced, sizeof work->rim_normal);
   work->distance_enough = SAME_POINT;
+  if (work->has_drag && fl_may_any_stall(block, work)) {
+    serve_on_arcs(block, work, wrench, policy, out);
+    return;
+  }
   serve(block, work, wrench, policy, force, score);
   const real most_ray_share = 1 - score[MISSING_RAY_SHARE]; /* that all parts could give */
   const int gap = fl_worst_gap(block, work, force, 0);
@@ -551,5 +619,7 @@ void fl_out_of_reach(const real *block, fl_work *work, const real *wrench, const
   const int is_met = fl_answer_with_drag(block, work, with_offset, target_reduced, status, out);
   if (!keeps_direction) return;
   const real found = (real)is_met * ray_share;
-  fl_largest_ray_share(block, work, wrench, found, most_ray_share, out);
+  real start[FL_MOST][3];
+  fl_commands_for_forces(block, &work->box, out->force, work->command_previous, start);
+  fl_largest_ray_share(block, work, wrench, start, found, most_ray_share, out);
 }

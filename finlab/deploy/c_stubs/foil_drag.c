@@ -21,11 +21,12 @@ int fl_take_sure_forces(const real *block, fl_work *work) {
   return 0;
 }
 
-void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, real found,
-                          real most, fl_answer *out) {
+void fl_largest_ray_share(const real *block, fl_work *work, const real *wrench, real start[][3],
+                          real found, real most, fl_answer *out) {
   (void)block;
   (void)work;
   (void)wrench;
+  (void)start;
   (void)found;
   (void)most;
   (void)out;
@@ -62,4 +63,63 @@ void fl_foil_at(const real *block, int i, real angle, fl_tangent *tangent) {
   (void)i;
   (void)angle;
   (void)tangent;
+}
+
+int fl_may_any_stall(const real *block, const fl_work *work) {
+  (void)block;
+  (void)work;
+  return 0;
+}
+
+void fl_improve_from(const real *block, fl_work *work, const real *target_reduced,
+                     const real *lambda, real command[][3], real *best_cost) {
+  (void)lambda;
+  (void)command;
+  fl_improve_commands(block, work, target_reduced, best_cost);
+}
+
+void fl_lay_arcs(const real *block, fl_work *work) {
+  (void)block;
+  (void)work;
+}
+
+real fl_lay_closer_arcs(const real *block, fl_work *work, int is_first, real force[][2]) {
+  (void)block;
+  (void)work;
+  (void)is_first;
+  (void)force;
+  return 0;
+}
+
+void fl_commands_on_arcs(const real *block, const fl_work *work, real force[][2],
+                         real command[][3]) {
+  (void)block;
+  (void)work;
+  (void)force;
+  (void)command;
+}
+
+void fl_farthest_on_arc(const fl_set *set, const real *price, wide *force) {
+  (void)set;
+  (void)price;
+  (void)force;
+}
+
+real fl_gap_of_arc(const fl_actuator *a, const fl_set *set, const real *force) {
+  (void)a;
+  (void)set;
+  (void)force;
+  return 0;
+}
+
+int fl_nearer_side_of_arc(const fl_set *set, const real *force) {
+  (void)set;
+  (void)force;
+  return 1;
+}
+
+void fl_narrow_arc(fl_set *set, const real *force, int side) {
+  (void)set;
+  (void)force;
+  (void)side;
 }
