@@ -39,9 +39,9 @@ def test_the_largest_wrench_is_still_taken() -> None:
     np.testing.assert_array_equal(question.check_target(most), most)
     assert question.check_target([1, 2, 3, 4, 5, 6]).dtype == np.float64
     assert question.check_wrenches(np.empty((0, 6))).shape == (0, 6)
-    sentence = r"wrench: Tx must be a number of at most 1e\+06 in size, got -1000001"
+    sentence = r"wrench: Tx must be a number of at most 1e\+12 in size, got -1000000000001"
     with pytest.raises(CommandError, match=sentence):
-        question.check_wrenches([[0] * 6, [0, 0, 0, -question.MAX_WRENCH - 1, 0, 9e9]])
+        question.check_wrenches([[0] * 6, [0, 0, 0, -question.MAX_WRENCH - 1, 0, 9e15]])
 
 
 @pytest.mark.parametrize("shape", [(6,), (2, 5), (1, 2, 6), ()])
