@@ -27,6 +27,7 @@ from finlab import axes
 from finlab.actuators.law import ActuatorLaw
 from finlab.arrays import Array
 from finlab.axes import Vector3
+from finlab.display import prefix_of
 from finlab.errors import FinlabError, LayoutError
 from finlab.files.schema import Checked, Name, Part
 
@@ -471,7 +472,10 @@ class Actuator(Checked, ABC):
             if number.unit == "rad":
                 words.append(axes.arc_words(low, high))
             else:
-                words.append(f"{low:g}..{high:g} {number.unit}")
+                prefix = prefix_of(max(abs(low), abs(high)))
+                low /= prefix.factor
+                high /= prefix.factor
+                words.append(f"{low:g}..{high:g} {prefix.symbol}{number.unit}")
         return ", ".join((*words, self.model_type))
 
     @property

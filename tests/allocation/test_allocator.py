@@ -64,7 +64,10 @@ def method() -> AllocatorCache:
             [1, 0, 0, 0, 0, -math.inf],
             "Tz must be a number of at most 1e+12 in size, got -inf; an axis",
         ),
-        ([1, 2e12, 0, 0, 0, 0], "Fy must be a number of at most 1e+12 in size, got 2000000000000.0"),
+        (
+            [1, 2e12, 0, 0, 0, 0],
+            "Fy must be a number of at most 1e+12 in size, got 2000000000000.0",
+        ),
         ([10**400, 0, 0, 0, 0, 0], "wrench: expected six numbers"),
         (
             [1, 0, 0],
