@@ -12,7 +12,7 @@ from finlab.exchange import Question
 from webapp.handles import Presses
 from webapp.viser_internals import run_file, run_script
 
-MAX_FORCE = 1e6
+MAX_FORCE = 1e9
 """Largest force that is taken for an answer [N]."""
 Take = Callable[[Mapping[str, tuple[str, ...]]], object]
 """Takes the answers, by option."""

@@ -27,6 +27,7 @@ from finlab import axes
 from finlab.actuators.law import ActuatorLaw
 from finlab.arrays import Array
 from finlab.axes import Vector3
+from finlab.display import prefix_of
 from finlab.errors import FinlabError, LayoutError
 from finlab.files.schema import Checked, Name, Part
 
@@ -37,7 +38,7 @@ Indices = NDArray[np.intp]
 """Indices (m,) of actuators in a layout, or in a sequence of some."""
 CommandRow = tuple[float, float, float]
 """Numbers of one command [rad, Hz or N, by kind], or their limits, or their rates per second."""
-Metres = Annotated[float, Meta(ge=-100.0, le=100.0)]
+Metres = Annotated[float, Meta(ge=-1000.0, le=1000.0)]
 """A coordinate of a point on a robot, or a lever arm [m]."""
 Place = tuple[Metres, Metres, Metres]
 """A point on a robot, body frame [m]."""
@@ -77,7 +78,7 @@ class Uncertainty(Checked):
     KEYS = {"floor": "floor_n"}
 
     share: Annotated[float, Meta(ge=0.0, le=10.0)] = 0.0
-    floor: Annotated[float, Meta(ge=0.0, le=1e6)] = 0.0
+    floor: Annotated[float, Meta(ge=0.0, le=1e9)] = 0.0
     common: Name | None = None
     correlation: Annotated[float, Meta(ge=0.0, le=1.0)] = 1.0
 
@@ -471,7 +472,10 @@ class Actuator(Checked, ABC):
             if number.unit == "rad":
                 words.append(axes.arc_words(low, high))
             else:
-                words.append(f"{low:g}..{high:g} {number.unit}")
+                prefix = prefix_of(max(abs(low), abs(high)))
+                low /= prefix.factor
+                high /= prefix.factor
+                words.append(f"{low:g}..{high:g} {prefix.symbol}{number.unit}")
         return ", ".join((*words, self.model_type))
 
     @property

@@ -16,6 +16,7 @@ from finlab.actuators.response import Form
 from finlab.actuators.thrust_model import MAX_FORCE, PowerLaw, PowerTable, ThrustModel
 from finlab.actuators.thrust_power import ThrustPower
 from finlab.arrays import NEARLY, NOTHING, AnyArray, Array, Values
+from finlab.display import prefix_of
 from finlab.errors import AllocationError
 
 if TYPE_CHECKING:
@@ -247,7 +248,8 @@ def _scaled(model: ThrustModel, share: float) -> ThrustModel:
 
 def force_words(force: float, angle: str, table_input: float | None) -> str:
     """Returns a command as text: force [N], angle in words, and input where there is one."""
-    words = f"{round(force, 3) + 0.0:.3f} N{angle}"
+    prefix = prefix_of(abs(force))
+    words = f"{round(force / prefix.factor, 3) + 0.0:.3f} {prefix.symbol}N{angle}"
     return words if table_input is None else f"{words}, input {table_input:.5g}"
 
 

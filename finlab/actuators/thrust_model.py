@@ -17,7 +17,7 @@ from finlab.files.schema import Checked, Part
 if TYPE_CHECKING:
     from typing_extensions import Self  # Python 3.10 has none of its own
 
-MAX_FORCE = 1e6
+MAX_FORCE = 1e9
 """Largest force of one actuator [N]."""
 MAX_ROWS = 2000
 """Most rows of a table."""

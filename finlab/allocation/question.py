@@ -21,7 +21,7 @@ from finlab.errors import AllocationError, CommandError
 from finlab.layout.damage import NO_DAMAGE, Damage, lost_names
 from finlab.layout.layout import Layout
 
-MAX_WRENCH = 1e6
+MAX_WRENCH = 1e12
 """Largest magnitude of a component of a wrench [N, N m]; beyond it something is wrong upstream."""
 
 MAX_FLOW = 100.0

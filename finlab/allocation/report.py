@@ -8,7 +8,7 @@ and limits in colour, and are too narrow for the words of a command.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -22,7 +22,7 @@ from finlab.actuators.kinds import KINDS
 from finlab.actuators.law import FinLaw
 from finlab.arrays import NEARLY, Array
 from finlab.axes import AXES, MOTIONS, UNITS
-from finlab.display import Block, Table, listed, three_digits
+from finlab.display import Block, Prefix, Table, listed, prefix_of, with_unit
 from finlab.layout.layout import Layout
 from finlab.physics.plant import Plant
 
@@ -45,11 +45,6 @@ LEAST_POWER = 1e-3
 """Bound [W] that shares are taken of where it is smaller, or nothing."""
 SMALL_MISS = 0.05
 """Share of the largest miss, each axis over its scale, up to which another axis is not named."""
-COLUMNS = ("actuator", "type", "command", "force [N]")
-"""Columns of the table of actuators."""
-WRENCH_COLUMNS = ("", *(f"{axis} [{unit}]" for axis, unit in zip(AXES, UNITS, strict=True)))
-"""Columns of the table of wrenches."""
-
 _SIX_NUMBERS = " ".join(["%.3f"] * 6)
 """Format of the components of a wrench."""
 
@@ -65,8 +60,10 @@ def summary(result: Allocation) -> str:
     source = f", checkpoint {result.checkpoint}" if result.checkpoint else ""
     effort = "" if result.effort is None else f"effort {result.effort:.3f}   "
     expected = f"expected_error {result.expected_error:.2e}   " if result.expected_error else ""
+    prefix = prefix_of(result.power)
+    power = f"{result.power / prefix.factor:.3f} {prefix.symbol}W"
     return (
-        f"err_norm {result.err_norm:.2e}   {expected}power {result.power:.3f} W   {effort}"
+        f"err_norm {result.err_norm:.2e}   {expected}power {power}   {effort}"
         f"{result.solve_ms:.1f} ms   method {result.method}{source}"
     )
 
@@ -104,7 +101,7 @@ def missing_words(result: Allocation) -> str:
     for k in np.argsort(-sizes):
         if sizes[k] < SMALL_MISS * sizes.max():
             continue
-        amount = f"{three_digits(abs(unallocated[k]))} {UNITS[k]} of {MOTIONS[k]}"
+        amount = f"{with_unit(abs(unallocated[k]), UNITS[k])} of {MOTIONS[k]}"
         is_undone = unallocated[k] * result.target[k] > 0.0
         (undone if is_undone else unasked).append(amount)
     phrases = []
@@ -121,27 +118,46 @@ def allocation_blocks(result: Allocation) -> list[Block]:
     actuator_rows: list[tuple[str, ...]] = []
     commands = result.commands
     # Python's numbers: numpy's take ten times as long to be written.
-    for actuator, force in zip(result.layout.actuators, result.forces.tolist(), strict=True):
+    sizes = [math.hypot(*force) for force in result.forces.tolist()]
+    prefix = prefix_of(max(filter(math.isfinite, sizes), default=0.0))
+    for actuator, size in zip(result.layout.actuators, sizes, strict=True):
         command = commands[actuator.name]
         words = "lost"
-        size = ""
+        force = ""
         if command is not None:
             words = command.words
-            size = f"{math.hypot(*force):.3f}"
-        actuator_rows.append((actuator.name, actuator.type, words, size))
+            force = f"{size / prefix.factor:.3f}"
+        actuator_rows.append((actuator.name, actuator.type, words, force))
     wrenches = {"asked": result.target, "delivered": result.wrench, "missing": result.unallocated}
     if result.expected_error:
         wrenches["uncertain"] = result.expected_miss
-    wrench_rows = [(name, *_wrench_words(wrench)) for name, wrench in wrenches.items()]
+    wrench_table = _wrench_table({name: each.tolist() for name, each in wrenches.items()})
     is_text = (True, True, True, False)
-    actuators = Table(COLUMNS, actuator_rows, is_text)
-    wrench_table = Table(WRENCH_COLUMNS, wrench_rows, (True, *(False,) * 6))
+    columns = ("actuator", "type", "command", f"force [{prefix.symbol}N]")
+    actuators = Table(columns, actuator_rows, is_text)
     return [actuators, wrench_table, "\n".join([summary(result), *remarks(result)])]
 
 
-def _wrench_words(wrench: Array) -> list[str]:
-    """The components of a wrench (6,) [N, N m]; NaN is that of a free axis."""
-    numbers = _SIX_NUMBERS % tuple(wrench.tolist())  # in half the time of one after the other
+def _wrench_table(wrenches: Mapping[str, list[float]]) -> Table:
+    """Wrenches (6,) [N, N m] by name, all forces with one SI prefix and all torques with one: those
+    of what is delivered, so that a target beyond all reach leaves its digits."""
+    sizes = [abs(value) for value in wrenches["delivered"]]
+    force_prefix = prefix_of(max(sizes[:3]))
+    torque_prefix = prefix_of(max(sizes[3:]))
+    prefixes = (force_prefix,) * 3 + (torque_prefix,) * 3
+    rows = [(name, *_wrench_words(wrench, prefixes)) for name, wrench in wrenches.items()]
+    heads = [""]
+    for axis, unit, prefix in zip(AXES, UNITS, prefixes, strict=True):
+        heads.append(f"{axis} [{prefix.symbol}{unit}]")
+    return Table(heads, rows, (True, *(False,) * 6))
+
+
+def _wrench_words(wrench: list[float], prefixes: Sequence[Prefix]) -> list[str]:
+    """The components of a wrench (6,) [N, N m] with SI prefixes; NaN is that of a free axis."""
+    scaled = []
+    for value, prefix in zip(wrench, prefixes, strict=True):
+        scaled.append(value / prefix.factor)
+    numbers = _SIX_NUMBERS % tuple(scaled)  # in half the time of one after the other
     return numbers.replace("nan", "free").replace("-0.000", "0.000").split()
 
 

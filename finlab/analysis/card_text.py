@@ -10,7 +10,16 @@ from typing import Any, NamedTuple
 
 from finlab.analysis.authority import AXES, Authority, HeldAxes, Loss
 from finlab.axes import UNITS, MotionAxis
-from finlab.display import Block, Column, Table, percent, table_of, three_digits
+from finlab.display import (
+    Block,
+    Column,
+    Table,
+    percent,
+    prefix_of,
+    table_of,
+    three_digits,
+    with_unit,
+)
 
 ScoreCard = Any
 """`finlab.analysis.ScoreCard`, which shows itself by what is here."""
@@ -99,7 +108,7 @@ def card_blocks(card: ScoreCard) -> list[Block]:
         lines.insert(1, f"Lost: {', '.join(card.lost)}.")
     blocks: list[Block] = [
         "\n".join(lines),
-        table_of(AXIS_COLUMNS, axis_rows(card)),
+        table_of(AXIS_COLUMNS, [_prefixed(row) for row in axis_rows(card)]),
         _evenness(card.authority),
     ]
     if card.losses:
@@ -158,6 +167,16 @@ def axis_rows(card: ScoreCard) -> list[AxisRow]:
     return rows
 
 
+def _prefixed(row: AxisRow) -> AxisRow:
+    """A row whose wrenches are in thousands or millions of their unit where they are large."""
+    prefix = prefix_of(max(row.largest, row.most_negative))
+    return row._replace(
+        unit=f"{prefix.symbol}{row.unit}",
+        largest=row.largest / prefix.factor,
+        most_negative=row.most_negative / prefix.factor,
+    )
+
+
 def range_words(positive: float, negative: float) -> str:
     """Returns the largest wrench along an axis with either sign: `±2.32`, `+2.32 -1.10`, `none`.
 
@@ -180,10 +199,12 @@ def _evenness(authority: Authority) -> str:
             components.append((value, axis))
     components.sort(key=lambda component: -abs(component[0]))
     direction = ", ".join(f"{axis} {value:+.2f}" for value, axis in components)
-    values = " ".join(three_digits(value) for value in authority.singular_values)
+    prefix = prefix_of(max(authority.singular_values))
+    values = " ".join(three_digits(value / prefix.factor) for value in authority.singular_values)
+    weakest = with_unit(authority.weakest, "N")
     return (
-        f"Weakest direction: {three_digits(authority.weakest)} N along {direction} (torques over "
-        f"0.2 m).\nSingular values {values} N."
+        f"Weakest direction: {weakest} along {direction} (torques over "
+        f"0.2 m).\nSingular values {values} {prefix.symbol}N."
     )
 
 

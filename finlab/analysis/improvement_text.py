@@ -7,7 +7,7 @@ from finlab.analysis.authority import AXES
 from finlab.analysis.card_text import Remark
 from finlab.analysis.goals import MISSION, UNREACHED, GoalName
 from finlab.analysis.optimize import Improvement
-from finlab.display import Table, as_sentence, listed, table_of, three_digits
+from finlab.display import Table, as_sentence, listed, table_of, with_unit
 from finlab.layout.layout_text import COLUMNS
 
 GOAL_WORDS: Mapping[str, str] = {
@@ -31,7 +31,7 @@ def goal_value(goal: str, value: float) -> str:
         goal: its name.
         value: as the search has it; powers are negative.
     """
-    return f"{three_digits(abs(value))} {'W' if goal == POWER_GOAL else 'N'}"
+    return with_unit(abs(value), "W" if goal == POWER_GOAL else "N")
 
 
 def improvement_remarks(improvement: Improvement) -> list[Remark]:

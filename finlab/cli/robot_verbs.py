@@ -65,6 +65,7 @@ def allocate(
     from finlab.allocation import Allocator
     from finlab.allocation.policy import policy_from
     from finlab.allocation.report import allocation_record
+    from finlab.display import prefix_of
     from finlab.layout.damage import Damage
 
     shared_options.check_json_file(json)
@@ -82,8 +83,10 @@ def allocate(
     lines = [str(result)]
     if bound and result.bound is None:
         raise FinlabError(f"bound: method {method!r} proves none; leave --bound out")
-    if bound:
-        lines.append(f"no exact answer takes less than {result.bound:.4g} W")
+    if bound and result.bound is not None:
+        prefix = prefix_of(result.bound)
+        least = f"{result.bound / prefix.factor:.4g} {prefix.symbol}W"
+        lines.append(f"no exact answer takes less than {least}")
     shared_options.put_json(allocation_record(result), json, "\n".join(lines))
 
 

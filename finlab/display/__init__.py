@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from base64 import b64encode
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from html import escape
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -28,6 +28,10 @@ LARGEST_PLAIN = 1e4
 """Size up to which a number is written without an exponent."""
 LARGEST_WITH_DECIMALS = 999.5
 """Size from which a number with three digits is rounded to a whole one of four."""
+PREFIXES = ("", "k", "M", "G", "T")
+"""SI prefixes of thousands."""
+PREFIXED_UNITS = ("N", "N m", "W")
+"""Units of columns that have an SI prefix where their numbers are large."""
 
 
 def three_digits(value: float | None) -> str:
@@ -44,6 +48,35 @@ def three_digits(value: float | None) -> str:
         return f"{value:.0f}"
     # With # zeros at the end stay, and so does the point after three digits before it.
     return f"{value:#.3g}".rstrip(".")
+
+
+class Prefix(NamedTuple):
+    """An SI prefix."""
+
+    symbol: str = ""
+    factor: float = 1.0
+    """What it stands for."""
+
+
+NO_PREFIX = Prefix()
+"""That of a unit as it is."""
+
+
+def prefix_of(size: float) -> Prefix:
+    """Returns the SI prefix with which quantities are told whose largest has a size: none below
+    `LARGEST_PLAIN`, nor for NaN and infinities."""
+    if not LARGEST_PLAIN <= size < math.inf:
+        return NO_PREFIX
+    # Logarithms are rounded: 1e6 is not to fall below its own prefix.
+    order = min(int(math.log10(size) / 3.0 + 1e-9), len(PREFIXES) - 1)
+    return Prefix(PREFIXES[order], 1000.0**order)
+
+
+def with_unit(value: float, unit: str) -> str:
+    """Returns three significant digits and a unit, with an SI prefix where the number would be
+    long: `327 W`, `25.8 kW`."""
+    prefix = prefix_of(abs(value))
+    return f"{three_digits(value / prefix.factor)} {prefix.symbol}{unit}"
 
 
 def percent(share: float | None) -> str:
@@ -90,6 +123,26 @@ class Column:
         value = self.value(item)
         return value if isinstance(value, str) else self.digits(value)
 
+    def prefixed(self, items: Sequence[Any]) -> Column:
+        """The column as a table of these items has it: numbers of `PREFIXED_UNITS` with the SI
+        prefix of their largest."""
+        if self.unit not in PREFIXED_UNITS:
+            return self
+        sizes = [0.0]
+        for item in items:
+            value = self.value(item)
+            if isinstance(value, (int, float)) and math.isfinite(value):
+                sizes.append(abs(value))
+        prefix = prefix_of(max(sizes))
+        if prefix is NO_PREFIX:
+            return self
+
+        def scaled(item: Any) -> Any:
+            value = self.value(item)
+            return value / prefix.factor if isinstance(value, (int, float)) else value
+
+        return replace(self, value=scaled, unit=f"{prefix.symbol}{self.unit}")
+
 
 class Table(NamedTuple):
     """A table of texts."""
@@ -106,11 +159,13 @@ class Table(NamedTuple):
 
 def table_of(columns: Sequence[Column], items: Iterable[Any], title: str = "") -> Table:
     """Returns a table with a row for each item."""
+    all_items = list(items)
+    shown = [column.prefixed(all_items) for column in columns]
     rows = []
-    for item in items:
-        rows.append([column.cell(item) for column in columns])
-    heads = [column.heading for column in columns]
-    return Table(heads, rows, [column.is_text for column in columns], title)
+    for item in all_items:
+        rows.append([column.cell(item) for column in shown])
+    heads = [column.heading for column in shown]
+    return Table(heads, rows, [column.is_text for column in shown], title)
 
 
 Block = Table | str

@@ -26,15 +26,15 @@ MESH_SUFFIXES = (".stl", ".obj", ".glb", ".ply")
 """Ends of the names of mesh files that a hull may name."""
 
 # Bounds of the numbers in a file: far beyond any robot of this kind, they catch a wrong unit.
-Length = Annotated[float, Meta(ge=0.01, le=20.0)]
+Length = Annotated[float, Meta(ge=0.01, le=1000.0)]
 """A length of a hull [m]."""
-Coordinate = Annotated[float, Meta(ge=-20.0, le=20.0)]
+Coordinate = Annotated[float, Meta(ge=-1000.0, le=1000.0)]
 """A component of a point, body frame [m]."""
-Mass = Annotated[float, Meta(ge=1e-3, le=1e6)]
+Mass = Annotated[float, Meta(ge=1e-3, le=1e9)]
 """A mass [kg]."""
-InertiaMoment = Annotated[float, Meta(ge=1e-9, le=1e7)]
+InertiaMoment = Annotated[float, Meta(ge=1e-9, le=1e13)]
 """A moment of inertia [kg m^2]."""
-Coefficient = Annotated[float, Meta(ge=0.0, le=1e7)]
+Coefficient = Annotated[float, Meta(ge=0.0, le=1e13)]
 """A hydrodynamic derivative, in the unit of its key, or a buoyant force [N]."""
 PerAxis = Meta(min_length=3, max_length=3)
 """One number for each of x, y and z."""

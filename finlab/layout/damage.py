@@ -21,7 +21,7 @@ FaultKind = Literal["lost", "weak", "torn", "stuck", "running", "whole"]
 """What is wrong with an actuator; `whole` where a repair is meant."""
 ForceShare = Annotated[float, Meta(gt=0.0, le=1.0)]
 """Share of a force that is left [1]."""
-CommandNumber = Annotated[float, Meta(ge=-1e6, le=1e6)]
+CommandNumber = Annotated[float, Meta(ge=-1e9, le=1e9)]
 """A number of a command, such as an angle [rad] or a force [N]."""
 FAULT_VALUE_TYPES: Mapping[str, Any] = {
     "weak": ForceShare,

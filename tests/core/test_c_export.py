@@ -121,6 +121,14 @@ def test_self_test_holds_on_any_robot(kind: str, seed: int, tmp_path: Path) -> N
         ran(f"gcc -std=c99 -O1 {single} *.c -lm && ./a.out", tmp_path)
 
 
+@pytest.mark.parametrize("name", ["supply", "drillship"])
+def test_self_test_of_a_ship_holds(name: str) -> None:
+    """Its forces are a million times those of a small robot; so in single precision, too."""
+    folder = exported(name, 40)
+    for single in PRECISIONS:
+        assert ran(f"gcc -std=c99 -O1 {single} *.c -lm && ./a.out", folder).startswith("0 of 40 ")
+
+
 @pytest.mark.exhaustive
 @pytest.mark.parametrize("name", ["A", "bluerov2_heavy", "turtle_hybrid", "mixed", "restricted"])
 def test_single_precision_answers_as_double_does(name: str, tmp_path: Path) -> None:

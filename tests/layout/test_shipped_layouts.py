@@ -76,6 +76,8 @@ def test_there_is_something_to_teach():
         ("bluerov2", 5, []),
         ("torpedo", 4, []),
         ("catamaran", 3, ["Fz", "Tx", "Ty"]),
+        ("supply", 5, ["Fz"]),
+        ("drillship", 4, ["Fz", "Ty"]),
         ("fish", 5, []),
     ],
 )

@@ -15,9 +15,10 @@ from markupsafe import Markup
 from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
 from finlab.axes import AXES, MOTIONS
+from finlab.display import prefix_of
 from finlab.layout import Actuator, Fin, Layout
 from finlab.layout.damage import NO_DAMAGE, Damage
-from webapp.markup.words import KILO, damage_words, html, saturated, signed_degrees
+from webapp.markup.words import KILO, damage_words, html, prefixed, saturated, signed_degrees
 from webapp.theme import DEAD, css, fin_color, ink
 
 FIN_HEADER = Markup(
@@ -112,7 +113,8 @@ def _bars_header(force_scale: float, torque_scale: float) -> str:
 
 def _end(scale: float, unit: str) -> str:
     """What the end of a bar stands for."""
-    return f"{scale / 1000.0:g} k{unit}" if scale >= KILO else f"{scale:g} {unit}"
+    prefix = prefix_of(scale)
+    return f"{scale / prefix.factor:g} {prefix.symbol}{unit}"
 
 
 def nice_limit(value: float) -> float:
@@ -155,9 +157,8 @@ def _bar_row(axis: int, demanded: float | None, delivered: float | None, scale: 
     markup.append("</div>")
     columns = (("asked", demanded, "free"), ("given", delivered, "–"), ("missing", missing, "–"))
     digits = 2 if axis < 3 else 3
-    factor = 1.0
-    if scale >= KILO:  # all figures of the axis are in kN or kN m, as its scale is
-        factor = 1000.0
+    factor = prefix_of(scale).factor  # all figures of the axis are as its scale is
+    if factor > 1.0:
         digits = 1
     for style, value, placeholder in columns:
         rounded = 0.0 if value is None else round(value / factor, digits)
@@ -267,6 +268,13 @@ def _fin_cells(
     )
 
 
+def _force_digits(force: float) -> str:
+    """A force [N] in its column, with an SI prefix where it is large."""
+    if abs(force) >= KILO:
+        return "".join(prefixed(force))
+    return f"{round(force, 2) + 0.0:.2f}".replace("-", "−")
+
+
 def _plain_cells(
     actuator: Actuator,
     command: Sequence[float],
@@ -285,6 +293,6 @@ def _plain_cells(
         "<td colspan='3' class='words'>{}</td><td class='{}'>{}</td><td>{}</td>",
         remark,
         "full" if any(limits) else "",
-        f"{round(along, 2) + 0.0:.2f}".replace("-", "−"),
+        _force_digits(along),
         Markup(meter),
     )

@@ -144,17 +144,15 @@ def error_digits(value: float) -> str:
     return "≤ 1e−9" if value < ROUNDING else small(value)
 
 
-PREFIXES = ("", "k", "M", "G", "T")
-"""SI prefixes of thousands."""
 LARGE = re.compile(r"(\d(?:\.\d+)?)e\+(\d+)")
 """A large number with a power of ten."""
 
 
 def prefixed(value: float) -> tuple[str, str]:
     """Three significant digits of a number from `KILO` on, and the SI prefix that it has then."""
-    order = min(int(math.log10(abs(value)) / 3.0 + 1e-9), len(PREFIXES) - 1)
-    digits = finlab.display.three_digits(value / 1000.0**order).replace("-", "−")
-    return digits, PREFIXES[order]
+    prefix = finlab.display.prefix_of(abs(value))
+    digits = finlab.display.three_digits(value / prefix.factor).replace("-", "−")
+    return digits, prefix.symbol
 
 
 def without_powers(text: str) -> str:

@@ -20,7 +20,7 @@ from webapp.panels.actuator_model import add_fit, add_model, of_selected
 from webapp.panels.inspectors import Box, NumberBox, RangeBox, all_inspectors, inspector_of
 from webapp.session.state import number
 
-LARGEST = 1e6
+LARGEST = 1e9
 """Largest size of a number that a box takes, in its unit; its field has narrower bounds."""
 SNAPS: dict[str, Vector3] = {
     "+x": (1.0, 0.0, 0.0),

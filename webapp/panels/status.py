@@ -9,6 +9,7 @@ from markupsafe import Markup
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.report import is_proved_least
 from finlab.axes import AXES, UNITS
+from finlab.display import LARGEST_PLAIN, prefix_of
 from finlab.layout import Layout
 from finlab.physics.objective import REACHED
 from webapp.handles import set_properties
@@ -142,8 +143,12 @@ def scale_words(scale: Scale, size: float, has_rings: bool = True) -> str:
 
 
 def in_unit(value: float, unit: str) -> str:
-    """A value in a unit, or in thousands of it where it is that large."""
-    return f"{value / 1000.0:g} k{unit}" if value >= 1000.0 else f"{value:g} {unit}"
+    """A value in a unit, or in thousands or millions of it where it is that large."""
+    if value < 1000.0:
+        return f"{value:g} {unit}"
+    # A scale is a round number: 5000 N is told as 5 kN.
+    prefix = prefix_of(max(value, LARGEST_PLAIN))
+    return f"{value / prefix.factor:g} {prefix.symbol}{unit}"
 
 
 def set_rows(analysis: Analysis | None, size: float) -> str:

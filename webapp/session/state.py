@@ -22,7 +22,7 @@ from webapp.session.granted import Granted, SourceFile
 
 Links = tuple[tuple[str, str], ...]
 """Mirror pairs by name; an actuator is in at most one of them."""
-MAX_TARGET = 1e6
+MAX_TARGET = 1e12
 """Largest target component that the page may ask for [N, N m]."""
 Flow = tuple[float, float, float, float, float, float]
 FIRST_POLICY = "closest"
