@@ -35,8 +35,8 @@ typedef struct {
 /* What a flow takes of an actuator, whose jet has a speed V0: of its force F the shares c1 q + c2 q
    |q|, q = v.a / V0, by the speed along it, and the force c3 V0 v_across. */
 typedef struct {
-  real position[3]; /* [m] */
-  real area;        /* [m^2] */
+  real position[3];  /* [m] */
+  real area;         /* [m^2] */
   real thrust_still; /* left where there is no force [N] */
   real lost;         /* c1 */
   real lost_squared; /* c2 */
