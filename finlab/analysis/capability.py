@@ -248,8 +248,7 @@ def capability(
     cases = []
     for name, taken in [("intact", ()), *((name, (name,)) for name in working)]:
         sets = tuple(each for each in every if each.name not in {*lost, *taken})
-        if sets or not taken:
-            cases.append(Case(name, taken, sets))
+        cases.append(Case(name, taken, sets))
     full = [np.ones((len(angles), 1, len(case.sets))) for case in cases]
     return _answered(
         layout=layout.name,
@@ -301,8 +300,6 @@ def dp_capability(
     for name, taken in _failures(layout, ship.groups, lost):
         without = {*lost, *taken}
         sets = ship_sets(thrusters, ship, without, losses)
-        if not sets and taken:
-            continue
         cases.append(Case(name, taken, sets))
         working = [i for i, each in enumerate(thrusters) if each.name not in without]
         scales.append(np.moveaxis(left[working], 0, -1))
@@ -330,7 +327,8 @@ def dp_capability(
             scale = np.full_like(scale, CONSTANT_LOSS)
         sets = ship_sets(thrusters, ship, lost, others)
         share_without = largest_shares(sets, asked, scale).share
-        cost = 1.0 - with_all / np.maximum(share_without, np.finfo(float).tiny)
+        is_any = share_without > 0.0
+        cost = np.where(is_any, 1.0 - with_all / np.where(is_any, share_without, 1.0), 0.0)
         costs[loss] = np.where(cost > NEARLY, cost, 0.0)
     return replace(answered, loss_costs=costs)
 

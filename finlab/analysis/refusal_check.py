@@ -39,7 +39,8 @@ def proven_share(
         load: wrench (6,) that is to be held [N, N m]; the forces together oppose it.
 
     Returns:
-        The bound; infinity where the price proves nothing.
+        The bound; 0 where the price refuses the load, but not multiples of it; infinity where it
+        proves nothing.
     """
     price = leaf["price"]
     earned = 0.0
@@ -52,7 +53,10 @@ def proven_share(
         piece = actuator["cover"] if part is None else actuator["parts"][part]
         earned += scale * support(piece, (first, second))
     asked = -sum(p * w for p, w in zip(price, load, strict=True))
-    return earned / asked if asked > 0.0 else math.inf
+    if asked > 0.0:
+        return float(max(earned / asked, 0.0))
+    # Actuators that cannot stop may earn less than nothing: then the load itself is out of reach.
+    return 0.0 if earned < asked else math.inf
 
 
 def covers(leaves: list[dict[str, Any]], sets: list[dict[str, Any]]) -> bool:

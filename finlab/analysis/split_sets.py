@@ -42,6 +42,11 @@ class Piece(NamedTuple):
     corners: Array | None = None
     """Corners (K, 2) [N] of a polygon, in place of the arc."""
 
+    @property
+    def middle(self) -> Array:
+        """A force (2,) [N] of the set: the middle of a polygon, and none of a sector."""
+        return np.zeros(2) if self.corners is None else self.corners.mean(axis=0)
+
     def contains(self, force: Array) -> NDArray[np.bool_]:
         """Returns whether forces (R, 2) [N] are within the set, but for `INSIDE`."""
         margin = INSIDE * self.radius
@@ -161,6 +166,14 @@ def largest_shares(sets: Sequence[SplitSet], target: Array, factor: Array) -> Sh
     Returns:
         The shares, exact to about 1e-8, and their proofs.
     """
+    if not sets:
+        # Nothing is held, as any price of the wrench itself proves.
+        is_asked = (target != 0.0).any(axis=-1)
+        alone = [
+            (Leaf({}, wrench),) if asked else ()
+            for wrench, asked in zip(target, is_asked, strict=True)
+        ]
+        return Shares(np.where(is_asked, 0.0, np.inf), tuple(alone))
     search = _Search(sets, target, factor)
     asked = np.flatnonzero(search.length > 0.0)
     best = np.zeros(len(target))
@@ -205,6 +218,7 @@ class _Search:
         flat = [piece for pieces in self._pieces for piece in pieces]
         self._radius = np.array([piece.radius for piece in flat])
         self._center = np.array([piece.center for piece in flat])
+        self._middle = np.array([piece.middle for piece in flat])
         self._half_angle = np.array(
             [piece.half_angle if piece.corners is None else 0.0 for piece in flat]
         )
@@ -224,6 +238,14 @@ class _Search:
         )
         ray = self._ray[question]
         size, normal, force = sets.reach(np.zeros_like(ray), ray, FINE)
+        missed = np.flatnonzero(np.isneginf(size))
+        if len(missed):
+            # Actuators that cannot stop: the ray misses all wrenches. One from among these to the
+            # target ends before it, and the plane there parts them.
+            of_missed = sets.take(missed)
+            inside = of_missed.wrench(self._middle[piece[missed]])
+            target = ray[missed] * self.length[question[missed], None]
+            normal[missed] = of_missed.reach(inside, target - inside, FINE)[1]
         share = np.maximum(size, 0.0) / self.length[question]
         # A price of a unit norm: only its direction counts.
         norm = np.linalg.norm(normal, axis=-1, keepdims=True)

@@ -3,6 +3,7 @@
 import copy
 import json
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -373,3 +374,22 @@ def test_a_wrong_file_of_a_ship_is_refused(tmp_path: Path, text: str, words: str
 def test_fins_have_no_thrust_of_the_standard() -> None:
     with pytest.raises(LayoutError, match="without --standard"):
         dp_capability(load_layout("A"), ship_of("{}"))
+
+
+def test_pods_that_cannot_stop_hold_no_small_load_abeam() -> None:
+    robot = load_layout("catamaran")
+    pods = []
+    for actuator in robot.actuators:
+        is_pod = actuator.name != "bow"
+        pods.append(replace(actuator, force=(20.0, 60.0), arc=(-0.5, 0.5)) if is_pod else actuator)
+    plot = capability(replace(robot, actuators=tuple(pods)), headings=[0.0, 90.0])
+    assert plot.values[0] == pytest.approx([120.0, 0.0])
+    assert faults(as_file(plot)) == []
+
+
+def test_without_actuators_nothing_is_held() -> None:
+    robot = load_layout("pair")
+    plot = capability(robot, headings=[0.0], lost=[robot.names[0]])
+    assert [case.name for case in plot.cases] == ["intact", *robot.names[1:]]
+    assert plot.values[1:].tolist() == [[0.0]]
+    assert faults(as_file(plot)) == []
