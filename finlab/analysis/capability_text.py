@@ -8,15 +8,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from finlab.display import Block, Column, listed, table_of, three_digits
+from finlab.display import Block, Column, listed, prefix_of, table_of, three_digits
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Capability = Any
 """`finlab.analysis.Capability`, which shows itself by what is here."""
-LARGE_FORCE = 1e4
-"""Force from which a plot is in kN [N]."""
 FEW_HEADINGS = 4
 """Most headings that a sentence names."""
 
@@ -77,9 +75,8 @@ def shown_values(capability: Capability) -> Shown:
         return Shown("DP capability number", "", 1.0, lambda value: f"{value:.0f}")
     if capability.unit == "1":
         return Shown("share of the load", "", 1.0, three_digits)
-    if float(capability.values.max(initial=0.0)) >= LARGE_FORCE:
-        return Shown("largest force", "kN", 1e-3, three_digits)
-    return Shown("largest force", "N", 1.0, three_digits)
+    prefix = prefix_of(float(capability.values.max(initial=0.0)))
+    return Shown("largest force", f"{prefix.symbol}N", 1.0 / prefix.factor, three_digits)
 
 
 def capability_columns(capability: Capability) -> tuple[Column, ...]:
