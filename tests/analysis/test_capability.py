@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec import structs
 from scipy.optimize import Bounds, LinearConstraint, linprog, milp
 
 from finlab.analysis.capability import Capability, capability, dp_capability
@@ -393,3 +394,33 @@ def test_without_actuators_nothing_is_held() -> None:
     assert [case.name for case in plot.cases] == ["intact", *robot.names[1:]]
     assert plot.values[1:].tolist() == [[0.0]]
     assert faults(as_file(plot)) == []
+
+
+def test_the_origin_of_the_layout_does_not_count(four: tuple[Layout, Ship]) -> None:
+    layout, ship = four
+    moved = []
+    for actuator in layout.actuators:
+        x, y, z = actuator.position
+        moved.append(replace(actuator, position=(x + 7.0, y, z)))
+    shifted = structs.replace(ship, midship_m=7.0)
+    headings = [20.0, 100.0]
+    before = dp_capability(layout, ship, headings)
+    after = dp_capability(replace(layout, actuators=tuple(moved)), shifted, headings)
+    assert after.share[..., 1:] == pytest.approx(before.share[..., 1:], rel=1e-9)
+
+
+@pytest.mark.parametrize("up", [1.0, -1.0])
+def test_an_arc_is_that_of_the_body_whichever_way_an_azimuth_turns(up: float) -> None:
+    pod = AZIMUTH.format(name="pod", x=0, y=0).replace("[0, 0, 1]", f"[0, 0, {up:g}]")
+    arc = ", arc_deg: [0, 90]}"
+    layout = parse_layout_text(layout_text(pod[:-1] + arc), ".yaml", "test")
+    (one,) = ship_thrusters(layout, ship_of("{}"))
+    assert one.arc == pytest.approx((0.0, 0.5 * np.pi) if up > 0.0 else (-0.5 * np.pi, 0.0))
+    # It pushes ahead and to port, or to starboard: weather is held from there.
+    headings = [330.0, 30.0, 150.0]
+    plot = dp_capability(layout, ship_of("{}"), headings)
+    target = -plot.loads[:, 1, :2]
+    ahead_and_aside = (target[:, 0] > 0.0) & (target[:, 1] * up > 0.0)
+    (sets,) = [case.sets for case in plot.cases[:1]]
+    force = 1e3 * target / np.linalg.norm(target, axis=-1, keepdims=True)
+    assert sets[0].cover.contains(force).tolist() == ahead_and_aside.tolist()
