@@ -125,7 +125,7 @@ class ForceNodes:
     def __init__(self, scene: viser.SceneApi, robot: str = "/robot") -> None:
         """Nothing is shown yet; `robot` is the node of the robot."""
         self._arrows = Arrows(scene, f"{robot}/forces", THICKNESS)
-        self._halo = Outline(scene, f"{robot}/halo", THICKNESS, HALO, look(False).halo)
+        self._halo = Outline(scene, f"{robot}/halo", THICKNESS, HALO, linear_of(look(False).halo))
         self._is_dark = False
         wedge = unit_wedge()
         self._fans = scene.add_batched_meshes_simple(
@@ -203,7 +203,11 @@ class ForceNodes:
         """The outlines' colour of the dark or the light theme."""
         if is_dark != self._is_dark:
             self._is_dark = is_dark
-            self._halo.paint(look(is_dark).halo)
+            self._halo.paint(linear_of(look(is_dark).halo))
+
+    def take_script(self) -> str:
+        """The script that tells the page where outlines end; empty where it knows."""
+        return self._halo.take_script()
 
     def _clear_starts(self, forces: Array) -> Array:
         """Where arrows of forces (n, 3) [m] begin, clear of what gives them; one that would end in
@@ -259,6 +263,12 @@ def linear(colors: Sequence[Rgb]) -> NDArray[np.uint8]:
     share = np.array(colors) / 255.0
     light = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
     return np.asarray((255.0 * light).round().astype(np.uint8))
+
+
+def linear_of(color: Rgb) -> Rgb:
+    """A colour in linear light."""
+    red, green, blue = linear([color])[0].tolist()
+    return red, green, blue
 
 
 def unit_wedge() -> Mesh:

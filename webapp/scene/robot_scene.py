@@ -92,8 +92,8 @@ class RobotScene:
             self._show_stage,
             self._place,
             self._push,
-            self._animate,
             self._show_wrench,
+            self._animate,
             self._show_sets,
         )
         for show in (*shows, self._offer):
@@ -282,10 +282,11 @@ class RobotScene:
         pair: Pair | None,
         follows: str,
     ) -> None:
-        """What the page moves itself (`frames.js`), in one message: the fins, and the handle."""
-        script = ""
+        """What the page moves itself (`frames.js`), in one message: outlines of arrows, the fins,
+        and the handle."""
+        script = self._forces.take_script() + self._wrench.take_script()
         if pair is None:
-            script = self._flapping(moment, display, swim, paused)
+            script += self._flapping(moment, display, swim, paused)
         else:
             self._flaps = ""
         size = arrow_size(visible_layout)

@@ -221,6 +221,10 @@ class PairedRobot:
         demanded = (np.array(state.target) * layout.commanded).tolist()
         self._wrench.refresh(demanded, delivered, missing, top, *lengths, size)
 
+    def take_script(self) -> str:
+        """The script that tells the page where outlines end; empty where it knows."""
+        return self._forces.take_script() + self._wrench.take_script()
+
 
 def _leave_alone(*_: object) -> None:
     """Actuators of a pair are neither selected nor dragged."""
@@ -334,10 +338,13 @@ class PairScene:
         assert robots is not None
         moves = [move for robot in robots for move in robot.moves]
         counts = {robot.name: len(robot.moves) for robot in robots}
+        script = "".join([robot.take_script() for robot in robots])
         flaps = msgspec.json.encode([moves, SPEED, display.frozen, counts])[1:-1]
         if flaps != self._flaps:
             self._flaps = flaps
-            run_script(self._client.gui, f"finlabFrames.flap({flaps.decode()});")
+            script += f"finlabFrames.flap({flaps.decode()});"
+        if script:
+            run_script(self._client.gui, script)
 
 
 def pair_arrow_size(pair: Pair) -> float:

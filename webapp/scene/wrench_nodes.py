@@ -15,7 +15,7 @@ from finlab.swim.hull.mesh_file import Mesh
 from webapp.handles import set_properties
 from webapp.markup.words import missing_part
 from webapp.scene.actuator_shapes import NOTHING, SHORTEST, tube, unit_ring
-from webapp.scene.force_nodes import Arrows, linear, quaternion
+from webapp.scene.force_nodes import Arrows, linear, linear_of, quaternion
 from webapp.scene.outline import DIGITS, Outline
 from webapp.scene.stage import Shape
 from webapp.tasks.analysing import Analysis
@@ -149,7 +149,7 @@ class WrenchNodes:
         self._forces = Arrows(scene, f"{name}/forces", FORCE_THICKNESS)
         # What is asked frames what is delivered, and is seen where both are one.
         self._asked_force = Outline(
-            scene, f"{name}/asked_force", FORCE_THICKNESS, ASKED_MARGIN, ASKED
+            scene, f"{name}/asked_force", FORCE_THICKNESS, ASKED_MARGIN, linear_of(ASKED)
         )
         rings = (
             part("asked_torque", ASKED, unit_ring(0.075), side="back"),
@@ -161,10 +161,13 @@ class WrenchNodes:
         """Top of the hull [m] and size that the nodes stand for."""
 
     def thicken(self, factor: float) -> None:
-        """Draw the arrows of forces thicker by a factor; that of the asked one with the next
-        target."""
+        """Draw the arrows of forces thicker by a factor."""
         self._forces.thicken(factor)
         self._asked_force.thicken(factor)
+
+    def take_script(self) -> str:
+        """The script that tells the page where the outline ends; empty where it knows."""
+        return self._asked_force.take_script()
 
     def refresh(
         self,
