@@ -205,10 +205,6 @@ class ForceNodes:
             self._is_dark = is_dark
             self._halo.paint(linear_of(look(is_dark).halo))
 
-    def take_script(self) -> str:
-        """The script that tells the page where outlines end; empty where it knows."""
-        return self._halo.take_script()
-
     def _clear_starts(self, forces: Array) -> Array:
         """Where arrows of forces (n, 3) [m] begin, clear of what gives them; one that would end in
         the hull ends at its actuator instead."""
@@ -220,22 +216,26 @@ class ForceNodes:
         behind = self._starts - free - forces
         return np.asarray(np.where(is_into_hull[:, None], behind, ahead))
 
-    def command(self, forces: Array, half_angles: list[float], middles: list[float]) -> None:
+    def command(self, forces: Array, half_angles: list[float], middles: list[float]) -> str:
         """Show forces (n, 3) as arrows [m], and fans of half angles (n,) about angles (n,)
-        [rad]."""
+        [rad].
+
+        Returns:
+            A script that tells the page where the outlines end; empty where it knows.
+        """
         starts = self._clear_starts(forces)
         self._arrows.show(starts, forces, self._colors, self._sizes[1])
-        self._halo.show(starts, forces, self._sizes[1])
+        script = self._halo.show(starts, forces, self._sizes[1])
         swept = ([round(x, DIGITS) for x in half_angles], [round(x, DIGITS) for x in middles])
         if swept == self._swept:
-            return
+            return script
         self._swept = swept
         amplitudes, angles = np.array(swept)
         beats = amplitudes > 0.0
         fans = self._fans
         fans.visible = bool(beats.any())
         if not beats.any():
-            return
+            return script
         half = amplitudes[beats, None] / WEDGES
         across = half * (2.0 * np.arange(WEDGES) + 1.0 - WEDGES) + angles[beats, None]
         size = self._sizes[0]
@@ -250,6 +250,7 @@ class ForceNodes:
             batched_scales=_rows(scales),
             batched_wxyzs=_rows(turns),
         )
+        return script
 
 
 def _rows(values: Array) -> NDArray[np.float32]:

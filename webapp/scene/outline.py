@@ -58,8 +58,6 @@ class Outline:
         """How many are shown."""
         self._points = np.zeros((0, 2, 3))
         """Their ends (m, 2, 3), for size 1 [m]."""
-        self._script = ""
-        """Tells the page where they end, where no message has."""
 
     def _sizes_for(self, factor: float) -> tuple[float, float, float]:
         """Radius of the shaft, radius and length of the head of an outline, for size 1 and an arrow
@@ -80,14 +78,17 @@ class Outline:
         sizes = {"shaft_radius": radius, "head_radius": head_radius, "head_length": head_length}
         assign(self.node, sizes)
 
-    def show(self, starts: Array, vectors: Array, size: float) -> None:
-        """Shows outlines of arrows; those of no length have none. Where as many were shown before,
-        only `take_script` tells where they end.
+    def show(self, starts: Array, vectors: Array, size: float) -> str:
+        """Shows outlines of arrows; those of no length have none.
 
         Args:
             starts: where they begin (n, 3) [m].
             vectors: from there to their tips (n, 3) [m].
             size: factor of the thickness of their shafts.
+
+        Returns:
+            A script that tells the page where they end, where as many were shown before; empty
+            where a message tells it, or the page knows.
         """
         length = np.sqrt((vectors * vectors).sum(axis=1))
         is_drawn = length > SHORTEST * size
@@ -97,8 +98,7 @@ class Outline:
             self.node.visible = self._is_visible
         if count == 0:
             self._count = 0
-            self._script = ""
-            return
+            return ""
         if count < len(starts):
             starts, vectors, length = starts[is_drawn], vectors[is_drawn], length[is_drawn]
         direction = vectors / length[:, None]
@@ -108,12 +108,11 @@ class Outline:
         points[:, 1] = (starts + vectors) / size + BEYOND_TIP * margin * direction
         points = points.round(DIGITS)
         if count == self._count and size == self._size:
-            if points.tobytes() != self._points.tobytes():
-                self._points = points
-                self._script = script_of_points(self.node, points)
-            return
+            if points.tobytes() == self._points.tobytes():
+                return ""
+            self._points = points
+            return script_of_points(self.node, points)
         self._points = points
-        self._script = ""
         colors = np.broadcast_to(self._color, (count, 3)).copy()
         values = {"points": points.astype(np.float32), "colors": colors}
         if size != self._size:
@@ -121,9 +120,4 @@ class Outline:
         self._count = count
         self._size = size
         assign(self.node, values)
-
-    def take_script(self) -> str:
-        """The script that tells the page what `show` has not; empty where it knows."""
-        script = self._script
-        self._script = ""
-        return script
+        return ""

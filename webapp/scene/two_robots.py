@@ -141,6 +141,8 @@ class PairedRobot:
         self._works: list[bool] = []
         self.moves: list[Motion] = []
         """How its actuators move."""
+        self.outlines = ""
+        """Script that tells the page where outlines of its arrows end."""
 
     def hide(self) -> None:
         """The two are not looked at."""
@@ -214,16 +216,13 @@ class PairedRobot:
         swept = [
             move.amplitude if alive else 0.0 for move, alive in zip(self.moves, works, strict=True)
         ]
-        self._forces.command(arrows, swept, [move.angle for move in self.moves])
+        halo = self._forces.command(arrows, swept, [move.angle for move in self.moves])
         lengths = length / scale.newtons, length / scale.torque
         top = hull_top(layout)
         # An axis that the robot does not command takes what comes.
         demanded = (np.array(state.target) * layout.commanded).tolist()
-        self._wrench.refresh(demanded, delivered, missing, top, *lengths, size)
-
-    def take_script(self) -> str:
-        """The script that tells the page where outlines end; empty where it knows."""
-        return self._forces.take_script() + self._wrench.take_script()
+        asked = self._wrench.refresh(demanded, delivered, missing, top, *lengths, size)
+        self.outlines = halo + asked
 
 
 def _leave_alone(*_: object) -> None:
@@ -338,7 +337,7 @@ class PairScene:
         assert robots is not None
         moves = [move for robot in robots for move in robot.moves]
         counts = {robot.name: len(robot.moves) for robot in robots}
-        script = "".join([robot.take_script() for robot in robots])
+        script = "".join([robot.outlines for robot in robots])
         flaps = msgspec.json.encode([moves, SPEED, display.frozen, counts])[1:-1]
         if flaps != self._flaps:
             self._flaps = flaps

@@ -165,10 +165,6 @@ class WrenchNodes:
         self._forces.thicken(factor)
         self._asked_force.thicken(factor)
 
-    def take_script(self) -> str:
-        """The script that tells the page where the outline ends; empty where it knows."""
-        return self._asked_force.take_script()
-
     def refresh(
         self,
         target: Sequence[float],
@@ -178,10 +174,14 @@ class WrenchNodes:
         scale: float,
         turn: float,
         size: float,
-    ) -> None:
+    ) -> str:
         """Show a target (6,) [N, N m], what is delivered of it (zero while unknown), and what is
         missing enough to be drawn; `top` is the hull's [m], `scale` of arrows [m/N], `turn` of
-        rings [m/(N m)]."""
+        rings [m/(N m)].
+
+        Returns:
+            A script that tells the page where the outline ends; empty where it knows.
+        """
         if (top, size) != self._placed:
             self._placed = top, size
             self._root.position = np.array([0.0, 0.0, top + HEIGHT * size])
@@ -199,12 +199,13 @@ class WrenchNodes:
         )
         Fx, Fy, Fz = target[:3]
         asked_force = length_scale * Fx, length_scale * Fy, length_scale * Fz
-        self._asked_force.show(np.zeros((1, 3)), np.array([asked_force]), size)
+        script = self._asked_force.show(np.zeros((1, 3)), np.array([asked_force]), size)
         for ring, wrench in zip(self._torques, (target, got, missing), strict=True):
             torque = wrench[3:]
             length = math.hypot(*torque)
             radius = round(size * turn * length, DIGITS)
             ring.show(torque, length, (radius, radius, radius))
+        return script
 
 
 class UnitMesh:
