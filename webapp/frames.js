@@ -13,6 +13,9 @@
 // - `getRenderRequestState` is read: pictures that Python asks for are drawn in any case (MessageHandler.tsx).
 // - `nodePoseData`, `nodeRefFromName`: poses set in the page, 25 a second and none sent; an animation of a node in
 //   SceneTree.tsx would do.
+// - `messageQueue`, `drainMessageQueue`: arrows get other ends by a script, as by a message of their own; one message for
+//   several nodes in WebsocketMessages.ts would do.
+// - the material of outlines is changed: only its far side is drawn; a property `side` of arrows (Arrows.tsx) would do.
 // - `cameraControl`: the camera goes along with a node; "follow a node" in CameraControls of App.tsx would do.
 // - the shader of labels is changed, by its text: labels of a dark theme; a colour of labels in label/LabelRenderer.tsx
 //   would do.
@@ -67,7 +70,14 @@
 
   // Labels are black on white in viser, whatever the theme.
   const night = { value: 0 };
+  const OUTLINE = /\/(halo|asked_force)$/, FAR_SIDE = 1; // names of nodes; BackSide of three.js
   function paint(scene) {
+    for (const [name, node] of Object.entries(viewer().nodeRefFromName)) {
+      if (!OUTLINE.test(name)) continue;
+      node?.traverse(({ material }) => {
+        if (material && material.side !== FAR_SIDE) Object.assign(material, { side: FAR_SIDE, needsUpdate: true });
+      });
+    }
     night.value = Number(document.documentElement.dataset.mantineColorScheme === 'dark');
     scene.traverse(({ material }) => {
       if (!material?.uniforms?.uLabelData || material.finlab) return;
@@ -186,6 +196,12 @@
       if (node.poseUpdateState !== 'waitForMakeObject') node.poseUpdateState = 'needsUpdate';
       due = Math.max(due, performance.now() + 1);
       root()?.invalidate();
+    },
+    // Arrows end elsewhere, with the picture of all that is told with this script.
+    point(name, owner, points) {
+      const view = viewer();
+      view.messageQueue.push({ type: 'SceneNodeUpdateMessage', name, owner, updates: { points: new Float32Array(points) } });
+      view.drainMessageQueue?.();
     },
     // Counts: how many of the commands are for each robot, by the name of its node.
     flap(commands, rate, still, counts = { '/robot': commands.length }) {

@@ -23,6 +23,8 @@ viser-project/viser:
 - `keep_private`: no message to the other pages about an input of one page; `_gui_api.py`,
   `sync_other_clients`.
 - `assign`: several properties of a node in one message; `_scene_handles.py`, `_queue_update`.
+- `script_of_points`: arrows that follow others without a message of their own; `_scene_handles.py`,
+  `_queue_update`.
 - `know_position`: a pose that is known here and not sent, of a node that a script in the page
   places; `_scene_handles.py`, `SceneNodeHandle.position`.
 - `slider_marks`: marks of a slider that can be others later; `_gui_handles.py`, `GuiSliderProps`.
@@ -56,6 +58,7 @@ from typing import Any, get_type_hints
 from unittest.mock import patch
 from zipfile import ZipFile
 
+import msgspec
 import numpy as np
 import viser
 import websockets.asyncio.server as websockets_server
@@ -456,6 +459,15 @@ def assign(handle: Any, values: dict[str, Any]) -> None:
     for name, value in values.items():
         if name not in own:
             setattr(handle, name, value)
+
+
+def script_of_points(handle: Any, points: NDArray[np.float64]) -> str:
+    """A script that gives a node of arrows other ends (n, 2, 3) [m], for pages that are told a
+    script anyway: no message of its own."""
+    handle._impl.props.points = points.astype(np.float32)
+    owner = handle._impl.api._owner_id
+    values = msgspec.json.encode([handle.name, owner, points.ravel().tolist()]).decode()
+    return f"finlabFrames.point({values[1:-1]});"
 
 
 def know_position(handle: Any, position: NDArray[np.float64]) -> None:

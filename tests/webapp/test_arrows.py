@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 import viser
-from scipy.spatial.transform import Rotation
 
 from finlab import Allocator
 from finlab.allocation.allocation import Allocation
@@ -19,7 +18,7 @@ from webapp.markup.words import html
 from webapp.panels.status import in_unit, scale_words
 from webapp.scene.actuator_node import _moving, shape_of
 from webapp.scene.force_nodes import ForceNodes
-from webapp.scene.outline import HEAD_LENGTH, HEAD_RADIUS, Outline, turned_to
+from webapp.scene.outline import HEAD_LENGTH, HEAD_RADIUS, Outline
 from webapp.scene.stage import arrow_size, part_size
 from webapp.scene.wrench_nodes import (
     ACTUATOR_ARROWS,
@@ -30,6 +29,7 @@ from webapp.scene.wrench_nodes import (
     fitting_scale,
     fixed_scale,
 )
+from webapp.viser_internals import start_server, stop_server
 
 ONE = Scale(1.0, 1.0, 1.0)
 
@@ -88,48 +88,52 @@ def test_an_arrow_that_would_end_in_the_hull_ends_at_its_actuator() -> None:
     np.testing.assert_allclose(nodes._clear_starts(outward), nodes._starts, atol=1e-9)
 
 
-def test_turns_take_the_x_axis_to_directions() -> None:
-    directions = np.random.default_rng(1).normal(size=(40, 3))
-    directions = np.concatenate([directions, np.eye(3), -np.eye(3)])
-    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    turned = Rotation.from_quat(turned_to(directions)[:, [1, 2, 3, 0]]).apply([1.0, 0.0, 0.0])
-    np.testing.assert_allclose(turned, directions, atol=1e-9)
-
-
 def test_an_outline_is_one_margin_outside_of_its_arrow() -> None:
     scene = Recorded()
     outline: Any = Outline(scene, "/outline", 0.01, 0.003, (0, 0, 0))  # type: ignore[arg-type]
     starts = np.array([[0.1, 0.2, 0.3], [0.0, 0.0, 0.0]])
     vectors = np.array([[0.2, 0.0, 0.0], [0.0, 0.0, 0.0]])
     outline.show(starts, vectors, 2.0)
-    shafts, heads = outline._nodes
-    assert shafts.visible and shafts.batched_positions.shape == (1, 3)
+    node = outline.node
+    assert node.visible and node.points.shape == (1, 2, 3) and node.scale == 2.0
+    ends = node.scale * node.points[0, :, 0]
     margin = 2.0 * 0.003
     radius = 2.0 * 0.01
-    assert shafts.batched_positions[0] == pytest.approx([0.1 - margin, 0.2, 0.3])
-    assert shafts.batched_scales[0, 1] == pytest.approx(radius + margin, abs=1e-4)
-    base = float(heads.batched_positions[0, 0])
-    length, wide, _ = heads.batched_scales[0].tolist()
+    assert ends[0] == pytest.approx(0.1 - margin, abs=2e-4)
+    assert node.scale * node.shaft_radius == pytest.approx(radius + margin)
+    length = node.scale * node.head_length
     head = HEAD_LENGTH * radius
-    assert base == pytest.approx(0.3 - head - margin, abs=2e-4)
+    assert ends[1] - length == pytest.approx(0.3 - head - margin, abs=3e-4)
     # Distance of the tip of the arrow from the side of the cone about it.
     half = math.atan2(HEAD_RADIUS, HEAD_LENGTH)
-    assert math.atan2(wide, length) == pytest.approx(half, abs=1e-3)
-    beyond = base + length - 0.3
-    assert beyond * math.sin(half) == pytest.approx(margin, abs=3e-4)
+    assert math.atan2(node.scale * node.head_radius, length) == pytest.approx(half, abs=1e-9)
+    assert (ends[1] - 0.3) * math.sin(half) == pytest.approx(margin, abs=3e-4)
     outline.show(starts, 0.0 * vectors, 2.0)
-    assert not shafts.visible and not heads.visible
+    assert not node.visible
+
+
+def test_outlines_follow_their_arrows_by_a_script() -> None:
+    server = start_server()
+    outline: Any = Outline(server.scene, "/halo", 0.01, 0.003, (0, 0, 0))
+    starts = np.zeros((1, 3))
+    first = outline.show(starts, np.array([[0.2, 0.0, 0.0]]), 1.0)
+    assert first == "", "told by a message"
+    script = outline.show(starts, np.array([[0.3, 0.0, 0.0]]), 1.0)
+    assert script.startswith('finlabFrames.point("/halo",')
+    assert f"{float(outline.node.points[0, 1, 0]):.4f}" in script
+    again = outline.show(starts, np.array([[0.3, 0.0, 0.0]]), 1.0)
+    assert again == "", "the page knows"
+    stop_server(server)
 
 
 def test_what_is_asked_frames_what_is_delivered() -> None:
     nodes: Any = WrenchNodes(Recorded())  # type: ignore[arg-type]
     wrench = [1.0, 0.5, 0.0, 0.0, 0.0, 0.2]
     nodes.refresh(wrench, wrench, [0.0] * 6, 0.1, 0.1, 0.1, 1.0)
-    shafts, heads = nodes._asked_force._nodes
+    outline = nodes._asked_force.node
     arrow = nodes._forces.node
-    assert shafts.visible and heads.visible and arrow.visible
-    assert shafts.batched_scales[0, 1] > arrow.shaft_radius
-    assert all(node.side == "back" for node in (shafts, heads)), "what is delivered is seen in it"
+    assert outline.visible and arrow.visible
+    assert outline.shaft_radius > arrow.shaft_radius and outline.head_radius > arrow.head_radius
 
 
 def answer_of(name: str, wrench: tuple[float, ...]) -> Allocation:
@@ -176,7 +180,7 @@ def test_outlines_are_nodes_of_viser() -> None:
     outline = Outline(client.scene, "/outline", 0.01, 0.003, (1, 2, 3))
     outline.show(np.zeros((1, 3)), np.array([[0.0, 0.2, 0.0]]), 1.0)
     outline.paint((9, 8, 7))
-    for node in outline._nodes:
-        assert node.visible and node.batched_colors.tolist() == [9, 8, 7]
-        assert node.batched_wxyzs.shape == (1, 4) and node.batched_positions.shape == (1, 3)
+    outline.show(np.zeros((1, 3)), np.array([[0.0, 0.2, 0.0]]), 1.0)
+    assert outline.node.visible and outline.node.colors.tolist() == [[9, 8, 7]]
+    assert outline.node.points.shape == (1, 2, 3)
     server.stop()

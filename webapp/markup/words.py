@@ -196,7 +196,9 @@ def three_digits(value: float | None) -> str:
     there is no number, and zero where it is the computer's rounding."""
     if value is not None and abs(value) < ROUNDING:
         value = 0.0
-    text = without_powers(finlab.display.three_digits(value))
+    text = finlab.display.three_digits(value)
+    if "e" in text:
+        text = without_powers(text)
     return DASH if text == NO_NUMBER else text.replace("-", "−")
 
 

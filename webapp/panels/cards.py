@@ -85,10 +85,13 @@ def robot_name(layout: Layout, saved: Layout) -> str:
 
 
 def tasks(task: str) -> str:
-    """A button for each task; the present one is marked."""
+    """A button for each task; the present one is marked. On a phone each begins with the
+    inspector (`frame.css`)."""
     buttons = []
     for name in TASKS:
-        attributes = Markup("aria-current=page") if name == task else Markup()
+        attributes = Markup("onclick='document.documentElement.dataset.flSheet = \"\"'")
+        if name == task:
+            attributes += Markup(" aria-current=page")
         buttons.append(button(name, "task", name, attributes))
     return html("<nav class='fl-tasks' aria-label='Tasks'>{}</nav>", buttons)
 

@@ -296,4 +296,5 @@ def _tab_strip(desk: Desk, drawer: str | None, layout: Layout) -> str:
 
 def _brings(region: str) -> str:
     """Attributes of a button by which a phone shows a region (`frame.css`)."""
-    return html("onclick='document.documentElement.dataset.flSheet = \"{}\"'", region)
+    script = "document.documentElement.dataset.flSheet = innerWidth > 600 ? '' : '{}'"
+    return html('onclick="{}"', Markup(script.format(region)))

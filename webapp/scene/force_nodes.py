@@ -125,7 +125,7 @@ class ForceNodes:
     def __init__(self, scene: viser.SceneApi, robot: str = "/robot") -> None:
         """Nothing is shown yet; `robot` is the node of the robot."""
         self._arrows = Arrows(scene, f"{robot}/forces", THICKNESS)
-        self._halo = Outline(scene, f"{robot}/halo", THICKNESS, HALO, look(False).halo)
+        self._halo = Outline(scene, f"{robot}/halo", THICKNESS, HALO, linear_of(look(False).halo))
         self._is_dark = False
         wedge = unit_wedge()
         self._fans = scene.add_batched_meshes_simple(
@@ -203,7 +203,7 @@ class ForceNodes:
         """The outlines' colour of the dark or the light theme."""
         if is_dark != self._is_dark:
             self._is_dark = is_dark
-            self._halo.paint(look(is_dark).halo)
+            self._halo.paint(linear_of(look(is_dark).halo))
 
     def _clear_starts(self, forces: Array) -> Array:
         """Where arrows of forces (n, 3) [m] begin, clear of what gives them; one that would end in
@@ -216,22 +216,26 @@ class ForceNodes:
         behind = self._starts - free - forces
         return np.asarray(np.where(is_into_hull[:, None], behind, ahead))
 
-    def command(self, forces: Array, half_angles: list[float], middles: list[float]) -> None:
+    def command(self, forces: Array, half_angles: list[float], middles: list[float]) -> str:
         """Show forces (n, 3) as arrows [m], and fans of half angles (n,) about angles (n,)
-        [rad]."""
+        [rad].
+
+        Returns:
+            A script that tells the page where the outlines end; empty where it knows.
+        """
         starts = self._clear_starts(forces)
         self._arrows.show(starts, forces, self._colors, self._sizes[1])
-        self._halo.show(starts, forces, self._sizes[1])
+        script = self._halo.show(starts, forces, self._sizes[1])
         swept = ([round(x, DIGITS) for x in half_angles], [round(x, DIGITS) for x in middles])
         if swept == self._swept:
-            return
+            return script
         self._swept = swept
         amplitudes, angles = np.array(swept)
         beats = amplitudes > 0.0
         fans = self._fans
         fans.visible = bool(beats.any())
         if not beats.any():
-            return
+            return script
         half = amplitudes[beats, None] / WEDGES
         across = half * (2.0 * np.arange(WEDGES) + 1.0 - WEDGES) + angles[beats, None]
         size = self._sizes[0]
@@ -246,6 +250,7 @@ class ForceNodes:
             batched_scales=_rows(scales),
             batched_wxyzs=_rows(turns),
         )
+        return script
 
 
 def _rows(values: Array) -> NDArray[np.float32]:
@@ -259,6 +264,12 @@ def linear(colors: Sequence[Rgb]) -> NDArray[np.uint8]:
     share = np.array(colors) / 255.0
     light = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
     return np.asarray((255.0 * light).round().astype(np.uint8))
+
+
+def linear_of(color: Rgb) -> Rgb:
+    """A colour in linear light."""
+    red, green, blue = linear([color])[0].tolist()
+    return red, green, blue
 
 
 def unit_wedge() -> Mesh:

@@ -87,13 +87,15 @@ class RobotScene:
         self._thickness = 1.0
         self._top = 0.0
         self._flaps = ""
+        self._halo = self._asked = ""
+        """Scripts that tell the page where outlines end; empty where it knows."""
         shows = (
             self._thicken,
             self._show_stage,
             self._place,
             self._push,
-            self._animate,
             self._show_wrench,
+            self._animate,
             self._show_sets,
         )
         for show in (*shows, self._offer):
@@ -255,7 +257,7 @@ class RobotScene:
         elif False in works:
             arrows[~np.array(works)] = 0.0
         swept = [move.amplitude if alive else 0.0 for move, alive in zip(moves, works, strict=True)]
-        self._forces.command(arrows, swept, [move.angle for move in moves])
+        self._halo = self._forces.command(arrows, swept, [move.angle for move in moves])
         if visible_layout.interaction is not None or self._jets.drawn:
             robot = (
                 shown_allocation.layout
@@ -282,13 +284,15 @@ class RobotScene:
         pair: Pair | None,
         follows: str,
     ) -> None:
-        """What the page moves itself (`frames.js`), in one message: the fins, and the handle."""
-        script = ""
+        """What the page moves itself (`frames.js`), in one message: outlines of arrows, the fins,
+        and the handle."""
+        script = self._halo + self._asked
+        self._halo = self._asked = ""
         if pair is None:
-            script = self._flapping(moment, display, swim, paused)
+            script += self._flapping(moment, display, swim, paused)
         else:
             self._flaps = ""
-        size = arrow_size(visible_layout)
+        size = self._arrow_size
         if pulled is None:
             self._newtons_before = self.pulled_newtons = scale.newtons
         # The foot of the arrow is that of the wrench's nodes.
@@ -348,7 +352,9 @@ class RobotScene:
             missing = missing_part(shown_allocation)
         length = display.arrow_length * LENGTH
         lengths = length / scale.newtons, length / scale.torque
-        self._wrench.refresh(demanded, delivered, missing, self._top, *lengths, self._arrow_size)
+        self._asked = self._wrench.refresh(
+            demanded, delivered, missing, self._top, *lengths, self._arrow_size
+        )
 
     def _pull(self, phase: str, grip: Grip, tip: Array, angle: float) -> None:
         session = self._session
@@ -383,9 +389,7 @@ class RobotScene:
     ) -> None:
         visible_analysis = analysis if display.drawn != "none" and task == "Design" else None
         better = growing if growing is not None and growing.kind == DRAWN[display.drawn] else None
-        self._attainable.refresh(
-            visible_analysis, better, np.array(target), arrow_size(visible_layout)
-        )
+        self._attainable.refresh(visible_analysis, better, np.array(target), self._arrow_size)
 
     def _offer(
         self,

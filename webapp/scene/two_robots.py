@@ -141,6 +141,8 @@ class PairedRobot:
         self._works: list[bool] = []
         self.moves: list[Motion] = []
         """How its actuators move."""
+        self.outlines = ""
+        """Script that tells the page where outlines of its arrows end."""
 
     def hide(self) -> None:
         """The two are not looked at."""
@@ -214,12 +216,13 @@ class PairedRobot:
         swept = [
             move.amplitude if alive else 0.0 for move, alive in zip(self.moves, works, strict=True)
         ]
-        self._forces.command(arrows, swept, [move.angle for move in self.moves])
+        halo = self._forces.command(arrows, swept, [move.angle for move in self.moves])
         lengths = length / scale.newtons, length / scale.torque
         top = hull_top(layout)
         # An axis that the robot does not command takes what comes.
         demanded = (np.array(state.target) * layout.commanded).tolist()
-        self._wrench.refresh(demanded, delivered, missing, top, *lengths, size)
+        asked = self._wrench.refresh(demanded, delivered, missing, top, *lengths, size)
+        self.outlines = halo + asked
 
 
 def _leave_alone(*_: object) -> None:
@@ -334,10 +337,13 @@ class PairScene:
         assert robots is not None
         moves = [move for robot in robots for move in robot.moves]
         counts = {robot.name: len(robot.moves) for robot in robots}
+        script = "".join([robot.outlines for robot in robots])
         flaps = msgspec.json.encode([moves, SPEED, display.frozen, counts])[1:-1]
         if flaps != self._flaps:
             self._flaps = flaps
-            run_script(self._client.gui, f"finlabFrames.flap({flaps.decode()});")
+            script += f"finlabFrames.flap({flaps.decode()});"
+        if script:
+            run_script(self._client.gui, script)
 
 
 def pair_arrow_size(pair: Pair) -> float:

@@ -15,7 +15,7 @@ from finlab.swim.hull.mesh_file import Mesh
 from webapp.handles import set_properties
 from webapp.markup.words import missing_part
 from webapp.scene.actuator_shapes import NOTHING, SHORTEST, tube, unit_ring
-from webapp.scene.force_nodes import Arrows, linear, quaternion
+from webapp.scene.force_nodes import Arrows, linear, linear_of, quaternion
 from webapp.scene.outline import DIGITS, Outline
 from webapp.scene.stage import Shape
 from webapp.tasks.analysing import Analysis
@@ -149,7 +149,7 @@ class WrenchNodes:
         self._forces = Arrows(scene, f"{name}/forces", FORCE_THICKNESS)
         # What is asked frames what is delivered, and is seen where both are one.
         self._asked_force = Outline(
-            scene, f"{name}/asked_force", FORCE_THICKNESS, ASKED_MARGIN, ASKED
+            scene, f"{name}/asked_force", FORCE_THICKNESS, ASKED_MARGIN, linear_of(ASKED)
         )
         rings = (
             part("asked_torque", ASKED, unit_ring(0.075), side="back"),
@@ -161,8 +161,7 @@ class WrenchNodes:
         """Top of the hull [m] and size that the nodes stand for."""
 
     def thicken(self, factor: float) -> None:
-        """Draw the arrows of forces thicker by a factor; that of the asked one with the next
-        target."""
+        """Draw the arrows of forces thicker by a factor."""
         self._forces.thicken(factor)
         self._asked_force.thicken(factor)
 
@@ -175,10 +174,14 @@ class WrenchNodes:
         scale: float,
         turn: float,
         size: float,
-    ) -> None:
+    ) -> str:
         """Show a target (6,) [N, N m], what is delivered of it (zero while unknown), and what is
         missing enough to be drawn; `top` is the hull's [m], `scale` of arrows [m/N], `turn` of
-        rings [m/(N m)]."""
+        rings [m/(N m)].
+
+        Returns:
+            A script that tells the page where the outline ends; empty where it knows.
+        """
         if (top, size) != self._placed:
             self._placed = top, size
             self._root.position = np.array([0.0, 0.0, top + HEIGHT * size])
@@ -196,12 +199,13 @@ class WrenchNodes:
         )
         Fx, Fy, Fz = target[:3]
         asked_force = length_scale * Fx, length_scale * Fy, length_scale * Fz
-        self._asked_force.show(np.zeros((1, 3)), np.array([asked_force]), size)
+        script = self._asked_force.show(np.zeros((1, 3)), np.array([asked_force]), size)
         for ring, wrench in zip(self._torques, (target, got, missing), strict=True):
             torque = wrench[3:]
             length = math.hypot(*torque)
             radius = round(size * turn * length, DIGITS)
             ring.show(torque, length, (radius, radius, radius))
+        return script
 
 
 class UnitMesh:

@@ -99,7 +99,8 @@ class TwoRobots:
     @property
     def pair(self) -> Pair | None:
         """The two while they are looked at; the same object as long as they are the same."""
-        if not self.is_open:
+        desk = self._session.desk
+        if desk.opened[desk.task] != TWO_ROBOTS:
             return None
         left, right = self._standing()
         old = self._pair

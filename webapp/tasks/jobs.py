@@ -83,7 +83,9 @@ class Jobs:
                 of_robot.forget()
         task = session.desk.task
         self.answering.ask()
-        self.pairing.ask(session.two_robots.pair)
+        pair = session.two_robots.pair
+        if pair is not None:
+            self.pairing.ask(pair)
         if task == "Allocate":
             self.ranging.ask(
                 State(state.able, state.damage, target=state.target, speed=state.speed)

@@ -60,11 +60,8 @@ class Pairing:
         """Of the answers, left and right."""
         return self.left, self.right
 
-    def ask(self, pair: Pair | None) -> None:
-        """Have the robots of a pair answered, and their cards made; nothing where none is looked
-        at."""
-        if pair is None:
-            return
+    def ask(self, pair: Pair) -> None:
+        """Have the robots of a pair that is looked at answered, and their cards made."""
         for slot, standing in zip(self.slots, pair.both, strict=True):
             slot.ask(standing.state)
         left = CardQuestion.of_state(pair.left.state)
