@@ -35,13 +35,13 @@ def need(condition: Any, words: Any) -> None:
         raise WrongProof(words)
 
 
-def number(text: Any) -> Fraction:
+def number(text: Any) -> Any:
     exponent = text.lower().partition("e")[2]
     need(len(text) < 5000 and abs(int(exponent or 0)) < 40, f"a number is out of range: {text:.40}")
     return Fraction(text)
 
 
-def dot(a: Any, b: Any) -> Fraction:
+def dot(a: Any, b: Any) -> Any:
     return Fraction(sum(x * y for x, y in zip(a, b, strict=True)))
 
 
@@ -51,15 +51,15 @@ def cross(
     return a[0] * b[1] - a[1] * b[0]
 
 
-def root_below(x: Any) -> Fraction:
+def root_below(x: Any) -> Any:
     return Fraction(isqrt(x.numerator * FINE**2 // x.denominator), FINE)
 
 
-def root_above(x: Any) -> Fraction:
+def root_above(x: Any) -> Any:
     return root_below(x) + Fraction(1, FINE)
 
 
-def raised(size: Any, exponent: Any, root: Any, leftover: Any) -> Fraction:
+def raised(size: Any, exponent: Any, root: Any, leftover: Any) -> Any:
     """size^exponent by repeated square roots, rounded as `root` and `leftover` (min or max) are."""
     result = size ** int(exponent)
     rest = exponent - int(exponent)
@@ -83,13 +83,13 @@ def columns(actuator: Any) -> Any:
         yield [*a, *(t + k * along for t, along in zip(torque, a, strict=True))]
 
 
-def turns_left(arc: Any) -> bool:
+def turns_left(arc: Any) -> Any:
     """Whether the arc from its first to its second direction is at most half a turn: convex."""
     a, b = arc
     return cross(a, b) >= 0
 
 
-def in_arc(arc: Any, p: Any) -> bool:
+def in_arc(arc: Any, p: Any) -> Any:
     if arc is None:
         return True
     a, b = arc
@@ -154,7 +154,7 @@ def convex_part(actuator: Any, part: Any) -> Any:
     return arc, most, (part["ahead"], least)  # |p| >= ahead.p >= least
 
 
-def in_part(actuator: Any, part: Any, force: Any) -> bool:
+def in_part(actuator: Any, part: Any, force: Any) -> Any:
     if len(actuator["axes"]) == 1:
         least, most = actuator["force_n"]
         return least <= force[0] <= most
@@ -163,7 +163,7 @@ def in_part(actuator: Any, part: Any, force: Any) -> bool:
     return in_arc(arc, force) and dot(force, force) <= most**2 and is_ahead
 
 
-def most_watts(actuator: Any, force: Any) -> Fraction:
+def most_watts(actuator: Any, force: Any) -> Any:
     """An upper bound of the power of a force."""
     power = actuator["power"]
     is_plane = len(force) == 2
@@ -178,7 +178,7 @@ def most_watts(actuator: Any, force: Any) -> Fraction:
     return p0 + (p1 - p0) / (x1 - x0) * (x - x0)
 
 
-def most_gain(actuator: Any, price: Any) -> Fraction:
+def most_gain(actuator: Any, price: Any) -> Any:
     """An upper bound of price.d over the directions d in which an actuator can push."""
     arc = actuator["arc"]
     if in_arc(arc, price):
@@ -186,7 +186,7 @@ def most_gain(actuator: Any, price: Any) -> Fraction:
     return max(Fraction(0), dot(price, arc[0]), dot(price, arc[1]))
 
 
-def most_profit(actuator: Any, price: Any, watt_price: Any, touch: Any) -> Fraction:
+def most_profit(actuator: Any, price: Any, watt_price: Any, touch: Any) -> Any:
     """An upper bound of price.f - watt_price P(f) over all forces f of an actuator."""
     least, most = actuator["force_n"]
     power = actuator["power"]
@@ -203,13 +203,13 @@ def most_profit(actuator: Any, price: Any, watt_price: Any, touch: Any) -> Fract
         return max(along * x - watt_price * (p - power["error_w"]) for x, p in power["points"])
     best = Fraction(0)
     for gain, largest, side in sides:
-        at_rest, slope = Fraction(0), Fraction(0)
-        if touch > 0:  # P(s) is above its tangent where s = touch
+        bound = max(Fraction(0), gain * largest)  # at no power, and by the tangent at `touch`:
+        if touch > 0:
             e = power["exponent"]
             watts = power[side] * raised(touch, e, root_below, min)
-            at_rest, slope = (1 - e) * watts, e * watts / touch
-        at_most = (gain - watt_price * slope) * largest if largest > 0 else Fraction(0)
-        best = max(best, max(Fraction(0), at_most) - watt_price * at_rest)
+            at_end = (gain - watt_price * e * watts / touch) * largest
+            bound = min(bound, max(Fraction(0), at_end) + watt_price * (e - 1) * watts)
+        best = max(best, bound)
     return best
 
 

@@ -43,6 +43,8 @@ HALF_TURN_TOLERANCE = 1e-9
 """Most by which an arc that counts as half a turn differs from it [rad]."""
 INNER_SHARE = 0.3
 """Where a sector's inner point lies between its tip and its rim [1]."""
+NO_ROOM = 0.99
+"""Least force of a fin over its largest one from which on there is no room between them [1]."""
 MAX_CUT = 3
 """Most actuators whose wide arcs have several parts to choose from, three each."""
 
@@ -217,7 +219,7 @@ def _fin(fin: Fin, axes: Array) -> ProofActuator:
     least = float(force[0] * strongest_share) * (1.0 + FIN_MARGIN)
     most = float(force[1] * weakest_share) * (1.0 - FIN_MARGIN)
     outer = float(force[1] * strongest_share) * (1.0 + FIN_MARGIN)
-    if least >= 0.5 * most:
+    if least >= NO_ROOM * most:
         raise NotSettledError("can push hardly less than it can at most")
 
     # Chords of the least power over the force, of the weakest direction; of the strongest one it is
