@@ -45,9 +45,8 @@ def dot(a: Any, b: Any) -> Any:
     return Fraction(sum(x * y for x, y in zip(a, b, strict=True)))
 
 
-def cross(
-    a: Any, b: Any
-) -> Fraction:  # of vectors in a plane: positive where b lies to the left of a
+def cross(a: Any, b: Any) -> Any:
+    """Of vectors in a plane: positive where b lies to the left of a."""
     return a[0] * b[1] - a[1] * b[0]
 
 

@@ -136,12 +136,13 @@ class _Oracle:
         norms = (directions * directions).sum(axis=1)
         square = len(directions) == 1 or abs(directions[0] @ directions[1]) < Decimal("1e-9")
         unit = max(abs(norms - 1)) < Decimal("1e-9")
-        covered = self.outer >= max(self.most, -self.least) and self.most >= max(0, self.least)
-        stops = self.least <= 0 or actuator["mean"]
-        self.sane = bool(unit and square and covered and stops and len(directions) < 3)
+        covered = self.outer >= max(self.most, -self.least)
+        ordered = self.most >= self.least and self.most >= 0
+        self.stops = bool(self.least <= 0 or actuator["mean"] or len(directions) == 1)
+        self.sane = bool(unit and square and covered and ordered and len(directions) < 3)
 
     def can(self, force: Any) -> bool:
-        if len(force) != len(self.columns):
+        if len(force) != len(self.columns) or not self.stops:
             return False
         if len(force) == 1:
             return bool(self.least <= force[0] <= self.most)
@@ -151,11 +152,14 @@ class _Oracle:
         size = (force @ force).sqrt()
         side = "reverse" if len(force) == 1 and force[0] < 0 else "forward"
         if side in self.power:
-            return _decimal(self.power[side]) * size ** _decimal(self.power["exponent"])
+            power: Decimal = size ** _decimal(self.power["exponent"])
+            return _decimal(self.power[side]) * power
         x, y = _array(self.power["points"]).T
         along = force[0] if len(force) == 1 else size
         i = min(max(int(np.searchsorted(x, along)), 1), len(x) - 1)
-        return Decimal(y[i - 1] + (y[i] - y[i - 1]) / (x[i] - x[i - 1]) * (along - x[i - 1]))
+        slope = (y[i] - y[i - 1]) / (x[i] - x[i - 1])
+        watts: Decimal = y[i - 1] + slope * (along - x[i - 1])
+        return watts
 
     def most_profit(self, own_price: Any, per_watt: Decimal) -> Decimal:
         best = Decimal(0) if per_watt else Decimal("-Infinity")

@@ -5,7 +5,6 @@ import os
 import random
 import subprocess
 import sys
-from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -156,9 +155,9 @@ def files() -> list[str]:
 def test_files_with_a_changed_digit(files: list[str]) -> None:
     """Of files with one digit changed, all that are false are refused."""
     rng = random.Random(63)
-    count: Counter[tuple[bool, bool]] = Counter()
     for text in files:
         assert is_true(text)
+    n_refused = 0
     for number in range(CHANGED_FILES):
         text = files[number % len(files)]
         places = [i for i, letter in enumerate(text) if letter.isdigit()]
@@ -167,15 +166,12 @@ def test_files_with_a_changed_digit(files: list[str]) -> None:
         changed = text[:place] + digit + text[place + 1 :]
         try:
             check_proof.check(changed)
-            accepted = True
         except (check_proof.WrongProof, LookupError, TypeError, ValueError, ArithmeticError):
-            accepted = False
-        true = is_true(changed)
-        count[accepted, true] += 1
-        assert true or not accepted, f"{text[place - 40 : place]}[{text[place]} -> {digit}]"
-    print(f"\nrefused {count[False, False]} false, {count[False, True]} true", end=", ")
-    print(f"accepted {count[True, True]} true, {count[True, False]} false")
-    assert count[False, False] > CHANGED_FILES // 4
+            n_refused += 1
+        else:
+            assert is_true(changed), f"{text[place - 40 : place]}[{text[place]} -> {digit}]"
+    print(f"\nof {CHANGED_FILES} files {n_refused} are refused, the others are true")
+    assert n_refused > CHANGED_FILES // 4
 
 
 def test_the_checker_needs_python_alone(tmp_path: Path, files: list[str]) -> None:
