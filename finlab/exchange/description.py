@@ -160,6 +160,30 @@ def numbers(text: str, count: int, what: str) -> Array:
     return values
 
 
+def angles(text: str, what: str) -> Array:
+    """Returns roll, pitch and yaw (3,) [rad] in a text, as `numbers`; one written as the rounded or cut
+    decimals of quarter turns, or with three decimals or more of eighths, is as many turns exactly.
+
+    Files say 1.5708 for a right angle. Taken to the letter, a thruster that points up would push
+    ahead by some millionths, and hence along no axis alone.
+    """
+    values = numbers(text, 3, what)
+    return np.array([_exact_angle(*pair) for pair in zip(values, text.split(), strict=True)])
+
+
+def _exact_angle(angle: float, written: str) -> float:
+    """An angle [rad], or the whole eighths of a turn that its decimals stand for."""
+    decimals = written.partition(".")[2]
+    digits = len(decimals)
+    if not decimals.isdigit() or digits < 2:
+        return float(angle)
+    part = math.pi / 4 if digits >= 3 else math.pi / 2
+    exact = abs(round(angle / part)) * part
+    shift = 10.0**digits
+    stands_for_it = round(abs(angle) * shift) in (math.floor(exact * shift), round(exact * shift))
+    return math.copysign(exact, angle) if stands_for_it else float(angle)
+
+
 def number(element: Element, paths: str, default: float = 0.0) -> float:
     """Returns the number at one of some paths, as `text_at`; the default where there is none."""
     text = text_at(element, paths)
@@ -203,7 +227,8 @@ def _pose(element: Element) -> Array:
     what = f"the pose of {element.tag} {element.get('name', '')!r:.60}"
     origin = " ".join(text_at(element, f"origin@{key}", "0 0 0") for key in ("xyz", "rpy"))
     is_quaternion = text_at(element, "pose@rotation_format") == "quat_xyzw"
-    values = numbers(text_at(element, "pose", origin), 7 if is_quaternion else 6, what)
+    text = text_at(element, "pose", origin)
+    values = numbers(text, 7 if is_quaternion else 6, what)
     pose = np.eye(4)
     pose[:3, 3] = values[:3]
     rotation = values[3:]
@@ -213,8 +238,8 @@ def _pose(element: Element) -> Array:
         pose[:3, :3] = Rotation.from_quat(rotation).as_matrix()
     elif rotation.any():
         in_degrees = text_at(element, "pose@degrees") == "true"
-        angles = np.radians(rotation) if in_degrees else rotation
-        pose[:3, :3] = Rotation.from_euler("xyz", angles).as_matrix()
+        turns = np.radians(rotation) if in_degrees else angles(" ".join(text.split()[3:]), what)
+        pose[:3, :3] = Rotation.from_euler("xyz", turns).as_matrix()
     return pose
 
 

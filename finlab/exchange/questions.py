@@ -122,7 +122,7 @@ def which_links(
         finned: links whose names are those of fins.
     """
     choices = tuple(Choice(link, link, words) for link, words in kinds.items())
-    why = "No plugin or actuator of the file drives one. These are moved by a joint."
+    why = "No plugin or actuator of the file drives one. These hang on a joint."
     return (
         Question("thrusters", "Which links push?", why, choices, pushing, takes_several=True),
         Question(

@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 import finlab
+from finlab.analysis.authority import authority
 from finlab.errors import LayoutError
 from finlab.exchange import Exchange, convert, read_any
+from finlab.exchange.description import angles
 from finlab.layout import Azimuth, Body, Layout, Thruster, own_effectiveness
 from tests.allocator_cache import FIN_ROBOTS
 from tests.random_robots import load, random_robot
@@ -139,6 +141,43 @@ def test_an_axis_may_be_expressed_in_any_frame(tmp_path: Path) -> None:
         LayoutError, match="no frame 'nowhere', in which the axis of joint 'b_joint'"
     ):
         read(path)
+
+
+UP = """<robot name="up"><link name="base"><inertial><mass value="12"/></inertial></link>
+<link name="thruster_1"/><link name="thruster_2"/>
+<joint name="a" type="fixed"><parent link="base"/><child link="thruster_1"/>
+<origin xyz="0 0.2 0.05" rpy="{roll} {pitch} 0"/></joint>
+<joint name="b" type="fixed"><parent link="base"/><child link="thruster_2"/>
+<origin xyz="0 -0.2 0.05" rpy="{roll} {pitch} 0"/></joint></robot>"""
+"""Two thrusters that point up, by angles as a file writes them."""
+
+
+@pytest.mark.parametrize("pitch", ["-1.57", "-1.571", "-1.5708", "-1.57079", "-1.570796327"])
+def test_decimals_of_a_right_angle_stand_for_it(pitch: str, tmp_path: Path) -> None:
+    path = tmp_path / "up.urdf"
+    path.write_text(UP.format(roll=0, pitch=pitch))
+    layout = read(path, thrusters=("thruster_1", "thruster_2"), force=(-40.0, 40.0))
+    held = authority(layout)
+    assert held.reachable == ("heave", "roll")
+    assert held.largest[2] == pytest.approx(80.0)
+
+
+@pytest.mark.parametrize(
+    ("written", "angle"),
+    [
+        ("0.785", math.pi / 4),
+        ("-2.35619", -0.75 * math.pi),
+        ("3.14", math.pi),
+        ("0.79", 0.79),
+        ("1.58", 1.58),
+        ("1.5", 1.5),
+        ("1.5709", 1.5709),
+        ("0.001", 0.001),
+        ("1.5708e0", 1.5708),
+    ],
+)
+def test_only_decimals_of_eighths_of_a_turn_stand_for_them(written: str, angle: float) -> None:
+    np.testing.assert_array_equal(angles(f"0 {written} 0", "the pose"), [0.0, angle, 0.0])
 
 
 @pytest.mark.parametrize("suffix", ["urdf", "sdf"])
