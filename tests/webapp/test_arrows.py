@@ -1,6 +1,7 @@
 """Arrows stand clear of what gives their forces, are framed by their outlines, and fit the view."""
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -47,6 +48,16 @@ class Recorded:
 
     def __getattr__(self, name: str) -> Any:
         return lambda *_, **options: Node(**options)
+
+
+def test_two_actuators_at_one_place_leave_the_others_their_size() -> None:
+    layout = load_layout(shipped_layouts()["ucat"])
+    first = layout.actuators[0]
+    twin = replace(first, name="twin")
+    assert part_size(replace(layout, actuators=(*layout.actuators, twin))) == part_size(layout)
+    x, y, z = first.position
+    beside = replace(twin, position=(x, y, z + 0.06))
+    assert part_size(replace(layout, actuators=(*layout.actuators, beside))) == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize("name", ["ucat", "octo", "bluerov2", "catamaran", "torpedo", "fish"])

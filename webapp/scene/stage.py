@@ -152,6 +152,8 @@ HALF_DIAGONAL, MEAN_SIZE = 0.3455, 0.35
 """Of the U-CAT's hull: half its diagonal, and the geometric mean of its three sizes [m]."""
 APART = 0.12
 """Actuators of size 1 that stand so far apart [m] do not touch."""
+LEAST_SIZE = 0.15
+"""Smallest size of actuators, over the size after the hull."""
 STEPS = np.array([0.1, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 50.0])
 """Lengths of arrows are whole numbers of something that a legend can say."""
 
@@ -179,9 +181,12 @@ def arrow_size(layout: Layout) -> float:
 
 @lru_cache(maxsize=8)
 def part_size(layout: Layout) -> float:
-    """Size of the actuators: after the hull, and no larger than there is room between them."""
+    """Size of the actuators: after the hull, and no larger than there is room between them. Two
+    that overlap even at the least size, as two at one place do, make the others no smaller."""
     between = layout.position[:, None] - layout.position
     apart = np.linalg.norm(between, axis=-1)[~np.eye(layout.n, dtype=bool)]
     by_hull = 2.0 * math.prod(hull_of(layout).half) ** (1 / 3) / MEAN_SIZE
-    room = float(apart.min(initial=np.inf)) / APART
-    return max(min(by_hull, room), 0.15 * by_hull)
+    least = LEAST_SIZE * by_hull
+    rooms = apart / APART
+    room = float(rooms[rooms >= least].min(initial=np.inf))
+    return min(by_hull, room)
