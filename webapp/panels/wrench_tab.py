@@ -228,7 +228,7 @@ def _hint(axis: int, low: float, reach: float) -> str:
     unit = UNITS[axis]
     if reach < ROUNDING:
         return f"{word}: no working actuator pushes along it."
-    at_most = f"±{with_unit(reach, unit)} if nothing else is asked to stay"
+    at_most = f"up to {with_unit(reach, unit)} if nothing else is asked to stay"
     if not np.isfinite(low):
         return f"{word}: the other five are out of reach as they are; {at_most}."
     return f"{word}: the marks show what is within reach with the others as they are; {at_most}."
