@@ -161,8 +161,8 @@ def numbers(text: str, count: int, what: str) -> Array:
 
 
 def angles(text: str, what: str) -> Array:
-    """Returns roll, pitch and yaw (3,) [rad] in a text, as `numbers`; one written as the rounded or cut
-    decimals of quarter turns, or with three decimals or more of eighths, is as many turns exactly.
+    """Returns roll, pitch and yaw (3,) [rad] in a text, as `numbers`; one written as the rounded or
+    cut decimals of quarter turns, or with three decimals or more of eighths, is as many exactly.
 
     Files say 1.5708 for a right angle. Taken to the letter, a thruster that points up would push
     ahead by some millionths, and hence along no axis alone.

@@ -168,6 +168,8 @@ class Frame(Struct, forbid_unknown_fields=True):
     origin: Literal["center_of_gravity"] = "center_of_gravity"
 
 
+Z_DOWN = ("FRD", "NED")
+"""Other names of frames in files, of which it is told how they become FLU."""
 FRAME = to_builtins(Frame())
 """The frame, as a file says it."""
 
@@ -425,6 +427,13 @@ def _check_version(data: Any) -> None:
         )
     if data.get("format", FORMAT) != FORMAT:
         raise LayoutError(f"expected {FORMAT}, got {shown(data['format'])}", "format")
+    frame = data.get("frame")
+    if isinstance(frame, Mapping) and frame.get("convention") in Z_DOWN:
+        raise LayoutError(
+            f"expected FLU, got {shown(frame['convention'])}; y points left and z up: change "
+            "the sign of y and z of places, axes and shafts, and of mounting angles",
+            "frame.convention",
+        )
     version = data.get("version", VERSION)
     is_int = type(version) is int
     if (is_int and version == 1) or ("fins" in data and "actuators" not in data):

@@ -39,8 +39,8 @@ KINDS = (
 )
 """The kinds of files that the page opens, for hints and errors."""
 SHARED = (
-    "The link carries the whole design and the wrench that is asked for. Whoever opens it gets a "
-    "copy, on a finlab of their own."
+    "The link carries the whole design and the wrench that is asked for, without faults. Whoever "
+    "opens it gets a copy, on a finlab of their own."
 )
 """What is said beside a link."""
 
