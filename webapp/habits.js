@@ -124,6 +124,9 @@
     window.finlabPresses?.tell('jump', owner(number), key);
   });
 
+  // A double click takes the whole number; the browser would leave the sign before it.
+  listen('dblclick', ({ target }) => { if (target.matches?.(NUMBER)) target.select(); });
+
   // What is typed into a list takes the place of what is chosen there, and Enter takes the first that is left.
   const isList = (target) => target.matches?.('.mantine-Select-input');
   listen('click', ({ target }) => { if (isList(target)) target.select(); });
@@ -159,8 +162,19 @@
   let asked = 0;
   document.getElementById('root').role = 'main';  // all that viser draws; it has no landmark
 
+  // The inspector begins at its top where it turns from the robot to an actuator, or back.
+  let inspected = '';
+  function inspect() {
+    const inspector = document.querySelector('[data-fl~=region][data-fl~=right]');
+    const shown = ['Actuator', 'Body'].find((part) => inspector?.querySelector(`[data-fl~=${part}]`)?.checkVisibility()) ?? '';
+    if (shown === inspected) return;
+    inspected = shown;
+    inspector?.scrollTo(0, 0);
+  }
+
   function name() {
     asked = 0;
+    inspect();
     const list = document.querySelector('.mantine-Spotlight-content');
     list?.setAttribute('aria-label', 'Commands');
     list?.querySelector('[data-scrollarea-viewport]')?.setAttribute('tabindex', '0');
