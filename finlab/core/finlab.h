@@ -34,6 +34,9 @@ typedef double fl_wide; /* where differences of large numbers matter, in single 
 #ifndef FL_MOST
 #define FL_MOST 256 /* most actuators of a robot */
 #endif
+#ifndef FL_ARCS
+#define FL_ARCS 16 /* most foils that may stall beyond reach; others stay below their largest lift */
+#endif
 #ifndef FL_PARTS
 #define FL_PARTS 1000 /* the usual fl_settings.most_parts */
 #endif

@@ -110,9 +110,9 @@ int fl_nearer_side_of_arc(const fl_set *set, const real *force) {
 void fl_narrow_arc(fl_set *set, const real *force, int side) {
   const int point = point_of_cut(set, force);
   if (side < 0)
-    set->arc_last = point;
+    set->arc_last = (unsigned char)point;
   else
-    set->arc_first = point;
+    set->arc_first = (unsigned char)point;
 }
 
 /* The angle [rad] of the place on an arc that is nearest to a force. */
