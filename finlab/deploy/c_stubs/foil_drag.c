@@ -65,40 +65,6 @@ void fl_foil_at(const real *block, int i, real angle, fl_tangent *tangent) {
   (void)tangent;
 }
 
-int fl_may_any_stall(const real *block, const fl_work *work) {
-  (void)block;
-  (void)work;
-  return 0;
-}
-
-void fl_improve_from(const real *block, fl_work *work, const real *target_reduced,
-                     const real *lambda, real command[][3], real *best_cost) {
-  (void)lambda;
-  (void)command;
-  fl_improve_commands(block, work, target_reduced, best_cost);
-}
-
-void fl_lay_arcs(const real *block, fl_work *work) {
-  (void)block;
-  (void)work;
-}
-
-real fl_lay_closer_arcs(const real *block, fl_work *work, int is_first, real force[][2]) {
-  (void)block;
-  (void)work;
-  (void)is_first;
-  (void)force;
-  return 0;
-}
-
-void fl_commands_on_arcs(const real *block, const fl_work *work, real force[][2],
-                         real command[][3]) {
-  (void)block;
-  (void)work;
-  (void)force;
-  (void)command;
-}
-
 void fl_farthest_on_arc(const fl_set *set, const real *price, wide *force) {
   (void)set;
   (void)price;
