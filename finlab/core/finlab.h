@@ -35,7 +35,7 @@ typedef double fl_wide; /* where differences of large numbers matter, in single 
 #define FL_MOST 256 /* most actuators of a robot */
 #endif
 #ifndef FL_ARCS
-#define FL_ARCS 16 /* most foils that may stall beyond reach; others stay below their largest lift */
+#define FL_ARCS 16 /* most foils that may stall beyond reach; others keep to their tables */
 #endif
 #ifndef FL_PARTS
 #define FL_PARTS 1000 /* the usual fl_settings.most_parts */

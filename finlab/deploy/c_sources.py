@@ -167,8 +167,8 @@ def write_c(files: dict[str, bytes], folder: str | os.PathLike[str]) -> None:
 
 
 def _with_size(header: str, count: int, foils: int) -> str:
-    """finlab.h for so many actuators, of which so many are foils, in single precision where a processor has no unit for
-    double."""
+    """finlab.h for so many actuators, of which so many are foils, in single precision where a
+    processor has no unit for double."""
     header = re.sub(r"(#define FL_MOST) \d+", rf"\1 {count}", header, count=1)
     arcs = min(foils, constant("FL_ARCS"))
     header = re.sub(r"(#define FL_ARCS) \d+", rf"\1 {arcs}", header, count=1)

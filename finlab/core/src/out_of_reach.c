@@ -426,7 +426,7 @@ static void better_side(const real *block, fl_work *work, const real *wrench,
 static int most_parts_of_policy(const real *block, const fl_work *work) {
   int most = REACH_PARTS + REACH_PARTS_EACH * COUNT(block);
   for (int i = 0; i < COUNT(block); i++) {
-    if (work->set[i].arc) most += REACH_PARTS_ARC;
+    if (has_arc(work->set + i)) most += REACH_PARTS_ARC;
   }
   if (most < work->settings.most_parts) return most;
   return work->settings.most_parts;

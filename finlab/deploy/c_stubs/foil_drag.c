@@ -64,28 +64,3 @@ void fl_foil_at(const real *block, int i, real angle, fl_tangent *tangent) {
   (void)angle;
   (void)tangent;
 }
-
-void fl_farthest_on_arc(const fl_set *set, const real *price, wide *force) {
-  (void)set;
-  (void)price;
-  (void)force;
-}
-
-real fl_gap_of_arc(const fl_actuator *a, const fl_set *set, const real *force) {
-  (void)a;
-  (void)set;
-  (void)force;
-  return 0;
-}
-
-int fl_nearer_side_of_arc(const fl_set *set, const real *force) {
-  (void)set;
-  (void)force;
-  return 1;
-}
-
-void fl_narrow_arc(fl_set *set, const real *force, int side) {
-  (void)set;
-  (void)force;
-  (void)side;
-}
