@@ -34,6 +34,9 @@ typedef double fl_wide; /* where differences of large numbers matter, in single 
 #ifndef FL_MOST
 #define FL_MOST 256 /* most actuators of a robot */
 #endif
+#ifndef FL_ARCS
+#define FL_ARCS 16 /* most foils that may stall beyond reach; others keep to their tables */
+#endif
 #ifndef FL_PARTS
 #define FL_PARTS 1000 /* the usual fl_settings.most_parts */
 #endif
@@ -59,14 +62,14 @@ typedef double fl_wide; /* where differences of large numbers matter, in single 
               one for what is served there, and another search
    FL_STARTS  where foils drag, commands of one search that are made cheaper: those of each part
               and of the first dive, of vertices of lifts, of both ends of each foil's angles, of
-              first multipliers, and of points of a lattice
+              first multipliers, and of points of a lattice; beyond reach those that come nearest
    FL_FOILS   steps for these: of two searches, and twice for each share of a ray (begun at the last
               commands and anew); and a target for each start of a lattice
    FL_BOUND   forces are found twice in a tick in which drives pass their dead bands */
 #define FL_DIVE (FL_DIVE_ROUNDS * FL_STEPS_AT_KINK)
 #define FL_SEARCH (2 * FL_DIVE + (FL_PARTS + 1) * (FL_DIVE + 2 * FL_STEPS_AT_KINK))
 #define FL_FORCES (2 * (FL_STEPS + FL_SEARCH) + 3 * FL_STEPS_AT_KINK)
-#define FL_STARTS (FL_PARTS + 4 + FL_FOIL_VERTICES + 2 * FL_MOST + FL_LATTICE_FOLLOWED)
+#define FL_STARTS (FL_PARTS + 5 + FL_FOIL_VERTICES + 2 * FL_MOST + FL_LATTICE_FOLLOWED)
 #define FL_FOILS_CHEAPER (FL_FOIL_STEPS * FL_STEPS_AT_KINK * 2 * (FL_STARTS + FL_RAY_SHARES))
 #define FL_FOILS (FL_FOILS_CHEAPER + 2 * FL_LATTICE_STARTS * FL_STEPS_AT_KINK)
 #define FL_BOUND (2 * (FL_FORCES + FL_FOILS))

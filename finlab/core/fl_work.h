@@ -24,15 +24,9 @@ typedef struct {
   fl_real curvature;      /* of the cost less what the force is worth [W/rad^2] */
 } fl_tangent;
 
-/* Angles of a foil that may stall, and its forces there: what it gives where a wrench beyond reach is
-   looked for. */
+/* Angles of a foil that may stall, and its forces there: what it gives where a wrench beyond reach
+   is looked for. */
 #define FL_ARC_POINTS 96 /* intervals of all its angles */
-#define FL_ARCS_MOST 16  /* foils that have an arc; others count as in their tables of lift */
-#if FL_MOST < FL_ARCS_MOST
-#define FL_ARCS FL_MOST
-#else
-#define FL_ARCS FL_ARCS_MOST
-#endif
 typedef struct {
   fl_real angle[FL_ARC_POINTS + 1];    /* ascending [rad] */
   fl_real force[FL_ARC_POINTS + 1][2]; /* lift and drag there [N] */
@@ -59,15 +53,15 @@ typedef struct {
   fl_real turn_origin;         /* angle from which it turns, within a turn of sector_center [rad] */
   fl_real slope_max;           /* where turning costs: largest slope T' [N^2/W] */
   fl_real jump_angle;          /* where its response jumps: angle between the two [rad] */
-  int is_flipped;              /* whether it pushes in reverse alone */
-  int is_forked;               /* whether both ends of its arc may be worth the same */
-  int has_jumped;              /* whether its response jumps where Newton's method stood still */
+  unsigned char is_flipped;    /* whether it pushes in reverse alone */
+  unsigned char is_forked;     /* whether both ends of its arc may be worth the same */
+  unsigned char has_jumped;    /* whether its response jumps where Newton's method stood still */
+  unsigned char arc_first;     /* first point of `arc` that it keeps */
+  unsigned char arc_last;      /* last one */
   /* of a foil near to a command, whose limits are angles from there; else 0 */
   const fl_tangent *tangent;
   /* of a foil that may stall, while points beyond reach are looked for; else 0 */
   const fl_arc *arc;
-  int arc_first; /* its first point */
-  int arc_last;  /* its last one */
 } fl_set;
 
 /* A table of force over price as it is asked most. */
@@ -230,7 +224,9 @@ struct fl_work {
   fl_real power_max[FL_MOST];      /* of each actuator [W] */
   fl_real slope_max[FL_MOST];      /* of each pod: largest slope T' [N^2/W] */
 
+#if FL_ARCS > 0
   fl_arc arc[FL_ARCS]; /* of foils that may stall */
+#endif
 };
 
 /* How Newton's method ended: fl_answer.newton_status. */

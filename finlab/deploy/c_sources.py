@@ -20,7 +20,7 @@ from finlab.allocation.policy import Policy, PolicyName
 from finlab.allocation.question import check_flow
 from finlab.arrays import Array
 from finlab.axes import AXES
-from finlab.core.fields import actuators_of
+from finlab.core.fields import actuators_of, constant
 from finlab.deploy.thin_block import tables_of, thinned
 from finlab.errors import AllocationError
 from finlab.layout import Layout
@@ -123,14 +123,14 @@ def c_sources(
     sources = {
         path.name: path.read_text("utf-8") for path in files if path.name not in FILES_LEFT_OUT
     }
-    has_foils = bool((actuators_of(block)["flow_speed"] > 0.0).any())
-    if not has_foils:
+    foils = int((actuators_of(block)["flow_speed"] > 0.0).sum())
+    if foils == 0:
         for file in FILES_OF_FOILS:
             del sources[file]
         sources |= {path.name: path.read_text("utf-8") for path in STUBS.glob("*.c")}
     name = _identifier(layout.name)
     sources["fl_names.h"] = _prefixed_names(sources["finlab.h"] + sources["internal.h"], name)
-    sources["finlab.h"] = _with_size(sources["finlab.h"], layout.n)
+    sources["finlab.h"] = _with_size(sources["finlab.h"], layout.n, foils)
     sources["robot.c"] = _robot(block, thin)
     sources["robot.h"] = _header(layout, name)
     sources[f"fl_{name}.h"] = _plain_header(layout, name)
@@ -170,10 +170,12 @@ def write_c(files: dict[str, bytes], folder: str | os.PathLike[str]) -> None:
     write_folder(folder, files, foreign, "an export")
 
 
-def _with_size(header: str, count: int) -> str:
-    """finlab.h for so many actuators, in single precision where a processor has no unit for
-    double."""
+def _with_size(header: str, count: int, foils: int) -> str:
+    """finlab.h for so many actuators, of which so many are foils, in single precision where a
+    processor has no unit for double."""
     header = re.sub(r"(#define FL_MOST) \d+", rf"\1 {count}", header, count=1)
+    arcs = min(foils, constant("FL_ARCS"))
+    header = re.sub(r"(#define FL_ARCS) \d+", rf"\1 {arcs}", header, count=1)
     single = (
         "#if defined(__ARM_FP) && !(__ARM_FP & 8) && !defined(FL_SINGLE)\n#define "
         "FL_SINGLE\n#endif\n\n"

@@ -1,9 +1,13 @@
 """Commands of robots with foils by enumeration: what a dense grid of some deflections, and
-Newton's method for all else, find of least power. It shares nothing with the core."""
+Newton's method for all else, find of least power; beyond reach, what a grid of all commands and
+SciPy's steps from its best points come to. It shares nothing with the core."""
 
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 
 import numpy as np
+from scipy.optimize import minimize
 
 from finlab.arrays import Array
 from finlab.physics.plant import Plant
@@ -18,6 +22,12 @@ MISS = 1e-7
 """Scaled wrench by which commands may miss the target."""
 STARTS_OF_EACH = 2
 """Starts of each command that Newton's method finds."""
+POLISHED = 12
+"""Points of a grid of all commands from which steps go on."""
+LOOKED_AT = 400
+"""Best points of a grid among which these are."""
+APART = 0.15
+"""Share of the limits by which these are apart in a command at least."""
 
 
 def least_power(
@@ -83,3 +93,106 @@ def commands_on_grid(
         command[:, solved, 0] = np.clip(numbers, plant.lower[solved, 0], plant.upper[solved, 0])
     missed = np.linalg.norm(((plant.wrench(command) - wrench) / scale)[:, counts], axis=-1)
     return np.asarray(command[missed <= MISS])
+
+
+@dataclass(frozen=True)
+class Reach:
+    """What thrusters and foils, one number each, give in some axes, beside a grid of them all."""
+
+    plant: Plant
+    """In its flow."""
+    scale: Array
+    """Wrench scale (6,)."""
+    axes: Array
+    """Which axes (6,) of a wrench count."""
+    points: int
+    """Of each command on the grid."""
+
+    @cached_property
+    def grid(self) -> Array:
+        """Commands (N, n) as shares of their limits."""
+        shares = np.linspace(0.0, 1.0, self.points)
+        columns = np.meshgrid(*[shares] * self.plant.n, indexing="ij")
+        return np.stack(columns, axis=-1).reshape(-1, self.plant.n)
+
+    @cached_property
+    def given(self) -> Array:
+        """Wrenches (N, k) of the grid, over the scale."""
+        return self.wrench_of(self.grid)
+
+    def command_of(self, share: Array) -> Array:
+        """Commands (..., n, 3) of shares (..., n) of their limits."""
+        command = np.zeros((*share.shape, 3))
+        command[..., 0] = self.plant.lower[:, 0] + share * self.plant.width[:, 0]
+        return command
+
+    def wrench_of(self, share: Array) -> Array:
+        """Wrenches (..., k) of shares (..., n), over the scale."""
+        return np.asarray((self.plant.wrench(self.command_of(share)) / self.scale)[..., self.axes])
+
+    def slope_of(self, share: Array) -> Array:
+        """The derivative (k, n) of the wrench by the shares (n,)."""
+        _, jacobian = self.plant.linearize(self.command_of(share))
+        by_number = jacobian.reshape(6, self.plant.n, 3)[self.axes, :, 0]
+        return np.asarray(by_number * self.plant.width[:, 0] / self.scale[self.axes, None])
+
+    def starts(self, badness: Array) -> list[Array]:
+        """Shares (n,) of the best points of the grid that are apart from each other."""
+        picked: list[Array] = []
+        for k in np.argsort(badness)[:LOOKED_AT]:
+            share = self.grid[k]
+            if all(np.abs(share - other).max() > APART for other in picked):
+                picked.append(share)
+            if len(picked) == POLISHED:
+                break
+        return picked
+
+    def least_distance(self, target: Array) -> float:
+        """Returns the least distance from a target (k,), over the scale."""
+
+        def squared(share: Array) -> tuple[float, Array]:
+            residual = self.wrench_of(share) - target
+            return 0.5 * float(residual @ residual), self.slope_of(share).T @ residual
+
+        distance = np.linalg.norm(self.given - target, axis=1)
+        least = float(distance.min())
+        for start in self.starts(distance):
+            end = minimize(
+                squared,
+                start,
+                jac=True,
+                method="L-BFGS-B",
+                bounds=[(0.0, 1.0)] * self.plant.n,
+                options={"maxiter": 200, "ftol": 1e-15, "gtol": 1e-12},
+            )
+            least = min(least, float(np.sqrt(2.0 * end.fun)))
+        return least
+
+    def largest_share(self, target: Array) -> float:
+        """Returns the largest share of a target (k,) that is found along its ray."""
+        size = float(np.linalg.norm(target))
+        unit = target / size
+
+        def beside(numbers: Array) -> Array:
+            return np.asarray((self.wrench_of(numbers[:-1]) - numbers[-1] * target) / size)
+
+        def beside_slope(numbers: Array) -> Array:
+            slope = self.slope_of(numbers[:-1])
+            return np.column_stack([slope, -target]) / size
+
+        along = self.given @ unit
+        across = np.linalg.norm(self.given - along[:, None] * unit, axis=1)
+        largest = 0.0
+        for start in self.starts(across - along):
+            end = minimize(
+                lambda numbers: -numbers[-1],
+                np.append(start, np.clip(self.wrench_of(start) @ unit / size, 0.0, 1.0)),
+                jac=lambda numbers: -np.eye(len(numbers))[-1],
+                method="SLSQP",
+                bounds=[(0.0, 1.0)] * (self.plant.n + 1),
+                constraints={"type": "eq", "fun": beside, "jac": beside_slope},
+                options={"maxiter": 100, "ftol": 1e-10},
+            )
+            if np.linalg.norm(beside(end.x)) <= MISS:
+                largest = max(largest, float(end.x[-1]))
+        return largest

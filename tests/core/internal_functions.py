@@ -30,6 +30,8 @@ REAL = ctypes.c_double
 """`fl_real` and `fl_wide` of the library in this package."""
 MOST = constant("FL_MOST")
 """Most actuators of a robot."""
+ARCS = constant("FL_ARCS")
+"""Most foils that may stall beyond reach."""
 FIN = constant("FL_FIN")
 """Form of a fin's command, FL_FIN."""
 POD = constant("FL_POD")

@@ -14,12 +14,14 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pytest
 
+from finlab import Allocator
 from finlab.cli import main
-from finlab.core.fields import actuators_of
+from finlab.core.fields import actuators_of, constant
 from finlab.deploy.c_sources import c_sources, write_c
 from finlab.deploy.thin_block import tables_of, thinned
 from finlab.layout import load_layout
 from tests.allocator_cache import AllocatorCache
+from tests.core.test_foil_arcs import beyond, tail
 from tests.random_robots import KINDS, load, random_robot, with_rates
 from tests.sampled_cases import sampled
 from tests.terminal import refused
@@ -38,6 +40,10 @@ M7_COMPILER = f"arm-none-eabi-gcc -std=c99 -Os {CORTEX_M7} -ffunction-sections -
 """The cross compiler, for small code."""
 
 
+POLICIES = {
+    policy: constant(f"FL_{policy.upper()}") for policy in ("closest", "direction", "priority")
+}
+"""Numbers of policies in C."""
 SPEED = 2.5, 0.2, -0.1, 0.0, 0.05, 0.1
 """A velocity through the water [m/s, rad/s]."""
 EXPORTS = ("octo", None), ("A", None), ("torpedo", SPEED), ("bluerov2", None), ("torpedo", None)
@@ -156,6 +162,43 @@ def test_fuzzer_finds_nothing(name: str, cases: int, compiler: str, tmp_path: Pa
     said = ran(f"{words} -lm -o {tmp_path}/it && {tmp_path}/it {cases}", folder)
     blocks, refused_ones, answers = map(int, re.findall(r"\d+", said)[:3])
     assert blocks == cases and 0 < refused_ones < blocks / 2 and answers > blocks
+
+
+@pytest.mark.parametrize(("number", "foils"), [(0, 3), (1, 4)])
+def test_stalled_foils_in_a_flow_are_answered_as_in_python(
+    number: int, foils: int, tmp_path: Path
+) -> None:
+    """Within reach and beyond it, where foils stall."""
+    robot, flow = tail(number, foils)
+    folder = tmp_path / "c"
+    write_c(c_sources(robot.layout, 40, flow), str(folder))
+    built = f"gcc -std=c99 -O1 -Wall -Wextra -Werror {SANITIZERS}"
+    assert ran(f"{built} *.c -lm -o {tmp_path}/it && {tmp_path}/it", folder).startswith("0 of 40 ")
+
+    allocator = Allocator(robot.layout)
+    wrenches = [*beyond(robot, number), *beyond(robot, number) / 3.0]
+    asked = [(policy, wrench) for policy in POLICIES for wrench in wrenches]
+    lines = [
+        f"{POLICIES[policy]} {' '.join(map(repr, wrench.tolist()))}" for policy, wrench in asked
+    ]
+    questions = tmp_path / "questions"
+    questions.write_text("\n".join(lines))
+    words = f"{built} -DFL_NO_MAIN -I. *.c {HERE / 'answers.c'} -lm -o {tmp_path}/answers"
+    said = ran(f"{words} && {tmp_path}/answers < {questions}", folder)
+    command = np.array(said.split(), float).reshape(len(asked), robot.n, 3)
+    stalled = 0
+    for (policy, wrench), own in zip(asked, command, strict=True):
+        answer = allocator.allocate(wrench, policy=policy, flow=flow)
+        given = robot.plant.wrench(own)
+        size = np.linalg.norm(wrench / allocator.scale)
+        off = np.linalg.norm((given - robot.plant.wrench(answer.command)) / allocator.scale)
+        # An export goes by the grids of the laws, which are within FINE of them; Python's last steps
+        # go by the laws.
+        assert off <= 1e-5 * size
+        assert robot.plant.power(own).sum() == pytest.approx(answer.power, rel=1e-4)
+        angles = np.abs(own[-foils:, 0])
+        stalled += bool((angles > [part.stall for part in robot.layout.actuators[-foils:]]).any())
+    assert stalled >= 3
 
 
 def test_on_aarch64(tmp_path: Path) -> None:

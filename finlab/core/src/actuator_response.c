@@ -298,7 +298,7 @@ real fl_support_of_set(const real *block, int i, const fl_set *set, const real *
     if (price[0] > 0) force[0] = set->force_max;
     return price[0];
   }
-  if (set->arc) {
+  if (has_arc(set)) {
     fl_farthest_on_arc(set, price, force);
     return price[0];
   }

@@ -12,6 +12,9 @@
 #define END_SHARE R(0.25)  /* of an arc, that each side of a cut has at least */
 #define CLOSER_POINTS 16   /* intervals of an arc around an angle that was found */
 #define CLOSER_FIRST 4     /* half width of the first such arc, in intervals of the whole one */
+#define CLOSER_BY R(0.25)  /* half width of the next one over that of the last one */
+/* Share of a half width within which an angle has come to rest, so that the next arc is shorter. */
+#define NEAR_MIDDLE R(0.75)
 
 /* Lays the points of an arc at angles from `low` to `high` [rad], in so many intervals. */
 static void lay_points(const real *block, int i, real low, real high, int intervals, fl_arc *arc) {
@@ -110,9 +113,9 @@ int fl_nearer_side_of_arc(const fl_set *set, const real *force) {
 void fl_narrow_arc(fl_set *set, const real *force, int side) {
   const int point = point_of_cut(set, force);
   if (side < 0)
-    set->arc_last = point;
+    set->arc_last = (unsigned char)point;
   else
-    set->arc_first = point;
+    set->arc_first = (unsigned char)point;
 }
 
 /* The angle [rad] of the place on an arc that is nearest to a force. */
@@ -134,10 +137,11 @@ real fl_lay_closer_arcs(const real *block, fl_work *work, int is_first, real for
     const real high = work->box.command_max[i][0];
     const real angle = angle_on_arc(set, force[i]);
     const real from_middle = FABS(angle - arc->middle);
+    const int is_at_limit = !(angle > low && angle < high);
     if (is_first)
       arc->half_width = CLOSER_FIRST * (high - low) / FL_ARC_POINTS;
-    else if (from_middle < arc->half_width * R(0.75) || !(angle > low && angle < high))
-      arc->half_width *= R(0.25);
+    else if (from_middle < NEAR_MIDDLE * arc->half_width || is_at_limit)
+      arc->half_width *= CLOSER_BY;
     arc->middle = angle;
     lay_points(block, i, larger(low, angle - arc->half_width),
                smaller(high, angle + arc->half_width), CLOSER_POINTS, arc);

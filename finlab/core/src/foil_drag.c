@@ -39,7 +39,8 @@ void fl_improve_commands(const real *block, fl_work *work, const real *target_re
   real command[FL_MOST][3];
   fl_commands_for_forces(block, &work->box, work->state_found->force, work->command_previous,
                          command);
-  fl_improve_from(block, work, target_reduced, work->state_found->lambda_reduced, command, best_cost);
+  fl_improve_from(block, work, target_reduced, work->state_found->lambda_reduced, command,
+                  best_cost);
 }
 
 /* Whether a foil may stall at one end (0, 1) of its angles, which is then the command. */

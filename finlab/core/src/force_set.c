@@ -90,7 +90,7 @@ void fl_limit_set(const real *block, int i, fl_set *set, real low, real high, re
   const int has_reverse = plane && low < 0;
   set->is_flipped = has_reverse && high <= 0;
   set->tangent = 0;
-  set->arc = 0;
+  if (FL_ARCS > 0) set->arc = 0;
   set->turn_cost = 0;
   set->turn_origin = 0;
   set->jump_angle = 0;

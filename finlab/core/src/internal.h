@@ -395,11 +395,36 @@ void fl_commands_of_point(const real *block, const fl_work *work, const foil_lat
                           real command[][3]);
 
 /* foil_arcs.c: foils that may stall, beyond reach */
+static inline int has_arc(const fl_set *set) { return FL_ARCS > 0 && set->arc; }
 void fl_lay_arcs(const real *block, fl_work *work);
+#if FL_ARCS > 0
 void fl_farthest_on_arc(const fl_set *set, const real *price, wide *force);
 real fl_gap_of_arc(const fl_actuator *a, const fl_set *set, const real *force);
 int fl_nearer_side_of_arc(const fl_set *set, const real *force);
 void fl_narrow_arc(fl_set *set, const real *force, int side);
+#else /* a robot without foils has no arcs */
+static inline void fl_farthest_on_arc(const fl_set *set, const real *price, wide *force) {
+  (void)set;
+  (void)price;
+  (void)force;
+}
+static inline real fl_gap_of_arc(const fl_actuator *a, const fl_set *set, const real *force) {
+  (void)a;
+  (void)set;
+  (void)force;
+  return 0;
+}
+static inline int fl_nearer_side_of_arc(const fl_set *set, const real *force) {
+  (void)set;
+  (void)force;
+  return 1;
+}
+static inline void fl_narrow_arc(fl_set *set, const real *force, int side) {
+  (void)set;
+  (void)force;
+  (void)side;
+}
+#endif
 real fl_lay_closer_arcs(const real *block, fl_work *work, int is_first, real force[][2]);
 void fl_commands_on_arcs(const real *block, const fl_work *work, real force[][2],
                          real command[][3]);

@@ -426,7 +426,7 @@ static void better_side(const real *block, fl_work *work, const real *wrench,
 static int most_parts_of_policy(const real *block, const fl_work *work) {
   int most = REACH_PARTS + REACH_PARTS_EACH * COUNT(block);
   for (int i = 0; i < COUNT(block); i++) {
-    if (work->set[i].arc) most += REACH_PARTS_ARC;
+    if (has_arc(work->set + i)) most += REACH_PARTS_ARC;
   }
   if (most < work->settings.most_parts) return most;
   return work->settings.most_parts;
@@ -511,6 +511,7 @@ static void cheapen_by_parts(const real *block, fl_work *work, const real *targe
   out->gap_power_bound = fl_gap_power_bound(work, bound);
 }
 
+#if FL_ARCS > 0
 /* Comes closer to what a policy wants where foils may stall, from the forces of the best part on:
    arcs around their angles become shorter and shorter, until forces are on the curves of foils. */
 static void come_closer(const real *block, fl_work *work, const real *wrench,
@@ -569,6 +570,7 @@ static void serve_on_arcs(const real *block, fl_work *work, const real *wrench,
   if (policy->kind != FL_DIRECTION) return;
   fl_largest_ray_share(block, work, wrench, command, 0, 1 - score[MISSING_RAY_SHARE], out);
 }
+#endif
 
 void fl_out_of_reach(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,
                      fl_answer *out) {
@@ -577,10 +579,12 @@ void fl_out_of_reach(const real *block, fl_work *work, const real *wrench, const
   real score[FL_SCORES];
   memcpy(work->rim_normal, work->state_found->lambda_reduced, sizeof work->rim_normal);
   work->distance_enough = SAME_POINT;
+#if FL_ARCS > 0
   if (work->has_drag && fl_may_any_stall(block, work)) {
     serve_on_arcs(block, work, wrench, policy, out);
     return;
   }
+#endif
   serve(block, work, wrench, policy, force, score);
   const real most_ray_share = 1 - score[MISSING_RAY_SHARE]; /* that all parts could give */
   const int gap = fl_worst_gap(block, work, force, 0);

@@ -47,7 +47,7 @@ static real gap_in_band(const fl_actuator *a, const fl_set *set, const real *for
 /* The same of a line, 1 or 0; of a foil how far its drag is above that of its lift. */
 static real gap_of_line(const real *block, const fl_actuator *a, int i, const fl_set *set,
                         const real *force) {
-  if (set->arc) return fl_gap_of_arc(a, set, force);
+  if (has_arc(set)) return fl_gap_of_arc(a, set, force);
   if (is_foil(a)) {
     const real above = (force[1] - fl_drag_of_lift(block, i, force[0])) / a->row_force_max[1];
     if (above > HOLLOW) return above;
@@ -135,7 +135,7 @@ static int sign_of(int is_positive) {
 /* The side (-1, 1) of a gap on which a force is rather. */
 int fl_nearer_side(const real *block, int i, const fl_set *set, const real *force) {
   const fl_actuator *a = ACTUATOR(block, i);
-  if (set->arc) return fl_nearer_side_of_arc(set, force);
+  if (has_arc(set)) return fl_nearer_side_of_arc(set, force);
   if (is_foil(a)) return sign_of(!(force[0] < (set->force_min + set->force_max) / 2));
   if (!is_plane(a)) return sign_of(FABS(force[0]) > a->dead_band / 2);
   if (gap_in_band(a, set, force) > 0) return sign_of(size_of(force) > a->dead_band / 2);
@@ -253,7 +253,7 @@ static void narrow_line(const real *block, int i, fl_set *set, const real *force
    reverse (-1) or ahead (1), else as the functions above say. */
 void fl_narrow_set(const real *block, int i, fl_set *set, const real *force, int side) {
   const fl_actuator *a = ACTUATOR(block, i);
-  if (set->arc)
+  if (has_arc(set))
     fl_narrow_arc(set, force, side);
   else if (!is_plane(a))
     narrow_line(block, i, set, force, side);
