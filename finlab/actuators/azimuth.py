@@ -318,7 +318,7 @@ class Azimuth(Propeller):
         """Arcs of its angle [rad], ascending; the first and the last are one where they meet, a
         turn apart."""
         pairs = _pairs(self.arc)
-        joined = []
+        joined: list[Ends] = []
         for low, high in pairs:
             if joined and low - joined[-1][1] <= FILE_TURN_TOLERANCE:
                 joined[-1] = (joined[-1][0], high)

@@ -450,7 +450,8 @@ class Plant:
             if not zones:
                 continue
             # Uniform over the arcs: an angle from 0 to their summed widths, moved up by the zones.
-            low, high = actuator.turn_range
+            low = actuator.lower[0]
+            high = actuator.upper[0]
             barred = sum(end - begin for begin, end in zones)
             angle = low + (commands[..., i, 0] - low) * (1.0 - barred / (high - low))
             for begin, end in zones:
