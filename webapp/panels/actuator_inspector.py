@@ -139,7 +139,7 @@ def _has(actuator: Actuator, box: Box) -> bool:
     inspector = inspector_of(type(actuator))
     if box not in inspector.limits and box not in inspector.law:
         return False
-    if box.key == actuator.KIND.arc and getattr(actuator, "barred", ()):
+    if box.key == actuator.KIND.arc and getattr(actuator, "barred", False):
         return False  # two numbers do not hold several arcs: the head tells them
     return isinstance(box, RangeBox) or box.model in ("", actuator.model_type)
 
