@@ -470,13 +470,17 @@ class Actuator(Checked, ABC):
         words = []
         for number, low, high in zip(self.KIND.numbers, self.lower, self.upper, strict=False):
             if number.unit == "rad":
-                words.append(axes.arc_words(low, high))
+                words.append(self.angle_words(low, high))
             else:
                 prefix = prefix_of(max(abs(low), abs(high)))
                 low /= prefix.factor
                 high /= prefix.factor
                 words.append(f"{low:g}..{high:g} {prefix.symbol}{number.unit}")
         return ", ".join((*words, self.model_type))
+
+    def angle_words(self, low: float, high: float) -> str:
+        """Returns the limits of an angle [rad] in words."""
+        return axes.arc_words(low, high)
 
     @property
     def direction_words(self) -> str:
@@ -510,8 +514,7 @@ class Actuator(Checked, ABC):
         sense in a mirror: arcs and the reaction torque change sign."""
         changes: dict[str, Any] = {}
         if self.KIND.arc:
-            low, high = getattr(self, self.KIND.arc)
-            changes[self.KIND.arc] = (-high + 0.0, -low + 0.0)
+            changes[self.KIND.arc] = _mirrored(getattr(self, self.KIND.arc))
         if hasattr(self, "torque_per_newton"):
             changes["torque_per_newton"] = -self.torque_per_newton + 0.0
         frame = np.array(self.frame) * axes.MIRROR_SIGNS
@@ -557,6 +560,14 @@ class Actuator(Checked, ABC):
             )
         frame[1 - row] = axes.perpendicular(frame[row], wanted)
         return self.turned(frame)
+
+
+def _mirrored(arc: tuple[Any, ...]) -> tuple[Any, ...]:
+    """The mirror image of an arc, or of several."""
+    if isinstance(arc[0], tuple):
+        return tuple(map(_mirrored, reversed(arc)))
+    low, high = arc
+    return -high + 0.0, -low + 0.0
 
 
 def held_limits(angle: float | None, limits: tuple[float, float]) -> tuple[float, float]:

@@ -6,6 +6,7 @@ the force points along cos(a) zero + sin(a) (turn_axis x zero).
 
 from __future__ import annotations  # help() then prints `Newtons`, not the bounds of one
 
+import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 import numpy as np
 from msgspec import Meta
 
+from finlab import axes
 from finlab.actuators.actuator import (
     ACROSS,
     Command,
@@ -59,6 +61,23 @@ Angle = Annotated[float, Meta(ge=-TURN - 1e-9, le=TURN + 1e-9)]
 """End of an arc [rad]; a turn in degrees, converted, may exceed `TURN` by rounding."""
 AngleDegrees = Annotated[float, Meta(ge=-360.0, le=360.0)]
 """The same in a file [deg]."""
+Ends = tuple[float, float]
+"""Least and greatest angle of an arc [rad]."""
+MOST_ARCS = 5
+"""Most arcs of one azimuth; the core has room for the zones between so many."""
+# msgspec 0.22 misreads a tuple of fixed length within a union: these pairs have bounds of length.
+Arc = Annotated[
+    tuple[Angle | Annotated[tuple[Angle, ...], Meta(min_length=2, max_length=2)], ...],
+    Meta(min_length=1, max_length=MOST_ARCS),
+]
+"""Least and greatest angle [rad], or several such pairs."""
+ArcDegrees = Annotated[
+    tuple[
+        AngleDegrees | Annotated[tuple[AngleDegrees, ...], Meta(min_length=2, max_length=2)], ...
+    ],
+    Meta(min_length=1, max_length=MOST_ARCS),
+]
+"""The same in a file [deg]."""
 
 
 class AzimuthLaw(PropellerLaw):
@@ -100,7 +119,8 @@ class AzimuthGroup(Group):
             azimuths: m turning thrusters.
             effectiveness: wrench (m, 3, 6) of 1 N along each own axis [1, m], body frame.
         """
-        low, high = np.array([azimuth.arc for azimuth in azimuths]).T
+        low = np.array([azimuth.lower[0] for azimuth in azimuths])
+        high = np.array([azimuth.upper[0] for azimuth in azimuths])
         self._limits = np.array([usable_force(azimuth) for azimuth in azimuths])
         self._power = ThrustPower([azimuth.model for azimuth in azimuths])
         self._margins = power_law_margins(azimuths)
@@ -139,8 +159,20 @@ def _plane(azimuth: Azimuth, matrix: Array, center: float, half_angle: float) ->
     table = radial_table(azimuth.model, 1, max(least, 0.0), max(most, 0.0))
     reverse = radial_table(azimuth.model, -1, max(-most, 0.0), -least) if least < 0.0 else None
     return Plane(
-        matrix, table, center, half_angle, dead_band=azimuth.dead_band, reverse=reverse, high=most
+        matrix,
+        table,
+        center,
+        half_angle,
+        dead_band=azimuth.dead_band,
+        reverse=reverse,
+        high=most,
+        barred=getattr(azimuth, "barred", ()),  # a kind of another package may have one arc
     )
+
+
+def _pairs(arc: tuple[Any, ...]) -> tuple[Ends, ...]:
+    """Pairs of ends of an arc, or of several."""
+    return arc if isinstance(arc[0], tuple) else (arc,)
 
 
 def _arcs(low: Array, high: Array) -> tuple[Array, Array]:
@@ -178,7 +210,9 @@ class Azimuth(Propeller):
         force: least and most force [N]: the least below 0 where it also pushes against its
             direction, above 0 where it cannot stop.
         model: electrical power over the force [W]: `PowerLaw` or `PowerTable`.
-        arc: least and greatest angle [rad]; a full turn means any angle.
+        arc: least and greatest angle [rad]; a full turn means any angle. Or several such pairs, one
+            above the other, for one that pushes ahead only: it may be at any angle of any of them,
+            and in a tick it stays in its arc but where its rate takes it past the zone between.
         dead_band: forces smaller than this, other than 0, cannot be held [N].
         torque_per_newton: reaction torque about the direction of the force, per force, signed [m].
         turn_rate: largest change of the angle [rad/s]; None: nothing limits it.
@@ -196,7 +230,7 @@ class Azimuth(Propeller):
     """
 
     DEGREES: ClassVar[Mapping[str, tuple[str, Any]]] = {
-        "arc": ("arc_deg", tuple[AngleDegrees, AngleDegrees]),
+        "arc": ("arc_deg", ArcDegrees),
         "turn_rate": ("turn_rate_deg_s", TurnRateDegrees),
     }
     SAMPLE_ARC: ClassVar[tuple[float, float]] = (-math.pi, math.pi)
@@ -207,7 +241,9 @@ class Azimuth(Propeller):
         group=AzimuthGroup,
         command=AzimuthCommand,
         numbers=(
-            CommandNumber(name="angle", unit="rad", limits="arc", rate="turn_rate", aims=True),
+            CommandNumber(
+                name="angle", unit="rad", limits="turn_range", rate="turn_rate", aims=True
+            ),
             CommandNumber(name="force", unit="N", limits="force", rate="rate", lags=True),
         ),
         axes=("turn_axis", "zero"),
@@ -225,7 +261,7 @@ class Azimuth(Propeller):
     zero: Direction3
     force: tuple[Newtons, Newtons]
     model: ThrustModel
-    arc: tuple[Angle, Angle] = (-math.pi, math.pi)
+    arc: Arc = (-math.pi, math.pi)
     dead_band: Threshold = 0.0
     torque_per_newton: Metres = 0.0
     turn_rate: TurnRate | None = None
@@ -251,13 +287,61 @@ class Azimuth(Propeller):
             raise LayoutError(
                 f"leaves no force, got {self.dead_band:g} beside {self.force[1]:g} N", "dead_band"
             )
-        width = self.arc[1] - self.arc[0]
-        if not 0.0 <= width <= TURN + FILE_TURN_TOLERANCE:
-            low, high = map(math.degrees, self.arc)
-            raise LayoutError(
-                f"must rise, by at most one turn, got {low:g} and {high:g} deg", "arc"
-            )
+        self._check_arcs()
         check_force(self.model, self.force)
+
+    def _check_arcs(self) -> None:
+        """Checks the arcs against each other. Raises LayoutError."""
+        is_pair = [isinstance(item, tuple) for item in self.arc]
+        if any(is_pair) and not all(is_pair):
+            raise LayoutError("expected two numbers, or several pairs of two, got both", "arc")
+        if not any(is_pair) and len(self.arc) != 2:
+            raise LayoutError(f"expected two numbers, got {len(self.arc)}", "arc")
+        if len(self.arc) == 1:
+            object.__setattr__(self, "arc", self.arc[0])
+        ends = [angle for arc in _pairs(self.arc) for angle in arc]
+        low, high = ends[0], ends[-1]
+        is_rising = all(first <= second for first, second in itertools.pairwise(ends))
+        if not is_rising or high - low > TURN + FILE_TURN_TOLERANCE:
+            words = ", ".join(f"{math.degrees(end):g}" for end in ends)
+            words = words if len(ends) > 2 else words.replace(", ", " and ")
+            raise LayoutError(f"must rise, by at most one turn, got {words} deg", "arc")
+        if self.barred and self.force[0] < 0.0:
+            raise LayoutError(
+                f"several arcs are of one that pushes ahead only, got a least force of "
+                f"{self.force[0]:g} N; expected 0 or more",
+                "arc",
+            )
+
+    @property
+    def arcs(self) -> tuple[Ends, ...]:
+        """Arcs of its angle [rad], ascending; the first and the last are one where they meet, a
+        turn apart."""
+        pairs = _pairs(self.arc)
+        joined: list[Ends] = []
+        for low, high in pairs:
+            if joined and low - joined[-1][1] <= FILE_TURN_TOLERANCE:
+                joined[-1] = (joined[-1][0], high)
+            else:
+                joined.append((low, high))
+        if len(joined) > 1 and is_full_turn(joined[-1][1] - joined[0][0]):
+            first_high = joined[0][1] + TURN
+            joined = [*joined[1:-1], (joined[-1][0], first_high)]
+        return tuple(joined)
+
+    @property
+    def turn_range(self) -> Ends:
+        """Least and greatest angle of all its arcs [rad]."""
+        arcs = self.arcs
+        return arcs[0][0], arcs[-1][1]
+
+    @property
+    def barred(self) -> tuple[Ends, ...]:
+        """Zones between its arcs [rad], ascending."""
+        zones = []
+        for below, above in itertools.pairwise(self.arcs):
+            zones.append((below[1], above[0]))
+        return tuple(zones)
 
     @classmethod
     def sample(cls) -> Self:
@@ -286,12 +370,20 @@ class Azimuth(Propeller):
             low, high = force
             force = weakened((max(low, faults.weak * low), high), faults.weak)
         angle = faults.stuck if faults.running is None else faults.running[0]
-        left = replace(self, force=force, arc=held_limits(angle, self.arc))
+        arc = self.arc if angle is None else held_limits(angle, self.turn_range)
+        left = replace(self, force=force, arc=arc)
         return left if faults.running is None else left.hung(faults.running[1])
+
+    def angle_words(self, low: float, high: float) -> str:
+        """See `Actuator`: all arcs."""
+        if not self.barred:
+            return super().angle_words(low, high)
+        return " and ".join(axes.arc_words(*arc) for arc in self.arcs)
 
     @property
     def joints(self) -> Iterator[tuple[str, Vector3, tuple[float, float] | None]]:
-        limits = None if is_full_turn(self.arc[1] - self.arc[0]) else self.arc
+        low, high = self.turn_range
+        limits = None if is_full_turn(high - low) else (low, high)
         yield "_mount", self.turn_axis, limits
         yield "", self.zero, None
 
@@ -329,5 +421,6 @@ class Tilt(Azimuth):
     def check_together(self) -> None:
         """See `Actuator`."""
         super().check_together()
-        if is_full_turn(self.arc[1] - self.arc[0]):
+        low, high = self.turn_range
+        if is_full_turn(high - low):
             raise LayoutError("is missing: the arc of a tilt is less than a full turn", "arc")

@@ -279,6 +279,7 @@ class Plane:
         reverse: response of forces against the directions of the arc, from rest on; None where it
             pushes one way.
         high: largest force, below 0 in reverse, where that is less than the tables give [N].
+        barred: least and greatest angle of each zone within the arc that has no forces [rad].
     """
 
     effectiveness: Array
@@ -289,6 +290,7 @@ class Plane:
     dead_band: float = 0.0
     reverse: RadialTable | None = None
     high: float = np.inf
+    barred: tuple[tuple[float, float], ...] = ()
 
     @property
     def rows(self) -> Array:

@@ -54,6 +54,18 @@ MAX_STATES = 32
 """States of the robot, other than undamaged with all axes, that an allocator keeps prepared."""
 
 
+def _check_arcs(layout: Layout, kind: type[Method]) -> None:
+    """Refuses a robot with several arcs where its method would push in the zones between them."""
+    if kind.keeps_arcs:
+        return
+    for actuator in layout.actuators:
+        if getattr(actuator, "barred", ()):
+            raise AllocationError(
+                f"method {kind.name!r}: knows one arc of an actuator, {actuator.name!r} has "
+                f"{actuator.angle_words(0.0, 0.0)}; expected one arc, or method 'dual'"
+            )
+
+
 class Allocator:
     """Turns a target wrench into one command per actuator, for one robot.
 
@@ -145,6 +157,7 @@ class Allocator:
 
     def _prepare(self, layout: Layout, choice: methods.MethodChoice) -> None:
         """Prepares the undamaged robot; all constructors end here."""
+        _check_arcs(layout, choice.kind)
         self._layout = layout
         self._choice = choice
         self._scale = wrench_scale_of(layout)

@@ -206,6 +206,8 @@ class Method(ABC):
     keeps_limits: ClassVar[bool] = False
     """Whether its commands already are what a robot takes: within the rates in a tick, at rest
     inside a dead band outside of ticks. Those of any other method are brought there."""
+    keeps_arcs: ClassVar[bool] = False
+    """Whether it leaves out the zones between the arcs of an actuator with several."""
     needs_networks: ClassVar[bool] = False
     """Whether it is made with trained networks, of a checkpoint."""
     networks: Networks | None

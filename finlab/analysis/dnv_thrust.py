@@ -162,7 +162,11 @@ def _azimuth_arc(azimuth: Azimuth) -> tuple[tuple[float, float] | None, Actuator
             f"{azimuth.name}.turn_axis: DNV-ST-0111 level 1 has azimuths that turn about the "
             f"vertical, got {list(azimuth.turn_axis)}"
         )
-    low, high = azimuth.arc
+    if azimuth.barred:
+        raise LayoutError(
+            f"{azimuth.name}.arc_deg: expected one arc for the formulas of DNV-ST-0111, got several"
+        )
+    low, high = azimuth.turn_range
     if is_full_turn(high - low):
         return None, "azimuth"
     zero = math.atan2(azimuth.zero[1], azimuth.zero[0])

@@ -194,11 +194,13 @@ def _azimuth(azimuth: Azimuth, axes: Array, with_power: bool) -> ProofActuator:
         raise NotSettledError("has a dead band or a table of power astern, and so no convex power")
     if most <= 0.0:
         raise NotSettledError("pushes astern alone; turn its zero direction round")
+    if azimuth.barred:
+        raise NotSettledError("has several arcs, and premises are those of one")
     power = _propeller_power(azimuth, least, most, is_plane=True)
     outer = max(-least, most)
     values = _premises(azimuth, axes, (least, most), outer, power)
     values["mean"] = azimuth.dead_band > 0.0
-    low, high = azimuth.arc
+    low, high = azimuth.turn_range
     half_angle = math.pi if is_full_turn(high - low) else 0.5 * (high - low)
     return _plane(values, most, outer, 0.5 * (low + high), half_angle)
 

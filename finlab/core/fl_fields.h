@@ -48,6 +48,8 @@ FL_FIELD(fl_real, command_min, [3], "command", "least command; unused numbers 0"
 FL_FIELD(fl_real, command_max, [3], "command", "largest command; unused numbers 0")
 FL_FIELD(fl_real, max_change, [3], "command", "largest changes in a tick")
 FL_FIELD(fl_real, is_free_angle, , "1", "1 where the angle of the command may turn freely")
+FL_FIELD(fl_real, barred_count, , "1", "of a pod: zones between arcs that it may not push in")
+FL_FIELD(fl_real, barred, [4][2], "rad", "least and greatest angle of each such zone")
 FL_FIELD(fl_real, law_grid, , "offset", "grid of the law")
 FL_FIELD(fl_real, command_table, , "offset", "a fin's beat, or a foil's curve of lift and angle")
 FL_FIELD(fl_real, command_sign, , "1",

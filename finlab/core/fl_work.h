@@ -184,6 +184,7 @@ struct fl_work {
   fl_real power_of_use;         /* dual value above which an answer is of no use [W] */
   int is_convex;                /* whether no set has a gap or a kink */
   int has_forks;                /* whether one is forked, or pushes either way */
+  int has_zones;                /* whether a pod has barred zones between its arcs */
   int has_drag;                 /* whether a foil drags */
   int has_turn_cost;            /* whether turning costs */
   int has_kinks;    /* whether one of these is so of a question, or a plane cannot rest */

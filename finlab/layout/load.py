@@ -347,9 +347,9 @@ class PartReader:
 
 
 def _radians(degrees: Any) -> Any:
-    """Radians of degrees, a number or a tuple of numbers."""
+    """Radians of degrees, a number or a tuple of such."""
     if isinstance(degrees, tuple):
-        return tuple(map(math.radians, degrees))
+        return tuple(map(_radians, degrees))
     return math.radians(degrees)
 
 

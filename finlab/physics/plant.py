@@ -444,7 +444,20 @@ class Plant:
 
     def sample(self, rng: np.random.Generator, size: tuple[int, ...]) -> Array:
         """Returns random commands (*size, n, 3), uniform within the limits."""
-        return np.asarray(self.lower + rng.uniform(size=(*size, self.n, 3)) * self.width)
+        commands = np.asarray(self.lower + rng.uniform(size=(*size, self.n, 3)) * self.width)
+        for i, actuator in enumerate(self.layout.actuators):
+            zones = getattr(actuator, "barred", ())
+            if not zones:
+                continue
+            # Uniform over the arcs: an angle from 0 to their summed widths, moved up by the zones.
+            low = actuator.lower[0]
+            high = actuator.upper[0]
+            barred = sum(end - begin for begin, end in zones)
+            angle = low + (commands[..., i, 0] - low) * (1.0 - barred / (high - low))
+            for begin, end in zones:
+                angle = np.where(angle > begin, angle + end - begin, angle)
+            commands[..., i, 0] = angle
+        return commands
 
     def _checked(self, command: ArrayLike) -> tuple[Array, NDArray[np.bool_] | None]:
         """Finite commands (..., n, 3), 0 of lost actuators, and which are lost (..., n); None where

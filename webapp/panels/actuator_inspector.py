@@ -139,6 +139,8 @@ def _has(actuator: Actuator, box: Box) -> bool:
     inspector = inspector_of(type(actuator))
     if box not in inspector.limits and box not in inspector.law:
         return False
+    if box.key == actuator.KIND.arc and getattr(actuator, "barred", False):
+        return False  # two numbers do not hold several arcs: the head tells them
     return isinstance(box, RangeBox) or box.model in ("", actuator.model_type)
 
 
@@ -210,8 +212,12 @@ def _headline(layout: Layout, selection: tuple[str, ...], selected: str | None) 
         return html("<div class='fl dim'>{}</div>", sentence)
     badges = Markup().join(swatch(layout.index(name)) for name in selection)
     if len(selection) == 1:
+        actuator = layout.actuator(selection[0])
+        words = actuator.type
+        if getattr(actuator, "barred", ()):  # several arcs have no box
+            words = f"{actuator.type}, {actuator.angle_words(0.0, 0.0)}"
         head = "<div class='fl head'>{}<b>{}</b> <span class='dim'>{}</span></div>"
-        return html(head, badges, selection[0], layout.actuator(selection[0]).type)
+        return html(head, badges, selection[0], words)
     return html(
         "<div class='fl head'>{}<b>{} actuators</b><div class='dim'>The boxes show {}; what "
         "you change counts for all that have it.</div></div>",

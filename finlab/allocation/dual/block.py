@@ -136,6 +136,9 @@ def _describe(actuator: Any, response: Response, form: Form, offsets: "TableOffs
         actuator["rows"] = 2.0
         actuator["sector_center"] = response.sector_center
         actuator["sector_half_angle"] = response.sector_half_angle
+        actuator["barred_count"] = len(response.barred)
+        for k, zone in enumerate(response.barred):
+            actuator["barred"][k] = zone
         if _needs_no_reverse(response):
             actuator["force_min_needed"] = 0.0
 

@@ -142,6 +142,7 @@ class Dual(Method):
     most_targets = 4096
     reads = frozenset({"policy", "losses", "multipliers", "reference"})
     keeps_limits = True
+    keeps_arcs = True
     settings_class = DualSettings
     settings: DualSettings
 

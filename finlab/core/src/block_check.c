@@ -90,6 +90,20 @@ static int are_command_limits(const fl_actuator *a) {
   return 1;
 }
 
+/* Whether the barred zones of an actuator, if it has any, lie one above the other within the arc of
+   a pod that pushes one way. */
+static int are_barred_zones(const fl_actuator *a) {
+  if (!is_whole_number(a->barred_count, 0, MOST_ZONES)) return 0;
+  if (a->barred_count == 0) return 1;
+  if (!fl_aims_force(a) || a->force_min < 0 || a->is_free_angle != 0) return 0;
+  real below = a->command_min[0];
+  for (int k = 0; k < (int)a->barred_count; k++) {
+    if (!(below <= a->barred[k][0] && a->barred[k][0] <= a->barred[k][1])) return 0;
+    below = a->barred[k][1];
+  }
+  return below <= a->command_max[0] && a->command_max[0] - a->command_min[0] <= 2 * PI;
+}
+
 /* Whether all offsets of an actuator are those of tables that it needs. */
 static int has_tables(const real *block, const fl_actuator *a) {
   const command_form *form = fl_form_of(a);
@@ -116,6 +130,7 @@ static int check_actuator(const real *block, const fl_actuator *a) {
   if (!(a->force_min <= a->force_max && a->sector_half_angle >= 0)) return FL_BAD_NUMBER;
   if (!(a->dead_band >= 0 && a->flow_speed >= 0 && a->uncertainty_cost >= 0)) return FL_BAD_NUMBER;
   if (!(a->secant[0] >= 0 && a->secant[1] >= 0)) return FL_BAD_NUMBER;
+  if (!are_barred_zones(a)) return FL_BAD_NUMBER;
   const int drags = fl_form_of(a)->has_drag && a->rows == 2;
   if (is_foil(a) && !drags) return FL_BAD_BLOCK;
   return FL_OK;

@@ -69,7 +69,7 @@ void fl_clip_commands(const real *block, const fl_box *box, real command[][3]) {
       if (!(k == angle && box->is_free_angle[i])) value = fl_clip_number(box, i, k, angle, value);
       if (k == angle) {
         const real middle = (a->command_min[k] + a->command_max[k]) / 2;
-        value = middle + fl_wrap_angle(value - middle);
+        value = fl_leave_zone(a, middle + fl_wrap_angle(value - middle));
       }
       command[i][k] = clipped(value, a->command_min[k], a->command_max[k]);
     }

@@ -384,6 +384,7 @@ static pod_way pod_way_of(const real *block, int i, const fl_box *box, real angl
   if (is_back) force = -size;
   pod_way way;
   way.angle = fl_clip_number(box, i, 0, 0, angle + (real)is_back * PI);
+  way.angle = fl_leave_zone(ACTUATOR(block, i), way.angle);
   way.force = fl_clip_number(box, i, 1, 0, force);
   const real dx = way.force * COS(way.angle) - size * COS(angle);
   const real dy = way.force * SIN(way.angle) - size * SIN(angle);

@@ -141,10 +141,23 @@ static void take_step(const real *block, const fl_box *box, real command[][3], r
   }
 }
 
+/* The box of steps: without the barred zones of pods, which keep to the arcs that they are in. */
+static const fl_box *box_of_steps(const real *block, const fl_box *box, real command[][3],
+                                  fl_box *kept) {
+  int has_zones = 0;
+  for (int i = 0; i < COUNT(block); i++) has_zones |= ACTUATOR(block, i)->barred_count > 0;
+  if (!has_zones) return box;
+  *kept = *box;
+  fl_keep_arcs(block, kept, command);
+  return kept;
+}
+
 /* Commands within a box after one step by a damping mu that reduces a residual. */
 void fl_step_commands(const real *block, fl_work *work, const fl_box *box, const real *residual,
                       real mu, real command[][3], real stepped[][3]) {
   real step[FL_MOST][3];
+  fl_box kept;
+  box = box_of_steps(block, box, command, &kept);
   find_jacobian(block, work, box, command);
   step_within(block, work, box, command, residual, mu, step);
   take_step(block, box, command, step, stepped);
@@ -157,6 +170,8 @@ real fl_refine_commands(const real *block, fl_work *work, const fl_box *box, con
   const size_t size = (size_t)COUNT(block) * sizeof *command;
   real residual[6];
   real error_squared = residual_of(block, work, wrench, command, residual);
+  fl_box kept;
+  if (error_squared > EXACT * EXACT) box = box_of_steps(block, box, command, &kept);
   real mu = NEARLY;
   int has_moved = 1;
   for (int k = 0; k < steps && error_squared > EXACT * EXACT && mu <= 1; k++) {

@@ -38,11 +38,12 @@ static void box_after(const real *block, fl_box *box, int i, const real *before,
     const real middle = (a->command_min[k] + a->command_max[k]) / 2;
     real center = before[k];
     /* an angle of an arc may be told a whole turn off */
-    if (is_angle) center = middle + fl_wrap_angle(center - middle);
+    if (is_angle) center = fl_leave_zone(a, middle + fl_wrap_angle(center - middle));
     center = clipped(center, a->command_min[k], a->command_max[k]);
     box->command_min[i][k] = larger(center - step, a->command_min[k]);
     box->command_max[i][k] = smaller(center + step, a->command_max[k]);
   }
+  if (a->barred_count > 0) fl_trim_arc(a, box->command_min[i], box->command_max[i]);
 }
 
 /* Power [W] of an actuator at a command (3,), and the price [W/N] of its force ahead at which it

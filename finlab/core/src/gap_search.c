@@ -38,10 +38,17 @@ static int is_without_gap(const real *block, const fl_work *work, int status, in
   return status == FL_MET && gap < 0 && !any_hollow(block, work);
 }
 
+/* Share of a cost that is worth another search. Zones leave few parts, each with an answer of its
+   own that may be the best: all of them are looked at. */
+static real worth_search(const fl_work *work) {
+  if (work->has_zones) return NEARLY;
+  return CLOSE;
+}
+
 /* Whether forces of a part that has no answer yet could still be cheaper than the best answer. */
 static int may_be_cheaper(const fl_work *work, int status, int gap, real best_cost) {
   const int is_bound = status == FL_MET || (status == FL_NO_PROGRESS && gap >= 0);
-  return is_bound && work->state_found->dual_value < best_cost * (1 - CLOSE);
+  return is_bound && work->state_found->dual_value < best_cost * (1 - worth_search(work));
 }
 
 /* Whether the force of a plane is below its least one, at which it is then frozen. Pods whose
@@ -137,7 +144,7 @@ static fl_cut *last_cheaper_cut(const real *block, fl_work *work, int *depth, re
   for (;;) {
     fl_cut *cut = fl_last_open_cut(block, work, depth);
     if (!cut) return 0;
-    if (cut->score[0] < best_cost * (1 - CLOSE)) return cut;
+    if (cut->score[0] < best_cost * (1 - worth_search(work))) return cut;
     *bound = smaller(*bound, cut->score[0]);
   }
 }

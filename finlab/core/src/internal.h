@@ -241,6 +241,15 @@ void fl_leave_dead_bands(const real *block, real force[][2], real command[][3]);
 void fl_rest_in_dead_bands(const real *block, const fl_box *box, real command[][3]);
 int fl_is_in_dead_band(const fl_actuator *a, const real *command);
 
+/* barred_zones.c: angles between the arcs of a pod */
+#define MOST_ZONES 4 /* of an fl_actuator */
+int fl_has_barred_zone(const fl_actuator *a, const fl_set *set);
+int fl_is_barred(const fl_actuator *a, const fl_set *set, const real *force);
+void fl_narrow_by_zone(const fl_actuator *a, fl_set *set, const real *force, int side);
+void fl_trim_arc(const fl_actuator *a, real *low, real *high);
+real fl_leave_zone(const fl_actuator *a, real angle);
+void fl_keep_arcs(const real *block, fl_box *box, real command[][3]);
+
 /* command_law.c: forces of commands and commands for forces */
 typedef struct {
   real low, high, middle, half;

@@ -64,6 +64,7 @@ real fl_gap_of(const real *block, const fl_work *work, int i, const real *force,
                const real *lambda) {
   const fl_actuator *a = ACTUATOR(block, i);
   const fl_set *set = work->set + i;
+  if (fl_is_barred(a, set, force)) return PI;
   if (set->turn_cost > 0 && lambda) {
     if (set->has_jumped) return PI;
     return gap_in_band(a, set, force);
@@ -141,6 +142,10 @@ int fl_nearer_side(const real *block, int i, const fl_set *set, const real *forc
   if (gap_in_band(a, set, force) > 0) return sign_of(size_of(force) > a->dead_band / 2);
   if (set->sector_half_angle >= PI && set->force_max_reverse == 0 && !set->has_jumped) return 1;
   const real angle = angle_from_middle(set, force);
+  if (fl_is_barred(a, set, force)) {
+    const real direction = ATAN2(force[1], force[0]);
+    return sign_of(fl_wrap_angle(fl_leave_zone(a, direction) - direction) > 0);
+  }
   if (set->force_max_reverse > 0) return sign_of(!(COS(angle) < 0));
   if (set->has_jumped) return sign_of(!(ATAN2(force[1], force[0]) < set->jump_angle));
   return sign_of(!(angle < 0));
@@ -249,6 +254,16 @@ static void narrow_line(const real *block, int i, fl_set *set, const real *force
   }
 }
 
+/* Takes the ends of a set's arc out of barred zones. */
+static void trim_set(const fl_actuator *a, fl_set *set) {
+  if (!(a->barred_count > 0)) return;
+  real low = set->sector_center - set->sector_half_angle;
+  real high = set->sector_center + set->sector_half_angle;
+  fl_trim_arc(a, &low, &high);
+  set->sector_center = (low + high) / 2;
+  set->sector_half_angle = (high - low) / 2;
+}
+
 /* Cuts a set by a force and keeps one side of its gap: of a plane that pushes either way
    reverse (-1) or ahead (1), else as the functions above say. */
 void fl_narrow_set(const real *block, int i, fl_set *set, const real *force, int side) {
@@ -259,11 +274,15 @@ void fl_narrow_set(const real *block, int i, fl_set *set, const real *force, int
     narrow_line(block, i, set, force, side);
   else if (gap_in_band(a, set, force) > 0)
     narrow_by_band(block, i, set, force, side);
-  else if (set->force_max_reverse > 0) {
+  else if (!set->has_jumped && fl_has_barred_zone(a, set)) {
+    fl_narrow_by_zone(a, set, force, side);
+  } else if (set->force_max_reverse > 0) {
     if (side < 0) turn_round(set);
     set->force_max_reverse = 0;
-  } else
+  } else {
     narrow_by_angle(set, force, side);
+    trim_set(a, set);
+  }
   set->has_jumped = 0;
   fl_prepare_set(block, i, set);
 }
