@@ -19,9 +19,9 @@ from finlab.layout.jet_geometry import jet_geometry_of
 
 FREQUENCIES = {"pair": 320, "hull": 142}
 """Frequencies by kind of message: 1,706 weights in all."""
-LENGTH = {"pair": 3.0, "hull": 1.5}
+LENGTH = {"pair": 4.0, "hull": 3.0}
 """Length of the kernel, in standard deviations of the features."""
-RIDGE = 1e-4
+RIDGE = 1e-5
 """Penalty of the regression, over the mean square of the terms."""
 
 
