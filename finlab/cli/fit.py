@@ -143,5 +143,6 @@ def _fit_to_prior(robot: Layout, measured: Samples, output: Path | None, prior: 
         return
     file = output.with_suffix(WEIGHTS_SUFFIX)
     write_weights(file, fit.weights)
-    save_layout(replace(robot, interaction=Linear(str(file.resolve()))), output)
+    # Paths in a layout start in its folder: both files can be moved together.
+    save_layout(replace(robot, interaction=Linear(file.name)), output)
     print(f"{output}, {file}: the robot with this interaction, and its weights")

@@ -1,6 +1,7 @@
 """The interaction that is linear in its weights: its formula in the core, what samples of one robot
 change, and what it learns from many robots."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -26,13 +27,14 @@ from finlab.interaction.linear import (
     read_weights,
     write_weights,
 )
-from finlab.layout import layout_to_dict, parse_layout
+from finlab.layout import Layout, layout_to_dict, parse_layout
 from finlab.layout.jet_geometry import jet_geometry_of
 from finlab.physics import Plant
 from finlab.physics.objective import wrench_scale_of
 from finlab.research.interaction.linear_prior import train_weights
 from finlab.research.interaction.random_samples import random_samples
 from finlab.research.random_layouts import random_jet_robot
+from tests.interaction import third_plant
 from tests.interaction.second_plant import wrenches
 from tests.interaction.test_jets import differs
 
@@ -186,17 +188,23 @@ def read_weights_of_shipped() -> Weights:
     return read_weights(str(SHIPPED_PRIOR))
 
 
-def forward_errors(own: int, weights: Weights, seeds: range) -> tuple[Array, Array, Array]:
+def forward_errors(
+    own: int,
+    weights: Weights,
+    seeds: range,
+    plant_of: Callable[[Layout, Array], Array] = wrenches,
+    count: tuple[int, int] = (3, 8),
+) -> tuple[Array, Array, Array]:
     """Errors (K, 6) by the laws and by weights after own samples, and their deviations, over the
-    wrench scale, of robots of 3 to 8 actuators that a second plant judges."""
+    wrench scale, of robots of so many actuators that a plant judges, usually the second one."""
     laws = []
     errors = []
     deviations = []
     for seed in seeds:
         rng = np.random.default_rng([71, seed])
-        layout = random_jet_robot(rng, "robot", (3, 8))
+        layout = random_jet_robot(rng, "robot", count)
         command = Plant(layout).sample(rng, (20 + own,))
-        samples = Samples(layout, command, wrenches(layout, command))
+        samples = Samples(layout, command, plant_of(layout, command))
         tested = terms_of(samples.some(slice(0, 20)))
         known = weights
         if own > 0:
@@ -233,6 +241,17 @@ def test_own_samples_better_the_shipped_prior() -> None:
 @pytest.mark.parametrize("own", [0, 20, 100])
 def test_intervals_hold_what_they_promise(own: int) -> None:
     _, errors, deviations = shipped_errors(own)
+    inside = (np.abs(errors) < 1.645 * deviations).mean()
+    assert 0.8 < inside < 0.99
+
+
+@pytest.mark.parametrize("count", [(3, 8), (9, 12)])
+@pytest.mark.parametrize("own", [0, 20, 100])
+def test_intervals_hold_on_a_plant_by_which_nothing_was_chosen(
+    own: int, count: tuple[int, int]
+) -> None:
+    weights = read_weights_of_shipped()
+    _, errors, deviations = forward_errors(own, weights, range(8), third_plant.wrenches, count)
     inside = (np.abs(errors) < 1.645 * deviations).mean()
     assert 0.8 < inside < 0.99
 

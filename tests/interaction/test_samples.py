@@ -12,11 +12,13 @@ from numpy.testing import assert_allclose
 
 import finlab
 from finlab.arrays import Array
+from finlab.cli import main
 from finlab.errors import DataError
 from finlab.fit.columns import command_columns
 from finlab.fit.interaction.constants import fit_constants
 from finlab.fit.interaction.samples import Samples, read_samples, read_table, write_samples
 from finlab.interaction.jets import Jets
+from finlab.interaction.linear import Linear
 from finlab.layout import Layout, save_layout
 from finlab.layout.effectiveness import body_force
 from finlab.physics import Plant
@@ -128,6 +130,27 @@ def test_the_verbs_go_from_a_table_to_an_answer(samples: list[Samples], tmp_path
             np.linalg.norm((true_wrench(one.layout, command[None])[0] - target) / allocator.scale)
         )
     assert errors[1] < 0.5 * errors[0]
+
+
+def test_a_robot_fitted_to_a_prior_moves_with_its_weights(
+    samples: list[Samples], tmp_path: Path
+) -> None:
+    one = samples[0]
+    made = tmp_path / "made"
+    made.mkdir()
+    save_layout(one.layout, tmp_path / "robot.yaml")
+    write_table(one.some(slice(20)), tmp_path / "tank.csv")
+    robot, table, known = (
+        str(path) for path in (tmp_path / "robot.yaml", tmp_path / "tank.csv", made / "known.yaml")
+    )
+    run = ["fit", "interaction", robot, table, "--prior", "several_plants", "-o", known]
+    assert main(run) == 0
+    here = finlab.load_layout(known).interaction
+    moved = made.rename(tmp_path / "moved")
+    there = finlab.load_layout(moved / "known.yaml").interaction
+    assert isinstance(here, Linear) and isinstance(there, Linear)
+    assert here.path == str(made / "known.safetensors")
+    assert there.path == str(moved / "known.safetensors")
 
 
 def test_few_samples_are_refused(samples: list[Samples], tmp_path: Path) -> None:

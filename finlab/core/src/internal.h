@@ -569,8 +569,8 @@ void fl_out_of_reach(const real *block, fl_work *work, const real *wrench, const
 /* Messages between actuators, and of the hull to each; finlab/core/src/messages.c. */
 enum { FL_PAIR_MESSAGE, FL_HULL_MESSAGE };
 
-/* Writes the factors (k,) of a message's vectors for its features (f,), and their derivatives (k, f)
-   where `jacobian` is not 0. */
+/* Writes the factors (k,) of a message's vectors for its features (f,), and their derivatives
+   (k, f) where `jacobian` is not 0. */
 typedef void (*fl_factors_of)(const real *weights, int kind, const real *features, real *factors,
                               real *jacobian);
 

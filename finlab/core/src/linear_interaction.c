@@ -21,8 +21,8 @@ static const polynomial_form FORMS[2] = {
     [FL_HULL_MESSAGE] = {3, 7, 3},
 };
 
-/* Constants of a robot. Behind them are a `disc` for each actuator, `formulas` times a weight and the
-   constants of fl_jets, those of the messages, and the coefficients of their polynomials, pairs
+/* Constants of a robot. Behind them are a `disc` for each actuator, `formulas` times a weight and
+   the constants of fl_jets, those of the messages, and the coefficients of their polynomials, pairs
    first. */
 typedef struct {
   real n;

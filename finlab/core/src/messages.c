@@ -156,8 +156,8 @@ typedef struct {
   real radius; /* softened [diameters] */
 } pair_view;
 
-/* A feature of along and squared radius is one of the first six, and those from the fourth on depend
-   on both; the eighth and ninth are of the thrusts. */
+/* A feature of along and squared radius is one of the first six, and those from the fourth on
+   depend on both; the eighth and ninth are of the thrusts. */
 #define FIRST_OF_RADIUS 3
 #define FEATURES_OF_PLACE 6
 #define FIRST_OF_THRUSTS 8
@@ -547,8 +547,8 @@ static int is_out_of_window(const pair *p, const direction *source) {
   return onset - squared_radius / (3 + R(0.15) * along * along) < NOTHING_OF_WINDOW;
 }
 
-/* A pair's message m = S sum_k f_k v_k, with its strength S, the factors f_k that a model gives, and
-   its vectors v_k, as a function of what it depends on. */
+/* A pair's message m = S sum_k f_k v_k, with its strength S, the factors f_k that a model gives,
+   and its vectors v_k, as a function of what it depends on. */
 typedef struct {
   real scaled[PAIR_VECTORS];       /* S f_k */
   real by_scalar[PAIR_SCALARS][3]; /* derivatives by the scalars, of constant vectors */

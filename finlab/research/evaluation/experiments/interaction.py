@@ -29,6 +29,7 @@ from finlab.physics.objective import wrench_scale_of
 from finlab.research.evaluation.document import Column, Row
 from finlab.research.evaluation.experiment import Experiment, progress
 from finlab.research.evaluation.method_specs import own_function
+from finlab.research.interaction.fourier_features import FourierFeatures
 from finlab.research.interaction.linear_prior import train_weights
 from finlab.research.interaction.random_samples import (
     JETS,
@@ -166,6 +167,11 @@ def _models(
     shipped = read_weights(str(SHIPPED_PRIOR))
     for count in (0, *OWN_SAMPLES):
         models[f"linear, shipped prior, {count} own samples"] = linear(shipped, count)
+    if speed == 0.0:
+        process = FourierFeatures(samples, seed)
+        models["Gaussian process, no own samples"] = lambda own: _ByDifferences(
+            partial(process.wrench_offset, jet_geometry_of(own.layout))
+        )
     if network != "none":
         models |= _network_models(samples, steps, network, seed, folder)
     for count in own:
