@@ -482,9 +482,11 @@ class _Asked:
         step = np.zeros(len(at.logarithm))
         step[is_active] = np.linalg.lstsq(of_active, -at.excess[is_active], rcond=None)[0]
         step = np.clip(step, -LARGEST_STEP, LARGEST_STEP)
-        # Where Newton's method leads nowhere, each multiplier goes where its bus wants it.
+        # Where Newton's method leads nowhere, each multiplier goes where its bus wants it, or one
+        # alone does: the value of the dual rises along each.
         plain = np.clip(at.excess, -LARGEST_STEP, LARGEST_STEP)
-        for direction in (step, plain):
+        alone = np.eye(len(plain)) * plain if len(plain) > 1 else ()
+        for direction in (step, plain, *alone):
             for share in SHARES_OF_STEP:
                 logarithm = np.clip(at.logarithm + share * direction, 0.0, most)
                 after = self._point(target, weights, counts, logarithm)
