@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 AXES_MISSING = 6
 """Actuators that stand for what is missing along each axis; one along the ray follows them."""
-MISS_COST = 1e7
+MISS_COST = 1e5
 """Power of a miss of the wrench scale, over the robot's largest power, while budgets are kept: so
 much dearer that what binds no budget costs a miss of its inverse."""
 HELD = 1e4
@@ -361,9 +361,13 @@ class _Asked:
             trial, factors, _ = self._keep(wanted, np.append(weights, 0.0), held | served)
             got = self._core._wrench_of(trial, self._works)
             missed = np.abs((wanted - got) / self._core._scale)[served].max()
-            wanted[served] = got[served]
             held |= served
-            if missed > NEARLY and bool(self._budget.members.all()) and len(factors) == 1:
+            binds = bool((factors > 1.0).any())
+            if missed <= CLOSE and not binds:
+                continue  # what is missing is what a miss costs too little
+            wanted[served] = got[served]
+            feeds_all = len(factors) == 1 and bool(self._budget.members.all())
+            if binds and feeds_all and missed > NEARLY:
                 break  # no power is left, so that all else follows
         assert trial is not None
         return self._answered(target, trial, factors)
