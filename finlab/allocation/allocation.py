@@ -37,6 +37,7 @@ from finlab.physics.plant import Plant, plant_of
 if TYPE_CHECKING:
     from typing_extensions import Self  # Python 3.10 has none of its own
 
+    from finlab.allocation.power_budget import PowerBudget
     from finlab.allocation.robot_state import PreparedQuestion, RobotState
 
 Number = TypeVar("Number", float, Array)
@@ -86,6 +87,7 @@ class LazyFigures(NamedTuple):
             "policy": question.policy,
             "flow": question.flow,
             "seed": question.seed,
+            "budget": question.budget,
         }
 
     def fields_of_one(self) -> dict[str, Any]:
@@ -192,6 +194,8 @@ class Answer(PlainData, Generic[Number]):
     """Velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at rest."""
     seed: int = field(default_factory=int)
     """Seed that makes the answer repeatable."""
+    budget: "PowerBudget | None" = field(default_factory=_none)
+    """What the actuators might take together; None where nothing limited it."""
     wrench_expected: Array | None = field(default_factory=_none)
     """Wrench (6,) or (N, 6) that the method itself expected, if it used a model of its own."""
     unknown_fins: tuple[str, ...] = field(default_factory=tuple)
@@ -621,8 +625,8 @@ class Allocation(Answer[float]):
 
     @property
     def binding(self) -> tuple[str, ...]:
-        """Sentences about the limits, and in a tick the rates, that keep the robot from delivering
-        the target.
+        """Sentences about the limits, names of the buses whose power is used up, and in a tick
+        sentences about the rates, that keep the robot from delivering the target.
 
         Empty where the target is delivered, and where the method's networks do not know the fins:
         then limits are not what keeps it.
@@ -634,7 +638,10 @@ class Allocation(Answer[float]):
 
         period_s = float(self.settings.get("period_s", USUAL_PERIOD_S))
         missing = self.unallocated / self.scale
-        return what_binds(self.layout, self.command, missing, self.previous, period_s)
+        power = self._plant.power(self.command)
+        return what_binds(
+            self.layout, self.command, missing, self.previous, period_s, self.budget, power
+        )
 
     def with_command(self, command: Array) -> "Self":
         """Returns the same question with another command (n, 3) in place of the answer, judged by

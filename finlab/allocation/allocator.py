@@ -41,6 +41,8 @@ from finlab.physics.plant import plant_of
 if TYPE_CHECKING:
     from typing_extensions import Self  # Python 3.10 has none of its own
 
+    from finlab.allocation.power_budget import PowerBudget
+
 _NAME_LISTS = (tuple, list)
 """Types of lists of names by which states are found."""
 _NO_NAMES: tuple[str, ...] = ()
@@ -64,6 +66,15 @@ def _check_arcs(layout: Layout, kind: type[Method]) -> None:
                 f"method {kind.name!r}: knows one arc of an actuator, {actuator.name!r} has "
                 f"{actuator.angle_words(0.0, 0.0)}; expected one arc, or method 'dual'"
             )
+
+
+def _checked_budget(power: float | None, layout: Layout) -> PowerBudget | None:
+    """The budget that a question names; None for no limit."""
+    if power is None:
+        return None
+    from finlab.allocation.power_budget import check_power
+
+    return check_power(power, layout)
 
 
 class Allocator:
@@ -251,6 +262,7 @@ class Allocator:
         policy: Policy | PolicyName = CLOSEST,
         flow: ArrayLike | None = None,
         seed: int = 0,
+        power: float | None = None,
     ) -> Allocation:
         """Finds the commands for one target.
 
@@ -272,6 +284,8 @@ class Allocator:
             flow: velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at
                 rest.
             seed: the same target and seed give the same answer.
+            power: the most that all actuators may take together [W]; a wrench that takes more is
+                out of reach. None for no limit.
 
         Returns:
             Commands of all actuators, and what they give.
@@ -279,7 +293,7 @@ class Allocator:
         Raises:
             CommandError: the wrench is not six finite numbers, no axis counts, or another array has
                 a wrong shape.
-            AllocationError: the method does not know the policy.
+            AllocationError: the method does not know the policy, or keeps no power budget.
             LayoutError: an unknown actuator, or none left.
             DataError: a fin's force table cannot be read.
         """
@@ -290,7 +304,7 @@ class Allocator:
         if isinstance(previous, Allocation):
             multipliers = previous.multipliers
             previous = previous.command
-        if flow is None and reference is None and seed is _USUAL_SEED:
+        if flow is None and reference is None and seed is _USUAL_SEED and power is None:
             prepared = state.closest if policy is CLOSEST else state.prepared_question(policy)
             start = time.perf_counter()
             row = prepared.answer(wrench, previous, multipliers)
@@ -304,6 +318,7 @@ class Allocator:
         if previous is not None:
             checked_previous = check_previous(previous, state.layout)
 
+        budget = _checked_budget(power, state.layout)
         start = time.perf_counter()
         target = wrench_asked
         checked_reference: Array | None = None
@@ -318,6 +333,7 @@ class Allocator:
             checked_previous,
             multipliers,
             checked_reference,
+            budget,
         )
         solution = state.solve(question)
         solve_ms = (time.perf_counter() - start) * 1e3
@@ -358,6 +374,7 @@ class Allocator:
         flow: ArrayLike | None = None,
         seed: int = 0,
         threads: int = 1,
+        power: float | None = None,
     ) -> BatchAllocation:
         """Finds the commands for many targets.
 
@@ -371,6 +388,7 @@ class Allocator:
             seed: the same target and seed give the same answer, whatever the batch.
             threads: how many threads share the targets; each keeps a core busy. The answers do not
                 depend on it.
+            power: the most that all actuators may take together [W], as in `allocate`.
 
         Returns:
             The targets and the commands; what else there is to tell is computed when it is first
@@ -390,7 +408,10 @@ class Allocator:
         checked_seed = check_seed(seed)
         checked_flow = check_flow(flow)
         start = time.perf_counter()
-        question = state.question(wrenches_asked, checked_policy, checked_flow, checked_seed)
+        budget = _checked_budget(power, state.layout)
+        question = state.question(
+            wrenches_asked, checked_policy, checked_flow, checked_seed, budget=budget
+        )
 
         parts = chunks(len(wrenches_asked), thread_count, state.method.most_targets)
         command = np.empty((len(wrenches_asked), len(state.works), 3)) if len(parts) > 1 else None

@@ -1,5 +1,7 @@
-"""What keeps a robot from delivering a wrench: limits, rates and dead bands of its actuators, in
-sentences; `Allocation.binding` and the judge of logs ask for them."""
+"""What keeps a robot from delivering a wrench: limits, power budgets, rates and dead bands of its
+actuators, in sentences; `Allocation.binding` and the judge of logs ask for them."""
+
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,6 +9,9 @@ from numpy.typing import NDArray
 from finlab.arrays import Array
 from finlab.axes import axes_in, is_full_turn, wrapped
 from finlab.layout.layout import Layout
+
+if TYPE_CHECKING:
+    from finlab.allocation.power_budget import PowerBudget
 
 WITHIN = 1e-3
 """Share of a range, or of what a rate allows in a tick, within which a command is at its end."""
@@ -133,8 +138,29 @@ def band_words(layout: Layout, command: Array) -> tuple[str, ...]:
     return tuple(words)
 
 
+def budget_words(budget: "PowerBudget", power: Array) -> tuple[str, ...]:
+    """Names the buses that take all that they have.
+
+    Args:
+        budget: of b buses.
+        power: of each actuator (n,) [W], NaN of a lost one.
+
+    Returns:
+        Names of the buses.
+    """
+    taken = budget.power_of_buses(power)
+    is_used_up = taken >= (1.0 - WITHIN) * budget.watts
+    return tuple(name for name, is_full in zip(budget.names, is_used_up, strict=True) if is_full)
+
+
 def what_binds(
-    layout: Layout, command: Array, missing: Array, previous: Array | None, period_s: float
+    layout: Layout,
+    command: Array,
+    missing: Array,
+    previous: Array | None,
+    period_s: float,
+    budget: "PowerBudget | None" = None,
+    power: Array | None = None,
 ) -> tuple[str, ...]:
     """Says what keeps a robot from delivering what is missing.
 
@@ -144,12 +170,16 @@ def what_binds(
         missing: what is missing along each axis (6,), over the wrench scale.
         previous: command (n, 3) of the tick before; None outside of ticks.
         period_s: time between ticks [s].
+        budget: what actuators might take together; None for no limit.
+        power: of each actuator (n,) [W], where there is a budget.
 
     Returns:
-        Limits, then rates; where there are none of either, dead bands, and then the axes that these
-        actuators do not give apart from the others.
+        Limits, then buses, then rates; where there are none of these, dead bands, and then the axes
+        that these actuators do not give apart from the others.
     """
     words = limits_reached(layout, command)
+    if budget is not None and power is not None:
+        words += budget_words(budget, power)
     if previous is not None:
         words += rate_words(layout, previous, command, period_s)
     if words:

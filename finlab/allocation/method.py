@@ -30,6 +30,7 @@ from finlab.physics.plant import plant_of
 if TYPE_CHECKING:
     from typing_extensions import Self  # Python 3.10 has none of its own
 
+    from finlab.allocation.power_budget import PowerBudget
     from finlab.allocation.rates import Rates
 
 Takes = Literal["any actuator", "fins", "horizontal fins", "thrusters"]
@@ -342,6 +343,10 @@ class Method(ABC):
                 f"policy: method {self.name!r} minimizes the plain error and knows nothing else; "
                 "use method 'dual', or policy 'closest' without axis weights"
             )
+
+    def check_budget(self, budget: "PowerBudget", policy: Policy) -> None:
+        """Raise an `AllocationError` at a power budget that the method cannot keep by a policy."""
+        raise AllocationError(f"power: method {self.name!r} keeps no budget; use method 'dual'")
 
     def at(self, flow: Array | None) -> "Self":
         """Returns the method for a robot that moves through the water.

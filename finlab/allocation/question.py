@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,6 +20,9 @@ from finlab.axes import AXES, mask_of
 from finlab.errors import AllocationError, CommandError
 from finlab.layout.damage import NO_DAMAGE, Damage, lost_names
 from finlab.layout.layout import Layout
+
+if TYPE_CHECKING:
+    from finlab.allocation.power_budget import PowerBudget
 
 MAX_WRENCH = 1e12
 """Largest magnitude of a component of a wrench [N, N m]; beyond it something is wrong upstream."""
@@ -59,6 +62,8 @@ class MethodQuestion(NamedTuple):
     reference: Array | None = None
     """Wrenches (K, 6) of the next ticks [N, N m], for methods that read them; None where they are
     not known."""
+    budget: PowerBudget | None = None
+    """What actuators may take together, for methods that read it; None for no limit."""
 
     def part(self, rows: slice) -> MethodQuestion:
         """Returns the question for some of the targets. The seed is shifted by their first index,

@@ -23,6 +23,7 @@ from finlab.layout.layout import Layout
 from finlab.physics.plant import Plant
 
 if TYPE_CHECKING:
+    from finlab.allocation.power_budget import PowerBudget
     from finlab.core.calls import AnswerRow
     from finlab.core.prepared_call import Answer
 
@@ -238,6 +239,7 @@ class RobotState:
         previous: Array | None = None,
         multipliers: Array | None = None,
         reference: Array | None = None,
+        budget: PowerBudget | None = None,
     ) -> MethodQuestion:
         """Returns a question to the method, with what it reads of these arguments. Losses and free
         axes are told to a method that reads them; any other is made for the actuators that work
@@ -252,13 +254,16 @@ class RobotState:
                 outside of ticks.
             multipliers: (6,) [W/N, W/(N m)] of an earlier answer, for a single wrench.
             reference: wrenches (K, 6) of the next ticks [N, N m].
+            budget: what actuators may take together; None for no limit.
 
         Raises:
-            AllocationError: the method does not know the policy.
+            AllocationError: the method does not know the policy, or keeps no budget.
         """
         method = self.method
         if policy is not CLOSEST:  # which every method knows
             method.check_policy(policy)
+        if budget is not None:
+            method.check_budget(budget, policy)
         reads = method.reads
         lost: NDArray[np.bool_] | None = None
         free: NDArray[np.bool_] | None = None
@@ -274,7 +279,7 @@ class RobotState:
         targets = self.without_free_axes(wrenches)
         # By position, in the order of the fields: every tick pays for it.
         return MethodQuestion(
-            targets, policy, previous, flow, seed, lost, free, multipliers, reference
+            targets, policy, previous, flow, seed, lost, free, multipliers, reference, budget
         )
 
     def solve(self, question: MethodQuestion) -> Solved:

@@ -537,6 +537,17 @@ class Core:
             )
         return self._rows.written(memory, row, code)
 
+    def prepare_again(self) -> None:
+        """Prepares the work area for numbers that were changed in the block.
+
+        Raises:
+            DataError: they are out of the range that the core works with.
+        """
+        with self._lock:
+            code = self._core.fl_prepare(self._block_address, self._work_address)
+        if code:
+            raise DataError(f"the core refuses the robot: {error_text(code)}")
+
     def prepared_call(self) -> Record:
         """Returns an `fl_prepared_call` (1,) of this robot, without question and rows."""
         record = np.zeros(1, struct("fl_prepared_call"))

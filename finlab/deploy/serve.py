@@ -2,7 +2,8 @@
 
 A request is `{"wrench": [Fx, Fy, Fz, Tx, Ty, Tz]}`, with `id`, `lost` (names of actuators), `free`
 (names of axes that may take any wrench), `policy`, `reference`, the wrenches that are expected at
-the next ticks, and `flow`, the velocity of the body relative to the water [m/s, rad/s], if wanted.
+the next ticks, `flow`, the velocity of the body relative to the water [m/s, rad/s], and `power`,
+the most that all actuators may take together [W], if wanted.
 Each answer says in `status` what it is, and has the `id` of its request, a refused one's too:
 
 =========  ===================================================================================
@@ -56,6 +57,7 @@ class Request(Struct, forbid_unknown_fields=True):
     policy: str = "closest"
     reference: Any = None
     flow: Any = None
+    power: Any = None
 
 
 def parse_values(line: bytes) -> Any:
@@ -143,6 +145,7 @@ class Server:
                 reference=request.reference,
                 policy=request.policy,
                 flow=request.flow,
+                power=request.power,
             )
             reply = self._reply(name, "ok", answer.command, answer.forces) | _answer_record(answer)
             _line(reply)

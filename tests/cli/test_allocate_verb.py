@@ -80,6 +80,15 @@ def test_json_has_the_keys_of_the_contract(allocate: Callable[..., tuple[int, st
     assert result["err_norm"] == pytest.approx(scaled)
 
 
+def test_a_budget_binds(allocate: Callable[..., tuple[int, str, str]]) -> None:
+    full = answer(allocate("A", *WRENCH, "--json"))
+    flags = ("--power", str(0.5 * full["power"]), "--policy", "direction")
+    result = answer(allocate("A", *WRENCH, *flags, "--json"))
+    assert result["power"] == pytest.approx(0.5 * full["power"], rel=1e-6)
+    assert result["binding"] == ["power"] and not result["reachable"]
+    assert 0.5 < result["share"] < 1.0
+
+
 def test_failed_fins_have_no_command(allocate: Callable[..., tuple[int, str, str]]) -> None:
     flags = ["--lost", "front_right", "--lost", "back_left"]
     result = answer(allocate("A", *WRENCH, *flags, "--json"))

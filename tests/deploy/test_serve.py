@@ -287,6 +287,16 @@ def test_axes_that_are_not_commanded_are_null(robot: DeployedRobot) -> None:
     assert refused["status"] == "error" and 'free=("Fy",)' in refused["error"]
 
 
+def test_a_request_may_limit_the_power(robot: DeployedRobot) -> None:
+    request = {"wrench": [2.0, 0, 1.0, 0, 0, 0], "policy": "direction"}
+    watts = 0.5 * robot.allocate(request["wrench"], policy="direction").power
+    reply = served(robot, {**request, "power": watts})[0]
+    assert reply["status"] == "ok" and reply["err_norm"] > 1e-3
+    assert reply["power"] == pytest.approx(watts, rel=1e-6)
+    refused = served(robot, {**request, "power": -1})[0]
+    assert refused["status"] == "error" and "expected watts above 0" in refused["error"]
+
+
 def test_what_waited_longer_than_the_watchdog_allows_is_dropped(
     robot: DeployedRobot, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -138,7 +138,7 @@ class Compiled:
         wrenches are wrenches over it."""
         self.basis = self.span(np.ones(self.count, bool), np.ones(6, bool))
         """Directions (6, r) of scaled wrenches that the actuators span, orthonormal."""
-        contents = BlockContents(
+        self.contents = BlockContents(
             responses=self.responses,
             forms=forms,
             command_min=self._layout.lower,
@@ -157,7 +157,8 @@ class Compiled:
             axis_scale=self.axis_scale,
             basis=self.basis,
         )
-        self.block = block_of(contents)
+        """What the block says, by field."""
+        self.block = block_of(self.contents)
         """The numbers that the core reads; see finlab/core/fl_fields.h."""
         self.core = Core(self.block, self.count)
         """The robot in the core."""

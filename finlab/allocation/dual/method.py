@@ -22,13 +22,16 @@ from finlab.allocation.solution import PreparedAnswers, Solution, Solved
 from finlab.arrays import EXACT, NEARLY, NOTHING, ROUNDING, Array
 from finlab.axes import axes_in
 from finlab.core.calls import NOMINAL, AnswerRow, Conditions, CoreAnswer
+from finlab.errors import AllocationError
 from finlab.layout.effectiveness import wrench_of_forces
 from finlab.physics.objective import judged_power
 
 if TYPE_CHECKING:
     from typing_extensions import Self  # Python 3.10 has none of its own
 
+    from finlab.allocation.dual.budget import BudgetedCore
     from finlab.allocation.levenberg_marquardt import CommandProblem
+    from finlab.allocation.power_budget import PowerBudget
     from finlab.core.coupled_core import CoupledCore
 
 LAW_SAMPLES = 64
@@ -225,9 +228,60 @@ class Dual(Method):
             conditions = conditions_ahead(
                 method.compiled, method.turn_rates, method.period_s, reference, conditions
             )
-        return method.solve_under(
+        solved = method.solve_under(
             conditions, question.targets, question.policy, question.multipliers
         )
+        if question.budget is None:
+            return solved
+        from finlab.allocation.dual.budget import within_budget
+
+        targets = question.targets
+        replaced = within_budget(
+            lambda: method.budgeted,
+            method.plant,
+            solved,
+            targets,
+            question.policy,
+            conditions,
+            question.budget,
+        )
+        if replaced is None:
+            return solved
+        problem = method.problem_under(conditions)
+        _, finite_command = method._without_nan(replaced.command, conditions)
+        return method.solution(
+            replaced.command,
+            problem.wrench(finite_command) * problem.error_scale,
+            replaced.multipliers,
+            np.zeros(len(targets)),
+            partial(method.notes_of, set(), targets[replaced.rows], conditions),
+            conditions,
+        )
+
+    @cached_property
+    def budgeted(self) -> "BudgetedCore":
+        """The robot in the core with powers that have a scale, for power budgets."""
+        from finlab.allocation.dual.budget import BudgetedCore
+
+        return BudgetedCore(self.compiled.contents, self.plant, self.scale)
+
+    def check_budget(self, budget: "PowerBudget", policy: Policy) -> None:
+        """Refuses budgets where the core's power is not that of the actuators alone; see
+        `Method.check_budget`."""
+        refused = ""
+        if self.plant.interaction is not None:
+            refused = "robots whose actuators act on each other"
+        elif any(actuator.KIND.driven_by_flow for actuator in self.layout.actuators):
+            refused = "robots with rudders"
+        elif self.compiled.miss_cost is not None:
+            refused = "answers with the setting robust"
+        elif policy.kind == "falling":
+            refused = "policy 'falling'"
+        if refused:
+            raise AllocationError(
+                f"power: no budget is kept yet for {refused}; leave out `power`, or scale the "
+                "wrench down until `result.power` is small enough"
+            )
 
     def prepared_answers(
         self, policy: Policy, lost: NDArray[np.bool_] | None, free: NDArray[np.bool_] | None
