@@ -621,7 +621,7 @@ void fl_out_of_reach(const real *block, fl_work *work, const real *wrench, const
   real with_offset[6]; /* wrench that the commands are to give [N, N m] */
   for (int k = 0; k < 6; k++) with_offset[k] = out->wrench_served[k] + work->span.wrench_offset[k];
   const int is_met = fl_answer_with_drag(block, work, with_offset, target_reduced, status, out);
-  if (!keeps_direction) return;
+  if (!keeps_direction || FL_ARCS == 0) return; /* without foils there is no more to do */
   const real found = (real)is_met * ray_share;
   real start[FL_MOST][3];
   fl_commands_for_forces(block, &work->box, out->force, work->command_previous, start);
