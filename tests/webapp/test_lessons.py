@@ -60,6 +60,15 @@ def test_a_lesson_is_unsolved_until_its_exercise_is_done(lesson: Stop) -> None:
     assert session.guide.solved, "once done, done"
 
 
+def test_the_robot_that_cannot_turn_is_asked_to_turn() -> None:
+    session = Session(load_layout("penta"))
+    session.guide.open("no-yaw")
+    answer = _answer(session.state)
+    assert "Tz" in session.state.layout.axes and not answer.reachable
+    _turn_a_shaft(session)
+    assert _answer(session.state).reachable
+
+
 def test_wrong_ways_do_not_count() -> None:
     session = Session(load_layout("penta"))
     session.guide.open("lost-fin")

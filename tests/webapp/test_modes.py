@@ -234,6 +234,33 @@ def test_a_refinement_is_played_step_by_step_on_the_robot(monkeypatch: pytest.Mo
     assert not refining.running, "another question ends it"
 
 
+def test_play_follows_the_nearest_sample_where_none_becomes_exact(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("webapp.tasks.answering.SEARCH_REST_S", 0.0)
+    session = Session(load_layout("ucat"))
+    session.set_setting("method", "mdn")
+    context = context_of(Direct(), session)
+    answering = Answering(context)
+    refining = Refining(context, answering)
+    answering.ask()
+    answering.slot.attend()
+    answering.ask()
+    answering.search.attend()
+    found = answering.modes
+    errors = np.linspace(1.0, 0.5, len(found.ends))
+    *path, last = found.refinement
+    in_vain = replace(
+        found, ends=(-1,) * len(found.ends), refinement=(*path, replace(last, err_norm=errors))
+    )
+    answering.search.answer = in_vain
+    refining.toggle()
+    assert refining.running and session.step == 0
+    shown = answering.shown_answer().shown_allocation
+    assert shown is not None
+    np.testing.assert_array_equal(shown.command, in_vain.refinement[0].command[-1])
+
+
 @pytest.mark.parametrize("spread", [0.0, 1e-6, 0.01, 1.0])
 def test_dots_stand_at_their_values_and_their_numbers_beside_them(spread: float) -> None:
     modes = modes_of_turn()

@@ -10,6 +10,7 @@ import numpy as np
 from msgspec import Struct
 
 from finlab.allocation.allocation import Allocation
+from finlab.axes import axes_in, mask_of
 from finlab.files import parse_yaml
 from finlab.files.schema import checked
 from webapp.session.base import BaseSession
@@ -42,7 +43,10 @@ class Stop(Struct, frozen=True, forbid_unknown_fields=True):
     @property
     def state(self) -> State:
         """The prepared state, with nothing left of the present one."""
-        return State(shipped()[self.layout], target=self.target, method=self.method)
+        layout = shipped()[self.layout]
+        counts = mask_of(layout.axes) | (np.array(self.target) != 0.0)  # an asked axis counts
+        layout = replace(layout, axes=axes_in(counts))
+        return State(layout, target=self.target, method=self.method)
 
 
 def _aligned(answer: Allocation) -> bool:
@@ -165,7 +169,8 @@ class Guide:
         """Whether a robot was made here that no stop has prepared."""
         session = self._session
         layouts = [step.state.layout for step in session.history.past]
-        prepared = tuple(shipped().values())
+        stops = [stop.state.layout for stop in (*TOUR, *LESSONS)]
+        prepared = (*shipped().values(), *stops)
         return any(layout not in prepared for layout in [*layouts, session.state.layout])
 
     def end(self) -> None:

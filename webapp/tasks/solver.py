@@ -85,8 +85,15 @@ class Modes:
         return not (self.refinement[-1].err_norm <= ALTERNATIVE_ERROR).any()
 
     def proposal_of(self, mode: int) -> int | None:
-        """The first proposal that ends at a mode: the likeliest, as those come first."""
-        return self.ends.index(mode) if self.steps and mode in self.ends else None
+        """The first proposal that ends at a mode: the likeliest, as those come first. Where none
+        ends at any mode, the one that ends nearest to the wrench, whatever the mode."""
+        if not self.steps:
+            return None
+        if mode in self.ends:
+            return self.ends.index(mode)
+        if all(end < 0 for end in self.ends):
+            return int(np.argmin(self.refinement[-1].err_norm))
+        return None
 
 
 NO_MODES = Modes((), 0)
