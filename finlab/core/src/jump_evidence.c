@@ -150,9 +150,9 @@ void fl_jumps_of_actuators(const fl_real *information, const fl_real *score, con
         set_prior(&target[t], &actuator[i], numbers, strength[slot * (size_t)n + (size_t)i],
                   held_now, moved_now, &j);
         *odds += log_ratio(&j) / temper + span[o];
-        const size_t place = (size_t)((o * n + i) * kinds + t) * OWN_COLUMNS;
-        memcpy(mean + place, j.mean, (size_t)j.k * sizeof(real));
-        memcpy(variance + place, j.variance, (size_t)j.k * sizeof(real));
+        const size_t offset = (size_t)((o * n + i) * kinds + t) * OWN_COLUMNS;
+        memcpy(mean + offset, j.mean, (size_t)j.k * sizeof(real));
+        memcpy(variance + offset, j.variance, (size_t)j.k * sizeof(real));
       }
     }
   }

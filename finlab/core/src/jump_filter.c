@@ -59,8 +59,8 @@ static void add_rows(const real *a, int count, const real *b, int stride, int wi
   }
 }
 
-/* product (rows, width) of M (rows, d) and of the columns of `right` from its pointer on, whose rows
-   are `stride` apart. */
+/* product (rows, width) of M (rows, d) and of the columns of `right` from its pointer on, whose
+   rows are `stride` apart. */
 static void multiply_rows(const real *M, int rows, int d, int active, const real *right, int stride,
                           int width, real *product) {
   memset(product, 0, (size_t)(rows * width) * sizeof(real));
