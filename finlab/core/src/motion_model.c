@@ -344,7 +344,7 @@ static void set_slope_by_pushers(const pushers *all, const real *z, const dynami
     real wrench[6];
     wrench_of_pusher(all, z, i, wrench);
     const int column = size_of_pusher(all, i);
-    const int column = place_of_pusher(all, i);
+    const int first = place_of_pusher(all, i);
     for (int k = 0; k < 6; k++) slope[k * all->d + column] = dot(at->inverse[k], wrench, 6);
     if (z[column] == 0) continue;
     for (int axis = 0; axis < 3; axis++) {
@@ -353,7 +353,7 @@ static void set_slope_by_pushers(const pushers *all, const real *z, const dynami
       real torque[3];
       cross(step, wrench, torque);
       for (int k = 0; k < 6; k++) {
-        slope[k * all->d + column + axis] += dot(at->inverse[k] + 3, torque, 3);
+        slope[k * all->d + first + axis] += dot(at->inverse[k] + 3, torque, 3);
       }
     }
   }
