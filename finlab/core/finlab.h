@@ -425,8 +425,7 @@ void fl_prepare_line_jets(const fl_coupled_robot *robot, fl_real *numbers);
    @param constants  of the formula of jets, of messages and of their weights;
                      finlab/core/src/linear_interaction.c has their order */
 void fl_linear_interaction(const fl_real *constants, const fl_real *force, int count,
-                           const fl_real *inflow, fl_real *change, fl_real *offset,
-                           fl_real *slope);
+                           const fl_real *inflow, fl_real *change, fl_real *offset, fl_real *slope);
 
 /* A body that swims, and fins that follow their commands: what a simulation steps many times, and
    no allocation needs. finlab/swim/vehicle has the equations; a state of a body is position (3) in

@@ -8,11 +8,11 @@
    At last the points are laid anew, closer and closer, around the angles that were found. */
 #include "internal.h"
 
-#define ON_ARC R(1e-3)     /* distance from the curve, over its size, that is no gap */
-#define END_SHARE R(0.25)  /* of an arc, that each side of a cut has at least */
-#define CLOSER_POINTS 16   /* intervals of an arc around an angle that was found */
-#define CLOSER_FIRST 4     /* half width of the first such arc, in intervals of the whole one */
-#define CLOSER_BY R(0.25)  /* half width of the next one over that of the last one */
+#define ON_ARC R(1e-3)    /* distance from the curve, over its size, that is no gap */
+#define END_SHARE R(0.25) /* of an arc, that each side of a cut has at least */
+#define CLOSER_POINTS 16  /* intervals of an arc around an angle that was found */
+#define CLOSER_FIRST 4    /* half width of the first such arc, in intervals of the whole one */
+#define CLOSER_BY R(0.25) /* half width of the next one over that of the last one */
 /* Share of a half width within which an angle has come to rest, so that the next arc is shorter. */
 #define NEAR_MIDDLE R(0.75)
 

@@ -23,11 +23,11 @@ enum {
   FIRST_ACTUATOR = 46
 };
 
-#define SHARE_MIN R(-0.7)      /* least share of inertia and damping above the layout's */
-#define SHARE_MAX R(3.0)       /* greatest of them */
-#define COUPLING_MAX R(0.15)   /* greatest coupling */
-#define COS_PITCH_MIN R(0.05)  /* cosine of the pitch from which on roll rates are computed */
-#define EXPONENT_MAX R(0.5)    /* norm of A dt up to which the series is exact to 1e-7 */
+#define SHARE_MIN R(-0.7)       /* least share of inertia and damping above the layout's */
+#define SHARE_MAX R(3.0)        /* greatest of them */
+#define COUPLING_MAX R(0.15)    /* greatest coupling */
+#define COS_PITCH_MIN R(0.05)   /* cosine of the pitch from which on roll rates are computed */
+#define EXPONENT_MAX R(0.5)     /* norm of A dt up to which the series is exact to 1e-7 */
 #define EXPONENT_LIMIT R(100.0) /* norm of A dt at which all is over, or has no bounds */
 
 typedef real matrix[6][6];

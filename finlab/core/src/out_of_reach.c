@@ -15,8 +15,8 @@
 /* Distance, over the wrench scale, up to which the point of a part is the nearest one. */
 #define ROUGHLY (NEARLY / 10)
 #define CLOSER_ROUNDS 24 /* of shorter arcs around angles of foils, at most */
-#define HELD 1e3 /* weight of an axis that is held over one of the group that is served */
-#define HOLDS 16 /* rounds that look for the axes at an end of what they may get */
+#define HELD 1e3         /* weight of an axis that is held over one of the group that is served */
+#define HOLDS 16         /* rounds that look for the axes at an end of what they may get */
 #define TURNED (CLOSE / 10) /* pull at a held axis from which on it is let go */
 #define PULL 2e-3 /* miss of a group for which held axes give way by a millionth at a curved rim */
 /* Scaled wrench by which an answer at the rim may be off: what it gives is then what is served. */
@@ -526,8 +526,7 @@ static void come_closer(const real *block, fl_work *work, const real *wrench,
 /* Makes an answer the cheapest commands for the wrench of some commands: these themselves made
    cheaper by steps, or what a search from other starts comes to, where the tables of foils have
    that wrench. */
-static void cheapest_commands(const real *block, fl_work *work, real command[][3],
-                              fl_answer *out) {
+static void cheapest_commands(const real *block, fl_work *work, real command[][3], fl_answer *out) {
   real force[FL_MOST][2];
   real target_reduced[6];
   real with_offset[6]; /* wrench that the commands are to give [N, N m] */
