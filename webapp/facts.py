@@ -119,7 +119,7 @@ def facts_of(
         "fit_progress": jobs.fitting.progress,
         "judgement": jobs.log.shown,
         "judgement_error": jobs.log.error,
-        "judgement_stage": jobs.log.stage,
+        "judgement_stage": jobs.log.progress,
         "by_page": jobs.log.by_page,
         "log_moment": jobs.log.moment,
         "offers": jobs.offers.answer,

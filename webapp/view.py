@@ -131,7 +131,7 @@ class View:
         jobs.ask()
         is_revised = self._revision != self.session.revision
         self._revision = self.session.revision
-        if is_revised and self.busy:
+        if is_revised and jobs.answering.busy:
             self._hold(PATIENCE_S, jobs.first)
         elif self._patience is not None:
             self._end_hold()

@@ -173,7 +173,7 @@ def test_a_link_carries_the_wrench_and_says_that_it_is_a_copy(
     assert theirs.state.target == pytest.approx(mine.state.target, rel=1e-5)
     assert "is a copy" in browser.notes[0]
     state = theirs.state
-    for wrench in ("1,2", "a,b,c,d,e,f", "nan,0,0,0,0,0", "1e9,0,0,0,0,0"):
+    for wrench in ("1,2", "a,b,c,d,e,f", "nan,0,0,0,0,0", "1e13,0,0,0,0,0"):
         with pytest.raises(FinlabError, match="expected"):
             there.open_link(f"{fragment.partition('&')[0]}&wrench={wrench}")
         assert theirs.state.target == state.target

@@ -98,7 +98,7 @@ def test_a_way_along_the_null_space_is_a_step(session: Session) -> None:
     assert session.redo() == "Null space 1" and session.shifts == (2.0,)
 
 
-@pytest.mark.parametrize("value", [math.nan, math.inf, 1e9, "1", None, True])
+@pytest.mark.parametrize("value", [math.nan, math.inf, 1e13, "1", None, True])
 def test_bad_targets_change_nothing(session: Session, value: object) -> None:
     before = session.state
     revision = session.revision

@@ -26,21 +26,9 @@ def reach_marks(low: float, high: float, width: float) -> tuple[tuple[float, str
     """
     if not np.isfinite(low):
         return ()
-    low_text, high_text = _end_texts((low, high), width)
-    if high - low <= POINT_RANGE:
-        return ((round(low, 3), low_text),)
-    if high - low < CLOSE * width:
-        # Both texts stand at the upper end.
-        is_symmetric = low_text == f"−{high_text}"
-        high_text = f"±{high_text}" if is_symmetric else f"{low_text} … {high_text}"
-        low_text = ""
-    return (round(low, 3), low_text), (round(high, 3), high_text)
-
-
-def _end_texts(values: tuple[float, ...], width: float) -> list[str]:
-    """Ends of a range with as many digits as the slider's width needs."""
     texts = list[str]()
-    for value in values:
+    for value in (low, high):
+        # As many digits as the slider's width needs.
         if abs(value) >= 9.95:
             digits = 0
         elif width >= 2.0:
@@ -54,7 +42,15 @@ def _end_texts(values: tuple[float, ...], width: float) -> list[str]:
         if abs(value) >= KILO:
             text = "".join(prefixed(value))
         texts.append(text.replace("-", "−"))
-    return texts
+    low_text, high_text = texts
+    if high - low <= POINT_RANGE:
+        return ((round(low, 3), low_text),)
+    if high - low < CLOSE * width:
+        # Both texts stand at the upper end.
+        is_symmetric = low_text == f"−{high_text}"
+        high_text = f"±{high_text}" if is_symmetric else f"{low_text} … {high_text}"
+        low_text = ""
+    return (round(low, 3), low_text), (round(high, 3), high_text)
 
 
 def reach_style(ranges: Ranges | None, able: Layout, *slider_ends: float) -> Markup:

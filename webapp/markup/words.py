@@ -173,6 +173,7 @@ def with_unit(value: float | None, unit: str) -> str:
     return f"{three_digits(value)} {unit}"
 
 
+@lru_cache(maxsize=256)
 def signed(value: float) -> str:
     """Three significant digits with a sign, which zero has not."""
     text = three_digits(value)
@@ -191,6 +192,7 @@ def degrees(angle: float) -> str:
     return f"{math.degrees(angle):.0f}".replace("-", "−")
 
 
+@lru_cache(maxsize=256)
 def three_digits(value: float | None) -> str:
     """Three significant digits, as the library writes them, with a real minus sign; a dash where
     there is no number, and zero where it is the computer's rounding."""

@@ -70,16 +70,15 @@ def fitting_scale(
     target: Sequence[float], shown_allocation: Allocation | None, now: Scale
 ) -> Scale:
     """The scale for a target (6,) and what is shown of it; `now` as far as that is good enough."""
-    forces = [list(target[:3])]
-    torques = [list(target[3:])]
+    force = math.hypot(*target[:3])
+    torque = math.hypot(*target[3:])
     actuator_force = 0.0
     if shown_allocation is not None:
         wrench = shown_allocation.wrench.tolist()
-        forces.append(wrench[:3])
-        torques += [missing_part(shown_allocation)[3:], wrench[3:]]
+        missing = missing_part(shown_allocation)
+        force = max(force, math.hypot(*wrench[:3]))
+        torque = max(torque, math.hypot(*missing[3:]), math.hypot(*wrench[3:]))
         actuator_force = max([math.hypot(*f) for f in shown_allocation.forces.tolist()])
-    force = max([math.hypot(*vector) for vector in forces])
-    torque = max([math.hypot(*vector) for vector in torques])
     return _scale(force, torque, actuator_force, now)
 
 

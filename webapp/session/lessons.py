@@ -116,6 +116,7 @@ class Guide:
         elif self._has_made:
             here = Step(f"Open {stop.title}", session.state, session.shifts)
             history.past = [*session.history.past, here]
+            history.name_steps()
         self._enter(history)
         self.stop = stop
         self.solved = False

@@ -288,6 +288,10 @@ class History:
         self.merge_key: str | None = None
         """Key of the step that is still being merged into, if any."""
         self._merge_time = 0.0
+        self.undo_name: str | None = None
+        """Name of the step that undo takes back, if any."""
+        self.redo_name: str | None = None
+        """Name of the step that redo brings back, if any."""
 
     def commit(
         self,
@@ -312,7 +316,9 @@ class History:
         if not (is_same_change and self.past and is_quick):
             self.past.append(Step(name, self.state, shifts))
             self.past = self.past[-MAX_STEPS:]
+            self.undo_name = name
             self.future = []
+            self.redo_name = None
         self.merge_key = merge_key
         self._merge_time = now
         self.state = state
@@ -321,6 +327,7 @@ class History:
         """Let the present state be another one, without a step."""
         self.state = state
         self.merge_key = None
+        self.name_steps()
 
     def add_aside(self, name: str, shifts: tuple[float, ...], steps: Steps, close: Step) -> None:
         """Take in the steps of other work, which ended where this one goes on.
@@ -335,17 +342,13 @@ class History:
         self.past = [*self.past, *aside][-MAX_STEPS:]
         self.future = []
         self.merge_key = None
+        self.name_steps()
+
+    def name_steps(self) -> None:
+        """Say what undo and redo do, after `past` or `future` have changed."""
+        self.undo_name = self.past[-1].name if self.past else None
+        self.redo_name = self.future[-1].name if self.future else None
 
     def end_merge(self) -> None:
         """The next change starts a step of its own."""
         self.merge_key = None
-
-    @property
-    def undo_name(self) -> str | None:
-        """Name of the step that undo takes back, if any."""
-        return self.past[-1].name if self.past else None
-
-    @property
-    def redo_name(self) -> str | None:
-        """Name of the step that redo brings back, if any."""
-        return self.future[-1].name if self.future else None

@@ -187,13 +187,11 @@ class Refining:
         self._session = context.session
         self._bell = context.bell
         self._answering = answering
-        self._due: float | None = None
+        self._due_s = 0.0
+        """Time of the next step, while it is `running` [s]."""
         self._held = 0
-
-    @property
-    def running(self) -> bool:
+        self.running = False
         """Whether it goes on by itself."""
-        return self._due is not None
 
     def toggle(self) -> None:
         """Play, from the proposals where the end is shown, or pause. FinlabError: nothing can be
@@ -215,7 +213,7 @@ class Refining:
 
     def stop(self) -> None:
         """Stay where it is."""
-        self._due = None
+        self.running = False
 
     def hold(self, step: Any) -> None:
         """Stay at a step."""
@@ -223,16 +221,17 @@ class Refining:
         self._session.show_step(int(step), self._answering.modes.steps)
 
     def _wait(self) -> None:
-        self._due = time.monotonic() + STEP_S
+        self.running = True
+        self._due_s = time.monotonic() + STEP_S
         self._bell.ring_later(STEP_S, self)
 
     def attend(self) -> bool:
         """Take the next step, when its time has come."""
-        if self._due is None or time.monotonic() < self._due:
+        if not self.running or time.monotonic() < self._due_s:
             return False
         session = self._session
         steps = self._answering.modes.steps
-        self._due = None
+        self.running = False
         is_visible = session.opened == CANDIDATES
         if self._answering.searching or not steps or not is_visible:
             session.step = None

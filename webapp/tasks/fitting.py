@@ -75,11 +75,13 @@ class Fitting(Slot[Upload, FitResult | WhichVoltage]):
         self._session = context.session
         self.ask_voltage: Callable[[WhichVoltage], object] = lambda _: None
         """Asks the user which of several voltages counts."""
-
-    @property
-    def result(self) -> FitResult | None:
+        self.result: FitResult | None = None
         """The fit; None where there is none, or where a voltage is asked for."""
-        return self.answer if isinstance(self.answer, FitResult) else None
+
+    def forget(self) -> None:
+        """Drop the file, and what came of it."""
+        super().forget()
+        self.result = None
 
     def start_at(self, asked: WhichVoltage, voltage: float) -> None:
         """Fit a file by its rows at one voltage [V]."""
@@ -134,6 +136,7 @@ class Fitting(Slot[Upload, FitResult | WhichVoltage]):
         was_busy = self.busy
         came = super().attend()
         answer = self.answer
+        self.result = answer if isinstance(answer, FitResult) else None
         if was_busy and not self.busy and isinstance(answer, WhichVoltage):
             self.forget()
             self.ask_voltage(answer)

@@ -60,19 +60,13 @@ class LogReading(Slot[LogFile, "Judgement"]):
         """Which moment of the log is on the robot [s]."""
         self._is_on_page = False
         """Whether the robot of the log was put on the page."""
-
-    @property
-    def shown(self) -> "Judgement | None":
+        self.shown: Judgement | None = None
         """The judgement, or what is known of it by now."""
-        progress: Progress | str | None = self.progress
-        if self.busy and progress is not None and not isinstance(progress, str):
-            return progress.judgement
-        return self.answer
 
-    @property
-    def stage(self) -> "Progress | str | None":
-        """How far the judgement is; None while there is none under way."""
-        return self.progress if self.busy else None
+    def forget(self) -> None:
+        """Drop the log, and its judgement."""
+        super().forget()
+        self.shown = None
 
     def choose_robot(self, by_page: object) -> None:
         """Judge by the page's robot, or by the one that the log tells; a log that is there is
@@ -100,6 +94,11 @@ class LogReading(Slot[LogFile, "Judgement"]):
     def attend(self) -> bool:
         """Take what has come; the log's robot and its worst moment are put on the page once."""
         came = super().attend()
+        progress: Progress | str | None = self.progress
+        if progress is None or isinstance(progress, str):
+            self.shown = self.answer
+        else:
+            self.shown = progress.judgement
         judgement = self.shown
         if judgement is not None and not self._is_on_page:
             self._is_on_page = True

@@ -126,6 +126,9 @@ class Bell:
         self.rung = asyncio.Event()
         """Set while the page has still to look; it waits for this event."""
         self._waiting: dict[Attended, None] = {}
+        self.call_later: Callable[[float, Callable[[], object]], Timer] = loop.call_later
+        """Calls a function on the loop after some time [s], without waking the page; called on the
+        loop."""
 
     def ring(self, *waiting: Attended) -> None:
         """Wake the page, for some that wait; called on the loop."""
@@ -141,11 +144,6 @@ class Bell:
     def ring_later(self, seconds: float, waiting: Attended) -> None:
         """The same after some time [s]; called on the loop."""
         self.call_later(seconds, partial(self.ring, waiting))
-
-    def call_later(self, seconds: float, act: Callable[[], object]) -> Timer:
-        """Call a function on the loop after some time [s], without waking the page; called on the
-        loop."""
-        return self._loop.call_later(seconds, act)
 
     def take(self) -> list[Attended]:
         """Whom it rang for, once each; from now on it is silent again."""
@@ -320,7 +318,9 @@ class Slot(Generic[Question, Answer]):
             return
         if work.future is None:
             work.future = self._pool.submit(answer)
-        work.future.add_done_callback(ring)
+            work.future.add_done_callback(ring)
+        else:  # it is answered already, here on the loop
+            self._bell.ring(self)
         self.progress = self._stage
 
     def _answer(self, work: Work[Question]) -> Answer:
