@@ -122,7 +122,7 @@ def ship_thrusters(layout: Layout, ship: Ship) -> tuple[ShipThruster, ...]:
         else:
             raise LayoutError(
                 f"{actuator.name}: DNV-ST-0111 level 1 is computed of thrusters and azimuths, got "
-                f"a {type(actuator).__name__.lower()}; ask without --standard"
+                f"a {type(actuator).__name__.lower()}; the plot without a standard takes all types"
             )
         actuator_type = known_type if data.type is None else data.type
         turns = arc is None or arc[0] < arc[1]
