@@ -373,7 +373,7 @@ def test_a_wrong_file_of_a_ship_is_refused(tmp_path: Path, text: str, words: str
 
 
 def test_fins_have_no_thrust_of_the_standard() -> None:
-    with pytest.raises(LayoutError, match="without --standard"):
+    with pytest.raises(LayoutError, match="without a standard"):
         dp_capability(load_layout("A"), ship_of("{}"))
 
 
