@@ -11,7 +11,7 @@ from finlab.errors import FinlabError
 
 
 def app(
-    layout: Annotated[str, arg(metavar="LAYOUT")] = "ucat",
+    layout: Annotated[str | None, arg(metavar="LAYOUT")] = None,
     checkpoint: Annotated[str, arg(metavar="NAME|FOLDER")] = "default",
     host: Annotated[str, arg(metavar="ADDRESS")] = "127.0.0.1",
     port: Annotated[int, arg(metavar="N")] = 8080,
@@ -19,7 +19,8 @@ def app(
     """Serve the web app until interrupted.
 
     Args:
-        layout: layout to open first: a file or the name of a shipped one.
+        layout: layout to open first: a file or the name of a shipped one; without it a start page
+            offers several.
         checkpoint: trained checkpoint, of method mdn or paper.
         host: address to listen on; the default is reachable from this machine only.
         port: port to listen on.

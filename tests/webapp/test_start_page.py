@@ -11,6 +11,7 @@ import viser
 
 from finlab.allocation import Allocator
 from finlab.assets import shipped_layouts
+from finlab.cli import main
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
 from tests.webapp.stand_in import SilentClient, load_stand_in, until
@@ -184,3 +185,13 @@ def test_the_length_of_arrows_is_held_to_its_range(session: Session) -> None:
     for wrong in (0.0, 100.0, float("nan"), "long"):
         with pytest.raises(FinlabError, match="arrow length"):
             session.set_display("arrow_length", wrong)
+
+
+@pytest.mark.parametrize("words", [[], ["--layout", "A"]])
+def test_the_command_opens_the_start_page_unless_a_robot_is_named(
+    words: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    served: dict[str, Any] = {}
+    monkeypatch.setattr("webapp.serving.serve", lambda **asked: served.update(asked))
+    main(["app", *words])
+    assert served["layout"] == (words[1] if words else None)
