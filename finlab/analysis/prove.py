@@ -131,7 +131,7 @@ def box_share(layout: Layout, share: float, free: Sequence[str] = ()) -> tuple[f
     is_nothing = reach / SCALE < NO_REACH * strongest
     if is_nothing.all():
         raise CommandError(
-            f"box-share: {layout.name} can push along no axis alone; give the half widths by --box"
+            f"box-share: {layout.name} can push along no axis alone; give half widths of the box"
         )
     half_widths = np.where(is_nothing, 0.0, share * reach)
     return tuple(float(f"{half:.6g}") for half in half_widths)

@@ -37,6 +37,9 @@ typedef double fl_wide; /* where differences of large numbers matter, in single 
 #ifndef FL_ARCS
 #define FL_ARCS 16 /* most foils that may stall beyond reach; others keep to their tables */
 #endif
+#ifndef FL_ZONES
+#define FL_ZONES 4 /* most barred zones of a pod; exports of robots without any have 0 */
+#endif
 #ifndef FL_PARTS
 #define FL_PARTS 1000 /* the usual fl_settings.most_parts */
 #endif

@@ -130,7 +130,8 @@ def c_sources(
         sources |= {path.name: path.read_text("utf-8") for path in STUBS.glob("*.c")}
     name = _identifier(layout.name)
     sources["fl_names.h"] = _prefixed_names(sources["finlab.h"] + sources["internal.h"], name)
-    sources["finlab.h"] = _with_size(sources["finlab.h"], layout.n, foils)
+    zones = int(actuators_of(block)["barred_count"].max(initial=0.0))
+    sources["finlab.h"] = _with_size(sources["finlab.h"], layout.n, foils, zones)
     sources["robot.c"] = _robot(block, thin)
     sources["robot.h"] = _header(layout, name)
     sources[f"fl_{name}.h"] = _plain_header(layout, name)
@@ -170,12 +171,13 @@ def write_c(files: dict[str, bytes], folder: str | os.PathLike[str]) -> None:
     write_folder(folder, files, foreign, "an export")
 
 
-def _with_size(header: str, count: int, foils: int) -> str:
-    """finlab.h for so many actuators, of which so many are foils, in single precision where a
-    processor has no unit for double."""
+def _with_size(header: str, count: int, foils: int, zones: int) -> str:
+    """finlab.h for so many actuators, of which so many are foils, and so many barred zones of a
+    pod, in single precision where a processor has no unit for double."""
     header = re.sub(r"(#define FL_MOST) \d+", rf"\1 {count}", header, count=1)
     arcs = min(foils, constant("FL_ARCS"))
     header = re.sub(r"(#define FL_ARCS) \d+", rf"\1 {arcs}", header, count=1)
+    header = re.sub(r"(#define FL_ZONES) \d+", rf"\1 {zones}", header, count=1)
     single = (
         "#if defined(__ARM_FP) && !(__ARM_FP & 8) && !defined(FL_SINGLE)\n#define "
         "FL_SINGLE\n#endif\n\n"

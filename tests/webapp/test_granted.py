@@ -194,7 +194,8 @@ def test_a_force_is_chosen_or_typed(sent: list[str], answer: tuple[str, ...]) ->
 
 
 @pytest.mark.parametrize(
-    "sent", [[], None, ["T300"], ["1", "2"], ["a", "b"], ["", ""], ["-1", "1e9"], ["0", "0"], [[1]]]
+    "sent",
+    [[], None, ["T300"], ["1", "2"], ["a", "b"], ["", ""], ["-1", "1e10"], ["0", "0"], [[1]]],
 )
 def test_what_a_page_sends_is_checked(sent: Any) -> None:
     with pytest.raises(FinlabError):

@@ -96,10 +96,10 @@ def view(server: viser.ViserServer, app: App) -> Iterator[View]:
 
 def test_its_choices_do_what_they_say(server: viser.ViserServer, view: View) -> None:
     session = view.session
-    acts = view.page.presses._acts
+    start, _ = view.page.presses._acts["start"]
 
     def choose(key: str) -> None:
-        on_loop(server, lambda: view.do(lambda: acts["start"](key, "")))
+        on_loop(server, lambda: view.do(lambda: start(key, "")))
         until(lambda: on_loop(server, lambda: view.is_settled))
 
     choose("robot ucat")
@@ -113,11 +113,11 @@ def test_its_choices_do_what_they_say(server: viser.ViserServer, view: View) -> 
     session.guide.end()
     assert session.state.layout == shipped()["torpedo"], "the robot from before"
     with pytest.raises(FinlabError, match="start page: expected one of"):
-        acts["start"]("robot <b>", "")
+        start("robot <b>", "")
 
 
 def test_a_link_to_a_robot_opens_it_once(server: viser.ViserServer, view: View) -> None:
-    linked = view.page.presses._acts["robot-link"]
+    linked, _ = view.page.presses._acts["robot-link"]
     on_loop(server, lambda: view.do(lambda: linked("fish", "")))
     assert view.session.state.layout.name == "fish"
     on_loop(server, lambda: view.do(view.session.undo))

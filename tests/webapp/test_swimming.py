@@ -14,6 +14,7 @@ from finlab.swim.simulation import Trajectory, make_trajectory
 from tests.webapp.stand_in import LoneBell, context_of, load_stand_in, until
 from webapp.markup.outcomes import findings_words, pace_words, swim_card
 from webapp.panels.status import swim_corner
+from webapp.scene.scenery import INITIAL_SCALE
 from webapp.session.state import State
 from webapp.session.swim_plan import Plan, SwimSettings
 from webapp.tasks.slot import Pool
@@ -58,7 +59,9 @@ def test_swims_to_the_end_and_tells_how(swimming: Swimming) -> None:
     figures = first.visible_moment.figures
     assert figures is not None and figures.track_m < 0.3
     assert "arrived" in pace_words(swimming)
-    assert "arrived" in swim_corner(first, first.visible_moment, pace_words(swimming), 2.0)
+    assert "arrived" in swim_corner(
+        first, first.visible_moment, pace_words(swimming), INITIAL_SCALE, 1.0
+    )
     swimming.set_running(True)
     assert not swimming.running, "there is no way left"
 

@@ -2,6 +2,7 @@
    command_min to command_max, has all of them. Pods with such zones push one way. */
 #include "internal.h"
 
+#if FL_ZONES > 0
 #define EDGE R(1e-9) /* angle [rad] that counts as the edge of a zone */
 
 /* The zone that an angle of a command lies in, but for its edges; -1 where there is none. `off`
@@ -126,3 +127,4 @@ void fl_keep_arcs(const real *block, fl_box *box, real command[][3]) {
     }
   }
 }
+#endif

@@ -93,8 +93,8 @@ static int are_command_limits(const fl_actuator *a) {
 /* Whether the barred zones of an actuator, if it has any, lie one above the other within the arc of
    a pod that pushes one way. */
 static int are_barred_zones(const fl_actuator *a) {
-  if (!is_whole_number(a->barred_count, 0, MOST_ZONES)) return 0;
-  if (a->barred_count == 0) return 1;
+  if (!is_whole_number(a->barred_count, 0, FL_ZONES)) return 0;
+  if (FL_ZONES == 0 || a->barred_count == 0) return 1;
   if (!fl_aims_force(a) || a->force_min < 0 || a->is_free_angle != 0) return 0;
   real below = a->command_min[0];
   for (int k = 0; k < (int)a->barred_count; k++) {

@@ -144,6 +144,7 @@ static void take_step(const real *block, const fl_box *box, real command[][3], r
 /* The box of steps: without the barred zones of pods, which keep to the arcs that they are in. */
 static const fl_box *box_of_steps(const real *block, const fl_box *box, real command[][3],
                                   fl_box *kept) {
+  if (FL_ZONES == 0) return box;
   int has_zones = 0;
   for (int i = 0; i < COUNT(block); i++) has_zones |= ACTUATOR(block, i)->barred_count > 0;
   if (!has_zones) return box;

@@ -113,7 +113,7 @@ void fl_prepare_sets(const real *block, fl_work *work) {
     }
     work->has_forks |= set->is_forked || set->force_max_reverse > 0;
     work->has_drag |= is_foil(a) && !work->span.is_lost[i];
-    work->has_zones |= a->barred_count > 0;
+    work->has_zones |= FL_ZONES > 0 && a->barred_count > 0;
     if (fl_has_barred_zone(a, set)) work->is_convex = 0;
     if (work->has_forks || work->has_drag || work->has_turn_cost || a->dead_band > 0)
       work->is_convex = 0;

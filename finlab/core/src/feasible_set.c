@@ -43,7 +43,7 @@ static void box_after(const real *block, fl_box *box, int i, const real *before,
     box->command_min[i][k] = larger(center - step, a->command_min[k]);
     box->command_max[i][k] = smaller(center + step, a->command_max[k]);
   }
-  if (a->barred_count > 0) fl_trim_arc(a, box->command_min[i], box->command_max[i]);
+  if (FL_ZONES > 0 && a->barred_count > 0) fl_trim_arc(a, box->command_min[i], box->command_max[i]);
 }
 
 /* Power [W] of an actuator at a command (3,), and the price [W/N] of its force ahead at which it

@@ -41,7 +41,7 @@ static int is_without_gap(const real *block, const fl_work *work, int status, in
 /* Share of a cost that is worth another search. Zones leave few parts, each with an answer of its
    own that may be the best: all of them are looked at. */
 static real worth_search(const fl_work *work) {
-  if (work->has_zones) return NEARLY;
+  if (FL_ZONES > 0 && work->has_zones) return NEARLY;
   return CLOSE;
 }
 

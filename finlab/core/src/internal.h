@@ -242,13 +242,21 @@ void fl_rest_in_dead_bands(const real *block, const fl_box *box, real command[][
 int fl_is_in_dead_band(const fl_actuator *a, const real *command);
 
 /* barred_zones.c: angles between the arcs of a pod */
-#define MOST_ZONES 4 /* of an fl_actuator */
+#if FL_ZONES > 0
 int fl_has_barred_zone(const fl_actuator *a, const fl_set *set);
 int fl_is_barred(const fl_actuator *a, const fl_set *set, const real *force);
 void fl_narrow_by_zone(const fl_actuator *a, fl_set *set, const real *force, int side);
 void fl_trim_arc(const fl_actuator *a, real *low, real *high);
 real fl_leave_zone(const fl_actuator *a, real angle);
 void fl_keep_arcs(const real *block, fl_box *box, real command[][3]);
+#else /* no pod has any, so the compiler leaves out what is done about them */
+#define fl_has_barred_zone(a, set) 0
+#define fl_is_barred(a, set, force) 0
+#define fl_narrow_by_zone(a, set, force, side) (void)(side)
+#define fl_trim_arc(a, low, high) (void)(low)
+#define fl_leave_zone(a, angle) (angle)
+#define fl_keep_arcs(block, box, command) (void)(box)
+#endif
 
 /* command_law.c: forces of commands and commands for forces */
 typedef struct {

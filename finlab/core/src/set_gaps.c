@@ -256,7 +256,7 @@ static void narrow_line(const real *block, int i, fl_set *set, const real *force
 
 /* Takes the ends of a set's arc out of barred zones. */
 static void trim_set(const fl_actuator *a, fl_set *set) {
-  if (!(a->barred_count > 0)) return;
+  if (FL_ZONES == 0 || !(a->barred_count > 0)) return;
   real low = set->sector_center - set->sector_half_angle;
   real high = set->sector_center + set->sector_half_angle;
   fl_trim_arc(a, &low, &high);
