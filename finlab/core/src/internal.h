@@ -250,12 +250,38 @@ void fl_trim_arc(const fl_actuator *a, real *low, real *high);
 real fl_leave_zone(const fl_actuator *a, real angle);
 void fl_keep_arcs(const real *block, fl_box *box, real command[][3]);
 #else /* no pod has any, so the compiler leaves out what is done about them */
-#define fl_has_barred_zone(a, set) 0
-#define fl_is_barred(a, set, force) 0
-#define fl_narrow_by_zone(a, set, force, side) (void)(side)
-#define fl_trim_arc(a, low, high) (void)(low)
-#define fl_leave_zone(a, angle) (angle)
-#define fl_keep_arcs(block, box, command) (void)(box)
+static inline int fl_has_barred_zone(const fl_actuator *a, const fl_set *set) {
+  (void)a;
+  (void)set;
+  return 0;
+}
+static inline int fl_is_barred(const fl_actuator *a, const fl_set *set, const real *force) {
+  (void)a;
+  (void)set;
+  (void)force;
+  return 0;
+}
+static inline void fl_narrow_by_zone(const fl_actuator *a, fl_set *set, const real *force,
+                                     int side) {
+  (void)a;
+  (void)set;
+  (void)force;
+  (void)side;
+}
+static inline void fl_trim_arc(const fl_actuator *a, real *low, real *high) {
+  (void)a;
+  (void)low;
+  (void)high;
+}
+static inline real fl_leave_zone(const fl_actuator *a, real angle) {
+  (void)a;
+  return angle;
+}
+static inline void fl_keep_arcs(const real *block, fl_box *box, real command[][3]) {
+  (void)block;
+  (void)box;
+  (void)command;
+}
 #endif
 
 /* command_law.c: forces of commands and commands for forces */
