@@ -14,16 +14,21 @@ PROCESSOR_FILE = Path("/proc/cpuinfo")
 
 
 def commit_words() -> str:
-    """Returns the commit of the source tree, and whether it was changed since; of an installation
-    the version."""
+    """Returns the commit of the source tree, and whether what is not documentation was changed
+    since; of an installation the version."""
     version_words = f"version {finlab.__version__}"
     tree = Path(finlab.__file__).parents[1]
     if not (tree / ".git").exists():
         return version_words
-    describe = ["describe", "--always", "--abbrev=12", "--exclude=*"]
-    line = ["git", "-C", str(tree), *describe, "--dirty= and changes"]
-    described = subprocess.run(line, capture_output=True, text=True)
-    return version_words if described.returncode else f"commit {described.stdout.strip()}"
+    git = ["git", "-C", str(tree)]
+    described = subprocess.run(
+        [*git, "describe", "--always", "--abbrev=12", "--exclude=*"], capture_output=True, text=True
+    )
+    if described.returncode:
+        return version_words
+    # The record itself, which is written piece by piece, is no change of what is measured.
+    is_changed = subprocess.run([*git, "diff", "--quiet", "HEAD", "--", ".", ":!docs"]).returncode
+    return f"commit {described.stdout.strip()}{' and changes' if is_changed else ''}"
 
 
 def machine_words() -> str:
