@@ -30,7 +30,7 @@ FORMULA = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</\1>',
 NUMBER = re.compile(r"\s*\\tag\{(\d+)\}")
 NUMBERED = re.compile(r"^\$\$(?:(?!\$\$).)*\\tag\{(\d+)\}\$\$$", re.MULTILINE | re.DOTALL)
 PYTHON = "reference/python/"
-LETTERS_OF_LONG_PAGES = 150
+LETTERS_OF_LONG_PAGES = 60
 """Letters of a section by which the search finds pages that are long or of numbers."""
 _shown: dict[str, Any] = {}
 
