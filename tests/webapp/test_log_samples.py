@@ -10,7 +10,7 @@ from finlab.errors import FinlabError
 from finlab.layout import load_layout
 from finlab.log import judge
 from finlab.log.judging import STOPPED, Progress
-from finlab.swim.simulation.log import RunLog, Tick
+from finlab.swim.simulation.log import SHAPES, RunLog, Tick
 from tests.webapp.stand_in import Direct, context_of
 from webapp.panels.log_tab import _summary, _whose_robot, moved_markup
 from webapp.session import Session
@@ -83,24 +83,8 @@ def swim_of(names: tuple[str, ...], n: int = 40, layout: str = "ucat", **columns
     """A swim of fins that beat alike, of n ticks."""
     count = len(names)
     shapes = {
-        "position": (3,),
-        "quaternion": (4,),
-        "motion": (6,),
-        "flow": (3,),
-        "measured": (12,),
-        "reference": (3,),
-        "asked": (6,),
-        "allocated": (6,),
-        "delivered": (6,),
-        "command": (count, 3),
-        "fin_motion": (count, 3),
-        "force": (count, 3),
-        "inertial_power": (count,),
-        "driving_power": (count,),
-        "alive": (count,),
-        "fault_probability": (count,),
-        "strength": (count,),
-        "strength_std": (count,),
+        name: tuple(count if size is None else size for size in shape)
+        for name, shape in SHAPES.items()
     }
     made = {name: np.zeros((n, *shapes.get(name, ()))) for name in Tick._fields}
     made["time"] = 0.1 * np.arange(n)

@@ -2,7 +2,7 @@
 
 import gzip
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 from urllib.request import Request, urlopen
 
@@ -10,13 +10,10 @@ import pytest
 import viser
 
 from finlab.allocation import Allocator
-from finlab.assets import shipped_layouts
 from finlab.cli import main
 from finlab.errors import FinlabError
-from finlab.layout import load_layout
-from tests.webapp.stand_in import SilentClient, load_stand_in, until
-from tests.webapp.test_app import on_loop
-from webapp.app import App
+from tests.webapp.stand_in import until
+from tests.webapp.test_app import app, on_loop, server, view
 from webapp.panels.commands import page_commands
 from webapp.panels.menu import menu
 from webapp.session import Session
@@ -25,9 +22,10 @@ from webapp.session.lessons import LESSONS, TOUR
 from webapp.session.state import FIRST_POLICY, State
 from webapp.start_page import DOORS, ROBOTS, SENTENCE, start_page
 from webapp.tasks.designs import changed_words
-from webapp.tasks.solver import Solver
 from webapp.view import View
 from webapp.viser_internals import start_server, stop_server
+
+__all__ = ["app", "server", "view"]
 
 LARGEST = 120_000
 """Bytes that the start page may add to the page at most."""
@@ -64,34 +62,6 @@ def test_it_comes_before_the_script_of_the_viewer(encoding: str) -> None:
     stop_server(server)
     assert page.count(b"id='fl-start'") == 1
     assert page.index(b"id='fl-start'") < page.index(b"<script data-p") < page.index(b'id="root"')
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[viser.ViserServer]:
-    """A real server without a page."""
-    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-    yield server
-    server.stop()
-
-
-@pytest.fixture(scope="module")
-def app(server: viser.ViserServer) -> Iterator[App]:
-    """The app on it."""
-    app = App(server, Solver(load=load_stand_in), load_layout(shipped_layouts()["ucat"]))
-    yield app
-    app.stop()
-
-
-@pytest.fixture
-def view(server: viser.ViserServer, app: App) -> Iterator[View]:
-    """A page of the app without a browser."""
-    client: Any = SilentClient(server)
-    loop = server.get_event_loop()
-    session = Session(load_layout(shipped_layouts()["ucat"]))
-    view = on_loop(server, lambda: View(client, session, app._solver, app._pools, loop))
-    yield view
-    view.close()
-    on_loop(server, lambda: (server.gui.reset(), server.scene.reset()))
 
 
 def test_its_choices_do_what_they_say(server: viser.ViserServer, view: View) -> None:
