@@ -256,3 +256,18 @@ def until(condition: Callable[[], bool]) -> None:
         for bell in LoneBell.all:
             bell.attend()
         time.sleep(0.005)
+
+
+class Node(SimpleNamespace):
+    """A node that keeps what it is told."""
+
+    def __getattr__(self, name: str) -> Any:
+        """Nothing was told."""
+        return None
+
+
+class Recorded:
+    """A scene of such nodes."""
+
+    def __getattr__(self, name: str) -> Any:
+        return lambda *_, **options: Node(**options)

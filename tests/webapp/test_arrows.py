@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import replace
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,7 @@ from finlab.allocation.allocation import Allocation
 from finlab.assets import shipped_layouts
 from finlab.layout import load_layout
 from finlab.swim.hull import hull_of
-from tests.webapp.stand_in import SilentClient
+from tests.webapp.stand_in import Recorded, SilentClient
 from webapp.markup.words import html
 from webapp.panels.status import in_unit, scale_words
 from webapp.scene.actuator_node import _moving, shape_of
@@ -33,21 +32,6 @@ from webapp.scene.wrench_nodes import (
 from webapp.viser_internals import start_server, stop_server
 
 ONE = Scale(1.0, 1.0, 1.0)
-
-
-class Node(SimpleNamespace):
-    """A node that keeps what it is told."""
-
-    def __getattr__(self, name: str) -> Any:
-        """Nothing was told."""
-        return None
-
-
-class Recorded:
-    """A scene of such nodes."""
-
-    def __getattr__(self, name: str) -> Any:
-        return lambda *_, **options: Node(**options)
 
 
 def test_two_actuators_at_one_place_leave_the_others_their_size() -> None:

@@ -1,26 +1,17 @@
 """A gamepad asks for shares of what the robot reaches, and for nothing when it is let go."""
 
 import json
-from collections.abc import Iterator
 
 import pytest
 
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
 from tests.webapp.test_faults import Tab
+from tests.webapp.test_number_boxes import tab
 from webapp.panels.gamepad import shares_of
 from webapp.session.targets import lone_reach, nudge
-from webapp.tasks.slot import Pools
 
-
-@pytest.fixture(scope="module")
-def tab() -> Iterator[Tab]:
-    """A page of U-CAT."""
-    pools = Pools()
-    tab = Tab(pools, load_layout("ucat"))
-    yield tab
-    tab.close()
-    pools.stop()
+__all__ = ["tab"]
 
 
 def push(tab: Tab, *shares: float) -> None:

@@ -4,7 +4,6 @@ overlap."""
 import math
 import re
 from importlib.resources import files
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from finlab.assets import shipped_layouts
 from finlab.layout import Azimuth, Fin, Rudder, Thruster, load_layout
 from finlab.swim.hull import Surface, hull_of
 from finlab.swim.hull.mesh_file import Mesh
+from tests.webapp.stand_in import Recorded
 from webapp.markup.reach import reach_marks
 from webapp.scene import actuator_shapes as shapes
 from webapp.scene.actuator_node import TURNS_PER_S, motion, offered_mesh
@@ -135,21 +135,6 @@ def test_directions_become_rotations(turn: Any) -> None:
         np.testing.assert_allclose(rotation[:, axis], direction, atol=1e-12)
         np.testing.assert_allclose(rotation.T @ rotation, np.eye(3), atol=1e-12)
         assert np.linalg.det(rotation) == pytest.approx(1.0)
-
-
-class Node(SimpleNamespace):
-    """A node that keeps what it is told."""
-
-    def __getattr__(self, name: str) -> Any:
-        """Nothing was told."""
-        return None
-
-
-class Recorded:
-    """A scene of such nodes."""
-
-    def __getattr__(self, name: str) -> Any:
-        return lambda *_, **options: Node(**options)
 
 
 def test_forces_start_beside_blades_and_fans_reach_as_far_as_they_beat() -> None:

@@ -15,10 +15,10 @@ from markupsafe import Markup
 from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
 from finlab.axes import AXES, MOTIONS
-from finlab.display import prefix_of
+from finlab.display import LARGEST_PLAIN, prefix_of
 from finlab.layout import Actuator, Fin, Layout
 from finlab.layout.damage import NO_DAMAGE, Damage
-from webapp.markup.words import KILO, damage_words, html, prefixed, saturated, signed_degrees
+from webapp.markup.words import damage_words, html, prefixed, saturated, signed_degrees
 from webapp.theme import DEAD, css, fin_color, ink
 
 FIN_HEADER = Markup(
@@ -270,7 +270,7 @@ def _fin_cells(
 
 def _force_digits(force: float) -> str:
     """A force [N] in its column, with an SI prefix where it is large."""
-    if abs(force) >= KILO:
+    if abs(force) >= LARGEST_PLAIN:
         return "".join(prefixed(force))
     return f"{round(force, 2) + 0.0:.2f}".replace("-", "−")
 

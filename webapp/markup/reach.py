@@ -3,9 +3,10 @@
 import numpy as np
 from markupsafe import Markup
 
+from finlab.display import LARGEST_PLAIN
 from finlab.forces.reach import Ranges
 from finlab.layout import Layout
-from webapp.markup.words import KILO, prefixed
+from webapp.markup.words import prefixed
 
 CLOSE = 0.28
 """Share of a slider below which the texts of two marks would lie on each other."""
@@ -39,7 +40,7 @@ def reach_marks(low: float, high: float, width: float) -> tuple[tuple[float, str
             digits = 3
         rounded = round(value, digits)
         text = f"{rounded:.{digits}f}" if rounded else "0"
-        if abs(value) >= KILO:
+        if abs(value) >= LARGEST_PLAIN:
             text = "".join(prefixed(value))
         texts.append(text.replace("-", "−"))
     low_text, high_text = texts

@@ -19,7 +19,7 @@ from finlab.actuators.kinds import free_angles
 from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
 from finlab.axes import MOTIONS
-from finlab.display import NO_NUMBER, as_sentence, listed
+from finlab.display import LARGEST_PLAIN, NO_NUMBER, as_sentence, listed
 from finlab.layout import Layout
 from finlab.layout.damage import NO_DAMAGE, Damage
 from finlab.swim.vehicle.fossen import complete_body
@@ -116,8 +116,6 @@ COMPONENT = "component "
 """How the source of a candidate begins that comes from a component of a mixture."""
 MOST_LISTED = 2
 """Components of a mixture that are named; of more their number is told."""
-KILO = 1e4
-"""Size of a quantity in its unit from which it is told in thousands of it."""
 ROUNDING = 1e-9
 """Normalized error, and size of a quantity in its unit, below which the digits are those of the
 computer's rounding."""
@@ -149,7 +147,7 @@ LARGE = re.compile(r"(\d(?:\.\d+)?)e\+(\d+)")
 
 
 def prefixed(value: float) -> tuple[str, str]:
-    """Three significant digits of a number from `KILO` on, and the SI prefix that it has then."""
+    """Three significant digits of a number, and its SI prefix, from `LARGEST_PLAIN` on."""
     prefix = finlab.display.prefix_of(abs(value))
     digits = finlab.display.three_digits(value / prefix.factor).replace("-", "−")
     return digits, prefix.symbol
@@ -167,7 +165,7 @@ def without_powers(text: str) -> str:
 def with_unit(value: float | None, unit: str) -> str:
     """Three significant digits and a unit, in thousands or millions of it where the number would be
     long: `327 W`, `25.8 kW`."""
-    if value is not None and math.isfinite(value) and abs(value) >= KILO:
+    if value is not None and math.isfinite(value) and abs(value) >= LARGEST_PLAIN:
         digits, prefix = prefixed(value)
         return f"{digits} {prefix}{unit}"
     return f"{three_digits(value)} {unit}"
