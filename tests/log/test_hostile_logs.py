@@ -17,7 +17,7 @@ from finlab.layout import Layout
 from finlab.log import Log, judge, read_log
 from tests.log.conftest import Dive, sub_motion
 from tests.log.telemetry_writer import telemetry_of, write_telemetry
-from tests.log.test_readers import write_bag
+from tests.log.test_readers import bag_of
 
 FORBIDDEN = ("os.system", "os.exec", "os.posix_spawn", "subprocess.Popen", "socket.connect")
 """Events of Python's audit that no reader causes."""
@@ -53,7 +53,7 @@ def telemetry(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def bag(px4: Dive, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A bag of ROS 2 in one file of MCAP."""
     short = Dive(px4.robot, px4.path, px4.time[:600], px4.demand[:600], px4.given[:600])
-    return next(write_bag(tmp_path_factory.mktemp("bag") / "bag", short).glob("*.mcap"))
+    return next(bag_of(short, tmp_path_factory.mktemp("bag") / "bag").glob("*.mcap"))
 
 
 def mutated(content: bytes, seed: int) -> bytes:

@@ -6,54 +6,29 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from rosbags import rosbag2
-from rosbags.typesys import Stores, get_typestore
 
 import finlab
 from finlab.cli import main
 from finlab.errors import FinlabError
 from finlab.log import judge, read_log
+from tests.log.bag_writer import write_bag
 from tests.log.conftest import Dive
 from tests.log.test_judge import check
 
-TYPES = get_typestore(Stores.ROS2_HUMBLE)
-"""Types of the messages of ROS 2 Humble."""
 
-
-def write_bag(path: Path, dive: Dive, topics: tuple[str, ...] = ("/wrench",)) -> Path:
-    """A bag of wrenches, on several topics, and of forces of thrusters."""
-    t = {name.rsplit("/", 1)[1]: made for name, made in TYPES.types.items()}
+def bag_of(dive: Dive, path: Path, topics: tuple[str, ...] = ("/wrench",)) -> Path:
+    """A bag of a dive's wrenches, on several topics, and of forces of thrusters."""
     columns = np.array([[*p.axis, *np.cross(p.position, p.axis)] for p in dive.robot.actuators])
     forces = dive.given @ np.linalg.pinv(columns)
-    with rosbag2.Writer(path, version=9, storage_plugin=rosbag2.StoragePlugin.MCAP) as writer:
-        known: dict[str, Any] = {}
-
-        def put(topic: str, at: float, message: Any) -> None:
-            kind = message.__msgtype__
-            if topic not in known:
-                known[topic] = writer.add_connection(topic, kind, typestore=TYPES)
-            writer.write(known[topic], round(at * 1e9), TYPES.serialize_cdr(message, kind))
-
-        for at, wrench, force in zip(dive.time - dive.time[0], dive.demand, forces, strict=True):
-            for topic in topics:
-                put(
-                    topic,
-                    at,
-                    t["Wrench"](force=t["Vector3"](*wrench[:3]), torque=t["Vector3"](*wrench[3:])),
-                )
-            told = t["Float64MultiArray"](
-                layout=t["MultiArrayLayout"](dim=[], data_offset=0), data=force
-            )
-            put("/forces", at + 1e-4, told)
+    write_bag(path, dive.time - dive.time[0], dive.demand, forces, topics)
     return path
 
 
 def test_a_bag_of_wrenches_and_forces_is_judged(px4: Dive, tmp_path: Path) -> None:
-    bag = write_bag(tmp_path / "bag", px4)
+    bag = bag_of(px4, tmp_path / "bag")
     judged = judge(read_log(bag, px4.robot), improve=False)
     shifted = Dive(px4.robot, bag, px4.time - px4.time[0], px4.demand, px4.given)
     check(shifted, judged)
@@ -65,7 +40,7 @@ def test_a_bag_of_wrenches_and_forces_is_judged(px4: Dive, tmp_path: Path) -> No
 
 def test_a_bag_of_two_wrenches_asks_which(px4: Dive, tmp_path: Path) -> None:
     short = Dive(px4.robot, px4.path, px4.time[:50], px4.demand[:50], px4.given[:50])
-    bag = write_bag(tmp_path / "bag", short, ("/a", "/b"))
+    bag = bag_of(short, tmp_path / "bag", ("/a", "/b"))
     with pytest.raises(FinlabError, match="--demand TOPIC"):
         read_log(bag, px4.robot)
     assert len(read_log(bag, px4.robot, demand="/b")) > 40
