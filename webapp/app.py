@@ -196,7 +196,7 @@ class App:
             now = time.monotonic()
             for view in list(self.views.values()):
                 # A long pause (a busy machine) must not become a leap of the robots.
-                view.scenery.animate(min(now - before, 0.2))
+                view.animate(min(now - before, 0.2))
             before = now
 
 

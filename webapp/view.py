@@ -96,6 +96,16 @@ class View:
         """Whether all that was asked is answered, and written."""
         return not (self._is_due or self.bell.rung.is_set() or self.jobs.busy)
 
+    def animate(self, elapsed: float) -> None:
+        """Let time pass [s]: a robot that swims moves on. A fault ends the swim of this page, and
+        those of the others go on."""
+        try:
+            self.scenery.animate(elapsed)
+        except Exception as error:
+            self.jobs.swimming.halt()
+            self.intents.fault(error)
+            self.bell.ring()
+
     async def _run(self) -> None:
         while True:
             try:

@@ -131,6 +131,29 @@ def test_solver_errors_become_notes_and_the_page_goes_on(
     assert view.jobs.answering.shown_answer().error is None and view.shown_allocation is not None
 
 
+def test_a_fault_of_a_swim_is_told_and_the_next_one_swims(
+    server: viser.ViserServer, app: App, view: View, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    swimming = view.jobs.swimming
+    session = view.session
+
+    def start() -> None:
+        on_loop(server, lambda: swimming.start(session.swim.plan(session.state)))
+
+    def fall(_elapsed: float) -> None:
+        raise RuntimeError("a node is gone")
+
+    monkeypatch.setattr(app, "views", {1: view})
+    start()
+    with monkeypatch.context() as patch:
+        patch.setattr(view.scenery, "animate", fall)
+        until(lambda: len(view.client.notes) == 1)
+    assert "a node is gone" in view.client.notes[0]
+    assert not swimming.active
+    start()
+    until(lambda: swimming.time > 0.3)
+
+
 def test_nodes_and_widgets_do_not_grow(server: viser.ViserServer, view: View) -> None:
     layouts = [load_layout(shipped_layouts()[name]) for name in ("pair", "octo", "ucat")]
 
