@@ -144,20 +144,36 @@ def _wrench_table(wrenches: Mapping[str, list[float]]) -> Table:
     sizes = [abs(value) for value in wrenches["delivered"]]
     force_prefix = prefix_of(max(sizes[:3]))
     torque_prefix = prefix_of(max(sizes[3:]))
+    rows = []
+    for name, wrench in wrenches.items():
+        rows.append((name, *_wrench_words(wrench, force_prefix, torque_prefix)))
+    return Table(_wrench_heads(force_prefix, torque_prefix), rows, (True, *(False,) * 6))
+
+
+@lru_cache(maxsize=64)
+def _wrench_heads(force_prefix: Prefix, torque_prefix: Prefix) -> Sequence[str]:
+    """Names of the columns of wrenches, cached: few prefixes occur."""
     prefixes = (force_prefix,) * 3 + (torque_prefix,) * 3
-    rows = [(name, *_wrench_words(wrench, prefixes)) for name, wrench in wrenches.items()]
     heads = [""]
     for axis, unit, prefix in zip(AXES, UNITS, prefixes, strict=True):
         heads.append(f"{axis} [{prefix.symbol}{unit}]")
-    return Table(heads, rows, (True, *(False,) * 6))
+    return heads
 
 
-def _wrench_words(wrench: list[float], prefixes: Sequence[Prefix]) -> list[str]:
+def _wrench_words(wrench: list[float], force_prefix: Prefix, torque_prefix: Prefix) -> list[str]:
     """The components of a wrench (6,) [N, N m] with SI prefixes; NaN is that of a free axis."""
-    scaled = []
-    for value, prefix in zip(wrench, prefixes, strict=True):
-        scaled.append(value / prefix.factor)
-    numbers = _SIX_NUMBERS % tuple(scaled)  # in half the time of one after the other
+    newtons = force_prefix.factor
+    newton_metres = torque_prefix.factor
+    fx, fy, fz, tx, ty, tz = wrench
+    scaled = (
+        fx / newtons,
+        fy / newtons,
+        fz / newtons,
+        tx / newton_metres,
+        ty / newton_metres,
+        tz / newton_metres,
+    )
+    numbers = _SIX_NUMBERS % scaled  # in half the time of one after the other
     return numbers.replace("nan", "free").replace("-0.000", "0.000").split()
 
 
