@@ -160,8 +160,10 @@ def on_post_build(config: Any) -> None:
         each["text"] = words[:LETTERS_OF_LONG_PAGES] if is_long else words
     index.write_text(json.dumps(found, separators=(",", ":")))
     first = (site / "index.html").read_text()
+    # What lies below the first screen is loaded when a reader comes to it, or presses on it.
+    at_once = re.sub(r'<a href="[^"]+\.webp">|<img[^>]*loading="lazy"[^>]*>', "", first)
     loaded = {
-        name for name in re.findall(r'(?:src|href)="([^"#?]+)"', first) if (site / name).is_file()
+        name for name in re.findall(r'(?:src|href)="([^"#?]+)"', at_once) if (site / name).is_file()
     }
     loaded |= {"index.html", "search/search_index.json", *re.findall(r'"search": "([^"]+)"', first)}
     if (weight := sum((site / name).stat().st_size for name in loaded)) > 1_000_000:
