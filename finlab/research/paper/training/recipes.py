@@ -1,6 +1,6 @@
 """Named recipes: `paper` (the printed numbers, our choices elsewhere), `shipped` (the weights that
-come with finlab, one to two hours of one core), `short` (20 minutes on two cores) and `smoke` (seconds); and
-the model card of what they make."""
+come with finlab, one to two hours of one core), `short` (20 minutes on two cores) and `smoke`
+(seconds); and the model card of what they make."""
 
 import hashlib
 import json
