@@ -29,7 +29,7 @@ class PaperOptions:
     data: Annotated[Path | None, arg(metavar="FOLDER")] = None
     """data set of `finlab data generate`; that of the surrogate or of the recipe by default."""
     preset: _Preset = "paper"
-    """recipe: smoke (a minute), shipped (what comes with finlab, an hour for both), short
+    """recipe: smoke (a minute), shipped (what comes with finlab, one to two hours), short
     (20 minutes for both on two cores) or paper (a week)."""
     seed: Count = 0
     """of the first weights, the noise and the order of the data."""

@@ -54,8 +54,21 @@ def figure_bytes(make: Callable[[], Figure], form: str, dpi: int = SCREEN_DPI) -
 
     content = io.BytesIO()
     with matplotlib.rc_context({"text.parse_math": False}):
-        make().savefig(content, format=form, dpi=dpi, bbox_inches="tight")
+        figure = make()
+        _plain_logarithms(figure)
+        figure.savefig(content, format=form, dpi=dpi, bbox_inches="tight")
     return content.getvalue()
+
+
+def _plain_logarithms(figure: Figure) -> None:
+    """Lets logarithmic axes have plain numbers: those that matplotlib gives them are formulas."""
+    from matplotlib.ticker import LogFormatter
+
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            if axis.get_scale() == "log":
+                axis.set_major_formatter(LogFormatter())
+                axis.set_minor_formatter(LogFormatter())
 
 
 def check_figure_file(path: Path | None) -> None:

@@ -31,10 +31,10 @@ from finlab.layout import Layout, layout_to_dict, parse_layout
 from finlab.layout.jet_geometry import jet_geometry_of
 from finlab.physics import Plant
 from finlab.physics.objective import wrench_scale_of
+from finlab.research.interaction import judging_plant
 from finlab.research.interaction.linear_prior import train_weights
 from finlab.research.interaction.random_samples import random_samples
 from finlab.research.random_layouts import random_jet_robot
-from tests.interaction import third_plant
 from tests.interaction.second_plant import wrenches
 from tests.interaction.test_jets import differs
 
@@ -251,7 +251,7 @@ def test_intervals_hold_on_a_plant_by_which_nothing_was_chosen(
     own: int, count: tuple[int, int]
 ) -> None:
     weights = read_weights_of_shipped()
-    _, errors, deviations = forward_errors(own, weights, range(8), third_plant.wrenches, count)
+    _, errors, deviations = forward_errors(own, weights, range(8), judging_plant.wrenches, count)
     inside = (np.abs(errors) < 1.645 * deviations).mean()
     assert 0.8 < inside < 0.99
 

@@ -317,7 +317,7 @@ def _curves_picture(rows: list[dict[str, float]], names: list[str]) -> Figure:
     for panel, name in zip(axes[:, 0], names, strict=True):
         values = [row[name] for row in rows]
         panel.plot(steps, values, linewidth=1.0)
-        panel.set_yscale("log" if min(values) > 0.0 else "symlog")
+        panel.set_yscale("log" if min(values) > 0.0 else "linear")
         panel.set_ylabel(name.replace("_", " "))
     axes[-1, 0].set_xlabel("step")
     return figure

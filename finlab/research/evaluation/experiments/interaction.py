@@ -3,8 +3,9 @@ told."""
 
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from copy import copy
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -18,36 +19,80 @@ from finlab.fit.interaction.constants import fit_constants
 from finlab.fit.interaction.own_samples import posterior, terms_of
 from finlab.fit.interaction.samples import Samples, left_by_laws
 from finlab.interaction.interaction import Interaction
-from finlab.interaction.jets import Jets
 from finlab.interaction.learned import Learned
 from finlab.interaction.linear import SHIPPED_PRIOR, LinearInteraction, Weights, read_weights
-from finlab.layout import Layout
+from finlab.layout import Layout, load_layout
 from finlab.layout.effectiveness import body_force
 from finlab.layout.jet_geometry import jet_geometry_of
 from finlab.physics import Plant
 from finlab.physics.objective import wrench_scale_of
 from finlab.research.evaluation.document import Column, Row
-from finlab.research.evaluation.experiment import Experiment, progress
+from finlab.research.evaluation.experiment import Experiment, check_names, progress
 from finlab.research.evaluation.method_specs import own_function
+from finlab.research.evaluation.scoring import mean_interval
 from finlab.research.interaction.fourier_features import FourierFeatures
+from finlab.research.interaction.judging_plant import wrenches
 from finlab.research.interaction.linear_prior import train_weights
 from finlab.research.interaction.random_samples import (
     JETS,
     WrenchOracle,
     random_flows,
     random_samples,
-    with_jets,
 )
-from finlab.research.random_layouts import random_jet_robot, random_shaft_fin
+from finlab.research.random_layouts import ActuatorMaker, random_jet_robot, random_shaft_fin
 
-GROUPS = {
-    "unseen robots": ((4, 8), None),
-    "6 to 8 fins": ((6, 8), [random_shaft_fin]),
-    "9 and 10 actuators": ((9, 10), None),
+
+class Group(NamedTuple):
+    """Robots that no training has seen."""
+
+    actuators: tuple[int, int] = (3, 8)
+    """How many actuators, least to most."""
+    kinds: Sequence[ActuatorMaker] | None = None
+    """Kinds of these; None for thrusters, azimuths, fins and mixtures."""
+    apart: float = 1.0
+    """Distances of actuators and size of the hull, over those of robots that are learned from."""
+    speed: float = 0.0
+    """Of the robots through the water, in any direction [m/s]."""
+    shipped: tuple[str, ...] = ()
+    """Names of shipped robots in place of random ones."""
+
+
+SHIPPED_ROBOTS = (
+    "bluerov2",
+    "bluerov2_heavy",
+    "octo",
+    "hexa",
+    "turtle_hybrid",
+    "catamaran",
+    "penta",
+)
+"""Shipped robots with a hull and jets that may meet it."""
+AT_REST = {
+    "3 to 8 actuators": Group(),
+    "6 to 8 fins": Group((6, 8), [random_shaft_fin]),
+    "8 actuators": Group((8, 8)),
+    "12 actuators": Group((12, 12)),
+    "half as far apart": Group(apart=0.5),
+    "twice as far apart": Group(apart=2.0),
+    "shipped robots": Group(
+        shipped=(
+            "bluerov2",
+            "bluerov2_heavy",
+            "octo",
+            "hexa",
+            "turtle_hybrid",
+            "catamaran",
+            "penta",
+        )
+    ),
 }
-"""Robots that no training has seen: their actuators, least to most, and kinds."""
-OTHER = Jets(2.2, 2.6, 30.0, 0.75, 0.95, 0.22, 0.12, 0.48)
-"""Constants of the plant where none is given; those of no method."""
+"""Groups of robots at rest, which any plant can judge."""
+GROUPS = AT_REST | {
+    "3 to 8 actuators at 0.5 m/s": Group(speed=0.5),
+    "3 to 8 actuators at 1 m/s": Group(speed=1.0),
+    "shipped robots at 1 m/s": AT_REST["shipped robots"]._replace(speed=1.0),
+}
+"""All groups of robots."""
 OWN_SAMPLES = (20, 100)
 """Own samples that the linear model is given."""
 FITTED = 20
@@ -56,55 +101,92 @@ FITTED = 20
 
 def run(
     plant: str | None = None,
+    groups: tuple[str, ...] = tuple(AT_REST),
     robots: int = 20,
     targets: int = 6,
     layouts: int = 4000,
     steps: int = 1800,
     network: str | None = None,
     own: tuple[int, ...] = (30, 100, 300, 1000),
-    speed: float = 0.0,
     seed: int = 0,
 ) -> Iterator[Row]:
     """One row for each group of robots and each model of what actuators do to each other.
 
     Args:
         plant: judge and teacher, as file.py:function or module:function of a layout and commands
-            (K, n, 3) that gives wrenches (K, 6); the formula of jets with other constants when left
-            out.
-        robots: of each group.
+            (K, n, 3) that gives wrenches (K, 6); when left out, a plant of another family than any
+            model or prior, by which no choice was made.
+        groups: of robots. Where these move, a plant has to take a flow (K, 6) as third argument;
+            the linear model is then learned at speeds up to the group's, and there are no networks.
+        robots: of each group; of shipped ones no more than there are.
         targets: on each robot, wrenches of random commands by the plant.
-        layouts: that the networks learn from, 20 samples each with 2 % noise.
+        layouts: that models of this plant learn from, 20 samples each with 2 % noise.
         steps: of the training of the network.
         network: file of `finlab train interaction` in place of one that is trained now;
             `none` for no networks, which need torch.
         own: samples of each robot that a ridge regression is given.
-        speed: of the robots through the water [m/s], at which a plant has to take a flow as third
-            argument; what is learned is learned at speeds up to it.
         seed: of all draws.
     """
-    oracle = partial(with_jets, jets=OTHER) if plant is None else own_function(plant)
+    check_names("groups", groups, GROUPS)
+    oracle = wrenches if plant is None else own_function(plant)
     with tempfile.TemporaryDirectory() as folder:
-        models = _models(oracle, layouts, steps, network, own, speed, seed, Path(folder))
-        for group, (count, kinds) in GROUPS.items():
-            cases = []
-            for k in range(robots):
-                rng = np.random.default_rng([32_000, seed, k])
-                layout = random_jet_robot(rng, f"robot_{k + 1}", count, kinds)
-                tested = Plant(layout).sample(rng, (targets,))
-                # A row of targets is one question in one flow: all have the same.
-                flow = random_flows(rng, 1, 1.0)[0]
-                flow *= speed / np.linalg.norm(flow)
-                moving = _moving(oracle, flow)
-                wrench = moving(layout, tested)
-                command = Plant(layout).sample(rng, (max(*own, *OWN_SAMPLES),))
-                noise = 0.02 * np.sqrt((wrench**2).mean(axis=0))
-                measured = moving(layout, command) + noise * rng.normal(size=(len(command), 6))
-                flows = np.broadcast_to(flow, (len(command), 6)) if speed > 0.0 else None
-                cases.append(
-                    Case(layout, flow, tested, wrench, Samples(layout, command, measured, flows))
+        models: dict[float, dict[str, Model]] = {}
+        for name in groups:
+            group = GROUPS[name]
+            if group.speed not in models:
+                models[group.speed] = _models(
+                    oracle, layouts, steps, network, own, group.speed, seed, Path(folder)
                 )
-            for name, model in models.items():
-                yield {"robots": group, "model": name} | _row(oracle, model, cases, name)
+            cases = _cases(oracle, group, robots, targets, max(*own, *OWN_SAMPLES), seed)
+            by_laws: Row = {}
+            for title, model in models[group.speed].items():
+                row = _row(oracle, model, cases, title)
+                by_laws = by_laws or row
+                for key in ("forward_rms", "error_mean"):
+                    row[f"{key}_of_laws"] = row[key] / by_laws[key]
+                yield {"robots": name, "model": title} | row
+
+
+def _cases(
+    oracle: WrenchOracle, group: Group, robots: int, targets: int, own: int, seed: int
+) -> "list[Case]":
+    """Robots of a group, each with targets and own samples."""
+    cases = []
+    for k in range(min(robots, len(group.shipped)) if group.shipped else robots):
+        rng = np.random.default_rng([32_000, seed, k])
+        if group.shipped:
+            layout = load_layout(group.shipped[k])
+        else:
+            layout = random_jet_robot(rng, f"robot_{k + 1}", group.actuators, group.kinds)
+        layout = _spread(layout, group.apart)
+        tested = Plant(layout).sample(rng, (targets,))
+        # A row of targets is one question in one flow: all have the same.
+        flow = random_flows(rng, 1, 1.0)[0]
+        flow *= group.speed / np.linalg.norm(flow)
+        moving = _moving(oracle, flow)
+        wrench = moving(layout, tested)
+        command = Plant(layout).sample(rng, (own,))
+        noise = 0.02 * np.sqrt((wrench**2).mean(axis=0))
+        measured = moving(layout, command) + noise * rng.normal(size=(len(command), 6))
+        flows = np.broadcast_to(flow, (len(command), 6)) if group.speed > 0.0 else None
+        own_samples = Samples(layout, command, measured, flows)
+        cases.append(Case(layout, flow, tested, wrench, own_samples))
+    return cases
+
+
+def _spread(layout: Layout, apart: float) -> Layout:
+    """A robot with so many times the distances and the size of the hull, of the same actuators."""
+    if apart == 1.0:
+        return layout
+    assert layout.body is not None and layout.body.hull is not None
+    hull = layout.body.hull
+    size = tuple(apart * side for side in hull.size_m or ())
+    actuators = [
+        replace(part, position=tuple(apart * coordinate for coordinate in part.position))
+        for part in layout.actuators
+    ]
+    body = replace(layout.body, hull=replace(hull, size_m=size))
+    return replace(layout, actuators=tuple(actuators), body=body)
 
 
 class Case(NamedTuple):
@@ -142,7 +224,7 @@ def _models(
     folder: Path,
 ) -> dict[str, Model]:
     """All models by their names in the table; without `network` one is trained, in `folder`."""
-    samples = random_samples(oracle, layouts, 20, seed, 0.02, (4, 8), speed)
+    samples = random_samples(oracle, layouts, 20, seed, 0.02, (3, 8), speed)
     weights, _ = train_weights(samples, seed)
 
     def linear(prior: Weights, count: int) -> Model:
@@ -160,19 +242,17 @@ def _models(
         f"formula, {FITTED} own samples": lambda own: fit_constants(_some(own, FITTED)).jets.of(
             jet_geometry_of(own.layout)
         ),
-        "linear, no own samples": linear(weights, 0),
     }
-    for count in OWN_SAMPLES:
-        models[f"linear, {count} own samples"] = linear(weights, count)
-    shipped = read_weights(str(SHIPPED_PRIOR))
-    for count in (0, *OWN_SAMPLES):
-        models[f"linear, shipped prior, {count} own samples"] = linear(shipped, count)
+    priors = {"shipped prior": read_weights(str(SHIPPED_PRIOR)), "prior of this plant": weights}
+    for name, prior in priors.items():
+        for count in (0, *OWN_SAMPLES):
+            models[f"{name}, {count} own samples"] = linear(prior, count)
     if speed == 0.0:
         process = FourierFeatures(samples, seed)
-        models["Gaussian process, no own samples"] = lambda own: _ByDifferences(
+        models["Gaussian process of this plant"] = lambda own: _ByDifferences(
             partial(process.wrench_offset, jet_geometry_of(own.layout))
         )
-    if network != "none":
+    if speed == 0.0 and network != "none":
         models |= _network_models(samples, steps, network, seed, folder)
     for count in own:
         models[f"ridge, {count} own samples"] = partial(Ridge, count)
@@ -191,8 +271,8 @@ def _network_models(
     file = network or str(folder / WEIGHTS_FILE)
     node = trained_surrogate(samples, seed)
     return {
-        "network, no own samples": lambda own: Learned(file).of(jet_geometry_of(own.layout)),
-        "the paper's surrogate form": lambda own: _ByDifferences(node(own.layout)),
+        "network of this plant": lambda own: Learned(file).of(jet_geometry_of(own.layout)),
+        "the paper's surrogate form, of this plant": lambda own: _ByDifferences(node(own.layout)),
     }
 
 
@@ -204,6 +284,7 @@ def _some(samples: Samples, count: int) -> Samples:
 def _row(oracle: WrenchOracle, model: Model, cases: list[Case], name: str) -> Row:
     """Errors, by the oracle, of what `dual` answers with a model, over all robots."""
     misses = []
+    counted = []
     deviations = []
     forwards = []
     watts = []
@@ -218,14 +299,17 @@ def _row(oracle: WrenchOracle, model: Model, cases: list[Case], name: str) -> Ro
         plant.interaction = told
         plant.feels_flow = plant.feels_flow or told is not None
         method.plant = plant.at(case.flow if case.flow.any() else None)
+        counts = layout.commanded
+        question = MethodQuestion(counts * case.wrench, free=None if counts.all() else ~counts)
         begun = time.thread_time()
-        command = method.solve(MethodQuestion(case.wrench)).command
+        command = method.solve(question).command
         milliseconds.append(1e3 * (time.thread_time() - begun) / len(command))
         if name == "oracle":
             command = np.array(
                 [_exact(moving, method, w, u) for w, u in zip(case.wrench, command, strict=True)]
             )
-        misses.append((moving(layout, command) - case.wrench) / scale)
+        misses.append(counts * (moving(layout, command) - case.wrench) / scale)
+        counted.append(np.broadcast_to(counts, misses[-1].shape))
         force = body_force(method.plant.force(command), layout.frames)
         inflow = method.plant.met_by_all(None)
         deviation = np.zeros_like(misses[-1])
@@ -233,28 +317,31 @@ def _row(oracle: WrenchOracle, model: Model, cases: list[Case], name: str) -> Ro
             deviation = told.deviation(force, inflow) / scale
         deviations.append(deviation)
         known = method.plant.wrench_of(method.plant.force(case.command))
-        forwards.append((known - case.wrench) / scale)
+        forwards.append(counts * (known - case.wrench) / scale)
         watts.append(method.plant.power(command).sum(axis=1))
     missed = np.concatenate(misses)
+    robot = np.repeat(np.arange(len(cases)), [len(case.wrench) for case in cases])
     error = np.linalg.norm(missed, axis=1)
     forward = np.linalg.norm(np.concatenate(forwards), axis=1)
     deviation = np.concatenate(deviations)
+    on_axes = np.concatenate(counted)
     is_uncertain = bool(deviation.any()) and name != "oracle"
     return {
         "n": len(error),
         "forward_rms": float(np.sqrt((forward**2).mean())),
         "error_mean": float(error.mean()),
+        "error_mean_interval": list(mean_interval(error, robot)),
         "error_median": float(np.median(error)),
         "error_p95": float(np.percentile(error, 95)),
-        "inside_50": _inside(missed, deviation, 0.674) if is_uncertain else None,
-        "inside_90": _inside(missed, deviation, 1.645) if is_uncertain else None,
+        "inside_50": _inside(missed[on_axes], deviation[on_axes], 0.674) if is_uncertain else None,
+        "inside_90": _inside(missed[on_axes], deviation[on_axes], 1.645) if is_uncertain else None,
         "power_mean": float(np.concatenate(watts).mean()),
         "ms": float(np.median(milliseconds)),
     }
 
 
 def _inside(missed: Array, deviation: Array, half_width: float) -> float:
-    """Share of the errors (N, 6) that lie within so many of their standard deviations."""
+    """Share of the errors (N,) that lie within so many of their standard deviations."""
     return float((np.abs(missed) <= half_width * deviation + NEARLY).mean())
 
 
@@ -270,14 +357,16 @@ def _exact(oracle: WrenchOracle, method: Dual, wrench: Array, command: Array) ->
         given = (
             oracle(method.layout, np.concatenate([command[None], command + steps])) / method.scale
         )
-        error = float(np.linalg.norm(given[0] - wrench / method.scale))
+        counts = method.layout.commanded
+        error = float(np.linalg.norm((given[0] - wrench / method.scale)[counts]))
         if error < least:
             best = command
             least = error
         if error <= NEARLY:
             break
-        slope = ((given[1:] - given[0]) / 1e-4).T
-        change = np.linalg.lstsq(slope, wrench / method.scale - given[0], rcond=1e-6)[0]
+        slope = ((given[1:] - given[0]) / 1e-4).T[counts]
+        missing = (wrench / method.scale - given[0])[counts]
+        change = np.linalg.lstsq(slope, missing, rcond=1e-6)[0]
         command = plant.feasible(
             command + np.clip(change, -0.2, 0.2).reshape(command.shape) * width
         )
@@ -357,7 +446,9 @@ experiment = Experiment(
         Column("model", "told", "text"),
         Column("n", "targets", "count"),
         Column("forward_rms", "forward", "error"),
-        Column("error_mean", "error, mean", "error"),
+        Column("forward_rms_of_laws", "over laws", "three"),
+        Column("error_mean", "error, mean", "error", "error_mean_interval"),
+        Column("error_mean_of_laws", "over laws", "three"),
         Column("error_median", "median", "error"),
         Column("error_p95", "95 %", "error"),
         Column("inside_50", "within 50 %", "three"),
@@ -367,18 +458,35 @@ experiment = Experiment(
     ),
     run=run,
     note=(
-        "Forward: root mean square of what the model misses of the plant's wrenches at random "
-        "commands, at which the targets are. Error: what the plant's wrench misses of the "
-        "target, over the robot's wrench scale. Targets are wrenches of random commands by the "
-        "plant. The oracle goes on from the linear model's answer by the plant itself. Within 50 "
-        "and 90 %: share of the misses, axis by axis, that lie in the intervals of "
-        "`expected_miss`. ms: processor time of one of a robot's answers."
+        "The plant that judges is of another family than the formula and than those that the "
+        "shipped prior was learned from (`finlab/research/interaction/judging_plant.py`); models "
+        "of this plant learned it from other robots. Forward: root mean square of what the model "
+        "misses of the plant's wrenches at random commands, at which the targets are. Error: what "
+        "the plant's wrench misses of the target, over the robot's wrench scale, of the axes that "
+        "it commands. Over laws: divided by that of the laws alone. Targets are wrenches of "
+        "random commands by the plant. The oracle goes on from the linear model's answer by the "
+        "plant itself. Within 50 and 90 %: share of the misses, axis by axis, that lie in the "
+        "intervals of `expected_miss`. ms: processor time of one of a robot's answers."
     ),
     measures=(
         "finlab/interaction",
         "finlab/research/interaction",
         "finlab/research/evaluation/experiments/interaction.py",
     ),
-    quick={"robots": 3, "targets": 2, "layouts": 60, "steps": 100, "own": (100,)},
-    usual={"robots": 5, "targets": 3, "layouts": 500, "steps": 600, "own": (100, 1000)},
+    quick={
+        "groups": ("3 to 8 actuators", "3 to 8 actuators at 1 m/s"),
+        "robots": 3,
+        "targets": 2,
+        "layouts": 60,
+        "steps": 100,
+        "own": (100,),
+    },
+    usual={
+        "groups": tuple(GROUPS),
+        "robots": 7,
+        "targets": 3,
+        "layouts": 500,
+        "steps": 600,
+        "own": (100,),
+    },
 )

@@ -1,6 +1,6 @@
 """Named recipes: `paper` (the printed numbers, our choices elsewhere), `shipped` (the weights that
-come with finlab, an hour of one core), `short` (20 minutes on two cores) and `smoke` (seconds); and
-the model card of what they make."""
+come with finlab, one to two hours of one core), `short` (20 minutes on two cores) and `smoke`
+(seconds); and the model card of what they make."""
 
 import hashlib
 import json
@@ -190,9 +190,9 @@ def write_card(folder: Path, weights: TrainedWeights) -> None:
 
 
 def _rows(name: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """Each number below a name, with its path."""
+    """Each number or word below a name that says something, with its path."""
     if isinstance(value, Mapping):
         for key, part in value.items():
             yield from _rows(f"{name} {key}".replace("_", " "), part)
-    elif value is not None:
+    elif value not in (None, ""):
         yield name, value

@@ -1,9 +1,11 @@
-"""A third plant of another family, by which no choice of the linear interaction was made.
+"""The plant that judges models of interaction: none of them, and no choice in them, was made by it.
 
-Jets with the profile of a free shear flow (Goertler's squared hyperbolic secant) that decay by a
-power of the distance which no other plant has, add up in the root of squares along a common way,
-and take thrust by the square of what is met. The hull is a sphere of the same volume, which takes
-of a jet the share of it that it hides.
+Its family is neither that of the formula nor one of those that priors are learned from. Jets with
+the profile of a free shear flow (Goertler's squared hyperbolic secant) that decay by a power of the
+distance which no other plant has, add up in the root of squares along a common way, and take thrust
+by the square of what is met. The hull is a sphere of the same volume, which takes of a jet the
+share of it that it hides. Of a robot that moves, jets stay behind with the water that they are in,
+propellers lose thrust by a curve that levels off, and the water taken in pushes aside.
 """
 
 import numpy as np
@@ -27,22 +29,43 @@ SIDE = 0.25
 """Share of the momentum taken in from the side."""
 PUSH = 0.5
 """Share of the thrust by which a jet pushes the hull."""
+STAYS = 0.8
+"""How far jets stay behind a robot that moves, over how far it moves until they arrive."""
+ADVANCE = 0.85
+"""Loss of thrust by a small speed, over that of the open-water line of the layout."""
+LEVEL = 1.5
+"""Speed over that of the jet at which this loss levels off."""
+CROSS = 0.3
+"""Share of the momentum taken in from the side of a robot that moves."""
 
 
-def wrenches(layout: Layout, command: Array) -> Array:
-    """Wrenches (K, 6) [N, N m] of commands (K, n, 3)."""
+def wrenches(layout: Layout, command: Array, flow: Array | None = None) -> Array:
+    """Returns wrenches; a `WrenchOracle`.
+
+    Args:
+        layout: the robot.
+        command: (K, n, 3).
+        flow: velocities (K, 6) of the body through the water [m/s, rad/s]; None at rest.
+
+    Returns:
+        (K, 6) [N, N m], body frame.
+    """
     plant = Plant(layout)
     own = plant.force(command)
     force = body_force(own, layout.frames)
     geometry = jet_geometry_of(layout)
     diameter = geometry.diameter
     jets = jets_of(force, diameter)
+    velocity = np.zeros_like(force) if flow is None else plant.point_velocity(flow)
     change = np.zeros_like(force)
     for j in range(len(diameter)):
         has_jet = np.arange(len(diameter)) != j
         met = np.zeros(force[:, j].shape)
         for i in np.flatnonzero(has_jet & (diameter > 0.0)):
             way = (geometry.position[j] - geometry.position[i]) / diameter[i]
+            along = -(way * jets.ahead[:, i]).sum(axis=-1)
+            time = np.maximum(along, 0.0) / jets.speed[:, i]
+            way = way + STAYS * time[:, None] * velocity[:, i]
             along = -(way * jets.ahead[:, i]).sum(axis=-1)
             radial = way + along[:, None] * jets.ahead[:, i]
             radius = np.sqrt((radial**2).sum(axis=-1))
@@ -58,8 +81,13 @@ def wrenches(layout: Layout, command: Array) -> Array:
         ratio = against / jets.speed[:, j]
         lost = TAKEN * ratio * np.abs(ratio) / (1.0 + np.abs(ratio)) + 0.3 * np.tanh(ratio)
         across = water + against[:, None] * ahead
-        flow = 1000.0 * np.pi / 4.0 * diameter[j] ** 2 * jets.speed[:, j]
-        change[:, j] += SIDE * flow[:, None] * across - lost[:, None] * force[:, j]
+        mass_flow = 1000.0 * np.pi / 4.0 * diameter[j] ** 2 * jets.speed[:, j]
+        speed_ratio = (velocity[:, j] * ahead).sum(axis=-1) / jets.speed[:, j]
+        levelled = speed_ratio / np.sqrt(1.0 + (speed_ratio / LEVEL) ** 2)
+        lost += ADVANCE * geometry.advance[j] * levelled
+        drift = (velocity[:, j] * ahead).sum(axis=-1)[:, None] * ahead - velocity[:, j]
+        change[:, j] += mass_flow[:, None] * (SIDE * across + CROSS * drift)
+        change[:, j] -= lost[:, None] * force[:, j]
         change[:, j] += _by_hull(geometry.hull, geometry.position[j], ahead, force[:, j])
     return np.asarray(
         plant.wrench_of(own) + np.einsum("kib,ibw->kw", change, lever_of(geometry.position))
