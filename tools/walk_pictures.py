@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Walks through the app as a user does and takes twelve pictures, for the first page of the site.
+"""Walks through the app as a user does and takes its pictures, for the site and the README.
 
     python tools/walk_pictures.py [FOLDER]
 
 Needs Chromium and playwright, as the tests of the browser do; a few minutes, as the 3D view is
-drawn by software. The pictures go to `docs/walk`, or to a folder that is named.
+drawn by software. The pictures go to `docs/pictures`, or to a folder that is named.
 """
 
 import sys
@@ -31,11 +31,11 @@ from webapp.start_page import start_page
 from webapp.tasks.solver import Solver
 from webapp.viser_internals import start_server, stop_server
 
-FOLDER = Path(__file__).resolve().parents[1] / "docs" / "walk"
+FOLDER = Path(__file__).resolve().parents[1] / "docs" / "pictures"
 """Where the pictures go."""
 WINDOW = {"width": 1400, "height": 860}
 """Size of the browser's window [px]."""
-WIDTH = 880
+WIDTH = 1000
 """Width of a picture [px]; its height follows."""
 QUALITY = 70
 """Of the WebP files, of 100."""
@@ -83,7 +83,7 @@ def pulled(page: Page) -> Held:
     """The wrench in the hand."""
     handle = 0.7 * TIP_SIZE
     start = page.pixel("/robot/wrench/tip", (handle, 0.0, 0.0))
-    end = page.pixel("/robot/wrench/tip", (handle + 0.15, 0.0, 0.0))
+    end = page.pixel("/robot/wrench/tip", (handle + 0.08, 0.0, 0.0))
     return page.held(start, end)
 
 
@@ -123,10 +123,18 @@ def asked(page: Page) -> None:
         page.page.locator(".fl-inquiry [role=dialog]").wait_for()
 
 
-def compared(page: Page) -> None:
-    """Two robots, one wrench."""
+def designed(page: Page) -> None:
+    """The places of the fins, one of them in the hand."""
     page.page.keyboard.press("Escape")
     page.page.locator(".fl-inquiry [role=dialog]").wait_for(state="detached")
+    page.tab("Design")
+    page.page.locator(".fin-list [data-fin=back_left]").click()
+    page.until(lambda: page.session.selected == "back_left")
+
+
+def compared(page: Page) -> None:
+    """Two robots, one wrench."""
+    page.tab("Allocate")
     page.tab("Two robots")
     page.node("/pair/right/fins/0/turn/blade")
     page.choose("Right", "Shipped: bluerov2_heavy")
@@ -184,6 +192,17 @@ def swum(page: Page) -> None:
     page.until(lambda: not swimming.running and not swimming.busy)
 
 
+def jets(page: Page) -> None:
+    """Thrusters that blow at each other."""
+    page.press("End")
+    page.until(lambda: not page.view.jobs.swimming.active)
+    page.press("Lessons")
+    page.page.get_by_role("button", name="Jets meet each other").first.click()
+    page.until(lambda: "Jets meet each other" in page.text(".fl-lesson"))
+    page.page.locator("label:visible", has_text="Count jets").first.click()
+    page.until(lambda: not page.view.busy and "✓" in page.text(".fl-lesson"))
+
+
 STOPS = (
     Stop("start", lambda page: None),
     Stop("opened", opened),
@@ -192,11 +211,13 @@ STOPS = (
     Stop("beyond", beyond),
     Stop("candidates", candidates),
     Stop("asked", asked),
+    Stop("designed", designed),
     Stop("compared", compared),
     Stop("improved", improved),
     Stop("presented", presented),
     Stop("log", logged),
     Stop("swim", swum),
+    Stop("jets", jets),
 )
 """The walk."""
 

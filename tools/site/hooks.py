@@ -6,7 +6,6 @@ Of tests, `tests/examples/test_site.py` holds the numbers of formulas and the na
 """
 
 import html
-import io
 import json
 import re
 import sys
@@ -19,7 +18,6 @@ import jupytext
 from latex2mathml.converter import convert_to_element
 from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import File, Files
-from PIL import Image
 
 sys.path.insert(0, str(Path(__file__).parent))
 import blocks
@@ -46,11 +44,6 @@ def on_files(files: Files, config: Any) -> Files:
     _shown.update(blocks.run_all(notebooks))
     made: dict[str, str | bytes] = {**reference.python_pages(), **reference.command_pages()}
     made |= {**reference.format_pages(), **reference.robots_page(), **gallery()}
-    picture = io.BytesIO()
-    Image.open(blocks.ROOT / "docs" / "app-jets.png").convert("RGB").save(
-        picture, "webp", quality=82
-    )
-    made["app-jets.webp"] = picture.getvalue()  # a quarter of the bytes, for the first page
     font = package_files("ziamath") / "fonts" / "STIXTwoMath-Regular.ttf"
     made["math.ttf"] = font.read_bytes()
     made |= {f"demo/{name}": content for name, content in demo_files().items()}
