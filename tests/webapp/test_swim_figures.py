@@ -18,6 +18,7 @@ from tests.webapp.stand_in import AtOnce, context_of, until
 from tests.webapp.test_swimming import SHORT_PATH, now
 from webapp.markup.outcomes import pace_words, swim_card
 from webapp.markup.words import righting_sentences
+from webapp.panels.swim_tab import swim_words
 from webapp.session.state import State
 from webapp.session.swim_plan import SCENARIOS, Plan, SwimSettings
 from webapp.tasks.designs import Designs
@@ -187,3 +188,16 @@ def test_any_robot_has_the_scenarios_that_it_can_swim(robot: str) -> None:
         and moment.figures.mean_w >= 0.0
         and moment.motion.shape == (layout.n, 3)
     )
+
+
+def test_a_borrowed_body_is_said_before_the_swim() -> None:
+    """A robot without a body swims with U-CAT's, which its designer must know."""
+    settings = SwimSettings()
+    assert "U-CAT" not in swim_words(settings, "dual", UCAT)
+    bodiless = swim_words(settings, "dual", load_layout("hexa"))
+    assert "Its body is not described: it swims with that of U-CAT, 19 kg." in bodiless
+    body = UCAT.body
+    assert body is not None
+    undamped = replace(UCAT, body=replace(body, linear_damping=None, quadratic_damping=None))
+    words = swim_words(settings, "dual", undamped)
+    assert "Not said of its body: linear damping and quadratic damping." in words

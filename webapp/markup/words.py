@@ -275,6 +275,24 @@ def authority_sentence(layout: Layout, lost: tuple[str, ...], reach: Array) -> s
     return f"{subject} robot cannot {listed(blind)}."
 
 
+BODY_WORDS = {
+    "mass_kg": "mass",
+    "inertia_kgm2": "inertia",
+    "added_mass": "added mass",
+    "linear_damping": "linear damping",
+    "quadratic_damping": "quadratic damping",
+    "center_of_buoyancy_m": "centre of buoyancy",
+}
+"""Field of `Body` that a swim needs -> its words."""
+
+
+def unsaid_of(layout: Layout) -> tuple[str, ...]:
+    """What a swim needs of the body and the layout does not say; it takes U-CAT's in its place, see
+    `complete_body`."""
+    body = layout.body
+    return tuple([words for key, words in BODY_WORDS.items() if getattr(body, key, None) is None])
+
+
 def righting_sentences(layout: Layout) -> tuple[str, ...]:
     """What there is to say of a robot that nothing rights; nothing where a moment does."""
     words = righting_words(layout)

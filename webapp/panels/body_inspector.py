@@ -8,18 +8,10 @@ from typing import Any
 from finlab.layout import Body, Layout
 from finlab.swim.hull import contradicts, displaced, lift_of
 from finlab.swim.vehicle.fossen import GRAVITY
-from webapp.markup.words import html, three_digits
+from webapp.markup.words import html, three_digits, unsaid_of
 from webapp.page import Page
 from webapp.panels.body_boxes import NUMBERS, VECTORS
 
-WORDS = {
-    "mass_kg": "mass",
-    "inertia_kgm2": "inertia",
-    "added_mass": "added mass",
-    "linear_damping": "linear damping",
-    "quadratic_damping": "quadratic damping",
-}
-"""Field of `Body` that a swim needs -> its words."""
 NEUTRAL_SHARE = 5e-4
 """Share of the mass by which a body that counts as neutral may be lighter or heavier."""
 
@@ -116,7 +108,7 @@ def _hull_card(layout: Layout) -> str:
             verb = "rises" if excess_kg > 0 else "sinks"
             motion = f"{verb} with {three_digits(abs(excess_kg))} kg"
         sentences.append(f"By mass and buoyancy below it {motion}.")
-    missing = [words for key, words in WORDS.items() if getattr(body, key) is None]
-    if missing:
-        sentences.append(f"Not said: {', '.join(missing)}.")
+    unsaid = unsaid_of(layout)
+    if unsaid:
+        sentences.append(f"Not said: {', '.join(unsaid)}.")
     return html("<div class='fl head'><div class='dim'>{}</div></div>", " ".join(sentences))

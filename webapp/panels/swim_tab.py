@@ -10,12 +10,21 @@ import numpy as np
 import viser
 
 from finlab.arrays import Array
+from finlab.display import listed
 from finlab.layout import Layout
 from finlab.layout.layout import MAX_ACTUATORS
+from finlab.swim.vehicle.fossen import complete_body
 from webapp.handles import add_html, set_properties
 from webapp.markup.outcomes import swim_card
 from webapp.markup.plot import cost_axis, exact_axis, over_time, positive_axis
-from webapp.markup.words import html, marker, righting_sentences, trim_sentence
+from webapp.markup.words import (
+    BODY_WORDS,
+    html,
+    marker,
+    righting_sentences,
+    trim_sentence,
+    unsaid_of,
+)
 from webapp.page import Page
 from webapp.panels.damage import Row, add_fin_buttons
 from webapp.session.swim_plan import CHOICES, SCENARIOS, SPEEDS, SwimSettings
@@ -37,7 +46,7 @@ def add_scenario(page: Page) -> None:
     )
     days = gui.add_dropdown("Scenario", tuple(SCENARIOS), hint=day)
     _bind(page, "scenario", days)
-    page.add_html(_swim_words)
+    page.add_html(swim_words)
     _bind(page, "path", gui.add_dropdown("Path", CHOICES["path"], hint="Where to swim."))
     laws = (
         "The paper's two beside ours: towards a waypoint; speed and depth by PID, which keeps no "
@@ -46,10 +55,25 @@ def add_scenario(page: Page) -> None:
     _bind(page, "controller", gui.add_dropdown("Controller", CHOICES["controller"], hint=laws))
 
 
-def _swim_words(swim: SwimSettings, method: str) -> str:
-    """The day, and who allocates ten times a second."""
-    about = swim.day.about
-    return html("<div class='fl'>{} Method {}, as in the bar, allocates.</div>", about, method)
+def swim_words(swim: SwimSettings, method: str, layout: Layout) -> str:
+    """The day, who allocates ten times a second, and whose body swims where the robot's own is not
+    described."""
+    text = f"{swim.day.about} Method {method}, as in the bar, allocates."
+    return html("<div class='fl'>{}{}</div>", text, _borrowed_body(layout))
+
+
+def _borrowed_body(layout: Layout) -> str:
+    """What the robot swims with in place of what nothing is said of; nothing where all is said."""
+    unsaid = unsaid_of(layout)
+    if not unsaid:
+        return ""
+    if len(unsaid) == len(BODY_WORDS):
+        mass_kg = complete_body(layout).mass_kg
+        sentence = f"Its body is not described: it swims with that of U-CAT, {mass_kg:g} kg."
+    else:
+        sentence = f"Not said of its body: {listed(unsaid)}. It swims with U-CAT's."
+    remedy = "Estimate them from the hull in Design, at the robot's row."
+    return html("<div class='missing'>{} {}</div>", sentence, remedy)
 
 
 def add_run(page: Page) -> None:
