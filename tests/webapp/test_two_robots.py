@@ -135,8 +135,25 @@ def test_either_can_be_accepted_by_a_step_that_is_undone(session: Session) -> No
     assert right.is_this and left.state.layout == ucat, "both still stand there"
     assert session.undo() == "Accept octo"
     assert session.state.layout == ucat
-    session.two_robots.swap()
-    assert [each.is_this for each in looked_at(session).both] == [True, False]
+    left, right = looked_at(session).both
+    assert left.is_this and right.title == "Shipped: octo", "the pair is as it was"
+    session.redo()
+    left, right = looked_at(session).both
+    assert right.is_this and left.state.layout == ucat
+
+def test_what_was_chosen_since_stays_at_undo(session: Session) -> None:
+    session.two_robots.choose("right", "Shipped: octo")
+    session.two_robots.accept("right")
+    session.two_robots.choose("left", "Shipped: hexa")
+    session.undo()
+    left, right = looked_at(session).both
+    assert left.title == "Shipped: hexa" and right.is_this
+
+
+def test_the_same_robot_is_not_accepted(session: Session) -> None:
+    session.toggle_loss("front_left")
+    session.toggle_loss("front_left")
+    session.two_robots.choose("right", "Before: Fail front_left")
     with pytest.raises(FinlabError, match="the right one is the same as this robot"):
         session.two_robots.accept("right")
 

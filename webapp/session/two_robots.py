@@ -79,6 +79,20 @@ THIS_ROBOT = Source(THIS, None)
 """The robot that the page works on."""
 
 
+@dataclass(frozen=True)
+class Acceptance:
+    """One of a pair became the robot of the page."""
+
+    state_before: State
+    """The robot of the page before it."""
+    sources_before: list[Source]
+    """What stood on `PLACES` before it."""
+    state_after: State
+    """The robot of the page from then on."""
+    sources_after: list[Source]
+    """What has stood on `PLACES` since."""
+
+
 class TwoRobots:
     """Which two robots of one session stand beside each other. Only `accept` is a step of undo."""
 
@@ -89,6 +103,8 @@ class TwoRobots:
         self.guests: tuple[Source, ...] = ()
         """Robots of files and links, which stand in the list."""
         self._pair: Pair | None = None
+        self._acceptances: list[Acceptance] = []
+        """The newest last; undo and redo of one bring back what stood there with it."""
 
     @property
     def is_open(self) -> bool:
@@ -180,12 +196,16 @@ class TwoRobots:
         if source.state is None:
             raise FinlabError(f"the {place} one is this robot already; accept the other one")
         session = self._session
-        state = source.state_for(session.state)
-        before = Source(f"Before: Accept {state.layout.name}", session.state)
+        state_before = session.state
+        state = source.state_for(state_before)
+        before = Source(f"Before: Accept {state.layout.name}", state_before)
         if not session.accept_state(f"Accept {state.layout.name}", state):
             raise FinlabError(f"the {place} one is the same as this robot; nothing changes")
-        self._chosen = [before if each.state is None else each for each in both]
-        self._chosen[index] = THIS_ROBOT
+        chosen = [before if each.state is None else each for each in both]
+        chosen[index] = THIS_ROBOT
+        self._chosen = chosen
+        self._acceptances.append(Acceptance(state_before, both, session.state, chosen))
+        self._acceptances = self._acceptances[-MOST_EARLIER:]
 
     def _standing(self) -> tuple[Standing, Standing]:
         """Both, with the question of this moment."""
@@ -200,6 +220,7 @@ class TwoRobots:
         """What stands on `PLACES`. Until something is chosen the right one is what the robot was
         before, or another one that is shipped."""
         if self._chosen is not None:
+            self._chosen = self._as_accepted(self._chosen)
             return self._chosen
         earlier = self._earlier()
         if earlier:
@@ -208,6 +229,17 @@ class TwoRobots:
             name for name, known in shipped().items() if known != self._session.state.layout
         )
         return [THIS_ROBOT, Source(f"Shipped: {name}", State(shipped()[name]))]
+
+    def _as_accepted(self, chosen: list[Source]) -> list[Source]:
+        """What stands on `PLACES` after undo or redo of an `accept`, where nothing else was chosen
+        since: the robot that was accepted is that of the page, or stands beside it again."""
+        state = self._session.state
+        for acceptance in reversed(self._acceptances):
+            if chosen is acceptance.sources_after and state is acceptance.state_before:
+                return acceptance.sources_before
+            if chosen is acceptance.sources_before and state is acceptance.state_after:
+                return acceptance.sources_after
+        return chosen
 
     def _put(self, place: str, source: Source) -> None:
         index = PLACES.index(one_of(place, "place", PLACES))
