@@ -1,7 +1,7 @@
 """The board of a page: properties of handles are declared as functions of facts, made when these
 change.
 
-A function names the facts that it is made of as its parameters: `lambda layout, saved: ...`.
+A function names the facts that it is made of as its parameters: `lambda layout, is_edited: ...`.
 """
 
 import inspect

@@ -79,8 +79,10 @@ def facts_of(
         "lost": state.lost,
         "flow": state.flow,
         "able": state.able,
-        # The session: saved, desk, display, draft, swim, loops ...
+        # The session: desk, display, draft, swim, loops ...
         **vars(session),
+        "saved": session.saved,
+        "is_edited": session.is_edited,
         "selected": session.selected,
         "selection": session.selection,
         "task": session.desk.task,

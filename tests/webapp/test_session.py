@@ -175,6 +175,22 @@ def test_starting_over_is_as_at_first_sight_and_can_be_undone(session: Session) 
     assert session.state.layout.name == "B"
 
 
+def test_undo_to_a_robot_as_it_was_opened_is_no_edit(session: Session) -> None:
+    session.new_layout("thruster")
+    assert not session.is_edited
+    session.rename_robot("mine")
+    assert session.is_edited
+    session.saved = session.state.layout  # what saving does
+    assert not session.is_edited
+    session.undo()
+    assert not session.is_edited, "as it was begun"
+    session.undo()
+    assert not session.is_edited, "the robot before it, which nobody has touched"
+    session.redo()
+    session.rename_robot("another")
+    assert session.is_edited
+
+
 @pytest.mark.parametrize("value", [-1.0, float("nan"), "warm"])
 def test_settings_have_the_ranges_of_their_method(value: object) -> None:
     session = Session(load_layout("A"))

@@ -141,6 +141,7 @@ def test_either_can_be_accepted_by_a_step_that_is_undone(session: Session) -> No
     left, right = looked_at(session).both
     assert right.is_this and left.state.layout == ucat
 
+
 def test_what_was_chosen_since_stays_at_undo(session: Session) -> None:
     session.two_robots.choose("right", "Shipped: octo")
     session.two_robots.accept("right")

@@ -77,9 +77,9 @@ def card(markup: Callable[..., str]) -> Callable[[Page], object]:
     return lambda page: page.add_html(markup)
 
 
-def robot_name(layout: Layout, saved: Layout) -> str:
+def robot_name(layout: Layout, is_edited: bool) -> str:
     """The robot's name, and whether it has been changed since it was opened or saved."""
-    remark = "" if layout == saved else Markup("<span class='dim'>edited</span>")
+    remark = Markup("<span class='dim'>edited</span>") if is_edited else ""
     template = "<div class='fl-robot' title='{}'><h1>{}</h1>{}</div>"
     return html(template, layout.name, layout.name, remark)
 

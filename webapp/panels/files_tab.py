@@ -126,8 +126,8 @@ def add_designs(page: Page) -> None:
         if name in shipped():
             page.designs.open_shipped(shipped()[name])
 
-    def entry(layout: Layout, saved: Layout) -> str:
-        return shipped_name(layout) or _own_entry(layout, saved)
+    def entry(layout: Layout, is_edited: bool) -> str:
+        return shipped_name(layout) or _own_entry(layout, is_edited)
 
     layouts = page.gui.add_dropdown(
         "Layout", tuple(shipped()), hint="Shipped layouts to start from."
@@ -137,15 +137,15 @@ def add_designs(page: Page) -> None:
     page.add_html(_description)
 
 
-def _own_entry(layout: Layout, saved: Layout) -> str:
+def _own_entry(layout: Layout, is_edited: bool) -> str:
     """The entry of a layout that is not shipped."""
-    return f"{layout.name}, {'yours' if layout == saved else 'edited'}"
+    return f"{layout.name}, {'edited' if is_edited else 'yours'}"
 
 
-def _entries(layout: Layout, saved: Layout) -> tuple[str, ...]:
+def _entries(layout: Layout, is_edited: bool) -> tuple[str, ...]:
     """The shipped layouts, and the present one where it is another."""
     names = tuple(shipped())
-    return names if shipped_name(layout) else (*names, _own_entry(layout, saved))
+    return names if shipped_name(layout) else (*names, _own_entry(layout, is_edited))
 
 
 def _description(layout: Layout) -> str:

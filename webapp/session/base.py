@@ -41,6 +41,10 @@ FAULT_VERBS = {"weak": "Weaken", "torn": "Tear", "stuck": "Jam", "running": "Let
 """Kind of fault -> what undo calls the step that brings it about."""
 
 
+MOST_KEPT = 20
+"""Layouts as they were opened or saved that a session remembers."""
+
+
 class BaseSession:
     """All of a session but changes of its layout. Undo takes back what was done last to the robot,
     to the question asked of it, or along the null space of the answer."""
@@ -53,8 +57,8 @@ class BaseSession:
         self.desk = Desk()
         self.selection_order: tuple[str, ...] = ()
         """The selected actuators, in the order in which they were chosen."""
-        self.saved = layout
-        """The layout as it was opened or saved last."""
+        self._kept: tuple[Layout, ...] = (layout,)
+        """Layouts as they were opened or saved, the newest last."""
         self.draft = SearchRequest()
         """What the next search for a better layout is to do."""
         self.swim = SwimSettings()
@@ -74,6 +78,22 @@ class BaseSession:
 
     state: State = property(attrgetter("history.state"))  # type: ignore[assignment]
     """The present state."""
+
+    @property
+    def saved(self) -> Layout:
+        """The layout as it was opened or saved last."""
+        return self._kept[-1]
+
+    @saved.setter
+    def saved(self, layout: Layout) -> None:
+        others = [kept for kept in self._kept if kept is not layout]
+        self._kept = (*others, layout)[-MOST_KEPT:]
+
+    @property
+    def is_edited(self) -> bool:
+        """Whether the robot is none of those that were opened or saved: undo may lead back to an
+        earlier one of them."""
+        return self.state.layout not in self._kept
 
     # The state and its undo.
 
