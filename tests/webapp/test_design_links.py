@@ -119,14 +119,16 @@ class Browser:
     def __init__(self) -> None:
         self.sent: list[str] = []
         self.notes: list[str] = []
+        self.saved: list[str] = []
+        """Notes on what was saved."""
 
 
 def designs_of(session: Session, browser: Browser) -> Designs:
     """The designs of a page, whose notes and downloads a stand-in keeps."""
 
     def notify(title: str, text: str, calm: bool = False) -> None:
-        if title != "Saved":
-            browser.notes.append(text)
+        notes = browser.saved if title == "Saved" else browser.notes
+        notes.append(text)
 
     def send(name: str, *_: object, **__: object) -> None:
         browser.sent.append(name)
@@ -153,6 +155,27 @@ def test_saving_sends_the_design_and_notes_it() -> None:
     session.rename_robot("My turtle")
     designs_of(session, browser).save()
     assert browser.sent == ["My_turtle.yaml"] and session.saved == session.state.layout
+
+
+def test_pairs_that_do_not_travel_are_named_and_linked_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    mine = Session(load_layout("hexa"))
+    browser = Browser()
+    scripts: list[str] = []
+    monkeypatch.setattr("webapp.tasks.designs.run_script", lambda _, script: scripts.append(script))
+    mine.new_layout("thruster")
+    mine.mirror()
+    designs_of(mine, browser).save()
+    designs_of(mine, browser).share()
+    said = "move together (left and right): once it is open, press Mirror on one of each pair"
+    assert said in browser.saved[-1]
+    assert "The link does not keep" in scripts[0]
+    theirs = Session(files.unpacked(files.packed(mine.state.layout)).layout)
+    theirs.select("left")
+    theirs.mirror()
+    assert theirs.state.links == mine.state.links, "nothing was added, both are linked"
+    assert theirs.state.layout == mine.state.layout
 
 
 def test_a_link_carries_the_wrench_and_says_that_it_is_a_copy(

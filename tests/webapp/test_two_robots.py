@@ -151,6 +151,23 @@ def test_what_was_chosen_since_stays_at_undo(session: Session) -> None:
     assert left.title == "Shipped: hexa" and right.is_this
 
 
+def test_two_of_one_name_are_told_apart(session: Session) -> None:
+    """A robot and what it was before have one name, which says nothing."""
+    session.new_layout("thruster")
+    session.rename_robot("mine")
+    session.mirror()
+    pair = looked_at(session)
+    assert pair.names == ("mine (This robot)", "mine (Before: Mirror left)")
+    assert "<i>Before: Mirror left</i>" in figures_table(pair, (None, None), (None, None))
+    card = score_card(session.state.layout)
+    words = summary(pair, (None, None), (card, None))
+    assert words == ("The left one loses axes when left or right fails.",)
+    session.two_robots.choose("right", "Shipped: octo")
+    pair = looked_at(session)
+    assert pair.names == ("mine", "octo")
+    assert "Shipped: octo</i>" not in figures_table(pair, (None, None), (None, None))
+
+
 def test_the_same_robot_is_not_accepted(session: Session) -> None:
     session.toggle_loss("front_left")
     session.toggle_loss("front_left")

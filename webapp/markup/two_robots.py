@@ -88,7 +88,6 @@ def figures_table(
         cards: their score cards; None while there is none.
         is_busy: whether the answers are to an earlier wrench.
     """
-    names = [standing.state.layout.name for standing in pair.both]
     groups = [
         ("At this wrench", _answer_rows(replies), is_busy),
         ("Reach", _reach_rows(pair, cards), False),
@@ -99,15 +98,20 @@ def figures_table(
         rows.append(html("<tr class='group'><th colspan='3'>{}</th></tr>", title))
         for figure in figures:
             rows.append(_markup_of(figure, is_old))
-    head = html(
-        "<tr><th></th><th title='{}'><i>left</i><br><b>{}</b></th>"
-        "<th title='{}'><i>right</i><br><b>{}</b></th></tr>",
-        names[0],
-        names[0],
-        names[1],
-        names[1],
-    )
+    head = html("<tr><th></th>{}{}</tr>", *_heads(pair))
     return html("<table class='versus'>{}{}</table>", head, rows)
+
+
+def _heads(pair: Pair) -> list[str]:
+    """The heads of both columns: place and name, and where each comes from where both have the same
+    name."""
+    heads = []
+    names = [standing.state.layout.name for standing in pair.both]
+    for place, standing, name in zip(PLACES, pair.both, names, strict=True):
+        origin = html("<br><i>{}</i>", standing.title) if len(set(names)) == 1 else ""
+        template = "<th title='{}'><i>{}</i><br><b>{}</b>{}</th>"
+        heads.append(html(template, f"{name}: {standing.title}", place, name, origin))
+    return heads
 
 
 def _markup_of(row: FigureRow, is_old: bool) -> str:
@@ -261,11 +265,12 @@ def summary(
         costly = [loss.actuator for loss in card.losses if loss.lost]
         if len(costly) > MOST_NAMED:
             sentences.append(
-                f"Without any one of {len(costly)} actuators the {place} one loses axes."
+                f"The {place} one loses axes when any of {len(costly)} of its "
+                f"{len(card.losses)} working actuators fails."
             )
         elif costly:
             names = " or ".join(costly)
-            sentences.append(f"Without {names} the {place} one loses axes.")
+            sentences.append(f"The {place} one loses axes when {names} fails.")
     return tuple(sentences)
 
 

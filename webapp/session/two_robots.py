@@ -74,6 +74,17 @@ class Pair:
         """In the order of `PLACES`."""
         return self.left, self.right
 
+    @property
+    def names(self) -> tuple[str, str]:
+        """What each is called where both are spoken of: its robot's name, with where it comes from
+        where both have the same."""
+        left, right = self.both
+        left_name = left.state.layout.name
+        right_name = right.state.layout.name
+        if left_name != right_name:
+            return left_name, right_name
+        return f"{left_name} ({left.title})", f"{right_name} ({right.title})"
+
 
 THIS_ROBOT = Source(THIS, None)
 """The robot that the page works on."""
