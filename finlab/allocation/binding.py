@@ -153,6 +153,10 @@ def budget_words(budget: "PowerBudget", power: Array) -> tuple[str, ...]:
     return tuple(name for name, is_full in zip(budget.names, is_used_up, strict=True) if is_full)
 
 
+NOT_APART = "not given apart by these actuators"
+"""How the last resort of `what_binds` ends, after names of axes."""
+
+
 def what_binds(
     layout: Layout,
     command: Array,
@@ -189,4 +193,4 @@ def what_binds(
         return words
     largest = np.abs(missing).max()
     axes = axes_in(np.abs(missing) >= MISSING_SHARE * largest)
-    return (f"{', '.join(axes)} not given apart by these actuators",)
+    return (f"{', '.join(axes)} {NOT_APART}",)

@@ -14,6 +14,7 @@ import pytest
 
 import finlab
 from finlab.allocation import Allocation, Allocator
+from finlab.allocation.binding import NOT_APART
 from finlab.allocation.report import bound_words, missing_words
 from finlab.analysis import score_card
 from finlab.analysis.card_text import AXIS_COLUMNS, axis_rows, held_remarks
@@ -41,6 +42,7 @@ from webapp.panels.modes_tab import comparison_table
 from webapp.panels.status import corner
 from webapp.scene.wrench_nodes import ARROWS, LENGTH, NEWTONS, fitting
 from webapp.session import Session, files
+from webapp.session.layout_edits import blank
 from webapp.session.lessons import TOUR
 from webapp.session.state import State
 from webapp.session.targets import PRESETS, axis_reach, full_thrust
@@ -97,6 +99,19 @@ def test_all_that_is_said_of_an_answer_agrees(share: float, target: tuple[float,
     if verdict != "Exact":
         axis = int(np.argmax(np.abs((wrench - target) / answer.scale)))
         assert MOTIONS[axis] in said
+
+
+def test_an_axis_that_nothing_gives_is_spoken_of_once() -> None:
+    layout = blank("thruster")  # one, which points ahead
+    target = (0.0, 2.0, 0.0, 0.0, 0.0, 0.0)
+    answer = Allocator(layout).allocate(target)
+    assert any(words.endswith(NOT_APART) for words in answer.binding)
+    said = str(answer_sentence(State(layout, target=target), answer, False, searching=True))
+    assert (
+        "This robot cannot sway, heave, roll and pitch." in said
+        and "of sway is left undone" in said
+    )
+    assert "apart" not in said
 
 
 def test_no_verdict_stands_beside_a_new_question() -> None:

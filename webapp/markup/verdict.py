@@ -9,6 +9,7 @@ from enum import Enum
 from markupsafe import Markup
 
 from finlab.allocation.allocation import Allocation
+from finlab.allocation.binding import NOT_APART
 from finlab.allocation.report import bound_words, missing_words, share_words
 from finlab.display import as_sentence
 from finlab.physics.objective import REACHED
@@ -80,28 +81,38 @@ def answer_sentence(
         searching: whether what is proved of the answer is not known yet, and not said.
     """
     sentences: list[str] = []
+    blind = authority_sentence(
+        state.layout, state.lost, axis_reach(state.able, state.lost, state.flow)
+    )
     if allocation is not None and not busy:
         if allocation.unknown_fins:
             sentences.append(_warning("; ".join(allocation.notes) + "."))
         sentences.append(as_sentence(missing_words(allocation)))
         if not allocation.reachable and not allocation.unknown_fins:
-            sentences.append(_remarks_sentence(allocation, searching))
+            sentences.append(_remarks_sentence(allocation, searching, blind is not None))
         elif allocation.reachable and not searching:
             sentences.append(as_sentence(bound_words(allocation)))
             sentences.append(as_sentence(allocation.measure_next))
     elif busy:
         sentences.append(WORKING)
-    blind = authority_sentence(
-        state.layout, state.lost, axis_reach(state.able, state.lost, state.flow)
-    )
     if blind is not None:
         sentences.insert(0, _warning(blind))
     return Markup(" ").join(filter(None, sentences))
 
 
-def _remarks_sentence(allocation: Allocation, searching: bool) -> str:
-    """How much is delivered, what binds, and what the method notes unless it is `searching`."""
-    remarks = [*share_words(allocation), *allocation.binding]
+def _remarks_sentence(allocation: Allocation, searching: bool, is_blind: bool) -> str:
+    """How much is delivered, what binds, and what the method notes.
+
+    Args:
+        allocation: the answer that is on the robot.
+        searching: whether what the method notes is not known yet.
+        is_blind: whether it has been said already that the robot cannot act on some axes.
+    """
+    remarks = share_words(allocation)
+    for words in allocation.binding:
+        is_told = is_blind and words.endswith(NOT_APART)
+        if not is_told:
+            remarks.append(words)
     if not searching:
         remarks += allocation.notes
     words = "; ".join([remark for remark in remarks if not remark.endswith(AT_REST)])
