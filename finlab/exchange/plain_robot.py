@@ -93,7 +93,8 @@ def _frame(
     if exchange.frame is None:
         frame, where = stated_frame(_scopes(thrusters), comments)
         if frame:
-            exchange.note(f"Its frame is {FRAMES[frame]} ({where}).")
+            turned = "" if frame == "FLU" else f", and was turned to {FRAMES['FLU']}"
+            exchange.note(f"Its frame is {FRAMES[frame]} ({where}){turned}.")
         return frame
     with suppress(LayoutError):  # a word for it that is not known does not count
         frame, where = stated_frame(_scopes(thrusters), comments)

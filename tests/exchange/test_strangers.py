@@ -50,7 +50,7 @@ def sdf(inside: str, version: str = "1.9") -> str:
                    "mass_matrix: [[1,0,0,0,0,0],[0,1,0,0,0,0],[0,0,1,0,0,0],[0,0,0,1,0,0],[0,0,0,0,1,0],[0,0,0,0,0,1]]",
          "Not read: mass_matrix"),
         ("a.yaml", "frame: ned\nmatrix: {fx: [1,1,0], fy: [0,0,0], fz: [0,0,-1], mx: [0,0,.1], my: [0,0,.2], mz: [-.3,.3,0]}",
-         "y right, z down"),
+         "y right, z down (frame ned), and was turned to x forward, y left, z up"),
         ("a.csv", "name,Fx,Fy,Fz,Tx,Ty,Tz,min,max\nport,1,0,0,0,0,0.3,-5,6\nstarboard,1,0,0,0,0,-3e-1,-5,6\n"
                   "lift,0,0,1,0.1,-0.2,0,-5,6\n", "a row per thruster"),
         ("a.csv", "# body frame SNAME, port and starboard\nX;Y;Z;K;M;N\n1;0;0;0;0;-.3\n1;0;0;0;0;.3\n0;0;-1;.1;.2;0\n", "its comment"),

@@ -168,9 +168,9 @@ def test_pairs_that_do_not_travel_are_named_and_linked_again(
     mine.mirror()
     designs_of(mine, browser).save()
     designs_of(mine, browser).share()
-    said = "move together (left and right): once it is open, press Mirror on one of each pair"
+    said = "That Mirror has linked left and right is not in the file"
     assert said in browser.saved[-1]
-    assert "The link does not keep" in scripts[0]
+    assert "is not in the link: press Mirror anew" in scripts[0]
     theirs = Session(files.unpacked(files.packed(mine.state.layout)).layout)
     theirs.select("left")
     theirs.mirror()

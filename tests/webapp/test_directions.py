@@ -89,6 +89,17 @@ def test_a_twin_follows_in_place_and_direction() -> None:
     assert session.undo() == "Point front_left"
 
 
+def test_what_rounding_has_left_of_a_direction_counts_as_none() -> None:
+    session = Session(load_layout("octo"))
+    name = session.state.layout.names[0]
+    session.point(name, (3e-7, 0.0, 1.0))
+    assert session.state.layout.actuator(name).direction == (0.0, 0.0, 1.0)
+    session.point(name, (3e-5, 0.0, 1.0))
+    assert session.state.layout.actuator(name).direction[0] == pytest.approx(3e-5)
+    with pytest.raises(FinlabError, match="expected a vector with a length"):
+        session.point(name, (0.0, 0.0, 0.0))
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_is_added_points_where_it_is_told_with_the_rest_across(kind: str) -> None:
     session = Session(load_layout("fish"))

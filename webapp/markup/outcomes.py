@@ -99,7 +99,7 @@ def _warnings(swimmer: Swimmer, moment: Moment) -> str:
         if missing:
             condition = f"Without {fins_words(missing, swimmer.layout)}"
         sentence = (
-            "<div class='missing'>{} surge, heave and yaw are not free of each other: expect it "
+            "<div class='missing'>{}, not all of surge, heave and yaw come apart: expect it "
             "to drift off.</div>"
         )
         lines.append(html(sentence, condition))

@@ -61,8 +61,11 @@ def with_mounting_angle(layout: Layout, name: str, angle: float) -> Layout:
 
 
 def pointed(layout: Layout, name: str, direction: Vector3) -> Layout:
-    """The layout with an actuator along a direction of any length, see `Actuator.facing`."""
-    x, y, z = (number(value, f"direction of {name}", -1e6, 1e6) for value in direction)
+    """The layout with an actuator along a direction of any length, see `Actuator.facing`. What the
+    page's rounding has left of a component counts as none: [3e-7, 0, 1] is straight up."""
+    checked = [number(value, f"direction of {name}", -1e6, 1e6) for value in direction]
+    least = UNTOUCHED * max(abs(value) for value in checked)
+    x, y, z = [value if abs(value) > least else 0.0 for value in checked]
     return layout.with_actuator(layout.actuator(name).facing((x, y, z)))
 
 

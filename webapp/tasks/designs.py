@@ -320,8 +320,7 @@ def pairs_words(links: Links, carrier: str) -> str:
         return ""
     pairs = "; ".join([" and ".join(pair) for pair in links])
     return (
-        f"The {carrier} does not keep which actuators move together ({pairs}): once it is open, "
-        "press Mirror on one of each pair"
+        f"That Mirror has linked {pairs} is not in the {carrier}: press Mirror anew once it is open"
     )
 
 
