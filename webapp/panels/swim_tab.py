@@ -72,7 +72,7 @@ def _borrowed_body(layout: Layout) -> str:
         sentence = f"Its body is not described: it swims with that of U-CAT, {mass_kg:g} kg."
     else:
         sentence = f"Not said of its body: {listed(unsaid)}. It swims with U-CAT's."
-    remedy = "Estimate them from the hull in Design, at the robot's row."
+    remedy = "Estimate it from the hull in Design, at the robot's row."
     return html("<div class='missing'>{} {}</div>", sentence, remedy)
 
 
@@ -92,7 +92,10 @@ def add_run(page: Page) -> None:
     page.add_button("Start", start, icon=viser.Icon.PLAYER_PLAY, hint="From the beginning.")
     runs = {"Pause": hold, "Go on": hold, "Step": swimming.step, "End": page.scenery.end_swim}
     run = page.add_buttons(
-        "Run", runs, visible=False, hint="Step swims for 0.1 s; B pauses or goes on."
+        "Run",
+        runs,
+        visible=False,
+        hint="Step swims for 0.1 s; B pauses or goes on. End clears the swim: save its log first.",
     )
     page.board.show(
         run,
