@@ -17,6 +17,7 @@ from finlab.swim.vehicle.fossen import GRAVITY
 from tests.webapp.stand_in import load_stand_in
 from webapp.markup.answer import fin_table
 from webapp.markup.words import damage_words
+from webapp.panels.body_inspector import hull_card
 from webapp.panels.files_tab import command_line
 from webapp.session import Session
 from webapp.session.layout_edits import DYNAMICS, with_dynamics
@@ -172,6 +173,17 @@ def body(hulled: Session) -> Body:
     found = hulled.state.layout.body
     assert found is not None
     return found
+
+
+def test_a_made_up_hull_is_not_held_against_the_body(hulled: Session) -> None:
+    """A file of another program has mass and buoyancy, and no hull that is read."""
+    hulled.estimate()
+    layout = hulled.state.layout
+    heavy = replace(body(hulled), mass_kg=99.0, buoyancy_n=None)
+    said = hull_card(replace(layout, body=heavy))
+    assert "The hull encloses" in said and "that of 99 kg" in said.replace("99.0", "99")
+    said = hull_card(replace(layout, body=replace(heavy, hull=None)))
+    assert "made to fit its actuators" in said and "buoyancy is that of" not in said
 
 
 def test_all_is_estimated_in_one_step_and_is_neutral(hulled: Session) -> None:

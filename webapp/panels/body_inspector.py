@@ -37,7 +37,7 @@ def add_body(page: Page) -> None:
         )
         page.ask("Forget the body?", text, {"Forget": session.forget_dynamics})
 
-    page.add_html(_hull_card)
+    page.add_html(hull_card)
     page.bind(gui.add_text("Name", ""), session.rename_robot, lambda layout: layout.name)
     text = gui.add_text("About", "", multiline=True)
     page.bind(text, session.describe_robot, lambda layout: layout.description)
@@ -88,14 +88,21 @@ def _numbers(body: Body, key: str) -> tuple[float, ...]:
     return numbers or (nan,) * 3 * len(VECTORS[key])
 
 
-def _hull_card(layout: Layout) -> str:
-    """How much water the hull encloses, whether that fits the body, and what a swim would lack."""
+def hull_card(layout: Layout) -> str:
+    """How much water the hull encloses, and whether it is a made-up one; whether that fits the
+    body, and what a swim would lack."""
     body = _body(layout)
     water_kg = displaced(layout)
+    is_described = body.hull is not None
     sentences = [f"The hull encloses {three_digits(water_kg)} kg of water."]
+    if not is_described:
+        sentences = [
+            "Of its hull nothing is said: the one that is drawn is made to fit its actuators, with "
+            f"{three_digits(water_kg)} kg of water."
+        ]
     if body.mass_kg is not None:
         lift_kg = lift_of(body) / GRAVITY
-        if contradicts(layout):
+        if is_described and contradicts(layout):
             is_less = lift_of(body) < GRAVITY * water_kg
             reason = "it is flooded in part" if is_less else "other parts lift, too"
             sentences.append(
