@@ -92,10 +92,7 @@ def add_run(page: Page) -> None:
     page.add_button("Start", start, icon=viser.Icon.PLAYER_PLAY, hint="From the beginning.")
     runs = {"Pause": hold, "Go on": hold, "Step": swimming.step, "End": page.scenery.end_swim}
     run = page.add_buttons(
-        "Run",
-        runs,
-        visible=False,
-        hint="Step swims for 0.1 s; B pauses or goes on. End clears the swim: save its log first.",
+        "Run", runs, visible=False, hint="Step swims for 0.1 s; B pauses or goes on."
     )
     page.board.show(
         run,
