@@ -197,7 +197,8 @@ def mode_table(modes: Modes, mode: int) -> str:
         )
     header = html(
         "<tr><th>#</th><th class='words'>mode</th><th>error</th><th>power&nbsp;[W]</th>{}"
-        "<th title='largest share of its range that an actuator uses'>used</th></tr>",
+        "<th title='largest share that an actuator uses: a fin of its range of amplitude or "
+        "frequency, another one of its full thrust'>used</th></tr>",
         Markup("<th>effort</th>" * of_fins),
     )
     remaining = modes.count - len(modes.visible)

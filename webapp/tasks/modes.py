@@ -27,6 +27,10 @@ SAME_SIZE = 0.25
 """Thrusts, and ratios of amplitude to frequency, whose logarithms differ by less are the same."""
 LEAST_SPAN = 1e-9
 """Span that a limited command is taken to have at least, for shares of it."""
+FIN_RANGES = slice(0, 2)
+"""Numbers of a fin's command that have a range to use: amplitude and frequency."""
+LEAST_THRUST = 1e-9
+"""What full thrust counts as at least [N], for shares of it."""
 
 
 class ModeSignature(NamedTuple):
@@ -62,7 +66,7 @@ class Mode(PlainData):
     power: float
     """Mean mechanical power [W]."""
     saturation: float
-    """Largest share of any fin's range of amplitude or frequency that is used; 1 is a limit."""
+    """Largest share that an actuator uses, see `largest_used_share`; 1 is a limit."""
     still: tuple[int, ...]
     """Indices of the fins that do not push, by their own laws; others of `resting` hardly do."""
     signature: ModeSignature
@@ -96,20 +100,37 @@ def find_modes(
     for members in cluster(signatures):
         first = members[0]
         command = candidates.command[first]
-        used = ((command - lower) / span)[:, :2]
+        used = (command - lower) / span
         size = force[first]
         mode = Mode(
             command=command,
             err_norm=float(candidates.err_norm[first]),
             effort=float(candidates.effort[first]),
             power=float(candidates.power[first]),
-            saturation=float(np.clip(np.nanmax(used), 0.0, 1.0)),
+            saturation=float(np.clip(np.nanmax(used[:, FIN_RANGES]), 0.0, 1.0)),
             still=tuple(np.flatnonzero(size < STILL * size.max()).tolist()),
             signature=signatures.row(first),
             sources=tuple(dict.fromkeys(map(candidates.source.__getitem__, members))),
         )
         modes.append(mode)
     return tuple(modes)
+
+
+def largest_used_share(layout: Layout, command: Array, size: Array, full_thrust: Array) -> float:
+    """Returns the largest share that an actuator uses: a fin of its range of amplitude or
+    frequency, another one of its full thrust.
+
+    Args:
+        layout: the robot of n actuators.
+        command: (n, 3), NaN for lost ones.
+        size: of each force (n,) [N].
+        full_thrust: largest force (n,) of each [N].
+    """
+    span = np.maximum(layout.upper - layout.lower, LEAST_SPAN)
+    range_shares = ((command - layout.lower) / span)[:, FIN_RANGES].max(axis=1)
+    thrust_shares = size / np.maximum(full_thrust, LEAST_THRUST)
+    shares = np.where(layout.is_fin, range_shares, thrust_shares)
+    return float(np.clip(np.nanmax(shares), 0.0, 1.0))
 
 
 def cluster(signatures: ModeSignature) -> list[list[int]]:

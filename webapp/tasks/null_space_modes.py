@@ -8,7 +8,7 @@ from finlab.allocation.report import is_proved_least
 from finlab.analysis.null_space import NullSpace
 from finlab.arrays import Array
 from webapp.session.targets import full_thrust
-from webapp.tasks.modes import Mode, mode_signature
+from webapp.tasks.modes import Mode, largest_used_share, mode_signature
 from webapp.tasks.solver import Modes, NamedMode, NullSpaceDirections
 
 MOST = 6
@@ -21,8 +21,6 @@ OTHER = "another way"
 """Name of the mode whose forces are shifted."""
 MEAN = "average of 1 and 2"
 """Name of the mode that is the mean of both commands."""
-LEAST_THRUST = 1e-9
-"""What full thrust counts as at least [N], for shares of it."""
 
 
 def null_space_modes(answer: Allocation, shifts: tuple[float, ...]) -> Modes:
@@ -80,13 +78,13 @@ def _mode(answer: Allocation, command: Array, name: str, badge: str) -> NamedMod
     other = answer.with_command(command)
     size = np.linalg.norm(other.forces, axis=-1)
     flow = None if answer.flow is None else tuple(answer.flow.tolist())
-    full = np.maximum(full_thrust(answer.layout, flow), LEAST_THRUST)
+    full = full_thrust(answer.layout, flow)
     mode = Mode(
         command=command,
         err_norm=other.err_norm,
         effort=np.nan if other.effort is None else other.effort,
         power=other.power,
-        saturation=min(float((size / full).max()), 1.0),
+        saturation=largest_used_share(answer.layout, command, size, full),
         still=(),
         signature=mode_signature(command, size),
         sources=(),

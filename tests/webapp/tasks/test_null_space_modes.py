@@ -50,6 +50,20 @@ def test_another_way_is_exact_and_dearer_and_the_mean_stands_beside_it(layout: L
     )
 
 
+def test_the_answer_uses_as_much_in_both_tables() -> None:
+    """Of fins it is the range of amplitude and frequency, of others the full thrust."""
+    answer = Allocator(load_layout("ucat")).allocate(TARGET)
+    ranges = answer.layout.upper - answer.layout.lower
+    used = (answer.command - answer.layout.lower) / ranges
+    (mode,) = null_space_modes(answer, ()).visible
+    assert mode.mode.saturation == pytest.approx(used[:, :2].max())
+    answer = Allocator(BLUEROV).allocate(TARGET)
+    forces = answer.command[:, 0]
+    limits = np.maximum(-BLUEROV.lower[:, 0], BLUEROV.upper[:, 0])
+    (mode,) = null_space_modes(answer, ()).visible
+    assert mode.mode.saturation == pytest.approx(np.abs(forces / limits).max(), rel=1e-3)
+
+
 def test_a_robot_without_another_way_says_so() -> None:
     layout = load_layout("ucat").without(["back_left", "back_right"])
     modes = null_space_modes(Allocator(layout).allocate([0.5, 0, 0, 0, 0, 0]), (1.0,))
