@@ -162,6 +162,10 @@ def test_two_of_one_name_are_told_apart(session: Session) -> None:
     card = score_card(session.state.layout)
     words = summary(pair, (None, None), (card, None))
     assert words == ("The left one loses axes when left or right fails.",)
+    for count, said in ((3, "any of 3 of its 4"), (4, "any of its 4")):
+        losses = [replace(card.losses[0], lost=("Fx",) * (k < count)) for k in range(4)]
+        (sentence,) = summary(pair, (None, None), (replace(card, losses=tuple(losses)), None))
+        assert sentence == f"The left one loses axes when {said} working actuators fails."
     session.two_robots.choose("right", "Shipped: octo")
     pair = looked_at(session)
     assert pair.names == ("mine", "octo")

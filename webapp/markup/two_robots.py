@@ -264,9 +264,11 @@ def summary(
             continue
         costly = [loss.actuator for loss in card.losses if loss.lost]
         if len(costly) > MOST_NAMED:
+            n_working = len(card.losses)
+            share = "" if len(costly) == n_working else f"{len(costly)} of "
             sentences.append(
-                f"The {place} one loses axes when any of {len(costly)} of its "
-                f"{len(card.losses)} working actuators fails."
+                f"The {place} one loses axes when any of {share}its {n_working} working actuators "
+                "fails."
             )
         elif costly:
             names = " or ".join(costly)
