@@ -156,6 +156,14 @@ def test_mirror_duplicate_add_and_selection(session: Session) -> None:
     assert session.selected is None, "a fin that is gone is not selected"
 
 
+def test_nothing_is_selected_of_another_robot(session: Session) -> None:
+    session.select("back_left")
+    session.rename("back_left", "stern")
+    assert session.selected == "stern", "it is called otherwise"
+    session.open_layout(load_layout("A"))
+    assert session.state.layout.n == 4 and session.selected is None
+
+
 def test_next_fin_goes_round(session: Session) -> None:
     seen = []
     for _ in range(5):

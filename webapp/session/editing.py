@@ -77,16 +77,20 @@ class Session(BaseSession):
             granted=granted,
             source=source,
         )
-        self._commit(step or f"Open {layout.name}", state)
-        self.saved = layout
+        self._open(step or f"Open {layout.name}", state)
 
     def open_example(
         self, layout: Layout, target: tuple[float, float, float, float, float, float], speed: float
     ) -> None:
         """A robot with a wrench (6,) [N, N m] and a speed ahead [m/s] that suit it."""
-        state = State(layout, target=target, speed=speed)
-        self._commit(f"Open {layout.name}", state)
-        self.saved = layout
+        self._open(f"Open {layout.name}", State(layout, target=target, speed=speed))
+
+    def _open(self, step: str, state: State) -> None:
+        """Another robot, none of whose actuators is selected: not even one in the place of that
+        which was."""
+        self._commit(step, state)
+        self.selection_order = ()
+        self.saved = state.layout
 
     def new_layout(self, kind: str) -> None:
         """A robot to begin with: one hull and one actuator of a type."""
