@@ -171,6 +171,9 @@ def test_pairs_that_do_not_travel_are_named_and_linked_again(
     said = "That Mirror has linked left and right is not in the file"
     assert said in browser.saved[-1]
     assert "is not in the link: press Mirror anew" in scripts[0]
+    mine.show_drawer(TWO_ROBOTS)
+    designs_of(mine, browser).share_pair()
+    assert "linked left and right is not in the link" in scripts[1]
     theirs = Session(files.unpacked(files.packed(mine.state.layout)).layout)
     theirs.select("left")
     theirs.mirror()

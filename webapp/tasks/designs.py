@@ -251,6 +251,9 @@ class Designs:
 
         def show(text: str) -> None:
             said = SHARED_PAIR + (" What is damaged does not travel." if is_damaged else "")
+            links = tuple(dict.fromkeys((*left.links, *right.links)))
+            if links:
+                said += f" {pairs_words(links, 'link')}."
             title = f"Share {' and '.join(pair.names)}"
             card = json.dumps([title, said, text])
             run_script(self._client.gui, f"finlabCards.share(...{card});")
