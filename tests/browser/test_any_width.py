@@ -95,6 +95,13 @@ def test_bar_and_status_have_all_at_every_width(resized: Any) -> None:
                 assert findings(page) == [], f"the menu at {width} px"
             tab.keyboard.press("Escape")
             tab.locator("#fl-menu").wait_for(state="hidden")
+            if width == SIZES[-1][0]:
+                menu.click()
+                tab.get_by_role("button", name="Share", exact=True).locator("visible=true").click()
+                card = tab.get_by_role("dialog")
+                box = card.bounding_box()
+                assert box["x"] >= 0.0 and box["x"] + box["width"] <= width, "all of the card"
+                card.get_by_role("button", name="Close").click()
 
 
 def test_a_lesson_is_opened_from_the_menu_of_a_phone_and_closed_by_a_key(resized: Any) -> None:
