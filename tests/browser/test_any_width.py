@@ -50,6 +50,8 @@ def test_a_newcomer_sees_three_doors_and_six_robots(browser: Any, served: Any) -
     assert findings(Newcomer(tab)) == [], "dark"
     tab.evaluate("document.querySelector('#fl-start').classList.remove('dark')")
     assert findings(Newcomer(tab), ["color-contrast"]) == [], "light"
+    back = tab.locator("#fl-start .back")
+    assert not back.is_visible(), "there is no work yet"
     tab.locator("[data-start='robot catamaran']").click()
     tab.locator("#fl-start").wait_for(state="hidden")
     tab.wait_for_function(SCHEME_SCRIPT, arg="dark")
@@ -59,6 +61,10 @@ def test_a_newcomer_sees_three_doors_and_six_robots(browser: Any, served: Any) -
     tab.reload()
     tab.locator(".fl-status .err").wait_for(state="attached")
     assert not tab.locator("#fl-start").is_visible(), "there is work now"
+    tab.evaluate("finlabStart.open()")
+    back.click()  # a phone has no Escape
+    tab.locator("#fl-start").wait_for(state="hidden")
+    assert session.state.layout.name == "catamaran"
     context.close()
 
 
