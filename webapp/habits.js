@@ -106,6 +106,30 @@
     lastKey = timeStamp;
   });
 
+  // A finger that goes along a slider drags it, and one that goes across scrolls the panel: Mantine would take hold of
+  // the slider with the first touch. So that touch is told once it is known to drag; what only taps is told by the mouse
+  // events that a browser makes of it.
+  const SLOP = 6; // pixels
+  let finger = null;
+  const hearTouch = (kind, hear) => window.addEventListener(kind, hear, { capture: true, passive: true });
+  hearTouch('touchstart', (event) => {
+    if (!event.isTrusted) return;
+    const { target, touches } = event;
+    finger = touches.length === 1 && target.closest?.('.mantine-Slider-root') ? { target, ...at(touches[0]) } : null;
+    if (finger) event.stopImmediatePropagation();
+  });
+  hearTouch('touchmove', ({ isTrusted, touches, changedTouches }) => {
+    if (!isTrusted || !finger) return;
+    const { x, y } = at(touches[0]), along = Math.abs(x - finger.x), across = Math.abs(y - finger.y);
+    if (Math.max(along, across) < SLOP) return;
+    const { target } = finger;
+    finger = null;
+    if (across > along) return;
+    const init = { touches: [...touches], changedTouches: [...changedTouches], bubbles: true, cancelable: true };
+    target.dispatchEvent(new TouchEvent('touchstart', init));
+  });
+  function at({ clientX, clientY }) { return { x: clientX, y: clientY }; }
+
   // Page keys go ten steps, Home and End to the ends of a slider: the server knows both (`number_boxes.py`). While one
   // types, Home and End belong to the text.
   listen('keydown', (event) => {
@@ -172,9 +196,22 @@
     inspector?.scrollTo(0, 0);
   }
 
+  // The card of a stop or lesson begins at its top and brings to a phone what it speaks of; its praise comes into sight.
+  let stop = '', isPraised = false;
+  function guide() {
+    const card = document.querySelector('.fl-tour'), praise = card?.querySelector('[role=status]');
+    const title = card?.querySelector('b').textContent ?? '';
+    if (card && title !== stop) {
+      page.dataset.flSheet = innerWidth > 600 ? '' : card.dataset.sheet;
+      card.closest('[data-fl~=region]')?.scrollTo(0, 0);
+    } else if (praise && !isPraised) praise.scrollIntoView({ block: 'nearest' });
+    [stop, isPraised] = [title, !!praise];
+  }
+
   function name() {
     asked = 0;
     inspect();
+    guide();
     const list = document.querySelector('.mantine-Spotlight-content');
     list?.setAttribute('aria-label', 'Commands');
     list?.querySelector('[data-scrollarea-viewport]')?.setAttribute('tabindex', '0');

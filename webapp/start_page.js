@@ -5,7 +5,8 @@
   const shown = () => !start.hidden;
   let isReady = false, chosen = null, isDecided = false;
 
-  function show(isDark) {
+  function show(isDark, hasWork = false) {
+    start.querySelector('.back').hidden = !hasWork;
     start.classList.toggle('dark', isDark);
     start.hidden = false;
     hold();
@@ -70,7 +71,7 @@
       else if (!isNew) hide();
       isDecided = true;
     },
-    open() { show(document.documentElement.dataset.mantineColorScheme === 'dark'); start.querySelector('button').focus(); },
+    open() { show(document.documentElement.dataset.mantineColorScheme === 'dark', true); start.querySelector('button').focus(); },
     close: hide,
   };
 })();

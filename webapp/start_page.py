@@ -85,6 +85,7 @@ def start_page() -> bytes:
     template = (
         "<style>{}</style><div id='fl-start' role='dialog' aria-modal='true' "
         "aria-labelledby='fl-start-title' hidden><div class='sheet'>"
+        "<button class='back' data-start='back' hidden>← Back to your robot</button>"
         "<h1 id='fl-start-title'>{}</h1><div class='doors'>{}</div>"
         "<h2>Or take one of these robots</h2><div class='robots'>{}</div></div></div>"
         "<script>{}</script>"

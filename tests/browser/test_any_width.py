@@ -50,6 +50,8 @@ def test_a_newcomer_sees_three_doors_and_six_robots(browser: Any, served: Any) -
     assert findings(Newcomer(tab)) == [], "dark"
     tab.evaluate("document.querySelector('#fl-start').classList.remove('dark')")
     assert findings(Newcomer(tab), ["color-contrast"]) == [], "light"
+    back = tab.locator("#fl-start .back")
+    assert not back.is_visible(), "there is no work yet"
     tab.locator("[data-start='robot catamaran']").click()
     tab.locator("#fl-start").wait_for(state="hidden")
     tab.wait_for_function(SCHEME_SCRIPT, arg="dark")
@@ -59,6 +61,10 @@ def test_a_newcomer_sees_three_doors_and_six_robots(browser: Any, served: Any) -
     tab.reload()
     tab.locator(".fl-status .err").wait_for(state="attached")
     assert not tab.locator("#fl-start").is_visible(), "there is work now"
+    tab.evaluate("finlabStart.open()")
+    back.click()  # a phone has no Escape
+    tab.locator("#fl-start").wait_for(state="hidden")
+    assert session.state.layout.name == "catamaran"
     context.close()
 
 
@@ -95,6 +101,13 @@ def test_bar_and_status_have_all_at_every_width(resized: Any) -> None:
                 assert findings(page) == [], f"the menu at {width} px"
             tab.keyboard.press("Escape")
             tab.locator("#fl-menu").wait_for(state="hidden")
+            if width == SIZES[-1][0]:
+                menu.click()
+                tab.get_by_role("button", name="Share", exact=True).locator("visible=true").click()
+                card = tab.get_by_role("dialog")
+                box = card.bounding_box()
+                assert box["x"] >= 0.0 and box["x"] + box["width"] <= width, "all of the card"
+                card.get_by_role("button", name="Close").click()
 
 
 def test_a_lesson_is_opened_from_the_menu_of_a_phone_and_closed_by_a_key(resized: Any) -> None:
@@ -129,4 +142,73 @@ def test_a_phone_reaches_list_and_drawer(resized: Any) -> None:
     tab.locator(".fl-strip").get_by_role("button", name="Values", exact=True).click()
     page.rest(300)
     assert tab.locator(".mantine-Paper-root[data-fl~=drawer]").first.bounding_box()["height"] < 50.0
+    page.page.get_by_role("button", name="Fold the drawer").click()
+    page.page.get_by_role("button", name="Open the drawer").wait_for()
+    tab.locator(".fl-strip").get_by_role("button", name="List", exact=True).click()
+    tab.get_by_role("button", name="Fold the drawer").wait_for()
+    list_region = tab.locator(".mantine-Paper-root[data-fl~=left]").first
+    page.until(lambda: list_region.bounding_box()["height"] > 200.0)
+    assert page.problems == []
+
+
+def swipe(page: Any, start: tuple[float, float], end: tuple[float, float]) -> None:
+    """Moves a finger over the page, from a point to another [px]."""
+    touch = page.page.context.new_cdp_session(page.page)
+
+    def tell(kind: str, *points: dict[str, float]) -> None:
+        touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": list(points)})
+
+    steps = 10
+    for step in range(steps + 1):
+        x, y = (a + (b - a) * step / steps for a, b in zip(start, end, strict=True))
+        tell("touchMove" if step else "touchStart", {"x": x, "y": y})
+        page.rest(20)
+    tell("touchEnd")
+    touch.detach()
+
+
+def test_a_finger_drags_a_slider_or_goes_across_it(resized: Any) -> None:
+    page = resized
+    tab = page.page
+    tab.set_viewport_size({"width": 390, "height": 844})
+    page.tab("Allocate")
+    page.rest(300)
+    thumb = tab.get_by_role("slider", name="Fz [N]")
+
+    def middle() -> tuple[float, float]:
+        box = thumb.bounding_box()
+        return box["x"] + box["width"] / 2.0, box["y"] + box["height"] / 2.0
+
+    before = page.session.state.target
+    x, y = middle()
+    swipe(page, (x, y), (x + 30.0, y))
+    page.until(lambda: page.session.state.target[2] > 1.0)
+    assert page.session.state.target[:2] == before[:2]
+    page.rest(500)
+    dragged = page.session.state.target
+    x, y = middle()
+    swipe(page, (x, y), (x + 2.0, y - 120.0))
+    page.rest(500)
+    assert page.session.state.target == dragged, "a finger that scrolls asks for nothing"
+    assert page.problems == []
+
+
+def test_a_stop_begins_at_its_top_on_a_phone_and_brings_what_it_speaks_of(resized: Any) -> None:
+    page = resized
+    tab = page.page
+    tab.set_viewport_size({"width": 390, "height": 844})
+    page.tab("Allocate")
+    scrolled = "[...document.querySelectorAll('[data-fl~=region][data-fl~=left]')][0].scrollTop"
+    sheet = "document.documentElement.dataset.flSheet"
+    for stop in LESSONS[3:8]:
+        page.view.do(lambda stop=stop: page.session.guide.open(stop.name))
+        tab.locator(".fl-tour", has_text=stop.title).wait_for()
+        page.until(lambda stop=stop: tab.evaluate(sheet) == ("" if stop.inspects else "drawer"))
+        assert tab.evaluate(scrolled) == 0, stop.title
+        card = tab.locator(".fl-tour .row").bounding_box()
+        strip = tab.locator(".fl-strip").bounding_box()
+        panel = tab.locator("[data-fl~=region][data-fl~=left]").first.bounding_box()
+        assert card["y"] + card["height"] <= panel["y"] + panel["height"] + 1.0, "Next is in sight"
+        assert strip["height"] > 0.0
+        tab.evaluate(f"{scrolled} = 400")
     assert page.problems == []

@@ -152,8 +152,11 @@ def guide_card(stop: Stop | None, solved: bool) -> str:
     buttons.append(button("Finish" if is_last else "Next", "on", attributes=attributes))
     if not is_last:
         buttons.append(button("Close", "end"))
-    template = "<div class='fl fl-tour {}'><b>{}</b>{}<div class='row'>{}</div></div>"
-    return html(template, style, title, markup, buttons)
+    template = (
+        "<div class='fl fl-tour {}' data-sheet='{}'><b>{}</b>{}<div class='row'>{}</div></div>"
+    )
+    sheet = "" if stop.inspects else "drawer"
+    return html(template, style, sheet, title, markup, buttons)
 
 
 def add_switches(page: Page) -> None:

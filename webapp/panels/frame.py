@@ -277,17 +277,20 @@ def _tab_strip(desk: Desk, drawer: str | None, layout: Layout) -> str:
     A phone has room for one region: two more buttons bring the inspector and the list there, and a
     tab brings the drawer.
     """
-    buttons = [
-        html("<button class='sheet' {}>{}</button>", _brings(region), word)
-        for region, word in ((RIGHT, "Values"), (LEFT, "List"))
-    ]
+    is_folded = drawer is None
+    buttons = []
+    for region, word in ((RIGHT, "Values"), (LEFT, "List")):
+        attributes = html("class='sheet {}' {}", "" if is_folded else region, _brings(region))
+        if is_folded:  # it unfolds what it brings
+            buttons.append(button(word, "fold", "", attributes))
+        else:
+            buttons.append(html("<button {}>{}</button>", attributes, word))
     for name in DRAWERS[desk.task]:
         if name == CANDIDATES and not layout.is_of_fins:
             continue
         is_pressed = str(name == drawer).lower()
         attributes = html("aria-pressed='{}' {}", is_pressed, _brings(DRAWER))
         buttons.append(button(name, "drawer", name, attributes))
-    is_folded = drawer is None
     words = "Open the drawer" if is_folded else "Fold the drawer"
     attributes = html("class='fold' aria-label='{}' title='{}'", words, words)
     buttons.append(button("▴" if is_folded else "▾", "fold", "", attributes))

@@ -37,6 +37,8 @@ class Stop(Struct, frozen=True, forbid_unknown_fields=True):
     swims: bool = False
     drawer: str = "Candidates"
     """What lies uppermost in the drawer; its task is open."""
+    inspects: bool = False
+    """Whether a phone begins with the inspector below its card; else with the drawer."""
     exercise: str = ""
     praise: str = ""
 
