@@ -17,6 +17,7 @@ import numpy as np
 
 from finlab.arrays import AnyArray, Array
 from finlab.core import library
+from finlab.core.calls import widest_lanes
 from finlab.files.schema import Checked
 
 if TYPE_CHECKING:
@@ -151,7 +152,7 @@ class PointInteraction(Interaction):
         n = len(self.lever)
         has_formula = constants is not None
         numbers = np.zeros(N_CONSTANTS) if constants is None else constants
-        head = [n, has_formula, DENSITY, MIN_JET_SPEED, *numbers]
+        head = [n, has_formula, DENSITY, MIN_JET_SPEED, widest_lanes(), *numbers]
         rows = np.column_stack([geometry.position, geometry.diameter, geometry.advance])
         self.table: Array = np.concatenate(
             [head, geometry.hull.ravel(), rows.ravel()], dtype=np.float64
