@@ -17,13 +17,29 @@ static inline void cross_of(const vector *a, const vector *b, vector *product) {
 #define LARGEST_EXPONENT 700
 #endif
 
-#if LANES == 1
+#ifdef FL_SINGLE
 static inline vector exp_of(vector x) { return EXP(clipped(x, -LARGEST_EXPONENT, LARGEST_EXPONENT)); }
 #else
 #define PER_LOG_2 0x1.71547652b82fep0
 /* log 2 in two parts, of which products of the first with integers up to 2^11 are exact. */
 #define LOG_2_HIGH 0x1.62e42fefa3800p-1
 #define LOG_2_LOW 0x1.ef35793c76730p-45
+
+#if LANES == 1
+/* 2^k, k as the lowest bits of a number that ROUNDER has been added to. */
+static inline vector power_of_two(vector shifted) {
+  unsigned long long bits;
+  vector power;
+  memcpy(&bits, &shifted, sizeof bits);
+  bits = (bits + 1023) << 52;
+  memcpy(&power, &bits, sizeof power);
+  return power;
+}
+#else
+static inline vector power_of_two(vector shifted) {
+  return (vector)(((mask)shifted + 1023) << 52);
+}
+#endif
 
 /* exp x = 2^k exp r, |r| <= log 2 / 2, by the series of exp r up to its 13th power: off by a unit in
    the last place. */
@@ -42,9 +58,7 @@ static inline vector exp_of(vector x) {
                        squared * (1.0 / 3628800 + r * (1.0 / 39916800));
   const vector last = 1.0 / 479001600 + r * (1.0 / 6227020800.0);
   const vector series = first + fourth * (second + fourth * (third + fourth * last));
-  /* The bits of a number of exponent k alone. */
-  const mask power = ((mask)shifted - (mask)lanes_of(ROUNDER) + 1023) << 52;
-  return series * (vector)power;
+  return series * power_of_two(shifted);
 }
 #endif
 

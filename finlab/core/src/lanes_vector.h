@@ -3,6 +3,9 @@
 
    A vector of one number is the number itself, so that one formula serves compilers without
    vectors, single precision, and what is asked for one by one. */
+#ifndef FL_SINGLE
+#define ROUNDER 0x1.8p52 /* 1.5 * 2^52: a number plus it, less it, is rounded to an integer */
+#endif
 #if LANES == 1
 typedef real vector;
 
@@ -17,8 +20,6 @@ static inline vector smaller_of(vector a, vector b) { return smaller(a, b); }
 #else
 typedef real vector __attribute__((vector_size(sizeof(real) * LANES)));
 typedef long long mask __attribute__((vector_size(sizeof(real) * LANES))); /* -1 or 0 */
-
-#define ROUNDER 0x1.8p52 /* 1.5 * 2^52: a number plus it, less it, is rounded to an integer */
 
 /* The same number in all lanes. */
 static inline vector lanes_of(real x) { return x - (vector){0}; }
