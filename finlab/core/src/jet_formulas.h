@@ -42,13 +42,13 @@ static inline vector rate_of_jet(const water *w, const jet_place *place, vector 
 }
 
 /* Share of jets that meets the hull, and its derivatives by the direction, in which it is constant
-   along it; `outlet` is where they begin. */
-static inline vector share_on_hull(const water *w, const vector *outlet, const vector *ahead,
+   along it; `begin` is where they begin. */
+static inline vector share_on_hull(const water *w, const vector *begin, const vector *ahead,
                                    vector *slope) {
   vector position[3]; /* on the scale of the ellipsoid, which is then a unit sphere */
   vector course[3];
   for (int c = 0; c < 3; c++) {
-    position[c] = (outlet[c] - w->center[c]) / w->half[c];
+    position[c] = (begin[c] - w->center[c]) / w->half[c];
     course[c] = -ahead[c] / w->half[c];
   }
   const vector size = root_of(dot_three(course, course) + TINY);
