@@ -39,7 +39,7 @@ HEADERS = ("jets.h", "interaction_lanes.h")
 """Those of them that declare functions."""
 DECLARATIONS = """
 #ifdef FL_SINGLE
-#error "the actuators act on each other: outer iterations need double precision; leave FL_SINGLE out"
+#error "the actuators act on each other: they need double precision; leave FL_SINGLE out"
 #endif
 
 /* The actuators act on each other. robot_linear is memory in which fl_answer_coupled keeps its

@@ -38,9 +38,7 @@ def targets_of(layout: Layout) -> Array:
     return plant.wrench(plant.sample(np.random.default_rng(2), (TARGETS,)))
 
 
-def test_a_bundle_and_its_server_answer_as_the_library_does(
-    layout: Layout, tmp_path: Path
-) -> None:
+def test_a_bundle_and_its_server_answer_as_the_library_does(layout: Layout, tmp_path: Path) -> None:
     desk = Allocator(layout)
     make_bundle(desk).write(tmp_path / "robot")
     targets = targets_of(layout)

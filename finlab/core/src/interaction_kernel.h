@@ -11,7 +11,6 @@
 
 /* Exponent of a message's window below which the message is left out: 2e-12 of its size. */
 #define NOTHING_OF_WINDOW R(-27.0)
-#define GROUPS ((FL_MOST + LANES - 1) / LANES)
 
 static inline real lane_of(const vector *x, int lane) { return ((const real *)x)[lane]; }
 
@@ -464,7 +463,7 @@ static inline void add_to_slope(const real *r, const pair_group *group,
 /* Adds what a receiver has of jets and messages of the others. */
 static void add_receiver(const robot_at_forces *robot, int i, interaction_effect *effect) {
   const interaction_model *model = robot->model;
-  pair_group groups[GROUPS];
+  pair_group groups[(FL_MOST + LANES - 1) / LANES];
   brought to;
   const int count = find_sources(robot, i, groups);
   if (count == 0) return;

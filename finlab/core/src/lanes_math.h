@@ -18,12 +18,14 @@ static inline void cross_of(const vector *a, const vector *b, vector *product) {
 #endif
 
 #ifdef FL_SINGLE
-static inline vector exp_of(vector x) { return EXP(clipped(x, -LARGEST_EXPONENT, LARGEST_EXPONENT)); }
+static inline vector exp_of(vector x) {
+  return EXP(clipped(x, -LARGEST_EXPONENT, LARGEST_EXPONENT));
+}
 #else
-#define PER_LOG_2 0x1.71547652b82fep0
+#define PER_LOG_2 1.4426950408889634
 /* log 2 in two parts, of which products of the first with integers up to 2^11 are exact. */
-#define LOG_2_HIGH 0x1.62e42fefa3800p-1
-#define LOG_2_LOW 0x1.ef35793c76730p-45
+#define LOG_2_HIGH 0.6931471805598903
+#define LOG_2_LOW 5.497923018708371e-14
 
 #if LANES == 1
 /* 2^k, k as the lowest bits of a number that ROUNDER has been added to. */
@@ -41,8 +43,8 @@ static inline vector power_of_two(vector shifted) {
 }
 #endif
 
-/* exp x = 2^k exp r, |r| <= log 2 / 2, by the series of exp r up to its 13th power: off by a unit in
-   the last place. */
+/* exp x = 2^k exp r, |r| <= log 2 / 2, by the series of exp r up to its 13th power: off by a unit
+   in the last place. */
 static inline vector exp_of(vector x) {
   const vector most = lanes_of(LARGEST_EXPONENT);
   const vector exponent = smaller_of(larger_of(x, -most), most);

@@ -73,8 +73,8 @@ static inline void view_pair(const pair *p, pair_view *view) {
   view->scalar[RECEIVER_THRUST] = p->receiver_thrust;
 }
 
-#define BELL_GROWTH R(0.05)                /* of a jet's squared width by that of the way along it */
-#define ONSET_SHARE R(0.1353352832366127)  /* exp(-2): the onset is half a diameter upstream */
+#define BELL_GROWTH R(0.05) /* of a jet's squared width by that of the way along it */
+#define ONSET_SHARE R(0.1353352832366127) /* exp(-2): the onset is half a diameter upstream */
 
 /* exp(-a s / w) of s and x, w = 1 + 0.05 x^2, and its derivatives, of its value and 1 / w. */
 static inline void bell_slopes(vector value, vector s, vector x, real a, vector per_width,
@@ -280,7 +280,8 @@ static inline void message_of_hull(const real *half, const hull_place *a, hull_m
   const dual from = product(&away, &per_length);
   const vector towards = -from.value;
   const vector squared_radius = dot_three(a->hull_position, a->hull_position);
-  const vector offset = squared_radius - towards * towards; /* squared, of the jet from the centre */
+  /* squared, of the jet from the centre */
+  const vector offset = squared_radius - towards * towards;
   const dual squared_offset = chain(&from, offset, 2 * towards);
 
   const vector rim = tanh_of(2 * (offset - 1));
