@@ -139,11 +139,11 @@ class CoupledCore:
         robot["axis_counts"] = wrench_offset.counts
         robot["starts"] = _address_of(starts)
         robot["start_count"] = len(starts)
-        self._line_jets = np.zeros(self._core.fl_line_jets_length(robot.ctypes.data))
+        self.line_jets = np.zeros(self._core.fl_line_jets_length(robot.ctypes.data))
         """Jets of a robot of thrusters as the core has prepared them; empty of other robots."""
-        if len(self._line_jets):
-            self._core.fl_prepare_line_jets(robot.ctypes.data, self._line_jets.ctypes.data)
-            robot["line_jets"] = self._line_jets.ctypes.data
+        if len(self.line_jets):
+            self._core.fl_prepare_line_jets(robot.ctypes.data, self.line_jets.ctypes.data)
+            robot["line_jets"] = self.line_jets.ctypes.data
         self._robot: Record = robot
         self._limits: Record = np.zeros(1, struct("fl_outer_limits"))
         """When the iterations end."""

@@ -77,7 +77,7 @@ typedef double fl_wide; /* where differences of large numbers matter, in single 
 #define FL_FOILS (FL_FOILS_CHEAPER + 2 * FL_LATTICE_STARTS * FL_STEPS_AT_KINK)
 #define FL_BOUND (2 * (FL_FORCES + FL_FOILS))
 
-#define FL_VERSION 25  /* of all structs and functions here */
+#define FL_VERSION 27  /* of all structs and functions here */
 #define FL_MAGIC 41721 /* first number of a block */
 
 /* The structs that cross the border of the library. */

@@ -15,14 +15,22 @@ from numpy.typing import ArrayLike
 import finlab
 from finlab import core
 from finlab.allocation.allocator import Allocator
+from finlab.allocation.dual.compiled import core_policy
 from finlab.allocation.dual.method import Dual, DualSettings
 from finlab.allocation.policy import Policy, PolicyName
 from finlab.allocation.question import check_flow
 from finlab.arrays import Array
 from finlab.axes import AXES
 from finlab.core.fields import actuators_of, constant
+from finlab.deploy.c_interaction import (
+    DECLARATIONS,
+    DECLARATIONS_WITHOUT,
+    FILES_OF_INTERACTION,
+    HEADERS,
+    check_interaction,
+    coupled_source,
+)
 from finlab.deploy.thin_block import tables_of, thinned
-from finlab.errors import AllocationError
 from finlab.layout import Layout
 from finlab.physics.objective import wrench_scale_of
 from finlab.whole_file import write_folder
@@ -34,21 +42,11 @@ MAX_CORE_ERROR = 3e-7
 library would refine them, and its answer were not the core's."""
 FILES_LEFT_OUT = (
     "actuator_formulas.c",
-    "jets.c",
-    "jets.h",
-    "line_jets.c",
-    "linear_interaction.c",
     "messages.c",
-    "outer_iterations.c",
-    "outer_newton.c",
-    "outer_reach.c",
-    "outer_starts.c",
     "ray_reach.c",
     "for_python.c",
     "prepared_call.c",
     "answer_many.c",
-    "lanes.h",
-    "lanes_vector.h",
     "lanes_kernel.h",
     "lanes_baseline.c",
     "lanes_avx2.c",
@@ -62,8 +60,8 @@ FILES_LEFT_OUT = (
     "motion_model.c",
     "path_wrench.c",
 )
-"""Files of the core that an export does not need: judgement by formulas, `interaction`, attainable
-sets, batches, what Python alone calls, and what swims in a simulation."""
+"""Files of the core that an export does not need: judgement by formulas, messages of networks,
+attainable sets, batches, what Python alone calls, and what swims in a simulation."""
 QUESTIONS: tuple[tuple[PolicyName, float], ...] = (
     ("closest", 0.9),
     ("closest", 3.0),
@@ -105,17 +103,15 @@ def c_sources(
             holds: foils push by it, propellers lose to it. None for a robot at rest.
 
     Raises:
-        AllocationError: the actuators act on each other, which an export does not hold.
+        AllocationError: the actuators act on each other by no formula of the core.
         CommandError: `flow` is not six finite numbers.
         DataError: a force table cannot be read.
     """
-    if layout.interaction is not None:
-        raise AllocationError(
-            f"layout {layout.name!r}: has `interaction`, which the C files do not know; export it "
-            "without"
-        )
     water = check_flow(flow)
     method = Dual(layout, DualSettings(), wrench_scale_of(layout), None).at(water)
+    is_coupled = layout.interaction is not None
+    if is_coupled:
+        check_interaction(method)
     block = method.compiled.block
     thin = thinned(block)
     folder = Path(core.__path__[0])
@@ -128,11 +124,20 @@ def c_sources(
         for file in FILES_OF_FOILS:
             del sources[file]
         sources |= {path.name: path.read_text("utf-8") for path in STUBS.glob("*.c")}
+    headers = ["finlab.h", "internal.h"]
+    if is_coupled:
+        headers += HEADERS
+    else:
+        for file in FILES_OF_INTERACTION:
+            del sources[file]
     name = _identifier(layout.name)
-    sources["fl_names.h"] = _prefixed_names(sources["finlab.h"] + sources["internal.h"], name)
+    declared = "".join(sources[header] for header in headers)
+    sources["fl_names.h"] = _prefixed_names(declared, name)
     zones = int(actuators_of(block)["barred_count"].max(initial=0.0))
-    sources["finlab.h"] = _with_size(sources["finlab.h"], layout.n, foils, zones)
+    sources["finlab.h"] = _with_size(sources["finlab.h"], layout.n, foils, zones, is_coupled)
     sources["robot.c"] = _robot(block, thin)
+    if is_coupled:
+        sources["robot.c"] += "\n" + coupled_source(method, _block)
     sources["robot.h"] = _header(layout, name)
     sources[f"fl_{name}.h"] = _plain_header(layout, name)
     sources["allocate.c"] = _plain_source(layout, name)
@@ -171,13 +176,16 @@ def write_c(files: dict[str, bytes], folder: str | os.PathLike[str]) -> None:
     write_folder(folder, files, foreign, "an export")
 
 
-def _with_size(header: str, count: int, foils: int, zones: int) -> str:
+def _with_size(header: str, count: int, foils: int, zones: int, is_coupled: bool) -> str:
     """finlab.h for so many actuators, of which so many are foils, and so many barred zones of a
-    pod, in single precision where a processor has no unit for double."""
+    pod. In single precision where a processor has no unit for double, but for robots whose
+    actuators act on each other, which have no lanes of vectors."""
     header = re.sub(r"(#define FL_MOST) \d+", rf"\1 {count}", header, count=1)
     arcs = min(foils, constant("FL_ARCS"))
     header = re.sub(r"(#define FL_ARCS) \d+", rf"\1 {arcs}", header, count=1)
     header = re.sub(r"(#define FL_ZONES) \d+", rf"\1 {zones}", header, count=1)
+    if is_coupled:
+        return header.replace("#ifdef FL_SINGLE\n", "#define FL_NO_LANES\n#ifdef FL_SINGLE\n", 1)
     single = (
         "#if defined(__ARM_FP) && !(__ARM_FP & 8) && !defined(FL_SINGLE)\n#define "
         "FL_SINGLE\n#endif\n\n"
@@ -262,7 +270,7 @@ extern "C" {{
 extern const fl_real robot[];    /* its block of numbers */
 extern const int robot_length;   /* how many */
 int robot_selftest(void);        /* how many answers differ from the library's */
-#define ROBOT_HEAD ((const fl_head *)(const void *)robot)
+{coupled}#define ROBOT_HEAD ((const fl_head *)(const void *)robot)
 #define ROBOT_ACTUATOR(i) ((const fl_actuator *)(const void *)(ROBOT_HEAD + 1) + (i))
 
 {rows}
@@ -317,7 +325,7 @@ int fl_{name}_allocate(const double *wrench, const double (*previous)[3], double
   fl_question question = {{.calm = CALM}};
   if (!is_prepared) {{
     int code = fl_check(robot, robot_length);
-    if (!code) code = fl_prepare(robot, &work);
+    if (!code) code = robot_prepare(&work);
     if (code) return code;
     is_prepared = 1;
   }}
@@ -328,7 +336,7 @@ int fl_{name}_allocate(const double *wrench, const double (*previous)[3], double
       for (int k = 0; k < 3; k++) before[i][k] = (fl_real)previous[i][k];
     question.previous = before[0];
   }}
-  const int code = fl_answer_one(robot, &work, &question, &answer);
+  const int code = robot_answer(&work, &question, &answer);
   if (code) return code;
   for (int i = 0; i < ROBOT_COUNT; i++)
     for (int k = 0; k < 3; k++) command[i][k] = (double)answer.command[i][k];
@@ -338,7 +346,11 @@ int fl_{name}_allocate(const double *wrench, const double (*previous)[3], double
 
 
 def _header(layout: Layout, name: str) -> str:
-    return _HEADER.format(title=layout.name, name=name, rows=_rows_of_commands(layout, "ROBOT"))
+    coupled = DECLARATIONS_WITHOUT
+    if layout.interaction is not None:
+        coupled = DECLARATIONS.format(name=name)
+    rows = _rows_of_commands(layout, "ROBOT")
+    return _HEADER.format(title=layout.name, name=name, rows=rows, coupled=coupled)
 
 
 def _plain_header(layout: Layout, name: str) -> str:
@@ -348,6 +360,13 @@ def _plain_header(layout: Layout, name: str) -> str:
 
 def _plain_source(layout: Layout, name: str) -> str:
     return _PLAIN_SOURCE.format(name=name, calm=DualSettings().calm)
+
+
+def _core_command(method: Dual, wrench: Array, policy: Policy) -> Array:
+    """Commands (1, n, 3) for a wrench (6,) as the core gives them."""
+    if method.plant.interaction is None:
+        return method.compiled.forces(wrench[None], policy).command
+    return method.coupled.answer_many(wrench[None], core_policy(policy)).command
 
 
 def _self_test(layout: Layout, method: Dual, count: int) -> str:
@@ -370,7 +389,7 @@ def _self_test(layout: Layout, method: Dual, count: int) -> str:
         tick = allocator.allocate(0.5 * wrench, flow=flow).command if reach < 0.9 else None
         answer = allocator.allocate(reach * wrench, policy=policy, previous=tick, flow=flow)
         delivered = answer.wrench * layout.commanded
-        core_command = method.compiled.forces(reach * wrench[None], Policy(policy)).command
+        core_command = _core_command(method, reach * wrench, Policy(policy))
         core_error = method.problem.error(core_command, delivered[None] / method.scale)[0]
         if tick is None and core_error > MAX_CORE_ERROR:
             continue

@@ -17,6 +17,7 @@ import numpy as np
 
 from finlab.arrays import AnyArray, Array
 from finlab.core import library
+from finlab.core.calls import widest_lanes
 from finlab.files.schema import Checked
 
 if TYPE_CHECKING:
@@ -28,6 +29,8 @@ MIN_JET_SPEED = 0.03
 """Speed of the jet of an actuator at rest [m/s]: a floor that keeps derivatives finite there."""
 MIN_DISC_AREA = 1e-12
 """Area added to each disc, so that an actuator without one divides by no zero [m^2]."""
+LANES_INDEX = 4
+"""Index of the number of lanes among the numbers that finlab/core/src/jets.c reads."""
 N_CONSTANTS = 10
 """How many constants of the formula of jets the core takes, in the order of its table."""
 
@@ -112,6 +115,16 @@ class Interaction(ABC):
         """What `CORE_FUNCTION` works with; None where the core has to ask `effect`."""
         return None
 
+    def constants_in_lanes(self, lanes: int) -> Array | None:
+        """Returns what `CORE_FUNCTION` works with where it computes so many pairs of actuators at
+        once; None where there is no such function.
+
+        Args:
+            lanes: 1, or up to `widest_lanes()` of finlab.core.calls, which `core_constants` has.
+                Answers have the same bits with any.
+        """
+        return self.core_constants
+
     @abstractmethod
     def deviation(self, force: Array, inflow: Array | None = None) -> Array:
         """Returns how uncertain the wrench offset is.
@@ -151,12 +164,18 @@ class PointInteraction(Interaction):
         n = len(self.lever)
         has_formula = constants is not None
         numbers = np.zeros(N_CONSTANTS) if constants is None else constants
-        head = [n, has_formula, DENSITY, MIN_JET_SPEED, *numbers]
+        head = [n, has_formula, DENSITY, MIN_JET_SPEED, widest_lanes(), *numbers]
         rows = np.column_stack([geometry.position, geometry.diameter, geometry.advance])
         self.table: Array = np.concatenate(
             [head, geometry.hull.ravel(), rows.ravel()], dtype=np.float64
         )
         """The numbers that finlab/core/src/jets.c reads."""
+
+    def table_in_lanes(self, lanes: int) -> Array:
+        """Returns `table` for so many pairs of actuators at once."""
+        table = self.table.copy()
+        table[LANES_INDEX] = lanes
+        return table
 
     @abstractmethod
     def at_rest(self, force: Array) -> Array:

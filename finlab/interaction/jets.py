@@ -93,6 +93,9 @@ class JetInteraction(PointInteraction):
     def core_constants(self) -> Array:
         return self.table
 
+    def constants_in_lanes(self, lanes: int) -> Array:
+        return self.table_in_lanes(lanes)
+
     def at_rest(self, force: Array) -> Array:
         return self.compute_in_core(force, None, False)[0]
 

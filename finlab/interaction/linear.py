@@ -34,6 +34,7 @@ from msgspec import Meta
 from finlab.arrays import Array
 from finlab.bundle_files import file_stamp, read_named_file
 from finlab.core import library
+from finlab.core.calls import widest_lanes
 from finlab.errors import CheckpointError, DataError
 from finlab.interaction.interaction import (
     DENSITY,
@@ -160,11 +161,14 @@ class LinearInteraction(PointInteraction):
         super().__init__(geometry)
         self.weights = weights
         self.terms = Terms(geometry)
-        self._constants = self._constants_of(weights.mean)
+        self._constants = self.constants_in_lanes(widest_lanes())
 
     @property
     def core_constants(self) -> Array:
         return self._constants
+
+    def constants_in_lanes(self, lanes: int) -> Array:
+        return self._constants_of(self.weights.mean, lanes)
 
     def at_rest(self, force: Array) -> Array:
         return self._in_core(force, None, False)[0]
@@ -194,8 +198,8 @@ class LinearInteraction(PointInteraction):
             library().fl_linear_interaction, self._constants, force, inflow, with_slope
         )
 
-    def _constants_of(self, mean: Array) -> Array:
-        """The numbers that finlab/core/src/linear_interaction.c reads."""
+    def _constants_of(self, mean: Array, lanes: int) -> Array:
+        """The numbers that finlab/core/src/linear_interaction.c reads, of weights and lanes."""
         messages = self.terms.messages.table
         of_formulas, formulas = _merged(mean[: len(FORMULAS)], self.geometry)
         of_flow = mean[len(FORMULAS) : FIRST_MESSAGE]
@@ -216,7 +220,7 @@ class LinearInteraction(PointInteraction):
             discs.ravel(),
         ]
         for weight, formula in zip(of_formulas, formulas, strict=True):
-            parts += [[weight], formula.table]
+            parts += [[weight], formula.table_in_lanes(lanes)]
         parts.append(messages)
         for kind, weights in by_vector(mean):
             parts.append(coefficients(kind, weights))

@@ -70,6 +70,10 @@ NO_CHOICE = {
     "KINDS",
     "WALSH",
     "ROUNDER",
+    "LANES",
+    "PER_LOG_2",
+    "LOG_2_HIGH",
+    "LOG_2_LOW",
 }
 """Constants that nobody has chosen: sizes, versions, mathematics, and what follows from others."""
 OPERATORS: dict[type, Callable[[Any, Any], Any]] = {

@@ -98,9 +98,9 @@ def test_other_robots_have_none() -> None:
     layout = finlab.load_layout("A")
     plant = Plant(replace(layout, interaction=Jets()))
     core = coupled_core(plant, Compiled.of(replace(layout, interaction=None)))
-    assert len(core._line_jets) == 0
+    assert len(core.line_jets) == 0
     assert int(core._robot["line_jets"][0]) == 0
     moving, _core = robot_of(0)
     in_flow = moving.at(np.array([0.5, 0.0, 0.0, 0.0, 0.0, 0.0]))
     compiled = Compiled.of(replace(moving.layout, interaction=None))
-    assert len(coupled_core(in_flow, compiled)._line_jets) == 0
+    assert len(coupled_core(in_flow, compiled).line_jets) == 0

@@ -8,10 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 import finlab
 from finlab.arrays import Array
+from finlab.core import library
+from finlab.core.calls import widest_lanes
 from finlab.errors import CheckpointError, DataError
 from finlab.fit.interaction.own_samples import fit_weights, posterior, terms_of, whitened
 from finlab.fit.interaction.samples import Samples, read_samples, read_table, write_samples
@@ -94,6 +96,23 @@ def test_derivatives(seed: int) -> None:
         moved[i, c] = step
         change = model.offset(force + moved, inflow) - model.offset(force - moved, inflow)
         assert_allclose(slope[i, c], change / (2.0 * step), atol=1e-6)
+
+
+@pytest.mark.parametrize("has_messages", [False, True])
+def test_any_number_of_lanes_gives_the_same_bits(has_messages: bool) -> None:
+    rng = np.random.default_rng(0)
+    robot = geometry(3, count=11)
+    model = LinearInteraction(random_weights(0), robot) if has_messages else Jets().of(robot)
+    force = 8.0 * rng.normal(size=(2, 11, 3))
+    function = getattr(library(), model.CORE_FUNCTION)
+    widths = [lanes for lanes in (1, 2, 4, 8) if lanes <= widest_lanes()]
+    answers = []
+    for lanes in widths:
+        constants = model.constants_in_lanes(lanes)
+        found = model.call_core(function, constants, force, None, True)
+        answers.append(np.concatenate([part.ravel() for part in found]))
+    for answer in answers[1:]:
+        assert_array_equal(answer, answers[0])
 
 
 def one_robot(seed: int, count: int) -> Samples:

@@ -44,20 +44,23 @@ def coupled_core(plant: Plant, compiled: Compiled) -> CoupledCore:
     Returns:
         What runs outer iterations for it.
     """
+    return CoupledCore(compiled.block, wrench_offset_of(plant, compiled))
+
+
+def wrench_offset_of(plant: Plant, compiled: Compiled) -> WrenchOffset:
+    """Returns what the actuators of a robot do to each other, as the core asks for it; the
+    arguments are those of `coupled_core`."""
     interaction = plant.interaction
     assert interaction is not None
-    return CoupledCore(
-        compiled.block,
-        WrenchOffset(
-            frames=compiled.axes @ plant.layout.frames,
-            counts=plant.counts,
-            inflow=plant.met_by_all(None),
-            core_function=interaction.CORE_FUNCTION,
-            core_constants=interaction.core_constants,
-            effect=interaction.effect,
-            offset=interaction.offset,
-            starts=start_factors(compiled.is_line),
-        ),
+    return WrenchOffset(
+        frames=compiled.axes @ plant.layout.frames,
+        counts=plant.counts,
+        inflow=plant.met_by_all(None),
+        core_function=interaction.CORE_FUNCTION,
+        core_constants=interaction.core_constants,
+        effect=interaction.effect,
+        offset=interaction.offset,
+        starts=start_factors(compiled.is_line),
     )
 
 

@@ -600,22 +600,4 @@ int fl_newton_from(const fl_coupled_robot *robot, real *block, fl_work *work,
 void fl_out_of_reach(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,
                      fl_answer *out);
 
-/* Messages between actuators, and of the hull to each; finlab/core/src/messages.c. */
-enum { FL_PAIR_MESSAGE, FL_HULL_MESSAGE };
-
-/* Writes the factors (k,) of a message's vectors for its features (f,), and their derivatives
-   (k, f) where `jacobian` is not 0. */
-typedef void (*fl_factors_of)(const real *weights, int kind, const real *features, real *factors,
-                              real *jacobian);
-
-typedef struct {
-  fl_factors_of factors_of;
-  const real *weights; /* that it works with */
-} fl_message_model;
-
-/* Adds the messages of one robot at forces (n, 3) to the changes (n, 3) of its forces, to their
-   wrench (6,) and to its derivatives (n, 3, 6), 0 for none. */
-void fl_add_messages(const real *constants, const fl_message_model *model, const real *force,
-                     real *change, real *offset, real *slope);
-
 #endif

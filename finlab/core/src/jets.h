@@ -11,6 +11,7 @@ typedef struct {
   real formula; /* 1 where jets count, else speed alone takes */
   real density;
   real still; /* speed of a jet below which it counts as none [m/s] */
+  real lanes; /* how many pairs of actuators are computed at once: fl_widest_lanes of Python's */
   /* The constants. */
   real length, width, spread, lag, most, side, housing, hull, behind, grazing;
   real center[3], half[3]; /* of the ellipsoid that stands for the hull [m]; 0 for none */
@@ -25,6 +26,16 @@ static inline const outlet *outlets_of(const water *w) { return (const outlet *)
 /* Whether jets meet a hull. */
 static inline int has_hull(const water *w) {
   return w->formula != 0 && w->half[0] > 0 && w->half[1] > 0 && w->half[2] > 0;
+}
+
+#define FAR_BEHIND 14 /* a jet is nothing at so many `behind` upstream of its outlet */
+#define FAR_ASIDE 28  /* nor where the exponent of its profile is above that */
+
+/* Whether there is next to nothing of a jet, below ROUNDING of what it is in the middle, so many
+   diameters along it and off its axis, squared. */
+static inline int is_nothing_of_jet(const water *w, real along, real aside_squared) {
+  if (along < -FAR_BEHIND * w->behind) return 1;
+  return w->spread * aside_squared > FAR_ASIDE * (along * along + w->width * w->width);
 }
 
 typedef struct {

@@ -7,13 +7,15 @@
    a gauge. A target that they do not finish is left to fl_answer_one: one beyond reach, one whose
    forces may lie in a gap of their sets, one whose commands need steps by the laws.
 
+   FL_NO_LANES leaves vectors out.
+
    All operations of a lane are those of IEEE 754 in one order, without contraction. So an answer
    has the same bits whatever the width of the vector, and whatever stands in the other lanes. */
 #ifndef FL_LANES_H
 #define FL_LANES_H
 #include "internal.h"
 
-#if defined(__GNUC__) && !defined(FL_SINGLE)
+#if defined(__GNUC__) && !defined(FL_SINGLE) && !defined(FL_NO_LANES)
 #define HAS_LANES
 #if defined(__x86_64__)
 #define HAS_X86_LANES

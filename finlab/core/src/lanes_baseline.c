@@ -28,8 +28,14 @@ static inline void gather_four(const real *numbers, mask index, vector *gathered
 }
 
 #include "lanes_kernel.h"
+#include "interaction_kernel.h"
 
 void fl_lanes_baseline(const lanes_robot *robot, const lanes_batch *batch) {
   answer_in_lanes(robot, batch);
+}
+
+void fl_interaction_baseline(const interaction_model *model, const real *force,
+                             interaction_effect *effect) {
+  add_interaction(model, force, effect);
 }
 #endif

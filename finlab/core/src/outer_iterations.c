@@ -17,6 +17,7 @@
    iterations settle at once, less. */
 #define GAIN_LEAST (CLOSE / 2)
 #define GAIN_LEAST_OF_LINES (NEARLY / 10)
+#define WORTH_OFF R(0.5) /* share by which a residual may be worth less than multipliers say */
 #define MUCH_CHEAPER (10 * CLOSE) /* share of a known power below which forces are other ones */
 
 /* Along how many axes the law of an actuator has forces, from the first one on. */
@@ -152,16 +153,37 @@ static void command_fins_by_law(const fl_coupled_robot *robot, real *block, fl_w
   }
 }
 
+/* A merit that commands have to get below, and multipliers (6,) of the wrench by which it is seen
+   before they give the wrench. */
+typedef struct {
+  real merit; /* [W] */
+  const real *multipliers;
+} merit_limit;
+
+/* Whether commands are surely at no less than the limit: by the Lagrangian, their power and what
+   their residual is worth, which to first order is the power where they give the wrench. */
+static int is_too_dear(const real *block, fl_work *work, real command[][3], const real *residual,
+                       const merit_limit *limit) {
+  const real *sigma = HEAD(block)->wrench_scale;
+  real unused[FL_MOST][2];
+  real worth = 0;
+  for (int k = 0; k < 6; k++) worth += limit->multipliers[k] * sigma[k] * residual[k];
+  const real lagrangian = fl_power_of_commands(block, work, command, unused) + worth;
+  return lagrangian - limit->merit > WORTH_OFF * FABS(worth);
+}
+
 /* Steps on commands to a wrench, by the whole model, which the block is linear at where they
-   end, or by a chord where they begin, until an error is enough; the error that is left. */
+   end, or by a chord where they begin, until an error is enough, or commands are seen to be beyond
+   a limit, 0 for none; the error that is left, LARGEST_NUMBER beyond the limit. */
 static real step_to_wrench(const fl_coupled_robot *robot, real *block, fl_work *work,
                            const fl_box *box, const real *wrench, real enough, int is_chord,
-                           real command[][3]) {
+                           const merit_limit *limit, real command[][3]) {
   const size_t size = (size_t)COUNT(block) * sizeof *command;
   real residual[6];
   real share = 1;
   real error = fl_linearize_coupled(robot, block, work, wrench, command, 0, residual);
   for (int k = 0; k < MODEL_STEPS && error > enough; k++) {
+    if (limit && is_too_dear(block, work, command, residual, limit)) return LARGEST_NUMBER;
     real stepped[FL_MOST][3];
     real nearer[6]; /* than the wrench, by a share of the way */
     real residual_stepped[6];
@@ -310,7 +332,7 @@ static int begin_search(outer_search *search, int most_iterations) {
   const int has_lines_alone = fl_has_lines_alone(search->robot->block_uncoupled);
   const int is_chord = most_iterations == 0 && has_lines_alone && !search->robot->inflow;
   search->error = step_to_wrench(search->robot, block, work, &search->box, q->wrench, enough,
-                                 is_chord, command);
+                                 is_chord, 0, command);
   search->power = fl_power_of_commands(block, work, command, search->force);
   return FL_OK;
 }
@@ -320,6 +342,9 @@ static int begin_search(outer_search *search, int most_iterations) {
 static int step_to_answer(outer_search *search, fl_answer *answer, real merit) {
   real *block = search->block;
   const fl_question *q = &search->question;
+  /* Lines settle at once: their steps are mostly kept. */
+  const int has_lines_alone = fl_has_lines_alone(search->robot->block_uncoupled);
+  const merit_limit limit = {merit, answer->multipliers};
   real(*stepped)[3] = answer->command;
   real share = 1;
   for (int k = 0; k < TRIALS; k++) {
@@ -331,7 +356,7 @@ static int step_to_answer(outer_search *search, fl_answer *answer, real merit) {
       fl_commands_for_forces(block, &search->box, force_wanted, q->previous, stepped);
     }
     const real error = step_to_wrench(search->robot, block, search->work, &search->box, q->wrench,
-                                      EXACT_ON_WAY, 0, stepped);
+                                      EXACT_ON_WAY, 0, has_lines_alone ? 0 : &limit, stepped);
     const real power = fl_power_of_commands(block, search->work, stepped, force_stepped);
     if (power + search->penalty * error < merit) {
       search->power = power;
@@ -395,7 +420,7 @@ static void finish_search(outer_search *search, fl_answer *out) {
                                        out->command, 1, unused);
   if (search->error > EXACT) {
     search->error = step_to_wrench(search->robot, search->block, search->work, &search->box,
-                                   q->wrench, EXACT, 0, out->command);
+                                   q->wrench, EXACT, 0, 0, out->command);
   }
   fl_rest_in_dead_bands(search->block, &search->box, out->command);
   fl_clip_commands(search->block, &search->box, out->command);

@@ -13,7 +13,7 @@ public:
   RobotAllocator() : ScheduledWorkItem("robot_allocator", px4::wq_configurations::rate_ctrl) {}
 
   bool start(uint32_t interval_us) { // false: not the robot of these C files
-    if (fl_check(robot, robot_length) || fl_prepare(robot, &_work)) return false;
+    if (fl_check(robot, robot_length) || robot_prepare(&_work)) return false;
     ScheduleOnInterval(interval_us);
     return true;
   }
@@ -30,7 +30,7 @@ public:
       question.wrench[k] = sign * thrust.xyz[k] * scale[k];
       question.wrench[3 + k] = sign * torque.xyz[k] * scale[3 + k];
     }
-    if (fl_answer_one(robot, &_work, &question, &_answer)) return; // a setpoint is not finite
+    if (robot_answer(&_work, &question, &_answer)) return; // a setpoint is not finite
     actuator_motors_s motors{};
     motors.timestamp = motors.timestamp_sample = thrust.timestamp;
     for (int i = 0; i < actuator_motors_s::NUM_CONTROLS; i++)

@@ -7,7 +7,7 @@
 class RobotAllocator : public rclcpp::Node {
 public:
   RobotAllocator() : Node("robot_allocator") {
-    if (fl_check(robot, robot_length) || fl_prepare(robot, &work_)) throw std::runtime_error("no block of a robot");
+    if (fl_check(robot, robot_length) || robot_prepare(&work_)) throw std::runtime_error("no block of a robot");
     out_ = create_publisher<std_msgs::msg::Float64MultiArray>("commands", 1);
     in_ = create_subscription<geometry_msgs::msg::Wrench>(
         "wrench", 1, [this](const geometry_msgs::msg::Wrench &wrench) { answer(wrench); });
@@ -20,7 +20,7 @@ private:
     fl_question question{};
     question.policy = &policy_;
     for (int k = 0; k < 6; k++) question.wrench[k] = fl_real(values[k]);
-    if (fl_answer_one(robot, &work_, &question, &answer_)) {
+    if (robot_answer(&work_, &question, &answer_)) {
       RCLCPP_WARN(get_logger(), "a wrench that is not finite was left out");
       return;
     }
