@@ -258,7 +258,10 @@ def add_losses(page: Page) -> None:
             return
         start, end = judgement.timeline.time[[0, -1]].tolist()
         value = start if log_moment is None else log_moment
-        set_properties(slider, max=max(end, start + 0.1), min=start, value=value)
+        # In the slider's own steps, or its ends are written with digits that say nothing.
+        low = round(start, 1)
+        high = max(round(end, 1), low + 0.1)
+        set_properties(slider, max=high, min=low, value=min(max(round(value, 1), low), high))
 
     page.board.act(set_range, slider)
     page.add_html(_losses)
