@@ -8,9 +8,11 @@ from numpy.typing import NDArray
 
 from finlab.arrays import Array
 from finlab.axes import axes_in, is_full_turn, wrapped
+from finlab.layout.effectiveness import own_effectiveness
 from finlab.layout.layout import Layout
 
 if TYPE_CHECKING:
+    from finlab.actuators.actuator import Actuator
     from finlab.allocation.power_budget import PowerBudget
 
 WITHIN = 1e-3
@@ -118,6 +120,37 @@ def rate_words(layout: Layout, previous: Array, command: Array, period_s: float)
     return tuple(words)
 
 
+def gives_all_axes_apart(layout: Layout, works: NDArray[np.bool_]) -> bool:
+    """Whether a robot away from its limits changes each axis that counts and leaves the others.
+
+    It does where what pushes either way has an effectiveness matrix of full rank in these axes. An
+    actuator of one direction, or one that the flow drives, is not asked.
+
+    Args:
+        layout: the robot of n actuators.
+        works: which actuators (n,) work.
+    """
+    columns = [np.zeros((0, 6))]
+    rows = zip(layout.actuators, own_effectiveness(layout), works, strict=True)
+    for actuator, effectiveness, is_working in rows:
+        if is_working and _pushes_either_way(actuator):
+            columns.append(effectiveness[list(actuator.KIND.push_rows)])
+    in_counted_axes = np.concatenate(columns)[:, layout.commanded]
+    rank = np.linalg.matrix_rank(in_counted_axes)
+    return bool(rank == layout.commanded.sum())
+
+
+def _pushes_either_way(actuator: "Actuator") -> bool:
+    """Whether it pushes along each of its directions and against it, at rest as well."""
+    kind = actuator.KIND
+    if kind.driven_by_flow:
+        return False
+    if kind.aiming_number is not None:
+        arc = actuator.upper[kind.aiming_number] - actuator.lower[kind.aiming_number]
+        return bool(is_full_turn(arc))
+    return kind.force_number is not None and bool(actuator.lower[kind.force_number] < 0.0)
+
+
 def band_words(layout: Layout, command: Array) -> tuple[str, ...]:
     """Names the actuators that a command has inside their dead bands, or at their edges.
 
@@ -179,7 +212,8 @@ def what_binds(
 
     Returns:
         Limits, then buses, then rates; where there are none of these, dead bands, and then the axes
-        that these actuators do not give apart from the others.
+        that these actuators do not give apart from the others. Nothing where they do: then it is
+        the method that does not find the command.
     """
     words = limits_reached(layout, command)
     if budget is not None and power is not None:
@@ -191,6 +225,8 @@ def what_binds(
     words = band_words(layout, command)
     if words:
         return words
+    if gives_all_axes_apart(layout, np.isfinite(command[:, 0])):
+        return ()
     largest = np.abs(missing).max()
     axes = axes_in(np.abs(missing) >= MISSING_SHARE * largest)
     return (f"{', '.join(axes)} {NOT_APART}",)

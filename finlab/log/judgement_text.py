@@ -50,7 +50,7 @@ IMPULSE_COLUMNS = (
 """Columns of the table of axes; a row is an `ImpulseRow`."""
 SPELL_COLUMNS = (
     Column("when [s]", lambda spell: f"{spell.start:.1f} to {spell.end:.1f}", is_text=True),
-    Column("lost", lambda spell: lost_words(spell), is_text=True),
+    Column("given of asked", lambda spell: lost_words(spell), is_text=True),
     Column("at a limit", lambda spell: ", ".join(spell.limits) or "no limit known", is_text=True),
 )
 """Columns of the table of spells; a row is a `Spell`."""

@@ -2,6 +2,7 @@
 in a tick and in dead bands."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,8 @@ from finlab.actuators.rudder import Rudder
 from finlab.actuators.thrust_model import PowerLaw
 from finlab.allocation.binding import at_limits, band_words, limits_reached, rate_words, what_binds
 from finlab.arrays import Array
-from finlab.layout import Azimuth, Fin, Layout, Limits, Thruster
+from finlab.axes import AXES
+from finlab.layout import Azimuth, Fin, Layout, Limits, Thruster, load_layout
 
 ORIGIN = (0.0, 0.0, 0.0)
 LAW = PowerLaw(1.0)
@@ -187,3 +189,20 @@ def test_limits_come_before_dead_bands_and_these_before_axes() -> None:
         "screw at full thrust",
         "rate of screw",
     )
+
+
+@pytest.mark.parametrize(
+    ("lost", "freed", "is_apart"),
+    [((), (), True), ((0,), (), True), ((0, 1), (), False), ((0, 1), ("Fy", "Ty"), True)],
+)
+def test_axes_that_fins_give_apart_do_not_bind(
+    lost: tuple[int, ...], freed: tuple[str, ...], is_apart: bool
+) -> None:
+    # Each fin pushes along two directions, so three of them give six axes, and two give four.
+    layout = load_layout("ucat")
+    layout = replace(layout, axes=tuple([axis for axis in AXES if axis not in freed]))
+    command = np.tile([0.3, 1.0, 0.2], (layout.n, 1))
+    command[list(lost)] = np.nan
+    missing = np.array([0.01, 0.0, 0.01, 0.0, 0.0, 0.0])
+    words = what_binds(layout, command, missing, None, 0.1)
+    assert words == (() if is_apart else ("Fx, Fz not given apart by these actuators",))

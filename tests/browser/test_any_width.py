@@ -212,3 +212,49 @@ def test_a_stop_begins_at_its_top_on_a_phone_and_brings_what_it_speaks_of(resize
         assert strip["height"] > 0.0
         tab.evaluate(f"{scrolled} = 400")
     assert page.problems == []
+
+
+def test_a_lesson_on_a_low_window_has_its_title_its_praise_and_next(resized: Any) -> None:
+    page = resized
+    tab = page.page
+    tab.set_viewport_size({"width": 933, "height": 573})
+    page.rest(200)
+    region = tab.locator(".mantine-Paper-root[data-fl~=region][data-fl~=left]")
+    tab.locator(".fl-more > button").click()
+    tab.get_by_text("Lessons", exact=True).locator("visible=true").click()
+    tab.locator(f"#fl-menu [data-key={LESSONS[0].name}]").click()
+    tab.get_by_text(LESSONS[0].exercise).wait_for()
+    region.evaluate("(region) => region.scrollTo(0, 500)")
+    page.press("Next")
+    title = tab.get_by_text(f"Lesson 2 of {len(LESSONS)}")
+    page.until(lambda: title.is_visible() and top(title) >= top(region))
+    page.press("▶ Play")
+    praise = tab.get_by_text(LESSONS[1].praise)
+    praise.wait_for()
+    next_button = tab.get_by_role("button", name="Next", exact=True).locator("visible=true")
+    box = region.bounding_box()
+    assert top(praise) < top(next_button) < box["y"] + box["height"] - 30.0
+    page.key("Escape")
+    page.until(lambda: page.session.guide.stop is None)
+    assert page.problems == []
+
+
+def test_the_list_of_methods_ends_in_the_window(resized: Any) -> None:
+    page = resized
+    tab = page.page
+    tab.set_viewport_size({"width": 933, "height": 573})
+    page.rest(200)
+    tab.locator("[data-fl~=method] + div input").first.click()
+    longest = tab.get_by_role("option").filter(has_text="linearized step by step")
+    longest.wait_for()
+    box = longest.bounding_box()
+    assert box["x"] >= 0.0 and box["x"] + box["width"] <= 933.0
+    assert tab.locator("canvas[data-engine]").bounding_box()["x"] == 0.0, "nothing is scrolled"
+    tab.keyboard.press("Escape")
+    longest.wait_for(state="hidden")
+    assert page.problems == []
+
+
+def top(element: Any) -> float:
+    """Where an element begins [px]."""
+    return float(element.bounding_box()["y"])

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 import viser
 
@@ -13,6 +14,7 @@ from finlab.layout import Layout, load_layout
 from tests.webapp.stand_in import SilentClient, until
 from tests.webapp.test_app import on_loop
 from webapp.app import App
+from webapp.markup.plot import cost_axis
 from webapp.session import Session
 from webapp.session.looking import DRAWERS, TASKS
 from webapp.tasks.solver import Solver
@@ -143,3 +145,19 @@ def test_no_figure_is_unreadable(server: viser.ViserServer, view: View, case: st
             for text in texts(server):
                 found += unreadable(text)
     assert sorted(set(found)) == []
+
+
+@pytest.mark.parametrize(
+    ("ends", "max_ticks", "ticks"),
+    [
+        ((0.0, 103.0), 4, ["0", "50", "100"]),
+        ((-21.0, -5.0), 4, ["−20", "−15", "−10", "−5"]),
+        # Steps of 50 would leave the zero alone.
+        ((-42.0, 42.0), 4, ["−40", "−20", "0", "20", "40"]),
+    ],
+)
+def test_an_axis_has_two_ticks_at_least(
+    ends: tuple[float, float], max_ticks: int, ticks: list[str]
+) -> None:
+    axis = cost_axis("heave [N]", np.array(ends), max_ticks)
+    assert [words for _, words in axis.ticks] == ticks

@@ -12,6 +12,7 @@ from finlab.log import judge
 from finlab.log.judging import STOPPED, Progress
 from finlab.swim.simulation.log import SHAPES, RunLog, Tick
 from tests.webapp.stand_in import Direct, context_of
+from webapp.markup.words import three_digits
 from webapp.panels.log_tab import _summary, _whose_robot, moved_markup
 from webapp.session import Session
 from webapp.tasks.log_reading import LogReading
@@ -66,6 +67,14 @@ def test_a_sample_puts_its_robot_and_worst_moment_on_the_page() -> None:
     assert improved is not None and improved.name == "bluerov2_heavy improved"
     moved = moved_markup(judgement)
     assert "bluerov2_heavy improved" in moved and "moved" in moved
+    # Both robots by the first method that was asked: what each misses, and takes.
+    own, other = (
+        next(replay for replay in judgement.replays if replay.robot == robot)
+        for robot in ("as it is", "improved")
+    )
+    assert own.name == other.name and own.lost is None and other.lost is None
+    assert f"By {own.name} it misses" in moved
+    assert f"at {three_digits(other.watts)} W, not {three_digits(own.watts)} W." in moved
     kept = [a == improved.actuator(a.name) for a in judgement.robot.actuators]
     assert moved.count("<tr><td>") == kept.count(False)
     assert "not the robot of the log" in _whose_robot(judgement, load_layout("ucat"), False)

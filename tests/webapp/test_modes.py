@@ -112,6 +112,9 @@ def test_samples_and_modes_are_drawn_and_listed() -> None:
     drawn = int((samples.effort <= max(first, *others, 2.0 * max(others))).sum())
     assert still.count("r='3'") == drawn and moving.count("r='3'") == 2 * drawn
     assert moving.count("class='moving'") == 1 and "class='moving'" not in still
+    hollow = "class='mode' stroke='[^']*' fill='transparent'"
+    assert len(re.findall(hollow, still)) == len(modes.visible) - 1, "one is on the robot"
+    assert len(re.findall(hollow, moving)) == len(modes.visible), "a step on the way to it is"
     table = mode_table(modes, 0)
     assert table.count("data-press=") == len(modes.visible) and "0.0000" not in table
     assert "more are" not in table

@@ -61,7 +61,8 @@ def mode_plot(modes: Modes, shown_mode: int, step: int | None, height: int) -> s
 
     Args:
         modes: the modes, and the proposals that led to them.
-        shown_mode: index of the mode that is on the robot; its ring is filled.
+        shown_mode: index of the mode that is on the robot; its ring is filled, unless the robot
+            shows a step on the way to it.
         step: after how many steps of refinement the samples are drawn; None for all steps.
         height: of the plot [px].
 
@@ -91,7 +92,7 @@ def mode_plot(modes: Modes, shown_mode: int, step: int | None, height: int) -> s
         note = "<text x='{}' y='14' text-anchor='end'>{} dearer →</text>"
         layers.append(html(note, WIDTH - RIGHT, samples.hidden))
     rings = [(float(x), float(y)) for x, y in zip(*plot.place(*refined.T), strict=True)]
-    layers += _rings(rings, shown_mode)
+    layers += _rings(rings, shown_mode if step is None else None)
     return html("<div class='fl'>{}</div>", plot.svg(layers, upright=True))
 
 
@@ -112,7 +113,7 @@ def _samples(modes: Modes, effort: Array) -> Samples:
     )
 
 
-def _rings(centers: list[Point], shown_mode: int) -> list[str]:
+def _rings(centers: list[Point], shown_mode: int | None) -> list[str]:
     """A ring where each mode lies, filled where it is on the robot, with its number above it; the
     first modes are drawn last, over the others."""
     ring = (

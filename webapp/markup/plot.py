@@ -32,6 +32,8 @@ BOTTOM = 34
 """Margin below a plot, with room for the ticks and the word of the axis [px]."""
 MOST_TICKS = 6
 """Ticks of an axis at most: their labels are not to touch."""
+LEAST_TICKS = 2
+"""Ticks of an axis at least, from which its scale can be read."""
 NARROW_WIDTH = 250
 """Width of a plot that stands beside others [px]."""
 NARROW_HEIGHT = 128
@@ -72,15 +74,19 @@ def cost_axis(word: str, values: Array, max_ticks: int = MOST_TICKS) -> Axis:
     margin = max(0.08 * (highest - lowest), 0.02 * highest, 1e-6)
     low = lowest - margin
     high = highest + margin
-    # The smallest of 1, 2, 5 and 10 times a power of ten with so few ticks.
+    # The smallest of 1, 2, 5 and 10 times a power of ten with so few ticks; a step less where that
+    # leaves a single one, which would not say how large anything is.
     decade = 10.0 ** math.floor(math.log10((high - low) / max_ticks))
+    multiples = range(0)
     step = 10.0 * decade
-    for factor in (1.0, 2.0, 5.0, 10.0):
-        step = factor * decade
-        if (high - low) / step <= max_ticks:
+    for factor in (10.0, 5.0, 2.0, 1.0):
+        is_fine_enough = (high - low) / (factor * decade) > max_ticks
+        if is_fine_enough and len(multiples) >= LEAST_TICKS:
             break
+        step = factor * decade
+        multiples = range(math.ceil(low / step), math.floor(high / step) + 1)
     ticks = []
-    for k in range(math.ceil(low / step), math.floor(high / step) + 1):
+    for k in multiples:
         ticks.append((k * step, without_powers(f"{k * step + 0.0:.4g}").replace("-", "−")))
     return Axis(word, low, high, tuple(ticks))
 

@@ -79,7 +79,7 @@ def lecture_sign(lecture_code: str, follower_count: int) -> str:
     """
     if not lecture_code:
         return ""
-    count = "nobody yet" if follower_count == 0 else f"{follower_count}"
+    count = "nobody" if follower_count == 0 else f"{follower_count}"
     words = html("Others follow by <b>{}</b>: {}", lecture_code, count)
     template = "<div class='fl fl-lecture' role='status'><span>{}</span>{}{}</div>"
     show = button("Link", "let-follow")

@@ -26,7 +26,7 @@ from finlab.log.judgement_text import (
 from webapp.handles import add_html, button, placed, press, set_properties
 from webapp.markup.plot import cost_axis, exact_axis, over_time
 from webapp.markup.tables import cell_text, cells, head_row
-from webapp.markup.words import html, in_app, marker
+from webapp.markup.words import html, in_app, marker, three_digits
 from webapp.page import Page
 from webapp.tasks.log_reading import SUFFIXES, worst_moment
 from webapp.tasks.log_samples import SAMPLES
@@ -47,6 +47,8 @@ INVITATION = (
 """What the tab says while there is no log."""
 SAMPLE_WORDS = "None at hand? Open a sample, a dive of half a minute:"
 """What stands above the buttons of the samples."""
+IMPROVED = "improved"
+"""Robot of the replays on the improved layout."""
 MIN_MOVE = 5e-4
 """Least distance [m], and least turn [rad], that counts as moved."""
 
@@ -200,13 +202,33 @@ def moved_markup(judgement: "Judgement | None") -> str:
     n_kept = judgement.robot.n - len(rows)
     kept = f" {n_kept} stay as they are." if n_kept else ""
     return html(
-        "<div class='fl'><div class='said'>The improved robot is {}.{}</div><table "
+        "<div class='fl'><div class='said'>The improved robot is {}.{}{}</div><table "
         "class='fins'>{}{}</table></div>",
         judgement.improved.name,
+        _gain_words(judgement),
         kept,
         Markup(head),
         rows,
     )
+
+
+def _gain_words(judgement: "Judgement") -> str:
+    """What the improved robot misses and takes on the same demands, beside the log's own; nothing
+    until both have been asked."""
+    whole = [replay for replay in judgement.replays if replay.lost is None]
+    of_improved = {replay.name: replay for replay in whole if replay.robot == IMPROVED}
+    for before in whole:
+        after = of_improved.get(before.name)
+        if before.robot == IMPROVED or after is None:
+            continue
+        axis = judged_axis(judgement)
+        missing = [three_digits(replay.missing[axis]) for replay in (after, before)]
+        watts = [three_digits(replay.watts) for replay in (after, before)]
+        return (
+            f" By {before.name} it misses {missing[0]} {UNITS[axis]} s of {MOTIONS[axis]} where "
+            f"the log's robot misses {missing[1]}, at {watts[0]} W, not {watts[1]} W."
+        )
+    return ""
 
 
 def angle_between(one: Sequence[float], other: Sequence[float]) -> float:
@@ -236,7 +258,10 @@ def add_losses(page: Page) -> None:
             return
         start, end = judgement.timeline.time[[0, -1]].tolist()
         value = start if log_moment is None else log_moment
-        set_properties(slider, max=max(end, start + 0.1), min=start, value=value)
+        # In the slider's own steps, or its ends are written with digits that say nothing.
+        low = round(start, 1)
+        high = max(round(end, 1), low + 0.1)
+        set_properties(slider, max=high, min=low, value=min(max(round(value, 1), low), high))
 
     page.board.act(set_range, slider)
     page.add_html(_losses)

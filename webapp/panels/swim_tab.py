@@ -91,9 +91,7 @@ def add_run(page: Page) -> None:
     add_html(gui, marker("fl-primary"))
     page.add_button("Start", start, icon=viser.Icon.PLAYER_PLAY, hint="From the beginning.")
     runs = {"Pause": hold, "Go on": hold, "Step": swimming.step, "End": page.scenery.end_swim}
-    run = page.add_buttons(
-        "Run", runs, visible=False, hint="Step swims for 0.1 s; B pauses or goes on."
-    )
+    run = page.add_buttons("Run", runs, visible=False, hint=RUN_HINT)
     page.board.show(
         run,
         options=lambda paused: ("Go on" if paused else "Pause", "Step", "End"),
@@ -137,6 +135,11 @@ def _trim(able: Layout, lost: tuple[str, ...], layout: Layout) -> str:
     return html("<div class='fl missing'>{}</div>", " ".join(sentences)) if sentences else ""
 
 
+RUN_HINT = (
+    "Step swims for 0.1 s; B pauses or goes on. End goes back to the design and drops plots and "
+    "figures: save the swim before, at Figures."
+)
+"""What the page says of the buttons of a swim."""
 FIN_LINES = tuple(fin_color(i) for i in range(MAX_ACTUATORS))
 EVERY_S = 0.2
 """Least time between two drawings [s]."""

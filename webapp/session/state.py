@@ -92,7 +92,8 @@ class State:
     def with_target(self, axis: int, value: Any) -> "State":
         """One component of the target changed."""
         target = list(self.target)
-        target[axis] = number(value, f"{AXES[axis]} [{UNITS[axis]}]", -MAX_TARGET, MAX_TARGET)
+        name = f"{AXES[axis]} [{UNITS[axis]}]"
+        target[axis] = number(value, name, -MAX_TARGET, MAX_TARGET) + 0.0  # -0.0 + 0.0 is 0.0
         fx, fy, fz, tx, ty, tz = target
         return replace(self, target=(fx, fy, fz, tx, ty, tz))
 
