@@ -196,14 +196,15 @@
     inspector?.scrollTo(0, 0);
   }
 
-  // The card of a stop or lesson begins at its top and brings to a phone what it speaks of; its praise comes into sight.
+  // At each stop and lesson all panels begin at their top, where its card says that things are, and a phone shows what it
+  // speaks of; its praise comes into sight.
   let stop = '', isPraised = false;
   function guide() {
     const card = document.querySelector('.fl-tour'), praise = card?.querySelector('[role=status]');
     const title = card?.querySelector('b').textContent ?? '';
     if (card && title !== stop) {
       page.dataset.flSheet = innerWidth > 600 ? '' : card.dataset.sheet;
-      card.closest('[data-fl~=region]')?.scrollTo(0, 0);
+      for (const region of document.querySelectorAll('[data-fl~=region]')) region.scrollTo(0, 0);
     } else if (praise && !isPraised) praise.scrollIntoView({ block: 'nearest' });
     [stop, isPraised] = [title, !!praise];
   }

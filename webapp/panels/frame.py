@@ -86,10 +86,6 @@ HEAD_PX = 68
 """Height of what is in the drawer beside the plots [px]."""
 FOLDER = ".mantine-Paper-root[data-fl~={}]"
 """Selector of a folder by the name of its marker."""
-SCROLL_UP = (
-    "document.querySelectorAll('[data-fl~=region]').forEach((region) => region.scrollTo(0, 0));"
-)
-"""Shows the upper end of each region."""
 
 
 class Section:
@@ -162,7 +158,6 @@ class Frame:
         page.board.act(self._arrange)
         page.board.act(self._guard_reload)
         page.board.act(self._set_title)
-        page.board.act(self._begin_at_top)
         add_nudging(page)
         add_gamepad(page)
         self._listen()
@@ -238,12 +233,6 @@ class Frame:
         """Writes the robot's name into the title of the browser's tab."""
         title = json.dumps(f"{layout.name} · finlab")
         run_script(self._page.gui, f"document.title = {title};")
-
-    def _begin_at_top(self, stop: Stop | None) -> None:
-        """Scrolls all regions up at each stop of the tour and in each lesson: what its card names
-        is where the card says, and the card itself begins with its title."""
-        if stop is not None:
-            run_script(self._page.gui, SCROLL_UP)
 
     def _listen(self) -> None:
         """Connects the buttons of the page's own markup, by their kinds, with what they do."""
