@@ -15,6 +15,8 @@ from finlab.allocation.question import check_flow
 from finlab.analysis.authority import commanded_axes, named_axes
 from finlab.analysis.climb import PENALTY, RADIUS_MIN, Climb, Rule, Rules
 from finlab.analysis.goals import MISSION, Goal, axes_to_raise, make_goal
+from finlab.analysis.keep_out import KeepOut, keep_out_rule
+from finlab.analysis.layout_bound import LayoutBound, check_bounded, layout_bound
 from finlab.analysis.moves import Bounds, Moves, mirror_pairs
 from finlab.analysis.score_card import ScoreCard, score_card
 from finlab.analysis.slopes import GoalPoint, MissionPower, SlopedGoal, WeakestDirection
@@ -89,6 +91,39 @@ class Improvement:
     """Score card at the start."""
     card_after: ScoreCard
     """Score card of `layout`."""
+    bound: LayoutBound | None = None
+    """What the goal of no layout within the bounds exceeds, where it was asked for."""
+
+    @property
+    def gap(self) -> float | None:
+        """Share by which the bound exceeds the goal [1]; None without a bound, or where the goal is
+        0."""
+        if self.bound is None or self.value_after <= 0.0:
+            return None
+        return self.bound.value / self.value_after - 1.0
+
+    def to_dict(self) -> dict[str, Any]:
+        """Returns it as values for JSON: lengths in m, forces in N, powers in W; the powers of a
+        mission are negative."""
+        places = {
+            name: {
+                "position_m": list(self.layout.actuator(name).position),
+                "axis": list(self.layout.actuator(name).frame[0]),
+            }
+            for name in self.moved
+        }
+        return {
+            "layout": self.layout.name,
+            "goal": self.goal,
+            "improved": self.improved,
+            "cancelled": self.cancelled,
+            "value_before": self.value_before,
+            "value_after": self.value_after,
+            "axes": list(self.axes),
+            "moved": places,
+            "bound": None if self.bound is None else self.bound.to_dict(),
+            "gap": self.gap,
+        }
 
 
 def optimize_layout(
@@ -102,9 +137,11 @@ def optimize_layout(
     rounds: int = 40,
     seed: int = 0,
     rule: Rule | None = None,
+    keep_outs: Sequence[KeepOut] = (),
     grid: tuple[float, float] = (0.0, 0.0),
     axes: Sequence[MotionAxis] | None = None,
     flow: ArrayLike | None = None,
+    bound: bool = False,
     progress: Callable[[Progress], None] | None = None,
     cancelled: Callable[[], bool] | None = None,
     mapped: MapParts = map,
@@ -126,12 +163,14 @@ def optimize_layout(
         rounds: most rounds of the search.
         seed: of its random numbers.
         rule: another one that they have to keep, such as to stand outside of a hull.
+        keep_outs: boxes in which none of those that move may stand.
         grid: steps [m], [rad] of the coordinates and angles that are tried; 0 for any number.
         axes: axes whose directions count for the two goals of directions, with anything on the
             others; all that the layout commands when None, or, with too few actuators for them,
             those that are pushed alone now, of which no move of a single coordinate costs one.
         flow: velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at
             rest.
+        bound: whether to say what no layout within the bounds exceeds, see `layout_bound`.
         progress: called after each round.
         cancelled: called after each round, and within long ones; the search stops when it returns
             True.
@@ -139,11 +178,14 @@ def optimize_layout(
             `finlab.research.executor.map_parts` does on a cluster.
 
     Raises:
-        LayoutError: an actuator, bounds, pairs, the goal or axes do not fit.
+        LayoutError: an actuator, bounds, pairs, the goal or axes do not fit, or there is no bound
+            of this goal, or not of these actuators.
         CommandError: `flow` is not six finite numbers, or `mission` not such wrenches.
     """
     bounds = bounds or {}
     water = check_flow(flow)
+    if bound:
+        check_bounded(layout, goal, water)
     start = layout
     if axes is not None:
         layout = replace(layout, axes=named_axes(axes))
@@ -153,6 +195,8 @@ def optimize_layout(
     }
     pairs = mirror_pairs(layout) if mirror is None else mirror
     moves = Moves(layout, names, bounds_of, pairs, grid, water)
+    if keep_outs:
+        rule = _both(keep_out_rule(keep_outs, layout.indices(moves.names)), rule)
     if axes is None and goal != "mission_power":
         axes = axes_to_raise(layout, water)
         if len(axes) < len(layout.axes):
@@ -180,6 +224,18 @@ def optimize_layout(
     is_better = after > before + 1e-9 * abs(before)
     improved = violation(best) <= 0.0 and (violation(layout) > 0.0 or is_better)
     card = score_card(start, flow=water)
+    counted_axes = tuple(axes or commanded_axes(layout))
+    limit = None
+    if bound:
+        limit = layout_bound(
+            layout,
+            names,
+            bounds_of,
+            mirror=pairs,
+            axes=named_axes(counted_axes),
+            keep_outs=keep_outs,
+            after_loss=goal == "worst_single_failure",
+        )
     return Improvement(
         layout=best if improved else start,
         improved=improved,
@@ -188,10 +244,22 @@ def optimize_layout(
         value_before=before,
         value_after=after if improved else before,
         moved=moves.names,
-        axes=tuple(axes or commanded_axes(layout)),
+        axes=counted_axes,
         card_before=card,
         card_after=score_card(best, flow=water) if improved else card,
+        bound=limit,
     )
+
+
+def _both(first: Rule, second: Rule | None) -> Rule:
+    """Two rules as one, where there are two."""
+    if second is None:
+        return first
+
+    def violation(position: Array, frames: Array) -> Array:
+        return np.asarray(first(position, frames) + second(position, frames))
+
+    return violation
 
 
 def _sloped_goal(
