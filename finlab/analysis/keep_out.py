@@ -95,7 +95,7 @@ def extreme_places(box: Array, keep_outs: Sequence[KeepOut]) -> Array:
 def _first_along(is_allowed: NDArray[np.bool_], axis: int) -> NDArray[np.bool_]:
     """Which points (X, Y, Z) are the first allowed ones of their lines along an axis."""
     count = np.cumsum(is_allowed, axis=axis)
-    return is_allowed & (count == 1)
+    return np.asarray(is_allowed & (count == 1))
 
 
 def _last_along(is_allowed: NDArray[np.bool_], axis: int) -> NDArray[np.bool_]:

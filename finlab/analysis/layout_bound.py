@@ -1,7 +1,7 @@
 """How much weakest direction no layout of some thrusters exceeds, wherever they stand and point.
 
-With f_i half of the range of forces of thruster i, b_i its scaled wrench per newton, and m axes
-that count, the weakest direction r of n thrusters keeps
+With f_i half of the range of forces of thruster i, or its weaker way where n = m, b_i its scaled
+wrench per newton, and m axes that count, the weakest direction r of n thrusters keeps
 
     r^2 <= K(n, m) / tr(M^-1),  M = sum_i f_i^2 b_i b_i^T,
 
@@ -107,7 +107,6 @@ def layout_bound(
     check_bounded(layout)
     counted = layout.axes if axes is None else axes
     rows = [WRENCH.index(axis) for axis in counted]
-    half_range = 0.5 * (layout.upper[:, 0] - layout.lower[:, 0])
     sets = _pose_sets(layout, names, bounds or {}, mirror, keep_outs)
     n_working = layout.n - after_loss
     factor = inradius_factor(n_working, len(rows))
@@ -115,7 +114,7 @@ def layout_bound(
         zeros = np.zeros((len(rows), len(rows)))
         no_length = (0.0,) * layout.n
         return LayoutBound(0.0, _as_tuples(zeros), no_length, 0.0, tuple(counted), 0)
-    design = _Design(sets, half_range**2, rows)
+    design = _Design(sets, _force_of_balls(layout, n_working == len(rows)) ** 2, rows)
     best_value = math.inf
     for n_rounds in range(1, rounds + 1):
         metric = design.metric()
@@ -184,6 +183,20 @@ def inradius_factor(n: int, m: int) -> float:
         cotangent = 1.0 / math.tan(math.pi / (2.0 * n))
         return n - 4.0 + 4.0 / n * cotangent**2
     return float(m * (n - m + 1))
+
+
+def _force_of_balls(layout: Layout, is_square: bool) -> Array:
+    """The forces f (n,) [N] that count for balls about zero wrench.
+
+    A ball about 0 has a mirror image in the middle of all wrenches, and between both there is one
+    of the same size about that middle: half of the range of forces counts. Where as many columns
+    as dimensions leave one force for each wrench, the weaker way counts.
+    """
+    least = layout.lower[:, 0]
+    most = layout.upper[:, 0]
+    if is_square:
+        return np.maximum(np.minimum(most, -least), 0.0)
+    return np.asarray(0.5 * (most - least))
 
 
 def _pose_sets(

@@ -135,6 +135,7 @@ def optimize_layout(
     *,
     mission: ArrayLike = MISSION,
     rounds: int = 40,
+    searches: int = 1,
     seed: int = 0,
     rule: Rule | None = None,
     keep_outs: Sequence[KeepOut] = (),
@@ -160,8 +161,9 @@ def optimize_layout(
         goal: `weakest_direction`, `mission_power` or `worst_single_failure`, see `make_goal`.
         mirror: pairs that stay each other's mirror image; when None, all that are so now.
         mission: wrenches (N, 6) [N, N m] for the goal `mission_power`.
-        rounds: most rounds of the search.
-        seed: of its random numbers.
+        rounds: most rounds of each search.
+        searches: how many times starts are drawn and climbs made from them; the best result counts.
+        seed: of the random numbers.
         rule: another one that they have to keep, such as to stand outside of a hull.
         keep_outs: boxes in which none of those that move may stand.
         grid: steps [m], [rad] of the coordinates and angles that are tried; 0 for any number.
@@ -208,10 +210,15 @@ def optimize_layout(
         return float(measure(force_sets(robot, flow=water), lambda _: robot)[0])
 
     before = measured(layout)
-    search = _Search(moves, Rules(moves.smooth, rule), before, rounds, progress, cancelled, mapped)
+    n_rounds = rounds * searches
+    rules = Rules(moves.smooth, rule)
+    search = _Search(moves, rules, before, n_rounds, progress, cancelled, mapped)
     if not moves.changes_forces:
         counted = axes or commanded_axes(layout)
-        search.climb(_sloped_goal(goal, moves.smooth, counted, mission, water), seed)
+        sloped_goal = _sloped_goal(goal, moves.smooth, counted, mission, water)
+        for number in range(searches):
+            if not search.stopped:
+                search.climb(sloped_goal, seed + number, with_present=number == 0)
     if not search.gained and not search.stopped:
         search.evolve(quick, seed)
     best = moves.moved(search.vector)
@@ -318,13 +325,15 @@ class _Search:
         self.stopped = self._cancelled()
         return self.stopped or self._done >= self._rounds
 
-    def climb(self, goal: SlopedGoal, seed: int) -> None:
-        """Climbs a few steps from several starts, then on from the best of them, and rounds the
-        results to the grid."""
+    def climb(self, goal: SlopedGoal, seed: int, with_present: bool = True) -> None:
+        """Climbs a few steps from several starts, among them the present vector where it is to be,
+        then on from the best of them, and rounds the results to the grid."""
         best = self.best
+        vector = self.vector
+        had_gained = self.gained
         self.stopped = self._cancelled()
         climbs = list[Climb]()
-        for start in self._starts(goal, seed) if not self.stopped else ():
+        for start in self._starts(goal, seed, with_present) if not self.stopped else ():
             climbs.append(Climb(goal, self._rules, start))
             if self._climbed(climbs[-1], FIRST_STEPS):
                 break
@@ -334,17 +343,17 @@ class _Search:
                 self._climbed(climb, MAX_STEPS)
         if self._moves.step.any() and self.gained:
             self.best = best
-            self.vector = self._moves.start
-            self.gained = False
+            self.vector = vector
+            self.gained = had_gained
             for climb in sorted(climbs, key=lambda climb: -climb.point.value)[:3]:
                 self._note(*climb.rounded(self._moves))
 
-    def _starts(self, goal: SlopedGoal, seed: int) -> Iterator[GoalPoint]:
-        """Yields the present vector and the best of some random ones that keep all rules; of these
-        half as they are, and half mirrored like the robot."""
+    def _starts(self, goal: SlopedGoal, seed: int, with_present: bool) -> Iterator[GoalPoint]:
+        """Yields the present vector, where it is to be, and the best of some random ones that keep
+        all rules; of these half as they are, and half mirrored like the robot."""
         moves = self._moves
         random = np.random.default_rng(seed)
-        if self._starts_within_rules:
+        if with_present and self._starts_within_rules:
             yield goal.evaluate(moves.start)
         vectors = random.uniform(moves.lower, moves.upper, (RANDOM_VECTORS, len(moves.start)))
         mirrored = moves.mirrored(vectors)

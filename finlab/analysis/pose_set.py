@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finlab.analysis.keep_out import KeepOut, extreme_places
 from finlab.analysis.moves import Bounds, turn_matrices
@@ -128,7 +129,7 @@ class PoseSet:
         torque = -np.cross(np.eye(3), place[:, None]) + self.torque_per_newton * np.eye(3)
         force = np.broadcast_to(np.eye(3), torque.shape)
         wrench = np.concatenate([force, torque], axis=-1) / SCALE
-        return np.swapaxes(wrench, -1, -2)[:, list(rows)]
+        return np.asarray(np.swapaxes(wrench, -1, -2)[:, list(rows)])
 
     def directions(self, angles: Array) -> Array:
         """Returns unit vectors (S, 3) at turns and tilts (S, 2) [rad]."""
@@ -191,7 +192,7 @@ class PoseSet:
 class _Cells(NamedTuple):
     """Cells of turn and tilt at places."""
 
-    place: Array
+    place: NDArray[np.intp]
     """Index of the place of each cell (S,)."""
     center: Array
     """Its turn and tilt (S, 2) [rad]."""
@@ -216,7 +217,7 @@ class _Cells(NamedTuple):
         and tilts move a direction by no more than their own angle."""
         return np.asarray(self.half.sum(axis=-1))
 
-    def split(self, is_open: Array) -> _Cells:
+    def split(self, is_open: NDArray[np.bool_]) -> _Cells:
         """Returns the quarters of some cells, by a mask (S,)."""
         quarter = 0.5 * self.half[is_open]
         signs = np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]])

@@ -218,6 +218,7 @@ def optimize(
     keep_out: Annotated[UseAppendAction[tuple[Box, ...]], arg(metavar="X0 X1 Y0 Y1 Z0 Z1")] = (),
     bound: bool = False,
     rounds: shared_options.Count = 40,
+    searches: shared_options.Count = 1,
     seed: shared_options.Count = 0,
     cluster: shared_options.Cluster = None,
     json: shared_options.JsonFile = None,
@@ -240,7 +241,8 @@ def optimize(
         keep_out: ends of a box in which none of them may stand [m]; may be given several times.
         bound: say what no layout within the bounds exceeds (thrusters at rest, goals of
             directions).
-        rounds: most rounds of the search.
+        rounds: most rounds of each search.
+        searches: how many times it searches from other starts; the best result counts.
         seed: same arguments and seed, same layout.
     """
     from dataclasses import replace
@@ -254,7 +256,7 @@ def optimize(
 
     shared_options.check_json_file(output, "output")
     shared_options.check_json_file(json)
-    shared_options.check_positive(rounds=rounds)
+    shared_options.check_positive(rounds=rounds, searches=searches)
     robot = shared_options.open_robot(layout)[0]
     if not (0.0 <= reach < math.inf and 0.0 <= turn <= 180.0):
         raise FinlabError(
@@ -268,7 +270,7 @@ def optimize(
         ends = _box_ends(box)
         space = {name: replace(bounds, **ends) for name, bounds in space.items()}
     keep_outs = [KeepOut(**_box_ends(ends)) for ends in keep_out]
-    bar = tqdm(total=rounds, desc=goal, unit="round", disable=None, leave=False, file=sys.stderr)
+    bar = tqdm(total=rounds * searches, desc=goal, unit="round", disable=None, leave=False, file=sys.stderr)
 
     def report(progress: Progress) -> None:
         bar.update()
@@ -283,6 +285,7 @@ def optimize(
             None if mirror else (),
             mission=wrench or MISSION,
             rounds=rounds,
+            searches=searches,
             seed=seed,
             keep_outs=keep_outs,
             bound=bound,
