@@ -45,11 +45,8 @@ NEGLIGIBLE_WEIGHT = 1e-7
 """Share of a thruster below which a column of its design is left out."""
 REGULARIZATION = 1e-12
 """Share of the trace that is added to the diagonal of M: any metric gives a bound."""
-ROUNDING = 1e-9
+ROUNDING_SHARE = 1e-9
 """Share by which rounding may lower the bound."""
-MOST_PROVED = 10
-"""Most thrusters for which the planar factor is proved, by the multipliers in
-tests/analysis/planar_factor.py."""
 
 
 @dataclass(frozen=True)
@@ -121,7 +118,7 @@ def layout_bound(
         longest = design.longest(metric)
         # A lost thruster is at best the one that counts most.
         total = longest.sum() - (longest.max() if after_loss else 0.0)
-        value = math.sqrt(factor * total) * (1.0 + ROUNDING)
+        value = math.sqrt(factor * total) * (1.0 + ROUNDING_SHARE)
         if value < best_value:
             best_value = value
             certificate = LayoutBound(
@@ -170,16 +167,17 @@ def check_bounded(
 def inradius_factor(n: int, m: int) -> float:
     """Returns K(n, m), for which r^2 <= K / tr(M^-1) holds of the largest ball in a zonotope.
 
-    It is m (n - m + 1) by Cauchy-Schwarz; with two more columns than dimensions, it is that of
-    evenly spaced directions in a plane. 0 where n columns do not span m dimensions.
+    It is m (n - m + 1) by Cauchy-Schwarz. With two more columns than dimensions it is the value
+    of evenly spaced lines in a plane; multipliers in tests/analysis/planar_factor.py prove it. It
+    is 0 where n columns do not span m dimensions.
 
     Args:
         n: columns of the zonotope.
-        m: dimensions.
+        m: dimensions, 1 to 6.
     """
     if n < m:
         return 0.0
-    if n == m + 2 and n <= MOST_PROVED:
+    if n == m + 2:
         cotangent = 1.0 / math.tan(math.pi / (2.0 * n))
         return n - 4.0 + 4.0 / n * cotangent**2
     return float(m * (n - m + 1))

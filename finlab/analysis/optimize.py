@@ -33,6 +33,8 @@ STEPS_PER_ROUND = 10
 """Steps of a climb that count as a round."""
 RANDOM_VECTORS = 64
 """Random vectors from which starts are chosen."""
+MAX_DRAWS = 20
+"""Most times that random vectors are drawn until enough of them keep all rules."""
 RANKED_PER_START = 6
 """Most vectors that are ranked for each start."""
 STARTS_SCALE = 2800
@@ -216,9 +218,7 @@ def optimize_layout(
     if not moves.changes_forces:
         counted = axes or commanded_axes(layout)
         sloped_goal = _sloped_goal(goal, moves.smooth, counted, mission, water)
-        for number in range(searches):
-            if not search.stopped:
-                search.climb(sloped_goal, seed + number, with_present=number == 0)
+        search.climb_often(sloped_goal, seed, searches)
     if not search.gained and not search.stopped:
         search.evolve(quick, seed)
     best = moves.moved(search.vector)
@@ -325,7 +325,14 @@ class _Search:
         self.stopped = self._cancelled()
         return self.stopped or self._done >= self._rounds
 
-    def climb(self, goal: SlopedGoal, seed: int, with_present: bool = True) -> None:
+    def climb_often(self, goal: SlopedGoal, seed: int, searches: int) -> None:
+        """Climbs with some seeds in turn, with the present vector by the first."""
+        for number in range(searches):
+            self.climb(goal, seed + number, with_present=number == 0)
+            if self.stopped:
+                return
+
+    def climb(self, goal: SlopedGoal, seed: int, with_present: bool) -> None:
         """Climbs a few steps from several starts, among them the present vector where it is to be,
         then on from the best of them, and rounds the results to the grid."""
         best = self.best
@@ -356,18 +363,35 @@ class _Search:
         if with_present and self._starts_within_rules:
             yield goal.evaluate(moves.start)
         vectors = random.uniform(moves.lower, moves.upper, (RANDOM_VECTORS, len(moves.start)))
-        mirrored = moves.mirrored(vectors)
-        variants = [vectors] if np.array_equal(vectors, mirrored) else [vectors, mirrored]
+        is_mirrored = [False] if np.array_equal(vectors, moves.mirrored(vectors)) else [False, True]
         count = (
             int(np.clip(round(STARTS_SCALE / len(moves.start) ** 2), MIN_STARTS, MAX_STARTS)) - 1
         )
-        n_best = -(-count // len(variants))
-        for variant in variants:
-            scaled = [moves.start + share * (variant - moves.start) for share in (1.0, 0.5, 0.25)]
-            within_rules = [rows[self._rules.violation(rows) <= 0.0] for rows in scaled]
-            valid = np.concatenate(within_rules)[: RANKED_PER_START * n_best]
+        n_best = -(-count // len(is_mirrored))
+        for mirrored in is_mirrored:
+            valid = self._valid(vectors, mirrored, RANKED_PER_START * n_best, random)
+            if not len(valid):
+                continue
             for k in np.argsort(-goal.guess(valid), kind="stable")[:n_best]:
                 yield goal.evaluate(valid[k])
+
+    def _valid(
+        self, vectors: Array, mirrored: bool, count: int, random: np.random.Generator
+    ) -> Array:
+        """Vectors that keep all rules (at most `count`, D): some random ones (P, D) first, mirrored
+        like the robot where they are to be, then others that are drawn."""
+        moves = self._moves
+        valid = np.zeros((0, len(moves.start)))
+        for draw in range(MAX_DRAWS):
+            if len(valid) >= count:
+                break
+            drawn = random.uniform(moves.lower, moves.upper, vectors.shape) if draw else vectors
+            variant = moves.mirrored(drawn) if mirrored else drawn
+            for share in (1.0, 0.5, 0.25):
+                rows = moves.start + share * (variant - moves.start)
+                keeps_rules = self._rules.violation(rows) <= 0.0
+                valid = np.concatenate([valid, rows[keeps_rules]])
+        return valid[:count]
 
     def _climbed(self, climb: Climb, steps: int) -> bool:
         """Takes steps of a climb; returns whether the search has to stop."""

@@ -8,6 +8,7 @@ encloses it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -22,7 +23,7 @@ from finlab.axes import MIRROR_SIGNS
 from finlab.errors import LayoutError
 from finlab.forces.force_sets import SCALE
 
-HALF_TURN = np.pi - 1e-9
+HALF_TURN = math.pi - 1e-9
 """Range of both angles from which on they point everywhere, up to the sign [rad]."""
 FIRST_CELLS = 8
 """Cells along each angle at first."""

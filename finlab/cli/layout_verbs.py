@@ -270,7 +270,9 @@ def optimize(
         ends = _box_ends(box)
         space = {name: replace(bounds, **ends) for name, bounds in space.items()}
     keep_outs = [KeepOut(**_box_ends(ends)) for ends in keep_out]
-    bar = tqdm(total=rounds * searches, desc=goal, unit="round", disable=None, leave=False, file=sys.stderr)
+    bar = tqdm(
+        total=rounds * searches, desc=goal, unit="round", disable=None, leave=False, file=sys.stderr
+    )
 
     def report(progress: Progress) -> None:
         bar.update()

@@ -8,7 +8,7 @@ import pytest
 
 from finlab.analysis import Bounds, KeepOut, layout_bound, optimize_layout
 from finlab.analysis.keep_out import extreme_places, keep_out_rule
-from finlab.analysis.layout_bound import MOST_PROVED, inradius_factor
+from finlab.analysis.layout_bound import inradius_factor
 from finlab.analysis.pose_set import TOLERANCE, PoseSet
 from finlab.arrays import Array
 from finlab.axes import AXES
@@ -135,7 +135,6 @@ def test_the_planar_factor_is_proved_and_attained(n: int) -> None:
     even = np.array([2.0 / n * np.sin(np.pi / n * (b - a)) for a, b in index])
     assert even @ even == pytest.approx(1.0)
     assert even @ form @ even == pytest.approx(factor)
-    assert max(MULTIPLIERS) == MOST_PROVED
     assert factor < inradius_factor(n + 1, n - 1) and factor < 3.0 * (n - 2)
 
 
