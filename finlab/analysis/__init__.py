@@ -13,6 +13,9 @@ from finlab.analysis.capability import Capability as Capability
 from finlab.analysis.capability import capability as capability
 from finlab.analysis.capability import dp_capability as dp_capability
 from finlab.analysis.goals import GOALS as GOALS
+from finlab.analysis.keep_out import KeepOut as KeepOut
+from finlab.analysis.layout_bound import LayoutBound as LayoutBound
+from finlab.analysis.layout_bound import layout_bound as layout_bound
 from finlab.analysis.moves import Bounds as Bounds
 from finlab.analysis.moves import mirror_pairs as mirror_pairs
 from finlab.analysis.optimize import Improvement as Improvement
@@ -36,6 +39,8 @@ __all__ = [
     "Bounds",
     "Capability",
     "Improvement",
+    "KeepOut",
+    "LayoutBound",
     "Loss",
     "Progress",
     "ScoreCard",
@@ -45,6 +50,7 @@ __all__ = [
     "authority",
     "capability",
     "dp_capability",
+    "layout_bound",
     "least_power",
     "losses",
     "mirror_pairs",

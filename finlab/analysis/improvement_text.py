@@ -38,13 +38,14 @@ def improvement_remarks(improvement: Improvement) -> list[Remark]:
     """Returns sentences on the goal before and after, and on what to know of these values."""
     goal = improvement.goal
     if not improvement.improved:
-        return [Remark("Nothing better was found within reach.")]
+        return [Remark("Nothing better was found within reach."), *_bound_remarks(improvement)]
     axes = ""
     if goal != POWER_GOAL and len(improvement.axes) < len(AXES):
         axes = f" of {listed(improvement.axes)}, with anything on the others"
     before = goal_value(goal, improvement.value_before)
     after = goal_value(goal, improvement.value_after)
     remarks = [Remark(as_sentence(f"{GOAL_WORDS[goal]}{axes}: {before} before, {after} after"))]
+    remarks += _bound_remarks(improvement)
     if improvement.cancelled:
         remarks.append(Remark("The search was stopped early."))
     # The goal is minus the mean over the mission, and one wrench alone may count with UNREACHED.
@@ -55,6 +56,17 @@ def improvement_remarks(improvement: Improvement) -> list[Remark]:
     if lost:
         remarks.append(Remark(f"It no longer pushes {listed(lost)} alone.", is_warning=True))
     return remarks
+
+
+def _bound_remarks(improvement: Improvement) -> list[Remark]:
+    """A sentence on what no layout exceeds, where that is known."""
+    if improvement.bound is None:
+        return []
+    value = goal_value(improvement.goal, improvement.bound.value)
+    words = f"no layout of these thrusters within these bounds has more than {value}"
+    if improvement.gap is not None:
+        words += f", {100.0 * improvement.gap:.1f} % more than this one"
+    return [Remark(as_sentence(words))]
 
 
 def moved_table(improvement: Improvement) -> Table:

@@ -232,7 +232,7 @@ class Moves:
         """Returns positions (P, n, 3) [m] and own axes (P, n, 3, 3) of vectors (P, D)."""
         numbers = self._numbers(vectors)
         frames = np.tile(self.layout.frames, (len(vectors), 1, 1, 1))
-        turns = _turn_matrices(
+        turns = turn_matrices(
             self.layout.frames[self._leader_rows, 0],
             numbers[..., 3] - self._azimuths[self._leader_rows],
             numbers[..., 4],
@@ -312,10 +312,15 @@ class Moves:
         return result
 
 
-def _turn_matrices(axis: Array, turn: Array, tilt: Array) -> Array:
-    """Matrices (P, L, 3, 3), from the right of rows, that raise main axes (L, 3) by angles (P, L)
-    [rad] and then turn them about the vertical by others; those that are vertical tilt towards
-    x."""
+def turn_matrices(axis: Array, turn: Array, tilt: Array) -> Array:
+    """Returns matrices (P, L, 3, 3), from the right of rows, that raise main axes and then turn
+    them about the vertical; those that are vertical tilt towards x.
+
+    Args:
+        axis: main axes (L, 3).
+        turn: angles about the vertical (P, L) [rad].
+        tilt: angles by which the axes are raised (P, L) [rad].
+    """
     level = np.hypot(axis[:, 0], axis[:, 1])[:, None]
     upright = np.stack([np.zeros(len(axis)), np.sign(axis[:, 2]), np.zeros(len(axis))], axis=-1)
     sideways = np.stack([axis[:, 1], -axis[:, 0], np.zeros(len(axis))], axis=-1) / np.maximum(

@@ -15,6 +15,8 @@ from finlab.allocation.question import check_flow
 from finlab.analysis.authority import commanded_axes, named_axes
 from finlab.analysis.climb import PENALTY, RADIUS_MIN, Climb, Rule, Rules
 from finlab.analysis.goals import MISSION, Goal, axes_to_raise, make_goal
+from finlab.analysis.keep_out import KeepOut, keep_out_rule
+from finlab.analysis.layout_bound import LayoutBound, check_bounded, layout_bound
 from finlab.analysis.moves import Bounds, Moves, mirror_pairs
 from finlab.analysis.score_card import ScoreCard, score_card
 from finlab.analysis.slopes import GoalPoint, MissionPower, SlopedGoal, WeakestDirection
@@ -31,6 +33,8 @@ STEPS_PER_ROUND = 10
 """Steps of a climb that count as a round."""
 RANDOM_VECTORS = 64
 """Random vectors from which starts are chosen."""
+MAX_DRAWS = 20
+"""Most times that random vectors are drawn until enough of them keep all rules."""
 RANKED_PER_START = 6
 """Most vectors that are ranked for each start."""
 STARTS_SCALE = 2800
@@ -89,6 +93,39 @@ class Improvement:
     """Score card at the start."""
     card_after: ScoreCard
     """Score card of `layout`."""
+    bound: LayoutBound | None = None
+    """What the goal of no layout within the bounds exceeds, where it was asked for."""
+
+    @property
+    def gap(self) -> float | None:
+        """Share by which the bound exceeds the goal [1]; None without a bound, or where the goal is
+        0."""
+        if self.bound is None or self.value_after <= 0.0:
+            return None
+        return self.bound.value / self.value_after - 1.0
+
+    def to_dict(self) -> dict[str, Any]:
+        """Returns it as values for JSON: lengths in m, forces in N, powers in W; the powers of a
+        mission are negative."""
+        places = {
+            name: {
+                "position_m": list(self.layout.actuator(name).position),
+                "axis": list(self.layout.actuator(name).frame[0]),
+            }
+            for name in self.moved
+        }
+        return {
+            "layout": self.layout.name,
+            "goal": self.goal,
+            "improved": self.improved,
+            "cancelled": self.cancelled,
+            "value_before": self.value_before,
+            "value_after": self.value_after,
+            "axes": list(self.axes),
+            "moved": places,
+            "bound": None if self.bound is None else self.bound.to_dict(),
+            "gap": self.gap,
+        }
 
 
 def optimize_layout(
@@ -100,11 +137,14 @@ def optimize_layout(
     *,
     mission: ArrayLike = MISSION,
     rounds: int = 40,
+    searches: int = 1,
     seed: int = 0,
     rule: Rule | None = None,
+    keep_outs: Sequence[KeepOut] = (),
     grid: tuple[float, float] = (0.0, 0.0),
     axes: Sequence[MotionAxis] | None = None,
     flow: ArrayLike | None = None,
+    bound: bool = False,
     progress: Callable[[Progress], None] | None = None,
     cancelled: Callable[[], bool] | None = None,
     mapped: MapParts = map,
@@ -123,15 +163,18 @@ def optimize_layout(
         goal: `weakest_direction`, `mission_power` or `worst_single_failure`, see `make_goal`.
         mirror: pairs that stay each other's mirror image; when None, all that are so now.
         mission: wrenches (N, 6) [N, N m] for the goal `mission_power`.
-        rounds: most rounds of the search.
-        seed: of its random numbers.
+        rounds: most rounds of each search.
+        searches: how many times starts are drawn and climbs made from them; the best result counts.
+        seed: of the random numbers.
         rule: another one that they have to keep, such as to stand outside of a hull.
+        keep_outs: boxes in which none of those that move may stand.
         grid: steps [m], [rad] of the coordinates and angles that are tried; 0 for any number.
         axes: axes whose directions count for the two goals of directions, with anything on the
             others; all that the layout commands when None, or, with too few actuators for them,
             those that are pushed alone now, of which no move of a single coordinate costs one.
         flow: velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at
             rest.
+        bound: whether to say what no layout within the bounds exceeds, see `layout_bound`.
         progress: called after each round.
         cancelled: called after each round, and within long ones; the search stops when it returns
             True.
@@ -139,11 +182,14 @@ def optimize_layout(
             `finlab.research.executor.map_parts` does on a cluster.
 
     Raises:
-        LayoutError: an actuator, bounds, pairs, the goal or axes do not fit.
+        LayoutError: an actuator, bounds, pairs, the goal or axes do not fit, or there is no bound
+            of this goal, or not of these actuators.
         CommandError: `flow` is not six finite numbers, or `mission` not such wrenches.
     """
     bounds = bounds or {}
     water = check_flow(flow)
+    if bound:
+        check_bounded(layout, goal, water)
     start = layout
     if axes is not None:
         layout = replace(layout, axes=named_axes(axes))
@@ -153,6 +199,8 @@ def optimize_layout(
     }
     pairs = mirror_pairs(layout) if mirror is None else mirror
     moves = Moves(layout, names, bounds_of, pairs, grid, water)
+    if keep_outs:
+        rule = _both(keep_out_rule(keep_outs, layout.indices(moves.names)), rule)
     if axes is None and goal != "mission_power":
         axes = axes_to_raise(layout, water)
         if len(axes) < len(layout.axes):
@@ -164,10 +212,13 @@ def optimize_layout(
         return float(measure(force_sets(robot, flow=water), lambda _: robot)[0])
 
     before = measured(layout)
-    search = _Search(moves, Rules(moves.smooth, rule), before, rounds, progress, cancelled, mapped)
+    n_rounds = rounds * searches
+    rules = Rules(moves.smooth, rule)
+    search = _Search(moves, rules, before, n_rounds, progress, cancelled, mapped)
     if not moves.changes_forces:
         counted = axes or commanded_axes(layout)
-        search.climb(_sloped_goal(goal, moves.smooth, counted, mission, water), seed)
+        sloped_goal = _sloped_goal(goal, moves.smooth, counted, mission, water)
+        search.climb_often(sloped_goal, seed, searches)
     if not search.gained and not search.stopped:
         search.evolve(quick, seed)
     best = moves.moved(search.vector)
@@ -180,6 +231,18 @@ def optimize_layout(
     is_better = after > before + 1e-9 * abs(before)
     improved = violation(best) <= 0.0 and (violation(layout) > 0.0 or is_better)
     card = score_card(start, flow=water)
+    counted_axes = tuple(axes or commanded_axes(layout))
+    limit = None
+    if bound:
+        limit = layout_bound(
+            layout,
+            names,
+            bounds_of,
+            mirror=pairs,
+            axes=named_axes(counted_axes),
+            keep_outs=keep_outs,
+            after_loss=goal == "worst_single_failure",
+        )
     return Improvement(
         layout=best if improved else start,
         improved=improved,
@@ -188,10 +251,22 @@ def optimize_layout(
         value_before=before,
         value_after=after if improved else before,
         moved=moves.names,
-        axes=tuple(axes or commanded_axes(layout)),
+        axes=counted_axes,
         card_before=card,
         card_after=score_card(best, flow=water) if improved else card,
+        bound=limit,
     )
+
+
+def _both(first: Rule, second: Rule | None) -> Rule:
+    """Two rules as one, where there are two."""
+    if second is None:
+        return first
+
+    def violation(position: Array, frames: Array) -> Array:
+        return np.asarray(first(position, frames) + second(position, frames))
+
+    return violation
 
 
 def _sloped_goal(
@@ -250,13 +325,22 @@ class _Search:
         self.stopped = self._cancelled()
         return self.stopped or self._done >= self._rounds
 
-    def climb(self, goal: SlopedGoal, seed: int) -> None:
-        """Climbs a few steps from several starts, then on from the best of them, and rounds the
-        results to the grid."""
+    def climb_often(self, goal: SlopedGoal, seed: int, searches: int) -> None:
+        """Climbs with some seeds in turn, with the present vector by the first."""
+        for number in range(searches):
+            self.climb(goal, seed + number, with_present=number == 0)
+            if self.stopped:
+                return
+
+    def climb(self, goal: SlopedGoal, seed: int, with_present: bool) -> None:
+        """Climbs a few steps from several starts, among them the present vector where it is to be,
+        then on from the best of them, and rounds the results to the grid."""
         best = self.best
+        vector = self.vector
+        had_gained = self.gained
         self.stopped = self._cancelled()
         climbs = list[Climb]()
-        for start in self._starts(goal, seed) if not self.stopped else ():
+        for start in self._starts(goal, seed, with_present) if not self.stopped else ():
             climbs.append(Climb(goal, self._rules, start))
             if self._climbed(climbs[-1], FIRST_STEPS):
                 break
@@ -266,31 +350,48 @@ class _Search:
                 self._climbed(climb, MAX_STEPS)
         if self._moves.step.any() and self.gained:
             self.best = best
-            self.vector = self._moves.start
-            self.gained = False
+            self.vector = vector
+            self.gained = had_gained
             for climb in sorted(climbs, key=lambda climb: -climb.point.value)[:3]:
                 self._note(*climb.rounded(self._moves))
 
-    def _starts(self, goal: SlopedGoal, seed: int) -> Iterator[GoalPoint]:
-        """Yields the present vector and the best of some random ones that keep all rules; of these
-        half as they are, and half mirrored like the robot."""
+    def _starts(self, goal: SlopedGoal, seed: int, with_present: bool) -> Iterator[GoalPoint]:
+        """Yields the present vector, where it is to be, and the best of some random ones that keep
+        all rules; of these half as they are, and half mirrored like the robot."""
         moves = self._moves
         random = np.random.default_rng(seed)
-        if self._starts_within_rules:
+        if with_present and self._starts_within_rules:
             yield goal.evaluate(moves.start)
         vectors = random.uniform(moves.lower, moves.upper, (RANDOM_VECTORS, len(moves.start)))
-        mirrored = moves.mirrored(vectors)
-        variants = [vectors] if np.array_equal(vectors, mirrored) else [vectors, mirrored]
+        is_mirrored = [False] if np.array_equal(vectors, moves.mirrored(vectors)) else [False, True]
         count = (
             int(np.clip(round(STARTS_SCALE / len(moves.start) ** 2), MIN_STARTS, MAX_STARTS)) - 1
         )
-        n_best = -(-count // len(variants))
-        for variant in variants:
-            scaled = [moves.start + share * (variant - moves.start) for share in (1.0, 0.5, 0.25)]
-            within_rules = [rows[self._rules.violation(rows) <= 0.0] for rows in scaled]
-            valid = np.concatenate(within_rules)[: RANKED_PER_START * n_best]
+        n_best = -(-count // len(is_mirrored))
+        for mirrored in is_mirrored:
+            valid = self._valid(vectors, mirrored, RANKED_PER_START * n_best, random)
+            if not len(valid):
+                continue
             for k in np.argsort(-goal.guess(valid), kind="stable")[:n_best]:
                 yield goal.evaluate(valid[k])
+
+    def _valid(
+        self, vectors: Array, mirrored: bool, count: int, random: np.random.Generator
+    ) -> Array:
+        """Vectors that keep all rules (at most `count`, D): some random ones (P, D) first, mirrored
+        like the robot where they are to be, then others that are drawn."""
+        moves = self._moves
+        valid = np.zeros((0, len(moves.start)))
+        for draw in range(MAX_DRAWS):
+            if len(valid) >= count:
+                break
+            drawn = random.uniform(moves.lower, moves.upper, vectors.shape) if draw else vectors
+            variant = moves.mirrored(drawn) if mirrored else drawn
+            for share in (1.0, 0.5, 0.25):
+                rows = moves.start + share * (variant - moves.start)
+                keeps_rules = self._rules.violation(rows) <= 0.0
+                valid = np.concatenate([valid, rows[keeps_rules]])
+        return valid[:count]
 
     def _climbed(self, climb: Climb, steps: int) -> bool:
         """Takes steps of a climb; returns whether the search has to stop."""

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from finlab.analysis import Improvement
     from finlab.axes import MotionAxis
 
+Box = tuple[float, float, float, float, float, float]
+"""Least and largest x, y and z [m]."""
 REMARKS = ("finlab.swim.vehicle.righting:righting_words",)
 """Functions that return a remark on a valid layout, or None, as `module:function`: the wings add
 theirs here."""
@@ -212,9 +214,14 @@ def optimize(
     wrench: Annotated[
         UseAppendAction[tuple[shared_options.Wrench, ...]], arg(metavar="FX FY FZ TX TY TZ")
     ] = (),
+    box: Annotated[Box | None, arg(metavar="X0 X1 Y0 Y1 Z0 Z1")] = None,
+    keep_out: Annotated[UseAppendAction[tuple[Box, ...]], arg(metavar="X0 X1 Y0 Y1 Z0 Z1")] = (),
+    bound: bool = False,
     rounds: shared_options.Count = 40,
+    searches: shared_options.Count = 1,
     seed: shared_options.Count = 0,
     cluster: shared_options.Cluster = None,
+    json: shared_options.JsonFile = None,
 ) -> None:
     """Move actuators within bounds to raise a goal, and write the layout that results.
 
@@ -229,17 +236,27 @@ def optimize(
         axes: surge, sway, heave, roll, pitch, yaw: those whose directions count; all that there are
             actuators enough for by default.
         wrench: a wrench of the mission for mission_power [N, N m]; may be given several times.
-        rounds: most rounds of the search.
+        box: ends along x, y and z of a box [m]; those that move may go anywhere in it, in place of
+            --reach.
+        keep_out: ends of a box in which none of them may stand [m]; may be given several times.
+        bound: say what no layout within the bounds exceeds (thrusters at rest, goals of
+            directions).
+        rounds: most rounds of each search.
+        searches: how many times it searches from other starts; the best result counts.
         seed: same arguments and seed, same layout.
     """
+    from dataclasses import replace
+
     from tqdm import tqdm
 
     from finlab.analysis import Bounds, Progress, optimize_layout
     from finlab.analysis.goals import MISSION
+    from finlab.analysis.keep_out import KeepOut
     from finlab.layout import save_layout
 
     shared_options.check_json_file(output, "output")
-    shared_options.check_positive(rounds=rounds)
+    shared_options.check_json_file(json)
+    shared_options.check_positive(rounds=rounds, searches=searches)
     robot = shared_options.open_robot(layout)[0]
     if not (0.0 <= reach < math.inf and 0.0 <= turn <= 180.0):
         raise FinlabError(
@@ -249,7 +266,13 @@ def optimize(
     space = {
         actuator.name: Bounds.around(actuator, reach, math.radians(turn)) for actuator in moving
     }
-    bar = tqdm(total=rounds, desc=goal, unit="round", disable=None, leave=False, file=sys.stderr)
+    if box is not None:
+        ends = _box_ends(box)
+        space = {name: replace(bounds, **ends) for name, bounds in space.items()}
+    keep_outs = [KeepOut(**_box_ends(ends)) for ends in keep_out]
+    bar = tqdm(
+        total=rounds * searches, desc=goal, unit="round", disable=None, leave=False, file=sys.stderr
+    )
 
     def report(progress: Progress) -> None:
         bar.update()
@@ -264,14 +287,23 @@ def optimize(
             None if mirror else (),
             mission=wrench or MISSION,
             rounds=rounds,
+            searches=searches,
             seed=seed,
+            keep_outs=keep_outs,
+            bound=bound,
             axes=cast("tuple[MotionAxis, ...]", axes) or None,  # which checks them
             flow=flow,
             progress=report,
             mapped=mapped,
         )
     save_layout(improvement.layout, output)
-    print(_improvement_text(improvement, output))
+    values = improvement.to_dict() | {"output": str(output)}
+    shared_options.put_json(values, json, _improvement_text(improvement, output))
+
+
+def _box_ends(box: Box) -> dict[str, tuple[float, float]]:
+    """The ends of a box by the names of its axes [m]."""
+    return {"x": box[:2], "y": box[2:4], "z": box[4:]}
 
 
 def _improvement_text(improvement: Improvement, output: Path) -> str:

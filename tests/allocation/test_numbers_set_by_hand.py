@@ -27,10 +27,12 @@ PYTHON_FILES = [
     ROOT / "finlab/actuators/rudder.py",
     ROOT / "finlab/actuators/thrust_power.py",
     ROOT / "finlab/actuators/thruster.py",
+    ROOT / "finlab/analysis/layout_bound.py",
+    ROOT / "finlab/analysis/pose_set.py",
     ROOT / "finlab/analysis/split_sets.py",
 ]
-"""Files of the default method in Python, and of the search behind capability plots, whose constants
-the page has to have."""
+"""Files of the default method in Python, of the search behind capability plots and of the bound over
+all layouts, whose constants the page has to have."""
 
 
 C_FILES = sorted((ROOT / "finlab/core").rglob("*.[ch]"))

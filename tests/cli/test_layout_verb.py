@@ -159,6 +159,58 @@ def test_optimize_within_reach(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert np.abs(moved).max() <= 0.03 + 1e-9
 
 
+def test_optimize_in_a_box_says_how_far_from_the_best(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    output = tmp_path / "best.yaml"
+    numbers = tmp_path / "best.json"
+    thrusters = ["front_right", "front_left", "rear_right", "rear_left"]
+    box = [
+        "--box",
+        "-0.2",
+        "0.2",
+        "-0.2",
+        "0.2",
+        "-0.06",
+        "0.06",
+        "--keep-out",
+        "-0.1",
+        "0.1",
+        "-0.1",
+        "0.1",
+        "-0.04",
+        "0.04",
+    ]
+    search = [
+        "--axes",
+        "surge",
+        "sway",
+        "yaw",
+        "--rounds",
+        "2",
+        "--searches",
+        "2",
+        "--no-mirror",
+        "--bound",
+    ]
+    files = ["-o", str(output), "--json", str(numbers)]
+    arguments = ["--actuators", *thrusters, *box, *search, *files]
+    assert main(["layout", "optimize", "bluerov2_heavy", *arguments]) == 0
+    told = capsys.readouterr().out
+    assert "No layout of these thrusters within these bounds has more than" in told
+    values = json.loads(numbers.read_text())
+    bound = values["bound"]["value"]
+    assert 0.0 < values["value_before"] < values["value_after"] < bound
+    assert values["gap"] == pytest.approx(bound / values["value_after"] - 1.0)
+    assert values["bound"]["axes"] == ["Fx", "Fy", "Tz"]
+    assert list(values["moved"]) == thrusters
+    for name, pose in values["moved"].items():
+        position = load_layout(output).actuator(name).position
+        assert pose["position_m"] == list(position)
+        assert np.abs(position).max() <= 0.2 + 1e-9
+        assert (np.abs(position) >= np.array([0.1, 0.1, 0.04]) - 1e-9).any()
+
+
 def test_capability_writes_its_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     layout, ship = write_vessel(tmp_path, retractable=False)
     json_file, csv, plot = (tmp_path / f"polar.{end}" for end in ("json", "csv", "svg"))
@@ -206,6 +258,16 @@ def test_capability_by_a_table_of_loads(tmp_path: Path, capsys: pytest.CaptureFi
         (
             "optimize A -o OUT --fins front_right --rounds 0",
             "rounds: expected a number of at least 1",
+        ),
+        ("optimize A -o OUT --fins front_right --bound", "bound: expected thrusters alone"),
+        ("optimize D -o OUT --fins front_right --searches 0", "searches: expected a number"),
+        (
+            "optimize bluerov2 -o OUT --actuators lift_left --keep-out 0 0 0 1 0 1",
+            "keep-out, x: expected two numbers, smaller first, got 0.0 0.0",
+        ),
+        (
+            "optimize bluerov2 -o OUT --actuators lift_left --box 1 0 0 1 0 1",
+            "bounds of x: expected two numbers, smaller first",
         ),
         (
             "optimize A -o no/where.yaml --fins front_right",
