@@ -305,15 +305,15 @@ def _velocity(rows: Sequence[Row]) -> list[Comparison]:
 
 
 def _trajectory(rows: Sequence[Row]) -> list[Comparison]:
-    """How much one and two lost fins add to the error."""
+    """How much one and two lost fins add to the error, on layout A, that of the paper's pool."""
     printed = paper_figures()["fault_tolerance"]
     healthy = printed["healthy"]["ours"]["ate"]
-    about = {"layout": "all", "controller": "waypoint", "method": "paper"}
+    about = {"layout": "A", "controller": "waypoint", "method": "paper"}
     whole = found_row(rows, lost=0, **about)
     judged = []
     for count, name in ((1, "one_fin"), (2, "two_fins")):
         ratio = printed[name]["ours"]["ate"] / healthy
-        what = f"ATE with {count} lost over that of the whole robot, all layouts"
+        what = f"ATE with {count} lost over that of the whole robot, layout A"
         damaged = found_row(rows, lost=count, **about)
         judged.append(quotient(what, ratio, damaged, whole, "ate"))
     return judged
