@@ -40,7 +40,9 @@ INTRODUCTION = (
     "which has learned one fin law from samples, were given these, so errors show how well "
     "methods solve, not how well a model fits a fin in the water. No robot swam and no fin was "
     "measured for this report: fin laws are means over a cycle in still water, bodies, water and "
-    f"sensors are simulated. Methods and controllers were developed on other seeds than {SEED}."
+    "sensors are simulated. What jets do to each other is in the section Interaction alone, where "
+    "no model was told it. Methods and controllers were developed on other seeds than "
+    f"{SEED}."
 )
 CLAIMS_INTRODUCTION = (
     "What the paper concludes, each from its printed figures and from the rows of the tables "
