@@ -8,10 +8,12 @@ A page holds a table between two marks,
 
 where NAME is an experiment of `finlab eval`, which runs with the sizes of its quick report, or that
 of a tool of that name. KEY... are the columns to show, by default all; OPTION=VALUE among them
-is an option in place of that of the quick report. What stands between the marks is replaced.
+is an option in place of that of the quick report; one with spaces stands in quotes. What stands
+between the marks is replaced.
 """
 
 import re
+import shlex
 import sys
 import time
 from dataclasses import replace
@@ -21,11 +23,11 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from finlab.research.evaluation.document import ReportBlock, ReportTable, to_markdown
-from finlab.research.evaluation.experiment import Experiment, begin, load_experiment
+from finlab.research.evaluation.experiment import Experiment, begin, item_type, load_experiment
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = {path.stem: path for path in [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]}
-MARK = re.compile(r"(<!-- figures: (\w+)((?: [\w.=/:,-]+)*) -->\n)")
+MARK = re.compile(r"(<!-- figures: (\w+)((?: (?:[\w.=/:,-]|'[^'\n]*')+)*) -->\n)")
 END_MARK = "<!-- end of figures -->"
 
 
@@ -39,7 +41,7 @@ def main(names: list[str]) -> int:
     for page in [PAGES[name] for name in names or PAGES]:
         for mark, name, keys in re.findall(MARK, page.read_text(encoding="utf-8")):
             # changed meanwhile
-            table = table_of(name, keys.split())
+            table = table_of(name, shlex.split(keys))
             text = page.read_text(encoding="utf-8")
             head, _, tail = text.partition(mark)
             page.write_text(
@@ -64,8 +66,14 @@ def table_of(name: str, keys: list[str]) -> str:
     experiment = experiment_of(name)
     began = time.monotonic()
     begin(name)
-    stated = dict(key.split("=") for key in keys if "=" in key)
-    chosen = {**experiment.quick, **{name: _value(value) for name, value in stated.items()}}
+    options = experiment.options()
+    stated = {}
+    for key in keys:
+        if "=" in key:
+            option, value = key.split("=")
+            _, is_list = item_type(options[option].annotation)
+            stated[option] = _value(value, is_list)
+    chosen = {**experiment.quick, **stated}
     keys = [key for key in keys if "=" not in key]
     table = experiment.table(experiment.rows(**chosen))
     columns = {column.key: replace(column, interval=None) for column in table.columns}
@@ -77,13 +85,13 @@ def table_of(name: str, keys: list[str]) -> str:
     return f"\n{to_markdown(*blocks)}\n"
 
 
-def _value(text: str) -> int | str | tuple[int, ...] | tuple[str, ...]:
-    """An option as its experiment takes it: numbers or words, several with commas between."""
-    words = text.split(",")
+def _value(text: str, is_list: bool) -> int | str | tuple[int, ...] | tuple[str, ...]:
+    """An option as its experiment takes it: a number or a word, or several with commas between."""
+    words = text.split(",") if is_list else [text]
     if all(word.isdigit() for word in words):
         numbers = tuple(int(word) for word in words)
-        return numbers if len(numbers) > 1 else numbers[0]
-    return tuple(words) if len(words) > 1 else text
+        return numbers if is_list else numbers[0]
+    return tuple(words) if is_list else text
 
 
 if __name__ == "__main__":

@@ -409,6 +409,9 @@ def _flow_notes(layout: Layout, flow: Array | None) -> tuple[str, ...]:
     if flow is None:
         return (_nothing_at_rest(foils),)
     if layout.interaction is not None:
+        if layout.interaction.type == "linear":
+            # Its weights were learned at speed, and `expected_miss` says how surely.
+            return ()
         guessed = ", ".join(
             actuator.name
             for actuator in layout.actuators

@@ -3,6 +3,7 @@ reads. Sentences are asked for the numbers and names in them."""
 
 import math
 import re
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -28,6 +29,7 @@ from finlab.allocation.report import (
 )
 from finlab.display import Table
 from finlab.interaction.jets import Jets
+from finlab.interaction.linear import Linear
 from finlab.layout import Azimuth, Fin, Layout, Limits, Thruster
 from finlab.physics import plant_of
 
@@ -224,6 +226,7 @@ def test_foils_and_jets_say_what_a_flow_tells() -> None:
     (guess,) = fin_notes(pods, surge)
     assert "known, guessed" in guess and "measured" not in guess
     assert fin_notes(pods) == ()
+    assert fin_notes(replace(pods, interaction=Linear()), surge) == ()
 
 
 @pytest.mark.parametrize(("least", "is_restless"), [(0.03, False), (0.2, True)])

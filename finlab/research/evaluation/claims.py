@@ -114,7 +114,7 @@ def _sqp_words(rows: Rows) -> str:
 
 
 def _temperature_words(rows: Rows) -> str:
-    """Whether a temperature is best."""
+    """Whether a temperature between the ends is best, as far as the table decides it."""
     usable = [row for row in rows.get("temperature", ()) if row.get("best_j_mean") is not None]
     if not usable:
         return ""
@@ -122,11 +122,23 @@ def _temperature_words(rows: Rows) -> str:
     temperatures = [float(row["temperature"]) for row in usable]
     ends = f"from {format_error(min(means))} to {format_error(max(means))}"
     span = f"between the temperatures {min(temperatures):g} and {max(temperatures):g}"
-    if max(means) > NEAR * min(means):
-        return f"The temperature of the draw matters: the mean J goes {ends} {span}."
+    verdicts = {comparison.verdict.word for comparison in _temperature(usable)}
+    if verdicts == {"reproduced"}:
+        return (
+            f"A temperature between is best, as the paper draws it: the mean J goes {ends} {span}."
+        )
+    if verdicts == {"not"}:
+        return (
+            f"The temperature of the draw is flat: the mean J goes {ends} {span}, where the paper "
+            "draws an optimum between."
+        )
+    best = temperatures[means.index(min(means))]
+    figures = f"the mean J goes {ends} {span}, and is least at {best:g}"
+    if "not" in verdicts:
+        return f"No temperature between is clearly best, where the paper draws one: {figures}."
     return (
-        f"The temperature of the draw is flat: the mean J goes {ends} {span}, where the paper "
-        "draws an optimum between."
+        "Whether a temperature between is best, as the paper draws it, cannot be decided: "
+        f"{figures}."
     )
 
 
@@ -155,15 +167,21 @@ def _stages_words(rows: Rows) -> str:
 
 def _ranking_words(rows: Rows) -> str:
     """What ranking by physics brings."""
-    likely = _stage(rows, "nll_selection")
-    whole = _stage(rows, "ours")
-    if likely is None or not whole:
-        return ""
+    table = rows.get("ablation", ())
+    likely = found_row(table, variant="nll_selection", scored_by="plant")
+    whole = found_row(table, variant="ours", scored_by="plant")
     printed = paper_figures()["ablation"]
     theirs = printed["nll_selection"]["err_norm_mean"] / printed["ours"]["err_norm_mean"]
+    gain = quotient("", theirs, likely, whole, "j_norm_mean")
+    if gain.figure is None:
+        return ""
+    ends = ""
+    if gain.interval is not None and None not in gain.interval:
+        low, high = (format_digits(end, 2) for end in gain.interval if end is not None)
+        ends = f" ({low} to {high})"
     return (
-        f"Ranking by physics is {format_digits(likely / whole, 2)} times better than by likelihood "
-        f"in J_norm, by the plant; the paper prints {format_digits(theirs, 2)}."
+        f"Ranking by physics is {format_digits(gain.figure, 2)} times{ends} better than by "
+        f"likelihood in J_norm, by the plant; the paper prints {format_digits(theirs, 2)}."
     )
 
 
@@ -287,18 +305,26 @@ def _velocity(rows: Sequence[Row]) -> list[Comparison]:
 
 
 def _trajectory(rows: Sequence[Row]) -> list[Comparison]:
-    """How much one and two lost fins add to the error."""
+    """How much one and two lost fins add to the error, on layout A, that of the paper's pool."""
     printed = paper_figures()["fault_tolerance"]
     healthy = printed["healthy"]["ours"]["ate"]
-    about = {"layout": "all", "controller": "waypoint", "method": "paper"}
+    about = {"layout": "A", "controller": "waypoint", "method": "paper"}
     whole = found_row(rows, lost=0, **about)
     judged = []
     for count, name in ((1, "one_fin"), (2, "two_fins")):
         ratio = printed[name]["ours"]["ate"] / healthy
-        what = f"ATE with {count} lost over that of the whole robot, all layouts"
+        what = f"ATE with {count} lost over that of the whole robot, layout A"
         damaged = found_row(rows, lost=count, **about)
-        judged.append(quotient(what, ratio, damaged, whole, "ate"))
+        compared = quotient(what, ratio, damaged, whole, "ate")
+        judged.append(replace(compared, obstacle=OTHER_FIN))
     return judged
+
+
+OTHER_FIN = (
+    "The paper does not say which fins were lost; by which one, ours differ more than this "
+    "(section Faults)."
+)
+"""Why figures of lost fins cannot be compared."""
 
 
 JUDGES: Mapping[str, Callable[[Sequence[Row]], list[Comparison]]] = {

@@ -17,7 +17,15 @@ from finlab.research.evaluation.experiment import (
     progress,
 )
 from finlab.research.evaluation.origin import version_words
-from finlab.research.evaluation.section import made_section, origin_words, rows_of
+from finlab.research.evaluation.section import (
+    is_kept,
+    kept_options,
+    made_section,
+    origin_words,
+    read_section,
+    rows_of,
+    section_path,
+)
 from finlab.research.evaluation.verdict import COLUMNS
 from finlab.whole_file import make_folder, write_whole
 
@@ -32,7 +40,9 @@ INTRODUCTION = (
     "which has learned one fin law from samples, were given these, so errors show how well "
     "methods solve, not how well a model fits a fin in the water. No robot swam and no fin was "
     "measured for this report: fin laws are means over a cycle in still water, bodies, water and "
-    f"sensors are simulated. Methods and controllers were developed on other seeds than {SEED}."
+    "sensors are simulated. What jets do to each other is in the section Interaction alone, where "
+    "no model was told it. Methods and controllers were developed on other seeds than "
+    f"{SEED}."
 )
 CLAIMS_INTRODUCTION = (
     "What the paper concludes, each from its printed figures and from the rows of the tables "
@@ -53,8 +63,9 @@ def make_report(
     """Runs experiments, and writes a page and all rows.
 
     What is done is kept in the folder piece by piece: a report that was stopped goes on when it is
-    asked for again, and what has not changed since is not run again. Each experiment runs on one
-    thread, so that times are of one core.
+    asked for again, and what has not changed since is not run again. Experiments that are not asked
+    for stand in the page as they are kept. Each experiment runs on one thread, so that times are
+    of one core.
 
     Args:
         out: folder of the report, which is made if need be.
@@ -80,19 +91,25 @@ def make_report(
         command += f" --sections {','.join(chosen)}"
     if seed != SEED:
         command += f" --seed {seed}"
-    for name in progress(chosen, "experiment", "report"):
+    kept = [name for name in EXPERIMENTS if name not in chosen and is_kept(name, out)]
+    shown = [name for name in EXPERIMENTS if name in chosen or name in kept]
+    for name in progress(shown, "experiment", "report"):
         experiment = load_experiment(name)
-        options = experiment.size(size)
-        if "seed" in experiment.options():
-            options["seed"] = seed
-        with threadpool_limits(1):
-            pieces = made_section(experiment, options, out)
+        if name in chosen:
+            options = experiment.size(size)
+            if "seed" in experiment.options():
+                options["seed"] = seed
+            with threadpool_limits(1):
+                pieces = made_section(experiment, options, out)
+        else:
+            pieces = read_section(section_path(out, name))
+            options = kept_options(experiment, pieces)
         rows[name] = rows_of(experiment, pieces)
         blocks += [*experiment.words(), *experiment.results(rows[name])]
         blocks += experiment.beside_the_paper(rows[name])
         made_by = f"The command `{experiment.command(options)}` prints the table."
         blocks.append(" ".join([made_by, *origin_words(pieces)]))
-        page = to_markdown(*_head_blocks(size, rows), *blocks, *_origin_blocks(command))
+        page = to_markdown(*_head_blocks(size, rows), *blocks, *_origin_blocks(command, kept))
         write_whole(out / PAGE_FILE, page, DataError)
         write_whole(out / ROWS_FILE, json.dumps(rows, indent=1) + "\n", DataError)
     return out / PAGE_FILE
@@ -115,10 +132,15 @@ def _head_blocks(size: Size, rows: Mapping[str, Sequence[Row]]) -> list[ReportBl
     return head
 
 
-def _origin_blocks(command: str) -> list[ReportBlock]:
-    """The last section of the page: the command that makes it, and versions."""
+def _origin_blocks(command: str, kept: Sequence[str]) -> list[ReportBlock]:
+    """The last section of the page: the command that makes it, what it kept, and versions."""
     lines = [
-        f"Command `{command}`; each section says at which commit and on which machine it was made",
+        f"Command `{command}`; each section says at which commit and on which machine it was made"
+    ]
+    if kept:
+        names = ", ".join(kept)
+        lines.append(f"As earlier runs left them, at the sizes of their own commands: {names}")
+    lines += [
         version_words(("finlab-marine", "numpy", "scipy")),
         "Printed figures are those of Y. Hamamatsu, M. Kruusmaa, A. Ristolainen, "
         "Layout-independent actuation allocator for fin-actuated marine robots",

@@ -20,7 +20,7 @@ from finlab.errors import DataError
 from finlab.files import parse_json
 from finlab.files.guarded import decoded, read_file
 from finlab.research.evaluation.document import Row
-from finlab.research.evaluation.experiment import Experiment
+from finlab.research.evaluation.experiment import Experiment, load_experiment
 from finlab.research.evaluation.origin import commit_words, machine_words
 from finlab.research.evaluation.source_hash import package_hashes
 from finlab.whole_file import make_folder, write_whole
@@ -115,7 +115,8 @@ def made_section(experiment: Experiment, options: Mapping[str, Any], out: Path) 
     Raises:
         DataError: a file cannot be read or written, or the options are wrong.
     """
-    path = make_folder(out / FOLDER) / f"{experiment.name}.json"
+    make_folder(out / FOLDER)
+    path = section_path(out, experiment.name)
     stored = read_section(path) if path.exists() else []
     pieces: list[Piece] = []
     for wanted in piece_options(experiment, options):
@@ -126,6 +127,58 @@ def made_section(experiment: Experiment, options: Mapping[str, Any], out: Path) 
         _write(path, [*pieces, *to_come])
     _write(path, pieces)
     return pieces
+
+
+def section_path(out: Path, name: str) -> Path:
+    """Returns the file of an experiment's section.
+
+    Args:
+        out: folder of the report.
+        name: of the experiment.
+    """
+    return out / FOLDER / f"{name}.json"
+
+
+def is_kept(name: str, out: Path) -> bool:
+    """Returns whether a folder has a section of one run, not one that was stopped while it took the
+    place of another.
+
+    Args:
+        name: of the experiment.
+        out: folder of the report.
+
+    Raises:
+        DataError: the section cannot be read.
+    """
+    path = section_path(out, name)
+    if not path.exists():
+        return False
+    experiment = load_experiment(name)
+    runs = []
+    for piece in read_section(path):
+        of_all = {key: piece.options[key] for key in piece.options if key not in experiment.pieces}
+        if of_all not in runs:
+            runs.append(of_all)
+    return len(runs) == 1 and set(runs[0]) <= set(experiment.options())
+
+
+def kept_options(experiment: Experiment, pieces: Sequence[Piece]) -> dict[str, Any]:
+    """Returns the options of the run whose pieces are kept: each option that it is split by with
+    the values of all pieces.
+
+    Args:
+        experiment: the experiment.
+        pieces: of its section.
+    """
+    options: dict[str, Any] = {}
+    for name, value in pieces[0].options.items():
+        options[name] = value
+        if isinstance(value, list):
+            options[name] = tuple(value)
+        if name in experiment.pieces and value is not None:
+            every = [each for piece in pieces for each in piece.options[name]]
+            options[name] = tuple(dict.fromkeys(every))
+    return options
 
 
 def read_section(path: Path) -> list[Piece]:

@@ -63,6 +63,7 @@ class RandomPlant:
         bend: how far a cross flow takes a jet along, over what it would without a jet's speed.
         advance: loss of thrust by speed, over that of the layout's open-water line.
         advance_squared: the same by its square.
+        drift: share of the momentum of the water taken in across the way of a robot that moves.
     """
 
     profile: str
@@ -85,6 +86,7 @@ class RandomPlant:
     bend: float
     advance: float
     advance_squared: float
+    drift: float
 
     def __call__(self, layout: Layout, command: Array, flow: Array | None = None) -> Array:
         """Returns wrenches.
@@ -148,6 +150,8 @@ class RandomPlant:
             lost = self.advance * advance * along
             lost += self.advance_squared * advance * along * np.abs(along)
             change -= np.clip(lost, -0.8, 1.0)[..., None] * force
+            with_jet = (velocity * jets.course).sum(axis=-1, keepdims=True) * jets.course
+            change -= self.drift * mass_flow * (velocity - with_jet)
         return np.asarray(change)
 
     def _met(
@@ -267,4 +271,5 @@ def random_plant(rng: np.random.Generator) -> RandomPlant:
         bend=float(rng.uniform(0.5, 1.5)),
         advance=log_uniform(rng, 0.7, 1.4),
         advance_squared=float(rng.uniform(-0.3, 0.3)),
+        drift=float(rng.uniform(0.0, 0.5)),
     )

@@ -5,6 +5,7 @@ import os
 import re
 import resource
 import shlex
+import shutil
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
@@ -135,6 +136,23 @@ def test_two_reports_of_one_seed_have_the_same_rows(folder: Path, tmp_path: Path
     assert list(second) == ["latency", "temperature"]
     assert without_times(second) == without_times({name: first[name] for name in second})
     assert "--sections latency,temperature --seed 3" in page.read_text("utf-8")
+
+
+def test_sections_that_are_not_asked_for_stand_as_they_are_kept(
+    folder: Path, tmp_path: Path
+) -> None:
+    shutil.copytree(folder, tmp_path / "report")
+    make_report(tmp_path / "report", size="quick", seed=3, names=["temperature"])
+    first, second = (
+        json.loads((out / ROWS_FILE).read_text("utf-8")) for out in (folder, tmp_path / "report")
+    )
+    assert list(first) == list(second)
+    assert without_times(first) == without_times(second)
+    commands = [re.findall(COMMAND, page_of(out), re.M) for out in (folder, tmp_path / "report")]
+    assert commands[0] == commands[1] and len(commands[0]) == len(TINY_SIZES)
+    assert "earlier runs left them, at the sizes of their own commands: wrench, latency" in page_of(
+        tmp_path / "report"
+    )
 
 
 def test_each_printed_figure_has_a_verdict(folder: Path) -> None:

@@ -145,7 +145,7 @@ def test_conclusions_are_said_with_the_figures_of_the_rows() -> None:
         "the paper prints 0.40 and 0.81",
         "is flat: the mean J goes from 0.078 to 0.082",
         "change places: J_norm is 0.090 for the mixture's mean and 0.045 for the best draw",
-        "Ranking by physics is 1.7 times better",
+        "Ranking by physics is 1.7 times (1.4 to 2.1) better",
         "the paper prints 12",
         "contradict each other",
         "0.017",
@@ -156,6 +156,8 @@ def test_conclusions_are_said_with_the_figures_of_the_rows() -> None:
     assert words_of["error of the printed SQP over the paper's method, id"] == "not"
     assert words_of["J_norm ranked by likelihood over ranked by physics"] == "not"
     assert words_of["J at the highest temperature, 10, over the least, at least"] == "not"
+    wide = [dict(row, best_j_mean_interval=[0.04, 0.16]) for row in ROWS["temperature"]]
+    assert "cannot be decided: the mean J goes" in " ".join(sentences({"temperature": wide}))
 
 
 def test_other_rows_say_otherwise() -> None:
@@ -166,12 +168,18 @@ def test_other_rows_say_otherwise() -> None:
             dict(row, j_norm_mean=0.01) if row["variant"] == "mean_only" else row
             for row in ROWS["ablation"]
         ],
-        "temperature": [dict(ROWS["temperature"][0], best_j_mean=0.3), *ROWS["temperature"][1:]],
+        "temperature": [
+            dict(ROWS["temperature"][0], best_j_mean=0.3, best_j_mean_interval=[0.29, 0.31]),
+            *ROWS["temperature"][1:],
+        ],
     }
     said = " ".join(sentences(other))
     assert "does not reach its targets" in said and "is exact" not in said
     assert "as in the paper" in said and "change places" not in said
-    assert "matters" in said and "flat" not in said
+    assert "No temperature between is clearly best" in said and "flat" not in said
+    both = [other["temperature"][0], ROWS["temperature"][1], dict(ROWS["temperature"][2])]
+    both[2] |= {"best_j_mean": 0.2, "best_j_mean_interval": [0.19, 0.21]}
+    assert "is best, as the paper draws it" in " ".join(sentences({"temperature": both}))
 
 
 def test_without_rows_nothing_is_said() -> None:

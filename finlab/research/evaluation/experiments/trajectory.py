@@ -128,7 +128,8 @@ def _compared(rows: Sequence[Row]) -> list[Comparison]:
     figures = paper_figures()
     wanted = [(layout, 0, row, OTHER_SIMULATOR) for layout, row in figures["trajectory"].items()]
     for count, table in enumerate(figures["fault_tolerance"].values()):
-        wanted.append(("all", count, table["ours"], POOL))
+        # The robot of its pool has layout A.
+        wanted.append(("A", count, table["ours"], POOL))
     compared = []
     for layout, count, printed, obstacle in wanted:
         about = {"layout": layout, "lost": count, "controller": "waypoint", "method": "paper"}
