@@ -336,8 +336,13 @@ class OraclePlant:
 
     def power(self, commands: Array) -> float:
         """Watts of commands (n, 3); NaN rows take none."""
+        return float(self.powers(commands).sum())
+
+    def powers(self, commands: Array) -> Array:
+        """Watts (n,) of each actuator at commands (n, 3); NaN rows take none."""
         pairs = zip(self.actuators, commands, strict=True)
-        return float(sum(each.watts(row) for each, row in pairs if np.isfinite(row).all()))
+        watts = [each.watts(row) if np.isfinite(row).all() else 0.0 for each, row in pairs]
+        return np.array(watts)
 
     def excess(self, commands: Array) -> float:
         """By how much commands (n, 3) break a limit at most."""

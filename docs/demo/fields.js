@@ -1,6 +1,6 @@
 // The structs of the core as JavaScript sees them, made of the text that the core itself gives (finlab/core/fl_fields.h).
 const SIZES = {
-  fl_real: 8, fl_byte: 1, int: 4, fl_reals: 4, fl_bytes: 4, fl_policy_at: 4, fl_offset_at: 4, fl_question_at: 4,
+  fl_real: 8, fl_byte: 1, int: 4, fl_reals: 4, fl_bytes: 4, fl_policy_at: 4, fl_budget_at: 4, fl_offset_at: 4, fl_question_at: 4,
   fl_work_at: 4, fl_row_at: 4, fl_flag_at: 4,
 };
 const VIEWS = { fl_real: Float64Array, fl_byte: Uint8Array, int: Int32Array };

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -41,7 +41,6 @@ from finlab.physics.plant import plant_of
 if TYPE_CHECKING:
     from typing_extensions import Self  # Python 3.10 has none of its own
 
-    from finlab.allocation.power_budget import PowerBudget
 
 _NAME_LISTS = (tuple, list)
 """Types of lists of names by which states are found."""
@@ -66,15 +65,6 @@ def _check_arcs(layout: Layout, kind: type[Method]) -> None:
                 f"method {kind.name!r}: knows one arc of an actuator, {actuator.name!r} has "
                 f"{actuator.angle_words(0.0, 0.0)}; expected one arc, or method 'dual'"
             )
-
-
-def _checked_budget(power: float | None, layout: Layout) -> PowerBudget | None:
-    """The budget that a question names; None for no limit."""
-    if power is None:
-        return None
-    from finlab.allocation.power_budget import check_power
-
-    return check_power(power, layout)
 
 
 class Allocator:
@@ -262,7 +252,7 @@ class Allocator:
         policy: Policy | PolicyName = CLOSEST,
         flow: ArrayLike | None = None,
         seed: int = 0,
-        power: float | None = None,
+        power: float | Mapping[str, float] | None = None,
     ) -> Allocation:
         """Finds the commands for one target.
 
@@ -284,8 +274,9 @@ class Allocator:
             flow: velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at
                 rest.
             seed: the same target and seed give the same answer.
-            power: the most that all actuators may take together [W]; a wrench that takes more is
-                out of reach. None for no limit.
+            power: the most that all actuators may take together [W], in place of what the layout
+                says, or of buses of the layout by their names; a wrench that takes more is out of
+                reach. None for what the layout says, infinity for no limit.
 
         Returns:
             Commands of all actuators, and what they give.
@@ -304,8 +295,13 @@ class Allocator:
         if isinstance(previous, Allocation):
             multipliers = previous.multipliers
             previous = previous.command
-        if flow is None and reference is None and seed is _USUAL_SEED and power is None:
-            prepared = state.closest if policy is CLOSEST else state.prepared_question(policy)
+        if flow is None and reference is None and seed is _USUAL_SEED:
+            if power is not None:
+                prepared = state.prepared_within(policy, power)
+            elif policy is CLOSEST:
+                prepared = state.closest
+            else:
+                prepared = state.prepared_question(policy)
             start = time.perf_counter()
             row = prepared.answer(wrench, previous, multipliers)
             if row is not None:
@@ -318,7 +314,7 @@ class Allocator:
         if previous is not None:
             checked_previous = check_previous(previous, state.layout)
 
-        budget = _checked_budget(power, state.layout)
+        budget = state.budget_of(power)
         start = time.perf_counter()
         target = wrench_asked
         checked_reference: Array | None = None
@@ -374,7 +370,7 @@ class Allocator:
         flow: ArrayLike | None = None,
         seed: int = 0,
         threads: int = 1,
-        power: float | None = None,
+        power: float | Mapping[str, float] | None = None,
     ) -> BatchAllocation:
         """Finds the commands for many targets.
 
@@ -388,7 +384,7 @@ class Allocator:
             seed: the same target and seed give the same answer, whatever the batch.
             threads: how many threads share the targets; each keeps a core busy. The answers do not
                 depend on it.
-            power: the most that all actuators may take together [W], as in `allocate`.
+            power: the most that actuators may take together [W], as in `allocate`.
 
         Returns:
             The targets and the commands; what else there is to tell is computed when it is first
@@ -408,7 +404,7 @@ class Allocator:
         checked_seed = check_seed(seed)
         checked_flow = check_flow(flow)
         start = time.perf_counter()
-        budget = _checked_budget(power, state.layout)
+        budget = state.budget_of(power)
         question = state.question(
             wrenches_asked, checked_policy, checked_flow, checked_seed, budget=budget
         )

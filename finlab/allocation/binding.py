@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from finlab.actuators.actuator import Actuator
     from finlab.allocation.power_budget import PowerBudget
 
+ALL = "power"
+"""Name of the bus that feeds all actuators, where a layout names none."""
+
 WITHIN = 1e-3
 """Share of a range, or of what a rate allows in a tick, within which a command is at its end."""
 END_SLACK = 1e-9
@@ -172,7 +175,7 @@ def band_words(layout: Layout, command: Array) -> tuple[str, ...]:
 
 
 def budget_words(budget: "PowerBudget", power: Array) -> tuple[str, ...]:
-    """Names the buses that take all that they have.
+    """Names the buses that take all that they have: `power` where one feeds all actuators.
 
     Args:
         budget: of b buses.
@@ -183,7 +186,11 @@ def budget_words(budget: "PowerBudget", power: Array) -> tuple[str, ...]:
     """
     taken = budget.power_of_buses(power)
     is_used_up = taken >= (1.0 - WITHIN) * budget.watts
-    return tuple(name for name, is_full in zip(budget.names, is_used_up, strict=True) if is_full)
+    words = []
+    for name, is_full in zip(budget.names, is_used_up, strict=True):
+        if is_full:
+            words.append(name if name == ALL else f"bus {name}")
+    return tuple(words)
 
 
 NOT_APART = "not given apart by these actuators"

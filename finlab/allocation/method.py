@@ -276,7 +276,11 @@ class Method(ABC):
         """
 
     def prepared_answers(
-        self, policy: Policy, lost: NDArray[np.bool_] | None, free: NDArray[np.bool_] | None
+        self,
+        policy: Policy,
+        lost: NDArray[np.bool_] | None,
+        free: NDArray[np.bool_] | None,
+        budget: "PowerBudget | None" = None,
     ) -> PreparedAnswers | None:
         """Prepares questions about single wrenches, at rest in the water and without a reference.
 
@@ -284,6 +288,7 @@ class Method(ABC):
             policy: what to give out of reach.
             lost: which actuators (n,) do not work; None where all do.
             free: which axes (6,) may take any wrench; None for none.
+            budget: what actuators may take together; None for no limit.
 
         Returns:
             What answers them as `solve` does, but more quickly; None where the method has nothing
@@ -346,7 +351,10 @@ class Method(ABC):
 
     def check_budget(self, budget: "PowerBudget", policy: Policy) -> None:
         """Raise an `AllocationError` at a power budget that the method cannot keep by a policy."""
-        raise AllocationError(f"power: method {self.name!r} keeps no budget; use method 'dual'")
+        raise AllocationError(
+            f"power: method {self.name!r} keeps no budget; use method 'dual', "
+            "or power=inf where the layout has one"
+        )
 
     def at(self, flow: Array | None) -> "Self":
         """Returns the method for a robot that moves through the water.

@@ -3,25 +3,30 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
 from numbers import Real
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.allocation.binding import ALL
 from finlab.arrays import Array
+from finlab.core.calls import budget_record
+from finlab.core.fields import Record
 from finlab.errors import AllocationError
 
 if TYPE_CHECKING:
     from finlab.layout.layout import Layout
 
-ALL = "power"
-"""Name of the bus that feeds all actuators."""
 MOST_WATTS = 1e12
 """Largest budget [W]; beyond it something is wrong upstream."""
 
 
-class PowerBudget(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class PowerBudget:
     """What the b buses of a robot of n actuators may take."""
 
     names: tuple[str, ...]
@@ -31,27 +36,78 @@ class PowerBudget(NamedTuple):
     watts: Array
     """The most that each may take (b,) [W]."""
 
+    @cached_property
+    def record(self) -> Record:
+        """The same as the core reads it."""
+        return budget_record(self.members, self.watts)
+
     def power_of_buses(self, power: Array) -> Array:
         """Returns the power (..., b) [W] of each bus at powers (..., n) [W] of the actuators, NaN
         of lost ones."""
         return np.asarray(np.nan_to_num(power) @ self.members.T)
 
 
-def check_power(power: object, layout: Layout) -> PowerBudget:
+def budget_of(layout: Layout) -> PowerBudget | None:
+    """Returns the budget that a layout has; None where nothing limits the power."""
+    if layout.power_w is not None:
+        return _budget_of_all(layout.power_w, layout)
+    if not layout.buses:
+        return None
+    members = np.zeros((len(layout.buses), layout.n), bool)
+    for row, bus in zip(members, layout.buses, strict=True):
+        row[list(layout.indices(bus.actuators))] = True
+    names = tuple(bus.name for bus in layout.buses)
+    return PowerBudget(names, members, np.array([bus.power_w for bus in layout.buses]))
+
+
+def check_power(power: object, layout: Layout) -> PowerBudget | None:
     """Returns the budget that a question names.
 
     Args:
-        power: the most power of all actuators together [W].
+        power: the most power of all actuators together [W], in place of what the layout says; or of
+            buses of the layout, by their names. Infinity for no limit.
         layout: the robot.
 
+    Returns:
+        The budget; None where nothing is limited.
+
     Raises:
-        AllocationError: it is no number above 0.
+        AllocationError: a power is no number above 0, or the layout has no such bus.
     """
+    if not isinstance(power, Mapping):
+        watts = _checked_watts(power, "power", "all actuators together")
+        return None if math.isinf(watts) else _budget_of_all(watts, layout)
+    own = budget_of(layout)
+    names = () if own is None or not layout.buses else own.names
+    for name in power:
+        if name not in names:
+            has = f"has {', '.join(names)}" if names else "has no buses"
+            raise AllocationError(f"power: layout {layout.name} {has}, got bus {name!r:.60}")
+    if own is None:
+        return None
+    watts_of = dict(zip(own.names, own.watts, strict=True))
+    for name, watts in power.items():
+        watts_of[name] = _checked_watts(watts, f"power[{name!r:.60}]", "the bus")
+    limits = np.array(list(watts_of.values()))
+    is_limited = np.isfinite(limits)
+    if not is_limited.any():
+        return None
+    left = tuple(name for name, watts in watts_of.items() if math.isfinite(watts))
+    return PowerBudget(left, own.members[is_limited], limits[is_limited])
+
+
+def _budget_of_all(watts: float, layout: Layout) -> PowerBudget:
+    """The budget of one bus that feeds all actuators."""
+    return PowerBudget((ALL,), np.ones((1, layout.n), bool), np.array([watts]))
+
+
+def _checked_watts(power: object, argument: str, what: str) -> float:
+    """A power above 0 [W], or infinity."""
     is_number = isinstance(power, Real) and not isinstance(power, bool)
     watts = float(power) if is_number else math.nan  # type: ignore[arg-type]
-    if not 0.0 < watts <= MOST_WATTS:
+    if not (0.0 < watts <= MOST_WATTS or watts == math.inf):
         raise AllocationError(
-            f"power: expected watts above 0, at most {MOST_WATTS:g}, for all actuators together, "
-            f"got {power!r:.60}"
+            f"{argument}: expected watts above 0, at most {MOST_WATTS:g}, for {what}, or infinity "
+            f"for no limit, got {power!r:.60}"
         )
-    return PowerBudget((ALL,), np.ones((1, layout.n), bool), np.array([watts]))
+    return watts

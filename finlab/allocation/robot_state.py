@@ -77,17 +77,21 @@ class PreparedQuestion:
     The first such question prepares nothing, since it is mostly the last one.
     """
 
-    __slots__ = ("_prepared", "answer", "policy", "state")
+    __slots__ = ("_prepared", "answer", "budget", "policy", "state")
 
-    def __init__(self, state: RobotState, policy: Policy) -> None:
+    def __init__(
+        self, state: RobotState, policy: Policy, budget: PowerBudget | None = None
+    ) -> None:
         """Takes what is known.
 
         Args:
             state: of the robot.
             policy: what to give out of reach.
+            budget: what actuators may take together; None for no limit.
         """
         self.state = state
         self.policy = policy
+        self.budget = budget
         self.answer: Answer = self._answer_first
         """Answers a wrench; None where `RobotState.solve` has to be asked."""
         self._prepared: PreparedAnswers | None = None
@@ -95,7 +99,7 @@ class PreparedQuestion:
     def question_of(self, wrench: Array, previous: Array | None) -> MethodQuestion:
         """Returns the question about a wrench (6,) [N, N m], with the command (n, 3) of the tick
         before; None outside of ticks."""
-        return self.state.question(wrench[None], self.policy, None, 0, previous)
+        return self.state.question(wrench[None], self.policy, None, 0, previous, budget=self.budget)
 
     def solved(self, row: AnswerRow, question: MethodQuestion) -> Solved:
         """Returns the solution of a question that was answered in a row."""
@@ -115,7 +119,9 @@ class PreparedQuestion:
         self, wrench: object, previous: object, multipliers: Array | None
     ) -> AnswerRow | None:
         state = self.state
-        self._prepared = state.method.prepared_answers(self.policy, state.lost, state.free)
+        self._prepared = state.method.prepared_answers(
+            self.policy, state.lost, state.free, self.budget
+        )
         self.answer = _left_to_method if self._prepared is None else self._prepared.answer
         return self.answer(wrench, previous, multipliers)
 
@@ -144,6 +150,10 @@ class RobotState:
 
     _prepared: dict[Policy | PolicyName, PreparedQuestion] = field(default_factory=dict)
     """Prepared questions by their policies, as these were given."""
+    _prepared_within: dict[tuple[Policy | PolicyName, float], PreparedQuestion] = field(
+        default_factory=dict
+    )
+    """The same with power budgets of all actuators."""
 
     def prepared_question(self, policy: Policy | PolicyName) -> PreparedQuestion:
         """Returns the question with a policy.
@@ -155,11 +165,10 @@ class RobotState:
         try:
             prepared = self._prepared.get(policy)
         except TypeError:  # weights in a list, which cannot be looked up; or no policy at all
-            return PreparedQuestion(self, as_policy(policy))
+            return self._prepare(as_policy(policy), self.budget)
         if prepared is None:
             checked = as_policy(policy)
-            self.method.check_policy(checked)
-            prepared = PreparedQuestion(self, checked)
+            prepared = self._prepare(checked, self.budget)
             if len(self._prepared) >= MAX_POLICIES:
                 self._prepared.clear()
             self._prepared[policy] = prepared
@@ -168,7 +177,64 @@ class RobotState:
     @cached_property
     def closest(self) -> PreparedQuestion:
         """The question with the usual policy."""
-        return PreparedQuestion(self, CLOSEST)
+        return self._prepare(CLOSEST, self.budget)
+
+    def prepared_within(self, policy: Policy | PolicyName, power: object) -> PreparedQuestion:
+        """Returns the question with a policy, and a power budget in place of the layout's.
+
+        Args:
+            policy: what to give out of reach.
+            power: as `power` of `Allocator.allocate`.
+
+        Raises:
+            CommandError: no policy is called so.
+            AllocationError: the method does not know the policy, or keeps no such budget.
+        """
+        if type(power) is not float and type(power) is not int:
+            return self._prepare(as_policy(policy), self.budget_of(power))
+        key = (policy, power)
+        try:
+            prepared = self._prepared_within.get(key)
+        except TypeError:  # as in `prepared_question`
+            return self._prepare(as_policy(policy), self.budget_of(power))
+        if prepared is None:
+            prepared = self._prepare(as_policy(policy), self.budget_of(power))
+            if len(self._prepared_within) >= MAX_POLICIES:
+                self._prepared_within.clear()
+            self._prepared_within[key] = prepared
+        return prepared
+
+    def _prepare(self, policy: Policy, budget: PowerBudget | None) -> PreparedQuestion:
+        """A question that is not kept."""
+        if policy is not CLOSEST:  # which every method knows
+            self.method.check_policy(policy)
+        if budget is not None:
+            self.method.check_budget(budget, policy)
+        return PreparedQuestion(self, policy, budget)
+
+    @cached_property
+    def budget(self) -> PowerBudget | None:
+        """What the layout lets actuators take together; None for no limit."""
+        if self.layout.power_w is None and not self.layout.buses:
+            return None
+        from finlab.allocation.power_budget import budget_of
+
+        return budget_of(self.layout)
+
+    def budget_of(self, power: object) -> PowerBudget | None:
+        """Returns the budget of a question.
+
+        Args:
+            power: as `power` of `Allocator.allocate`.
+
+        Raises:
+            AllocationError: it is none.
+        """
+        if power is None:
+            return self.budget
+        from finlab.allocation.power_budget import check_power
+
+        return check_power(power, self.layout)
 
     @cached_property
     def healthy(self) -> Layout:

@@ -257,6 +257,8 @@ class Conditions(NamedTuple):
     angles_wanted: Array | None = None
     """Angles (n,) [rad] from which turning of pods costs, in place of those of `previous`;
     NaN of an actuator without; None for none."""
+    budget: Record | None = None
+    """What buses may take, of `budget_record`; None for no limit."""
 
 
 NOMINAL = Conditions()
@@ -303,6 +305,22 @@ def policy_record(
     return record
 
 
+def budget_record(members: NDArray[np.bool_], watts: Array) -> Record:
+    """Returns power budgets as the core reads them, an `fl_budget` (1,).
+
+    Args:
+        members: which actuators (b, n) each bus feeds; an actuator has one bus at most.
+        watts: the most that each may take (b,) [W].
+    """
+    record = np.zeros(1, struct("fl_budget"))
+    buses, n = members.shape
+    record["buses"] = buses
+    record["watts"][:, :buses] = watts
+    for bus, feeds in enumerate(members):
+        record["bus_of"][0, :n][feeds] = bus + 1
+    return record
+
+
 class QuestionRecord:
     """One `fl_question`, the arrays that it points at, and their addresses.
 
@@ -326,11 +344,14 @@ class QuestionRecord:
         self._calm = record["calm"]
         self._ticks = record["ticks"]
         self._angles_wanted_pointer = record["angles_wanted"]
+        self._budget_pointer = record["budget"]
 
         self._policy: Record | None = None
         """At which the question points, so that it lives as long."""
         self._has_multipliers = False
         """Whether the question points at multipliers."""
+        self._budget: Record | None = None
+        """The same of power budgets."""
         self._constant_conditions: Conditions | None = None
         """Those that are written, where they are not of a single tick: the object, which nobody
         changes."""
@@ -394,6 +415,9 @@ class QuestionRecord:
         if conditions.free is not None:
             self._free[:] = conditions.free
             self._free_pointer[0] = self._free_address
+        if conditions.budget is not self._budget:
+            self._budget = conditions.budget
+            self._budget_pointer[0] = 0 if self._budget is None else self._budget.ctypes.data
         self._constant_conditions = conditions if conditions.previous is None else None
 
 

@@ -24,6 +24,7 @@ _NUMPY_TYPES: dict[str, Any] = {
     "fl_bytes": np.uintp,
     "fl_policy_at": np.uintp,
     "fl_offset_at": np.uintp,
+    "fl_budget_at": np.uintp,
     "fl_question_at": np.uintp,
     "fl_work_at": np.uintp,
     "fl_row_at": np.uintp,

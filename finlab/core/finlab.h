@@ -40,6 +40,7 @@ typedef double fl_wide; /* where differences of large numbers matter, in single 
 #ifndef FL_ZONES
 #define FL_ZONES 4 /* most barred zones of a pod; exports of robots without any have 0 */
 #endif
+#define FL_BUSES 8 /* most buses whose power is limited */
 #ifndef FL_PARTS
 #define FL_PARTS 1000 /* the usual fl_settings.most_parts */
 #endif
@@ -68,6 +69,7 @@ typedef double fl_wide; /* where differences of large numbers matter, in single 
               first multipliers, and of points of a lattice; beyond reach those that come nearest
    FL_FOILS   steps for these: of two searches, and twice for each share of a ray (begun at the last
               commands and anew); and a target for each start of a lattice
+   FL_BUDGETS targets within power budgets: the wrench itself, and each group of a policy
    FL_BOUND   forces are found twice in a tick in which drives pass their dead bands */
 #define FL_DIVE (FL_DIVE_ROUNDS * FL_STEPS_AT_KINK)
 #define FL_SEARCH (2 * FL_DIVE + (FL_PARTS + 1) * (FL_DIVE + 2 * FL_STEPS_AT_KINK))
@@ -75,9 +77,10 @@ typedef double fl_wide; /* where differences of large numbers matter, in single 
 #define FL_STARTS (FL_PARTS + 5 + FL_FOIL_VERTICES + 2 * FL_MOST + FL_LATTICE_FOLLOWED)
 #define FL_FOILS_CHEAPER (FL_FOIL_STEPS * FL_STEPS_AT_KINK * 2 * (FL_STARTS + FL_RAY_SHARES))
 #define FL_FOILS (FL_FOILS_CHEAPER + 2 * FL_LATTICE_STARTS * FL_STEPS_AT_KINK)
-#define FL_BOUND (2 * (FL_FORCES + FL_FOILS))
+#define FL_BUDGETS (13 * FL_STEPS)
+#define FL_BOUND (2 * (FL_FORCES + FL_FOILS) + FL_BUDGETS)
 
-#define FL_VERSION 27  /* of all structs and functions here */
+#define FL_VERSION 26  /* of all structs and functions here */
 #define FL_MAGIC 41721 /* first number of a block */
 
 /* The structs that cross the border of the library. */
@@ -85,6 +88,7 @@ typedef unsigned char fl_byte;
 typedef const fl_byte *fl_bytes;
 typedef const fl_real *fl_reals;
 typedef const struct fl_policy *fl_policy_at;
+typedef const struct fl_budget *fl_budget_at;
 typedef const struct fl_question *fl_question_at;
 typedef struct fl_work *fl_work_at;
 typedef fl_real *fl_row_at;

@@ -71,6 +71,14 @@ FL_FIELD(fl_real, axis_weight, [6], "1", "of the axes, largest 1, for FL_CLOSEST
 FL_FIELD(fl_byte, group, [6][6], "1", "1 of the axes of each group; of those that fall")
 FL_END(fl_policy)
 
+FL_BEGIN(fl_budget)
+FL_FIELD(int, buses, , "1", "of which the power is limited, 1 to FL_BUSES")
+FL_FIELD(fl_real, watts, [FL_BUSES], "W",
+         "the most that the actuators of each bus may take together")
+FL_FIELD(fl_byte, bus_of, [FL_MOST], "1",
+         "which bus feeds each actuator, from 1 on; 0 of one whose power has no limit")
+FL_END(fl_budget)
+
 FL_BEGIN(fl_question)
 FL_FIELD(fl_real, wrench, [6], "N, N m",
          "desired; behind it all is zeros where there is nothing to say")
@@ -89,6 +97,7 @@ FL_FIELD(int, ticks, , "1",
          "how many ticks after `previous` the commands are for; 0 or 1 for the next")
 FL_FIELD(fl_reals, angles_wanted, , "address",
          "(n,) [rad] from which turning of pods costs, NaN: that of `previous`; 0 for none")
+FL_FIELD(fl_budget_at, budget, , "address", "what buses may take; 0 for no limit")
 FL_END(fl_question)
 
 FL_BEGIN(fl_answer)
@@ -109,6 +118,8 @@ FL_FIELD(int, is_truncated, , "1",
          "1 where a search ended at its bound: all limits hold, but the power may not be least; "
          "most_parts of fl_settings is that bound")
 FL_FIELD(int, has_foil_commands, , "1", "1 where the commands are those of a search, for foils")
+FL_FIELD(int, exceeds_budget, , "1",
+         "1 where a bus takes more than it may, and no better answer was found")
 FL_END(fl_answer)
 
 FL_BEGIN(fl_answer_row)

@@ -4,7 +4,7 @@ What is asked of all actuators together, such as limits and own axes, is here as
 """
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any
@@ -32,6 +32,28 @@ MAX_DESCRIPTION_LENGTH = 4000
 """Most characters of a description."""
 
 
+Power = Annotated[float, Meta(gt=0.0, le=1e12)]
+"""The most power that actuators may take together [W]; beyond the largest something is wrong
+upstream."""
+
+
+@dataclass(frozen=True)
+class Bus(Checked):
+    """A power bus, which limits what the actuators that it feeds take together. Checked on
+    construction.
+
+    Raises:
+        LayoutError: a value is out of bounds; the message names the argument.
+    """
+
+    name: Name
+    """Name of the bus."""
+    power_w: Power
+    """The most that its actuators may take together [W]."""
+    actuators: Annotated[tuple[Name, ...], Meta(min_length=1, max_length=MAX_ACTUATORS)]
+    """Names of the actuators that it feeds."""
+
+
 @dataclass(frozen=True)
 class Layout(Checked):
     """The actuators of one robot. Immutable and comparable; every change returns a new layout."""
@@ -49,6 +71,10 @@ class Layout(Checked):
     them."""
     interaction: "InteractionModel | None" = None
     """Model of the hydrodynamic interaction of the actuators; None to neglect it."""
+    power_w: Power | None = None
+    """The most power that all actuators may take together [W]; None for no limit."""
+    buses: tuple[Bus, ...] = ()
+    """Power buses, each of which feeds some of the actuators; in place of `power_w`."""
 
     def __post_init__(self) -> None:
         """Puts the axes in the order of a wrench. Raises LayoutError: a value does not fit, or a
@@ -68,12 +94,51 @@ class Layout(Checked):
                     f"actuators[{i}].name",
                 )
             first_use[name] = i
+        object.__setattr__(self, "buses", tuple(self.buses))
+        self._check_buses()
+
+    def _check_buses(self) -> None:
+        """Raises LayoutError: a bus feeds an actuator that there is not, or that another one
+        feeds."""
+        if self.buses and self.power_w is not None:
+            raise LayoutError(
+                "expected either power_w, of all actuators together, or buses, got both", "power_w"
+            )
+        names = set(self.names)
+        buses: set[str] = set()
+        fed: dict[str, str] = {}
+        for bus in self.buses:
+            if bus.name in buses:
+                raise LayoutError(f"{bus.name!r} is already the name of a bus", "buses")
+            buses.add(bus.name)
+            key = f"buses.{bus.name}.actuators"
+            for name in bus.actuators:
+                if name not in names:
+                    raise LayoutError(
+                        f"there is no actuator {name!r}, expected names of {', '.join(self.names)}",
+                        key,
+                    )
+                if name in fed:
+                    raise LayoutError(
+                        f"bus {fed[name]!r} feeds {name!r} already, and an actuator has one bus",
+                        key,
+                    )
+                fed[name] = bus.name
 
     @cached_property
     def _hash(self) -> int:
         """Hash of all fields."""
         return hash(
-            (self.name, self.actuators, self.description, self.body, self.axes, self.interaction)
+            (
+                self.name,
+                self.actuators,
+                self.description,
+                self.body,
+                self.axes,
+                self.interaction,
+                self.power_w,
+                self.buses,
+            )
         )
 
     def __hash__(self) -> int:
@@ -117,7 +182,7 @@ class Layout(Checked):
     @cached_property
     def fins_alone(self) -> "Layout":
         """The robot with its fins alone; it has some."""
-        return replace(self, actuators=self.fins)
+        return self.with_actuators(self.fins)
 
     @cached_property
     def files(self) -> tuple[str, ...]:
@@ -315,7 +380,30 @@ class Layout(Checked):
             LayoutError: there is none of that name, or the new name is that of another one.
         """
         i = self.index(name or actuator.name)
-        return replace(self, actuators=(*self.actuators[:i], actuator, *self.actuators[i + 1 :]))
+        actuators = (*self.actuators[:i], actuator, *self.actuators[i + 1 :])
+        return self.with_actuators(actuators, {self.names[i]: actuator.name})
+
+    def with_actuators(
+        self, actuators: Sequence[Actuator], new_names: Mapping[str, str] | None = None
+    ) -> "Layout":
+        """Returns the layout with other actuators; buses feed those that remain.
+
+        Args:
+            actuators: the new ones.
+            new_names: of those that are called otherwise now, by their old names; None for none.
+
+        Raises:
+            LayoutError: none is left, or a name stands twice.
+        """
+        new_names = new_names or {}
+        names = {actuator.name for actuator in actuators}
+        buses = []
+        for bus in self.buses:
+            called = [new_names.get(name, name) for name in bus.actuators]
+            fed = tuple(name for name in called if name in names)
+            if fed:
+                buses.append(replace(bus, actuators=fed))
+        return replace(self, actuators=tuple(actuators), buses=tuple(buses))
 
     def without(self, names: Iterable[str], argument: str = "") -> "Layout":
         """Returns the layout without some actuators.
@@ -334,7 +422,7 @@ class Layout(Checked):
             problem = f"layout {self.name} has no {what} left once all are lost; repair one"
             raise LayoutError(problem, argument)
         working = tuple(actuator for i, actuator in enumerate(self.actuators) if i not in lost)
-        return replace(self, actuators=working)
+        return self.with_actuators(working)
 
     def replace_actuator(self, name: str, /, **changes: Any) -> "Layout":
         """Returns the layout with some fields of one actuator changed.

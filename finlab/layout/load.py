@@ -36,8 +36,8 @@ from finlab.axes import AXES
 from finlab.errors import LayoutError, layout_errors_at
 from finlab.files import parse_json, parse_yaml
 from finlab.files.guarded import read_text
-from finlab.files.schema import Checked, Part, checked, form, is_class, shown
-from finlab.layout.layout import MAX_ACTUATORS, Layout
+from finlab.files.schema import Checked, Name, Part, checked, form, is_class, shown
+from finlab.layout.layout import MAX_ACTUATORS, Bus, Layout
 
 FORMAT = "finlab-layout"
 """Value of the key `format` in a layout file."""
@@ -247,6 +247,7 @@ def _layout_form(
         actuators=Annotated[list[actuator], _ACTUATOR_COUNT],
         body=body,
         interaction=_union([part_form(interaction) for interaction in interactions]),
+        buses=dict[Name, form(Bus, {}, name=None)],  # type: ignore[misc]
         frame=Frame,
         optional=["frame", "interaction"],
     )
@@ -383,6 +384,11 @@ def parse_layout(
             body=values["body"],
             axes=tuple(file.axes or AXES),
             interaction=values["interaction"],
+            power_w=file.power_w,
+            buses=tuple(
+                Bus(name, bus.power_w, tuple(bus.actuators))
+                for name, bus in (file.buses or {}).items()
+            ),
         )
 
 

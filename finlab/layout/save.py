@@ -33,6 +33,13 @@ def layout_to_dict(layout: Layout) -> dict[str, Any]:
         value = getattr(layout, name)
         if value is not None:
             data[name] = plain(value)
+    if layout.power_w is not None:
+        data["power_w"] = layout.power_w
+    if layout.buses:
+        buses = {}
+        for bus in layout.buses:
+            buses[bus.name] = {"power_w": bus.power_w, "actuators": list(bus.actuators)}
+        data["buses"] = buses
     return data
 
 

@@ -66,6 +66,8 @@ NO_CHOICE = {
     "FL_FOILS",
     "FL_FOILS_CHEAPER",
     "FL_BOUND",
+    "FL_BUDGETS",
+    "UNKNOWNS",
     "FL_DEPTH",
     "DEPENDENT",
     "LATTICE",

@@ -5,6 +5,8 @@ import json
 import math
 import re
 import time
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 import yaml
@@ -12,6 +14,7 @@ import yaml
 from finlab.actuators.fin.fin_model import FIN_MODELS
 from finlab.errors import LayoutError
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout, parse_layout, save_layout
+from finlab.layout.layout import Bus
 
 GOOD_LAYOUT = {
     "format": "finlab-layout",
@@ -275,3 +278,30 @@ def test_a_layout_that_cannot_be_written_leaves_nothing_behind(tmp_path):
     with pytest.raises(LayoutError, match="cannot be written"):
         save_layout(layout, tmp_path / "missing" / "x.yaml")
     assert [p.name for p in tmp_path.iterdir()] == ["folder.yaml"]
+
+
+def test_power_buses_of_a_file_come_back(tmp_path: Path) -> None:
+    layout = load_layout("bluerov2")
+    front = layout.names[:2]
+    buses = (Bus("front", 150.0, front), Bus("rest of it", 80.5, layout.names[2:4]))
+    for changed in (replace(layout, buses=buses), replace(layout, power_w=216.0)):
+        for name in ("robot.yaml", "robot.json"):
+            save_layout(changed, tmp_path / name)
+            assert load_layout(tmp_path / name) == changed
+    lost = replace(layout, buses=buses).without([front[0]])
+    assert lost.buses[0].actuators == (front[1],)
+
+
+def test_power_buses_that_make_no_sense() -> None:
+    layout = load_layout("bluerov2")
+    bus = Bus("front", 150.0, layout.names[:2])
+    with pytest.raises(LayoutError, match="there is no actuator 'nobody'"):
+        replace(layout, buses=(Bus("front", 150.0, ("nobody",)),))
+    with pytest.raises(LayoutError, match="an actuator has one bus"):
+        replace(layout, buses=(bus, Bus("other", 10.0, layout.names[1:3])))
+    with pytest.raises(LayoutError, match="already the name of a bus"):
+        replace(layout, buses=(bus, Bus("front", 10.0, layout.names[2:3])))
+    with pytest.raises(LayoutError, match="got both"):
+        replace(layout, buses=(bus,), power_w=100.0)
+    with pytest.raises(LayoutError, match="power_w"):
+        Bus("front", -1.0, layout.names[:2])

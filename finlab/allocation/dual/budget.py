@@ -11,7 +11,7 @@ Method `dual` asks only where an answer takes more power than a bus has.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from functools import partial
 from threading import Lock
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -20,16 +20,19 @@ from numpy.typing import NDArray
 
 from finlab.actuators.response import Form, Line, RadialTable, price_grid
 from finlab.allocation.dual.block import BlockContents, block_of
+from finlab.allocation.dual.method import FinishedSolution
 from finlab.allocation.policy import Policy
 from finlab.arrays import CLOSE, EXACT, NEARLY, NOTHING, AnyArray, Array
-from finlab.core.calls import Conditions, Core, CoreAnswer
+from finlab.core.calls import Conditions, Core, CoreAnswer, budget_record
 from finlab.core.fields import actuators_of
 from finlab.layout.effectiveness import wrench_of_forces
 from finlab.physics.plant import Plant
 
 if TYPE_CHECKING:
+    from finlab.allocation.dual.method import Dual
     from finlab.allocation.power_budget import PowerBudget
-    from finlab.allocation.solution import Solved
+    from finlab.allocation.question import MethodQuestion
+    from finlab.allocation.solution import Solution, Solved
 
 AXES_MISSING = 6
 """Actuators that stand for what is missing along each axis; one along the ray follows them."""
@@ -41,6 +44,10 @@ HELD = 1e4
 across a ray over what is along it."""
 SLACK = 1e-9
 """Share by which an answer may exceed a budget and count as within it: rounding."""
+NEAR = 1e-3
+"""Share within which a power that is to be that of a budget is by the tables of the core."""
+CORRECTIONS = 4
+"""Budgets at which the core is asked, until powers are exact by the laws."""
 ENOUGH = 1e-8
 """Share of its power to which a bus is brought to its budget."""
 MOST_STEPS = 60
@@ -246,53 +253,109 @@ class BudgetedCore:
         missing["effectiveness_normalized"][-1, 0] = normalized
 
 
-class Replaced(NamedTuple):
-    """Answers within a budget in place of those that take more."""
-
-    command: Array
-    """Of all targets (N, n, 3)."""
-    multipliers: Array
-    """Multipliers (N, 6) [W/N, W/(N m)] of the wrenches that are given."""
-    rows: NDArray[np.bool_]
-    """Which answers (N,) are others than before."""
-
-
-def within_budget(
-    core: Callable[[], BudgetedCore],
-    plant: Plant,
-    solved: Solved,
-    targets: Array,
-    policy: Policy,
-    conditions: Conditions,
-    budget: PowerBudget,
-) -> Replaced | None:
-    """Answers anew what takes more than a budget.
+def solve_within(
+    method: Dual, conditions: Conditions, question: MethodQuestion, budget: PowerBudget
+) -> Solved:
+    """Solves for targets within a power budget.
 
     Args:
-        core: makes the robot with powers that have a scale.
-        plant: judges powers, in the flow of the question.
-        solved: answers to the targets, without a budget.
-        targets: (N, 6) [N, N m].
-        policy: what to give out of reach.
-        conditions: what holds of the robot.
+        method: in the flow of the question.
+        conditions: rates, losses and free axes, without a budget.
+        question: targets, policy and multipliers to begin with.
         budget: of the buses.
 
     Returns:
-        All answers; None where none takes more.
+        Commands, with the lower bound of their power.
     """
-    power = budget.power_of_buses(plant.power(solved.command))
+    targets = question.targets
+    if len(targets) == 1:
+        return _solve_one(method, conditions, targets, question, budget)
+    solved = method.solve_under(conditions, targets, question.policy)
+    power = budget.power_of_buses(method.plant.power(solved.command))
     exceeds = np.asarray((power > (1.0 + SLACK) * budget.watts).any(axis=-1))
     if not exceeds.any():
-        return None
+        return solved
     command = solved.command.copy()
     multipliers = np.zeros((len(targets), 6))
     if solved.multipliers is not None:
         multipliers = solved.multipliers.copy()
     for row in np.flatnonzero(exceeds):
-        answer = core().answer(targets[row], policy, conditions, budget)
-        command[row] = answer.command
-        multipliers[row] = answer.multipliers
-    return Replaced(command, multipliers, exceeds)
+        answer = _solve_one(method, conditions, targets[row : row + 1], question, budget)
+        command[row] = answer.command[0]
+        if answer.multipliers is not None:
+            multipliers[row] = answer.multipliers[0]
+    return _solution(method, conditions, targets, command, multipliers, exceeds)
+
+
+def _solve_one(
+    method: Dual,
+    conditions: Conditions,
+    targets: Array,
+    question: MethodQuestion,
+    budget: PowerBudget,
+) -> Solved:
+    """Solves for one target (1, 6): by the core at once where its tables say the power exactly,
+    else by watts that make up for what they are off, and else by `BudgetedCore`."""
+    policy = question.policy
+    multipliers = question.multipliers
+    watts = budget.watts
+    record = budget.record
+    for _ in range(CORRECTIONS):
+        asked = conditions._replace(budget=record)
+        solved = method.solve_under(asked, targets, policy, multipliers)
+        if method.has_exact_power and isinstance(solved, FinishedSolution):
+            return solved
+        power = _power_of_buses(method, solved, budget)
+        if _is_kept(power, budget.watts):
+            return solved
+        over = power / budget.watts
+        if (over > 1.0 + NEAR).any():
+            break  # the core has found nothing within the budget
+        watts = np.where(over > 1.0 - NEAR, watts / over, watts)
+        record = budget_record(budget.members, watts)
+    solved = method.solve_under(conditions, targets, policy, multipliers)
+    power = _power_of_buses(method, solved, budget)
+    if not (power > (1.0 + SLACK) * budget.watts).any():
+        return solved
+    answer = method.budgeted.answer(targets[0], policy, conditions, budget)
+    return _solution(
+        method, conditions, targets, answer.command[None], answer.multipliers[None], None
+    )
+
+
+def _power_of_buses(method: Dual, solved: Solved, budget: PowerBudget) -> Array:
+    """Power (b,) [W] of the buses at the command of a solution of one target."""
+    return np.asarray(budget.power_of_buses(method.plant.power(solved.command))[0])
+
+
+def _is_kept(power: Array, watts: Array) -> bool:
+    """Whether no bus takes more than it has, and none is so near to that that it ought to take
+    all."""
+    share = power / watts
+    is_short = (share > 1.0 - NEAR) & (share < 1.0 - ENOUGH)
+    return bool((share <= 1.0 + SLACK).all()) and not is_short.any()
+
+
+def _solution(
+    method: Dual,
+    conditions: Conditions,
+    targets: Array,
+    command: Array,
+    multipliers: Array,
+    rows: NDArray[np.bool_] | None,
+) -> Solution:
+    """The solution of commands (N, n, 3) for targets (N, 6), of which some rows (N,), None for
+    all, are not met."""
+    problem = method.problem_under(conditions)
+    _, finite_command = method._without_nan(command, conditions)
+    return method.solution(
+        command,
+        problem.wrench(finite_command) * problem.error_scale,
+        multipliers,
+        np.zeros(len(targets)),
+        partial(method.notes_of, set(), targets if rows is None else targets[rows], conditions),
+        conditions,
+    )
 
 
 class _Asked:

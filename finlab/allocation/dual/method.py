@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.actuators.response import power_of
 from finlab.allocation.dual.compiled import Compiled, core_policy
 from finlab.allocation.method import Method, Settings, number
 from finlab.allocation.policy import CLOSEST, Policy
@@ -36,6 +37,8 @@ if TYPE_CHECKING:
 
 LAW_SAMPLES = 64
 """Random commands of each actuator at which the core's grids are compared with the laws."""
+EXACT_POWER = 1e-11
+"""Share of a power by which the core's table may be off and count as the law."""
 NOT_MEASURED = -1.0
 """Stands for the error up to which the core's grids are exact where they were not measured."""
 MAX_BASES = 32
@@ -228,34 +231,12 @@ class Dual(Method):
             conditions = conditions_ahead(
                 method.compiled, method.turn_rates, method.period_s, reference, conditions
             )
-        solved = method.solve_under(
-            conditions, question.targets, question.policy, question.multipliers
-        )
-        if question.budget is None:
-            return solved
-        from finlab.allocation.dual.budget import within_budget
+        if question.budget is not None:
+            from finlab.allocation.dual.budget import solve_within
 
-        targets = question.targets
-        replaced = within_budget(
-            lambda: method.budgeted,
-            method.plant,
-            solved,
-            targets,
-            question.policy,
-            conditions,
-            question.budget,
-        )
-        if replaced is None:
-            return solved
-        problem = method.problem_under(conditions)
-        _, finite_command = method._without_nan(replaced.command, conditions)
-        return method.solution(
-            replaced.command,
-            problem.wrench(finite_command) * problem.error_scale,
-            replaced.multipliers,
-            np.zeros(len(targets)),
-            partial(method.notes_of, set(), targets[replaced.rows], conditions),
-            conditions,
+            return solve_within(method, conditions, question, question.budget)
+        return method.solve_under(
+            conditions, question.targets, question.policy, question.multipliers
         )
 
     @cached_property
@@ -283,20 +264,46 @@ class Dual(Method):
                 "wrench down until `result.power` is small enough"
             )
 
+    @cached_property
+    def has_exact_power(self) -> bool:
+        """Whether the core's tables say the powers of all actuators as their laws do: of
+        propellers with a power law. Of others budgets are corrected."""
+        rng = np.random.default_rng(0)
+        command = self.plant.sample(rng, (LAW_SAMPLES,))
+        power = self.plant.power(command)
+        rows = zip(self.layout.actuators, self.compiled.responses, strict=True)
+        for i, (actuator, response) in enumerate(rows):
+            number = actuator.KIND.force_number
+            if number is None:
+                return False
+            force = command[:, i, number]
+            is_given = np.abs(force) >= getattr(actuator, "dead_band", 0.0)
+            off = np.abs(power_of(response, force) - power[:, i])[is_given]
+            if off.max(initial=0.0) > EXACT_POWER * power[:, i].max():
+                return False
+        return True
+
     def prepared_answers(
-        self, policy: Policy, lost: NDArray[np.bool_] | None, free: NDArray[np.bool_] | None
+        self,
+        policy: Policy,
+        lost: NDArray[np.bool_] | None,
+        free: NDArray[np.bool_] | None,
+        budget: "PowerBudget | None" = None,
     ) -> PreparedAnswers | None:
         """Prepares questions about single wrenches; see `Method.prepared_answers`."""
         if not self._most_core_error >= 0.0:
+            return None
+        if budget is not None and not self.has_exact_power:
             return None
         from finlab.core.prepared_call import RowBound, prepared_call
 
         conditions = Conditions(None, lost, free)
         core = self.compiled.core if self.plant.interaction is None else self.coupled
+        record = None if budget is None else budget.record
         call = prepared_call(
             core,
             core_policy(policy),
-            conditions,
+            conditions._replace(budget=record),
             self.settings.calm,
             MAX_WRENCH,
             self._most_core_error,
@@ -380,7 +387,9 @@ class Dual(Method):
         all_reachable = 0 not in answer.is_attainable.tobytes()
         wrench_served = targets if all_reachable else answer.wrench_served
         sentences = {_TRUNCATED} if answer.is_truncated else set()
-        if not all_reachable and policy.kind == "direction":
+        # Within a budget what is nearer to the ray may take more.
+        is_on_ray = policy.kind != "direction" or conditions.budget is not None
+        if not all_reachable and not is_on_ray:
             from finlab.allocation.dual.ray import keep_on_rays
 
             sentences |= keep_on_rays(self.compiled, problem, conditions, targets, answer, command)

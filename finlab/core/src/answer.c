@@ -20,6 +20,7 @@ static void begin_answer(const real *block, const real *wrench, fl_answer *out) 
   out->gap_power_bound = 0;
   out->newton_status = FL_MET;
   out->has_foil_commands = 0;
+  out->exceeds_budget = 0;
   memset(out->lambda_reduced, 0, sizeof out->lambda_reduced);
   memset(out->multipliers, 0, sizeof out->multipliers);
   memset(out->force, 0, (size_t)COUNT(block) * sizeof out->force[0]);
@@ -90,10 +91,24 @@ static void find_forces(const real *block, fl_work *work, const real *wrench_wan
     out->has_foil_commands = 0;
     fl_out_of_reach(block, work, wrench, policy, out);
   }
+}
+
+/* Multipliers of the wrench of those in the basis. */
+static void find_multipliers(const fl_span *span, fl_answer *out) {
   for (int k = 0; k < 6; k++) {
     out->multipliers[k] = dot(span->basis[k], out->lambda_reduced, span->rank) /
                           span->axis_scale[k];
   }
+}
+
+/* Finds other forces where these take more power than their buses have; returns whether they do. */
+static int keep_budget(const real *block, fl_work *work, const fl_question *q,
+                        const real *wrench_desired, fl_answer *out) {
+  if (!q->budget || !fl_exceeds_budget(block, work, q->budget, out->force)) return 0;
+  real wrench[6];
+  take_off_offset(&work->span, wrench_desired, wrench);
+  out->exceeds_budget = !fl_keep_budget(block, work, wrench, q->policy, q->budget, out);
+  return 1;
 }
 
 /* Reduced multipliers to begin with [W]: those of a question, which go to `lambda`, or those of the
@@ -186,6 +201,8 @@ static void answer_question(const real *block, fl_work *work, const fl_question 
 
   real lambda[6];
   find_forces(block, work, wrench_desired, q->policy, first_multipliers(work, q, lambda), out);
+  const int is_budget_used_up = keep_budget(block, work, q, wrench_desired, out);
+  find_multipliers(span, out);
   for (int k = 0; k < 6; k++) {
     if (out->is_attainable) {
       out->wrench_served[k] = wrench_desired[k];
@@ -199,7 +216,7 @@ static void answer_question(const real *block, fl_work *work, const fl_question 
   }
   const int steps = work->settings.command_steps;
   out->error = fl_refine_commands(block, work, &work->box, out->wrench_served, out->command, steps);
-  meet_by_laws(block, work, wrench_desired, out);
+  if (!is_budget_used_up) meet_by_laws(block, work, wrench_desired, out);
   fl_rest_in_dead_bands(block, &work->box, out->command);
   if (q->previous && may_pass_bands(block, work, out->command)) {
     pass_bands(block, work, q, out->command);
@@ -229,12 +246,26 @@ static int are_small_or_unknown(const real *values, int count) {
   return 1;
 }
 
+/* Whether budgets are ones that are kept: power is that of the actuators alone, no drag. */
+static int is_valid_budget(const real *block, const fl_budget *budget) {
+  if (budget->buses < 1 || budget->buses > FL_BUSES) return 0;
+  for (int b = 0; b < budget->buses; b++) {
+    if (!(budget->watts[b] > 0 && budget->watts[b] <= LARGEST)) return 0;
+  }
+  for (int i = 0; i < COUNT(block); i++) {
+    if (budget->bus_of[i] > budget->buses || is_foil(ACTUATOR(block, i))) return 0;
+  }
+  return 1;
+}
+
 static int is_valid_question(const real *block, const fl_question *q) {
   const int n = COUNT(block);
   if (!fl_are_within(q->wrench, 6, LARGEST)) return 0;
   if (!(q->calm >= 0 && q->calm <= MOST_CALM)) return 0;
   if (q->ticks < 0) return 0;
   if (q->policy && !is_valid_policy(q->policy)) return 0;
+  if (q->budget && !is_valid_budget(block, q->budget)) return 0;
+  if (q->budget && q->policy && q->policy->kind == FL_FALLING) return 0;
   if (q->previous && !are_small_or_unknown(q->previous, 3 * n)) return 0;
   if (q->angles_wanted && !are_small_or_unknown(q->angles_wanted, n)) return 0;
   return 1;

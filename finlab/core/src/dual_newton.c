@@ -24,11 +24,9 @@
        mu, nu  damping of the step; its growth after a refused one                 Eq. 8
        S       secants of the responses                                            Eq. 9
        l       share of the slope that is left at the end of a step                Eq. 10 */
+#include "step_control.h"
 #include "symmetric.h"
 
-#define OVERSHOT R(-0.3)     /* share of the slope below which a kept step went too far, too */
-#define SEARCH_STEPS 12      /* of the search for where a step that went too far is to end */
-#define SLOPE_ENOUGH R(0.05) /* share of the slope that it may leave */
 #define JUMPS 4              /* trials with a jump after which Newton's method stands still */
 #define JUMP_STEP R(1e-3)    /* squared step, over squared multipliers, too long to judge */
 #define SHORT_STEP R(1e-7)   /* the same, in which any large change of a force is a jump */
@@ -239,51 +237,18 @@ static int jumps_between(const real *block, fl_work *work, const fl_state *one,
   return jumps;
 }
 
-/* What a trial step brought: slopes of the dual value along it at both of its ends, and its
-   rise [W]. */
-typedef struct {
-  real slope_begin, slope_end, rise;
-  real slope_left; /* l, Eq. 10 */
-} step_result;
-
 /* Multipliers at a share of a step. */
 static void lambda_after(const fl_state *from, const real *step, real share, real *lambda) {
   for (int j = 0; j < 6; j++) lambda[j] = from->lambda_reduced[j] + share * step[j];
 }
 
 static step_result judged_step(const real *step, const fl_state *from, const fl_state *to) {
-  step_result result;
-  result.slope_begin = dot(step, from->residual, 6);
-  result.slope_end = dot(step, to->residual, 6);
-  result.slope_left = result.slope_end / larger(result.slope_begin, TINY);
-  result.rise = to->dual_value - from->dual_value;
-  return result;
+  return step_result_of(dot(step, from->residual, 6), dot(step, to->residual, 6),
+                        to->dual_value - from->dual_value);
 }
 
-/* A step is kept that ends uphill, or where the value rose, or is the same and the residual
-   fell: with saturated actuators the residual may fall while the value does, too. */
 static int is_kept(const step_result *result, const fl_state *from, const fl_state *to) {
-  const real slack = ROUNDING * FABS(from->dual_value);
-  if (result->slope_left >= 0 || result->rise > 0) return 1;
-  return result->rise > -slack && to->residual_size < FELL * from->residual_size;
-}
-
-static real mu_after_kept(real mu, const step_result *result) {
-  real factor = clipped(FABS(result->slope_left) / 2, MU_KEPT_LEAST, 1);
-  if (result->slope_left > R(0.5)) factor = MU_KEPT_EARLY;
-  return larger(mu * factor, ROUNDING);
-}
-
-/* The mu that a share of the step asks for, at which the cubic along it, of both values and slopes,
-   is largest. */
-static real mu_after_refused(real mu, real nu, const step_result *result) {
-  const real a = 3 * (result->slope_begin + result->slope_end - 2 * result->rise);
-  const real b = result->slope_end - result->slope_begin - a;
-  const real discriminant = b * b - 4 * a * result->slope_begin;
-  real share = R(0.5);
-  if (discriminant > 0) share = 2 * result->slope_begin / (SQRT(discriminant) - b);
-  const real factor = larger(nu, 1 / clipped(share, SHARE_LEAST_AT_KINK, SHARE_MOST));
-  return mu * factor;
+  return is_step_kept(result, from->dual_value, from->residual_size, to->residual_size);
 }
 
 /* Makes a trial that went too far along a step the dual where its value is largest: at the jump of

@@ -19,6 +19,7 @@ static const constant CONSTANTS[] = {
     CONSTANT(FL_VERSION),
     CONSTANT(FL_MOST),
     CONSTANT(FL_ARCS),
+    CONSTANT(FL_BUSES),
     CONSTANT(FL_THRUSTER),
     CONSTANT(FL_POD),
     CONSTANT(FL_FIN),
@@ -142,7 +143,7 @@ int fl_answer_into_row(const real *block, fl_work *work, const fl_question *ques
   const int code = fl_answer_one(block, work, question, &out);
   if (code) return code;
   real *command = write_row(block, question, &out, row);
-  if (out.is_truncated || !(most_error >= 0)) return FL_UNFINISHED;
+  if (out.is_truncated || out.exceeds_budget || !(most_error >= 0)) return FL_UNFINISHED;
   if (out.is_attainable && !(out.error <= most_error)) return FL_UNFINISHED;
   if (!out.is_attainable && !is_best_beyond_reach(block, work, question, &out)) {
     return FL_UNFINISHED;

@@ -374,6 +374,12 @@ void fl_reduce_lambda(const fl_work *work, const real *lambda, real *lambda_redu
 int fl_is_in_range(const fl_work *work, const real *wrench, const real *target_reduced);
 void fl_wrench_of_forces(const real *block, const fl_work *work, real force[][2], real *wrench);
 
+/* power_budget.c: power that buses may take */
+int fl_exceeds_budget(const real *block, const fl_work *work, const fl_budget *budget,
+                      real force[][2]);
+int fl_keep_budget(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,
+                   const fl_budget *budget, fl_answer *out);
+
 /* set_gaps.c: sets with gaps */
 #define NARROW R(0.2)   /* half of an arc up to which its chord stands for its least forces */
 #define SHORTER R(0.98) /* a force below this share of the least one lies in the gap at rest */

@@ -76,6 +76,13 @@ static inline real trace_of(const symmetric *H) {
   return sum;
 }
 
+/* The lower triangle, as linear_algebra.c takes it. */
+static inline void lower_triangle(const symmetric *H, real to[6][6]) {
+  for (int i = 0; i < 6; i++) {
+    for (int j = 0; j <= i; j++) to[i][j] = H->row[j][i / 2][i % 2];
+  }
+}
+
 /* Takes a share of row U from a row, from a pair of columns on. */
 static inline __attribute__((always_inline)) void take_off(pair *row, const pair *U, real share,
                                                            int first) {
@@ -188,6 +195,10 @@ static inline real trace_of(const symmetric *H) {
   real sum = 0;
   for (int i = 0; i < 6; i++) sum += H->row[i][i];
   return sum;
+}
+
+static inline void lower_triangle(const symmetric *H, real to[6][6]) {
+  memcpy(to, H->row, sizeof H->row);
 }
 
 static inline int solve_symmetric(symmetric *H, const real *right, real *x) {

@@ -302,7 +302,7 @@ class ActuatorForce:
         self.laws_feel_flow = False
         """Whether their laws alone do."""
         if others:
-            self._others = plant_of(replace(layout, actuators=others, interaction=None))
+            self._others = plant_of(replace(layout.with_actuators(others), interaction=None))
             self.laws_feel_flow = self._others.feels_flow
 
     def move(self, command: Array, dt: float, count: int) -> ActuatorSteps:

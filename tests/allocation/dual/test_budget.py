@@ -1,7 +1,9 @@
 """Power budgets: what is given within them, beside cone programs and SLSQP, which share no line with
 the library."""
 
+import os
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from finlab.allocation import Allocation, Allocator, Policy
 from finlab.arrays import Array
 from finlab.errors import AllocationError
 from finlab.layout import load_layout
+from finlab.layout.layout import Bus, Layout
 from finlab.physics import plant_of
 from tests.oracle_budget import BudgetedPlant, least_miss_by_slsqp
 from tests.oracle_plant import OraclePlant
@@ -23,6 +26,8 @@ WATTS = 1e-6
 """Share by which a power may be off."""
 MISS = 1e-5
 """By how much an error or a share may be off."""
+MANY = int(os.environ.get("FINLAB_BUDGET_TARGETS", "0"))
+"""Targets of each kind beside the judges, where there is time."""
 ROBOTS = 9
 """Random robots of each kind."""
 
@@ -36,21 +41,54 @@ def is_convex(plant: OraclePlant) -> bool:
     return True
 
 
-def asked(kind: str, number: int) -> tuple[OraclePlant, Allocator, Array, float]:
-    """A robot with the judge's model of it on the same scale, a wrench, and a budget that is
-    mostly too small for it."""
+class Question(NamedTuple):
+    """A robot with the judge's model of it on the same scale, a wrench, and budgets that are mostly
+    too small for it."""
+
+    plant: OraclePlant
+    allocator: Allocator
+    """Of a layout with the budgets."""
+    wrench: Array
+    members: Array
+    """Which actuators (b, n) each bus feeds."""
+    watts: Array
+    """Of the buses (b,) [W]."""
+
+    def cones(self) -> BudgetedPlant:
+        """The judge of thrusters and pods."""
+        return BudgetedPlant(self.plant, self.members, self.watts)
+
+    def check_power(self, answer: Allocation) -> None:
+        """Each bus takes what it has at most."""
+        power = self.plant.powers(answer.command)
+        assert (self.members @ power <= self.watts * (1.0 + WATTS)).all()
+
+
+def asked(kind: str, number: int, buses: int = 1) -> Question:
+    """One bus feeds all actuators; of several each feeds some, and a few have none."""
     plant = random_plant(kind, number, 3)
-    allocator = Allocator(load(plant.layout))
+    layout = load(plant.layout)
+    allocator = Allocator(layout)
     plant.__dict__["scales"] = allocator.scale
     rng = np.random.default_rng([5, number])
     wrench = beyond(plant, rng, 1.5) if number % 3 == 0 else within(plant, rng)
-    watts = allocator.allocate(wrench).power * float(rng.uniform(0.2, 1.2))
-    return plant, allocator, wrench, watts
-
-
-def cones(plant: OraclePlant, watts: float) -> BudgetedPlant:
-    """The judge of one bus for all."""
-    return BudgetedPlant(plant, np.ones((1, len(plant.actuators)), bool), np.array([watts]))
+    share = float(rng.uniform(0.2, 1.2))
+    powers = plant.powers(allocator.allocate(wrench).command)
+    if buses == 1:
+        members = np.ones((1, layout.n), bool)
+        watts = share * powers.sum(keepdims=True)
+        return Question(
+            plant, Allocator(replace(layout, power_w=float(watts[0]))), wrench, members, watts
+        )
+    bus_of = rng.integers(0, buses + (number % 2), layout.n)
+    members = np.array([bus_of == bus for bus in range(buses)])
+    members = members[members.any(axis=1)]
+    watts = members @ powers * rng.uniform(0.2, 1.2, len(members)) + 0.05 * powers.mean()
+    fed = []
+    for row, most in zip(members, watts, strict=True):
+        names = tuple(name for name, is_fed in zip(layout.names, row, strict=True) if is_fed)
+        fed.append(Bus(f"bus {len(fed)}", float(most), names))
+    return Question(plant, Allocator(replace(layout, buses=tuple(fed))), wrench, members, watts)
 
 
 def miss_of(answer: Allocation) -> float:
@@ -58,43 +96,73 @@ def miss_of(answer: Allocation) -> float:
     return float(np.linalg.norm(answer.unallocated / answer.scale))
 
 
-@pytest.mark.parametrize("kind", ["thrusters", "azimuths"])
-@pytest.mark.parametrize("number", range(ROBOTS))
-def test_thrusters_and_pods_beside_clarabel(kind: str, number: int) -> None:
-    plant, allocator, wrench, watts = asked(kind, number)
-    if not is_convex(plant):
-        pytest.skip("an arc wider than half a turn is no convex set")
-    answer = allocator.allocate(wrench, power=watts)
-    assert answer.power <= watts * (1.0 + WATTS)
+def check_beside_clarabel(question: Question) -> None:
+    """Checks the answers by three policies."""
+    allocator, wrench = question.allocator, question.wrench
+    answer = allocator.allocate(wrench)
+    question.check_power(answer)
     if answer.reachable:
-        least = cones(plant, watts).least_power(wrench)
+        least = question.cones().least_power(wrench)
         assert answer.power == pytest.approx(least, rel=MISS)
-    assert miss_of(answer) == pytest.approx(cones(plant, watts).least_miss(wrench), abs=MISS)
+    assert miss_of(answer) == pytest.approx(question.cones().least_miss(wrench), abs=MISS)
 
-    answer = allocator.allocate(wrench, power=watts, policy="direction")
-    assert answer.power <= watts * (1.0 + WATTS)
-    assert answer.share == pytest.approx(cones(plant, watts).largest_share(wrench), abs=MISS)
+    answer = allocator.allocate(wrench, policy="direction")
+    question.check_power(answer)
+    assert answer.share == pytest.approx(question.cones().largest_share(wrench), abs=MISS)
     across = (answer.wrench - answer.share * wrench) / answer.scale
     assert float(np.linalg.norm(across)) <= MISS
 
-    answer = allocator.allocate(wrench, power=watts, policy="priority")
-    assert answer.power <= watts * (1.0 + WATTS)
+    answer = allocator.allocate(wrench, policy="priority")
+    question.check_power(answer)
     missing = np.abs(answer.unallocated / answer.scale)
-    first = cones(plant, watts).least_miss(wrench, [2])
+    first = question.cones().least_miss(wrench, [2])
     assert missing[2] == pytest.approx(first, abs=MISS)
     if first <= MISS:
-        then = cones(plant, watts)
+        then = question.cones()
         then.hold(wrench, [2], float(missing[2]) + 1e-9)
         turning = float(np.linalg.norm(missing[3:]))
         assert turning == pytest.approx(then.least_miss(wrench, [3, 4, 5]), abs=10 * MISS)
 
 
+@pytest.mark.parametrize("buses", [1, 3])
+@pytest.mark.parametrize("kind", ["thrusters", "azimuths"])
+@pytest.mark.parametrize("number", range(ROBOTS))
+def test_thrusters_and_pods_beside_clarabel(kind: str, number: int, buses: int) -> None:
+    question = asked(kind, number, buses)
+    if not is_convex(question.plant):
+        pytest.skip("an arc wider than half a turn is no convex set")
+    check_beside_clarabel(question)
+
+
+@pytest.mark.skipif(not MANY, reason="FINLAB_BUDGET_TARGETS says how many targets; takes minutes")
+@pytest.mark.parametrize("buses", [1, 3])
+@pytest.mark.parametrize("kind", ["thrusters", "azimuths"])
+def test_many_thrusters_and_pods_beside_clarabel(kind: str, buses: int) -> None:
+    wrong = []
+    asked_count = 0
+    number = 0
+    while asked_count < MANY:
+        number += 1
+        question = asked(kind, 100 + number, buses)
+        if not is_convex(question.plant):
+            continue
+        asked_count += 1
+        try:
+            check_beside_clarabel(question)
+        except AssertionError as error:
+            wrong.append(f"{100 + number}: {str(error)[:200]}")
+        except ValueError as error:  # the judge has no answer
+            wrong.append(f"{100 + number}: {error}")
+    assert not wrong, "\n".join(wrong)
+
+
 @pytest.mark.parametrize("number", range(2))
 def test_fins_beside_slsqp(number: int) -> None:
-    plant, allocator, wrench, watts = asked("fins any shaft", number)
-    answer = allocator.allocate(wrench, power=watts)
-    assert answer.power <= watts * (1.0 + WATTS)
-    known = least_miss_by_slsqp(plant, wrench, watts)
+    question = asked("fins any shaft", number)
+    answer = question.allocator.allocate(question.wrench)
+    question.check_power(answer)
+    watts = float(question.watts[0])
+    known = least_miss_by_slsqp(question.plant, question.wrench, watts)
     assert miss_of(answer) <= known + MISS
     assert known <= miss_of(answer) + 1e-3  # or else SLSQP has found nothing near it
 
@@ -186,3 +254,60 @@ def test_what_no_budget_is_kept_for() -> None:
         Allocator(load_layout("torpedo")).allocate(wrench, power=100.0)
     with pytest.raises(AllocationError, match="method 'px4' keeps no budget"):
         Allocator(load_layout("bluerov2"), "px4").allocate(wrench, power=100.0)
+
+
+def _with_buses() -> Layout:
+    """BlueROV2 with a bus for its front thrusters and one for the rear ones."""
+    layout = load_layout("bluerov2_heavy")
+    front = tuple(name for name in layout.names if "front" in name)
+    rear = tuple(name for name in layout.names if "rear" in name)
+    return replace(layout, buses=(Bus("front", 60.0, front), Bus("rear", 50.0, rear)))
+
+
+def test_buses_of_a_layout_limit_and_are_named() -> None:
+    layout = _with_buses()
+    allocator = Allocator(layout)
+    members = np.array([np.isin(layout.names, bus.actuators) for bus in layout.buses])
+    wrench = [60.0, 20.0, 10.0, 0, 0, 4.0]
+    for policy in ("closest", "direction", "priority"):
+        answer = allocator.allocate(wrench, policy=policy)
+        power = members @ plant_of(layout).power(answer.command)
+        assert (power <= np.array([60.0, 50.0]) * (1.0 + WATTS)).all()
+        assert "bus front" in answer.binding or "bus rear" in answer.binding
+    lower = allocator.allocate(wrench, power={"rear": 20.0})
+    assert members[1] @ plant_of(layout).power(lower.command) <= 20.0 * (1.0 + WATTS)
+    assert members[0] @ plant_of(layout).power(lower.command) <= 60.0 * (1.0 + WATTS)
+    free = Allocator(load_layout("bluerov2_heavy")).allocate(wrench)
+    np.testing.assert_array_equal(allocator.allocate(wrench, power=np.inf).command, free.command)
+    total = allocator.allocate(wrench, power=40.0)
+    assert total.power == pytest.approx(40.0, rel=WATTS)
+    with pytest.raises(AllocationError, match="has front, rear, got bus 'aft'"):
+        allocator.allocate(wrench, power={"aft": 20.0})
+
+
+def test_a_budget_of_a_layout_is_that_of_a_question() -> None:
+    layout = load_layout("bluerov2_heavy")
+    limited = Allocator(replace(layout, power_w=100.0))
+    wrench = [60.0, 20.0, 10.0, 0, 0, 4.0]
+    for _ in range(3):  # the first one, the one that prepares, and one that is prepared
+        own = limited.allocate(wrench)
+        asked_for = Allocator(layout).allocate(wrench, power=100.0)
+        np.testing.assert_allclose(own.command, asked_for.command, rtol=0.0, atol=1e-9)
+        assert own.binding == asked_for.binding == ("power",)
+        assert own.bound <= own.power <= 100.0 * (1.0 + WATTS)
+    batch = limited.allocate_batch([wrench, [10.0, 0, 0, 0, 0, 0]])
+    np.testing.assert_allclose(batch.command[0], own.command, rtol=0.0, atol=1e-9)
+
+
+def test_the_core_needs_no_help_with_thrusters(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise AssertionError("the slow way was taken")
+
+    monkeypatch.setattr("finlab.allocation.dual.budget.BudgetedCore.answer", refuse)
+    allocator = Allocator(load_layout("bluerov2_heavy"))
+    rng = np.random.default_rng(4)
+    for _ in range(30):
+        wrench = allocator.scale * rng.normal(size=6)
+        for policy in ("closest", "direction", "priority"):
+            answer = allocator.allocate(wrench, policy=policy, power=80.0)
+            assert answer.power <= 80.0 * (1.0 + WATTS)
