@@ -80,7 +80,7 @@ typedef double fl_wide; /* where differences of large numbers matter, in single 
 #define FL_BUDGETS (13 * FL_STEPS)
 #define FL_BOUND (2 * (FL_FORCES + FL_FOILS) + FL_BUDGETS)
 
-#define FL_VERSION 26  /* of all structs and functions here */
+#define FL_VERSION 29  /* of all structs and functions here */
 #define FL_MAGIC 41721 /* first number of a block */
 
 /* The structs that cross the border of the library. */
