@@ -81,10 +81,12 @@ class SensorNoise:
     yaw: float = 0.02
     """[rad]."""
     acceleration: float = 0.05
+    """Of the mean of a tenth of a second [m/s^2]."""
+    acceleration_bias: float = 0.03
     """[m/s^2]."""
 
 
-NO_NOISE = SensorNoise(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.2, 0.0, 0.0, 0.0, 0.0, 0.0)
+NO_NOISE = SensorNoise(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 """Exact sensors."""
 
 
@@ -271,7 +273,8 @@ class MujocoRobot:
             seed: of the robot, its water and its sensors.
             spread: how far it is from its layout.
             noise: of the sensors.
-            sensors: `dvl` for all, `imu` for no velocity.
+            sensors: `dvl` for rates, tilt, depth and velocity, `imu` for no velocity; `accelerometer`
+                is as `imu` with an accelerometer.
         """
         rng = np.random.default_rng([seed, 0x60])
         self.layout = layout
@@ -288,6 +291,11 @@ class MujocoRobot:
         self._rate_bias = noise.rate_bias * rng.normal(size=3)
         self._tilt_bias = noise.tilt_bias * rng.normal(size=2)
         self._velocity_bias = noise.velocity_bias * rng.normal(size=3)
+        # What is drawn for sensors that not every run has leaves the other numbers as they are.
+        self._rng_of_more = np.random.default_rng([seed, 0x63])
+        self._acceleration_bias = noise.acceleration_bias * self._rng_of_more.normal(size=3)
+        self._specific_force = np.zeros(3)  # summed over the steps since the last measurement
+        self._steps = 0
         self._velocity = np.zeros(3) if sensors == "dvl" else np.full(3, np.nan)
         self._velocity_time = 0.0
         self._in_transit: list[tuple[float, Array]] = []
@@ -366,6 +374,8 @@ class MujocoRobot:
         self.data.qfrc_applied[3:] = of_water[3:]
         mujoco.mj_step(self._model, self.data)
         self.acceleration = np.concatenate([acceleration[:3] + turning, acceleration[3:]])
+        self._specific_force += self.acceleration[:3] + GRAVITY * up
+        self._steps += 1
         self.time += STEP_S
 
     def _sample_velocity(self) -> None:
@@ -404,7 +414,19 @@ class MujocoRobot:
             roll=float(tilt[0]),
             pitch=float(tilt[1]),
             ages=(0.0, 0.0, self.time - self._velocity_time, 0.0),
+            acceleration=self._measured_acceleration(),
         )
+
+    def _measured_acceleration(self) -> Array:
+        """Mean specific force (3,) since the last measurement; NaN without an accelerometer."""
+        mean = self._specific_force / max(self._steps, 1)
+        has_sample = self._steps > 0 and self.sensors == "accelerometer"
+        self._specific_force = np.zeros(3)
+        self._steps = 0
+        if not has_sample:
+            return np.full(3, np.nan)
+        noise = self.noise.acceleration * self._rng_of_more.normal(size=3)
+        return np.asarray(mean + self._acceleration_bias + noise)
 
 
 class Path:

@@ -39,8 +39,8 @@ N_ROBOTS = 24
 """Of all of them; the others are random frames."""
 KINDS = ("lost", "weak", "reversed", "stuck")
 """Kinds of fault."""
-SENSORS = ("dvl", "imu")
-"""With a velocity log, and without."""
+SENSORS = ("dvl", "imu", "accelerometer")
+"""With a velocity log, without, and without but with an accelerometer."""
 PERIOD_S = 0.1
 """Of the loop [s]."""
 FAULT_RUN_S = 12.5

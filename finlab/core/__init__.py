@@ -9,7 +9,7 @@ from typing import TypeVar
 
 from finlab.errors import FinlabError
 
-VERSION = 27
+VERSION = 28
 """What `fl_version()` of the C files returns; both rise together where a signature or a struct
 changes."""
 SIGNATURES = {

@@ -77,7 +77,7 @@ typedef double fl_wide; /* where differences of large numbers matter, in single 
 #define FL_FOILS (FL_FOILS_CHEAPER + 2 * FL_LATTICE_STARTS * FL_STEPS_AT_KINK)
 #define FL_BOUND (2 * (FL_FORCES + FL_FOILS))
 
-#define FL_VERSION 27  /* of all structs and functions here */
+#define FL_VERSION 28  /* of all structs and functions here */
 #define FL_MAGIC 41721 /* first number of a block */
 
 /* The structs that cross the border of the library. */
@@ -539,7 +539,7 @@ void fl_kalman_correct(const fl_real *variance, const fl_real *innovation, int f
 /* Carries the state of the fault monitor's model on over a period, and says its derivatives.
 
    @param body        numbers of the body; finlab/core/src/motion_model.c has their order, and that
-                      of a state of d = 46 + 4 strengths + held numbers
+                      of a state of d = 49 + 4 strengths + held numbers
    @param wrenches    of each actuator at full strength, then of each unit of what stuck ones give
                       (strengths + held, 6), body frame [N, N m]
    @param owners      actuator of each of these (strengths + held,)
@@ -576,7 +576,7 @@ void fl_jumps_predict(const fl_real *transition, const fl_real *noise, const fl_
                       const int *columns, int most, int used, int d, int active, int c,
                       fl_real *covariance, fl_real *sensitivity);
 
-/* Corrects that filter by at most 9 measured numbers, and weighs the jumps by them. Nothing is
+/* Corrects that filter by at most 12 measured numbers, and weighs the jumps by them. Nothing is
    changed where the model says nothing of the measurement.
 
    @param rows           derivatives of what is measured by the state (measured, d)

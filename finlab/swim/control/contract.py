@@ -22,6 +22,8 @@ from finlab.layout.effectiveness import layout_effectiveness
 
 NO_WRENCH = np.zeros(6)
 """Wrench of actuators that have given nothing [N, N m]."""
+NOT_MEASURED = np.full(3, math.nan)
+"""Of a sensor that is not there."""
 
 
 class Measurement(NamedTuple):
@@ -45,6 +47,9 @@ class Measurement(NamedTuple):
     """Pitch [rad], positive with the nose down, from the IMU."""
     ages: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
     """How old the samples of markers, pressure, DVL and IMU are by their time stamps [s]."""
+    acceleration: Array = NOT_MEASURED
+    """Specific force (3,) in the body frame [m/s^2] as accelerometers show it, (0, 0, 9.81) at rest:
+    the mean of all samples of the IMU since the measurement before; NaN where there is none."""
 
     def as_array(self) -> Array:
         """Position, roll, pitch, yaw, velocity and rates side by side (12,), as a log keeps

@@ -16,6 +16,7 @@ from finlab.axes import wrapped_angle
 from finlab.layout import Layout
 from finlab.layout.damage import NO_DAMAGE, Damage
 from finlab.physics import plant_of
+from finlab.swim.control.accelerometer import specific_force
 from finlab.swim.control.contract import Measurement, asked_of_weak
 from finlab.swim.control.hypotheses import Hypotheses
 from finlab.swim.control.jump_evidence import (
@@ -50,6 +51,9 @@ KIND_ODDS = 10.0
 KIND_WAIT_S = 2.0
 """Time in which these odds go down to 1: one whose kind is in doubt is then taken for the likeliest
 [s]."""
+LOST_LOG_ODDS = math.log(KIND_ODDS)
+"""Logarithm of the odds of lost against weak below which one is called weak: it is used on, and asked
+for more, and soon shows which of both it is; one that is called lost rests, and shows nothing."""
 CAUTION_S = 15.0
 """Time after a fault was named in which another actuator is named more cautiously: the robot moves
 as it never did before [s]."""
@@ -77,6 +81,8 @@ PERIOD_MAX_S = 0.25
 """Longest step of the model [s]; a longer period is cut."""
 GAP_MAX_S = 2.0
 """A pause between samples after which the motion is unknown [s]."""
+MEASURED_MAX = 12
+"""Most numbers of one measurement: rates, tilt, velocity, depth, specific force."""
 STEEP_COSINE = 0.3
 """Cosine of the pitch below which roll and heading say too little of the attitude to tell
 anything."""
@@ -151,12 +157,11 @@ class FaultMonitor:
         self._hypotheses = Hypotheses(self._model, self.settings)
         self._probe = Probe(layout, self.settings, self.period_s)
         # Rows of what is measured by the state, those of rates and tilt first, and variances.
-        self._rows = np.zeros((9, self._model.size))
+        self._rows = np.zeros((MEASURED_MAX, self._model.size))
         self._rows[range(5), range(3, 8)] = 1.0
         s = self.settings
-        self._variance_of_imu = np.square([s.rate_noise] * 3 + [s.tilt_noise] * 2 + [0.0] * 4)
-        self._variance_of_all = self._variance_of_imu.copy()
-        self._variance_of_all[5:8] = s.velocity_noise**2
+        self._variance = np.zeros(MEASURED_MAX)
+        self._variance[:5] = np.square([s.rate_noise] * 3 + [s.tilt_noise] * 2)
         n = layout.n
         self._kind = np.full(n, WHOLE)
         """What each actuator is taken for, index in `KINDS`."""
@@ -187,6 +192,7 @@ class FaultMonitor:
         self._velocity: tuple[float, ...] | None = None
         self._velocity_time = -math.inf
         self._depth = math.nan
+        self._accelerometer = np.array(self.settings.accelerometer_place)
         self.evidence: Evidence | None = None
         """How likely each jump was at the last call; None before there is any."""
 
@@ -263,11 +269,11 @@ class FaultMonitor:
         anything of the motion."""
         state = self._hypotheses.state
         rows = self._rows
-        innovation = np.zeros(9)
+        innovation = np.zeros(MEASURED_MAX)
         innovation[:5] = (*m.rates.tolist(), m.roll, m.pitch)
         innovation[:5] -= state[3:8]
         innovation[3] = wrapped_angle(innovation[3])
-        variance = self._variance_of_imu
+        variance = self._variance
         count = 5
         if self._is_new_velocity(m):
             age = m.ages[2]
@@ -275,16 +281,22 @@ class FaultMonitor:
             innovation[5:8] = m.velocity - (state[VELOCITY] - age * step.acceleration[VELOCITY])
             rows[5:8] = -age * step.acceleration_slope[VELOCITY]
             rows[(5, 6, 7), (0, 1, 2)] += 1.0
-            variance = self._variance_of_all
+            variance[5:8] = self.settings.velocity_noise**2
             count = 8
         if math.isfinite(m.depth) and m.depth != self._depth:
             rows[count] = 0.0
             rows[count, DEPTH] = 1.0
             innovation[count] = m.depth - state[DEPTH]
-            variance = variance.copy()
             variance[count] = self.settings.depth_noise**2
             count += 1
         self._depth = m.depth
+        if np.isfinite(m.acceleration).all():
+            seen = slice(count, count + 3)
+            expected, rows[seen] = specific_force(state, step, self._accelerometer)
+            innovation[seen] = m.acceleration - expected
+            of_motion = self._hypotheses.acceleration_variance[VELOCITY]
+            variance[seen] = self.settings.acceleration_noise**2 + of_motion
+            count += 3
         return self._hypotheses.update(rows[:count], innovation[:count], variance[:count])
 
     def tell(self, name: str, strength: float = 1.0, stuck: float = math.nan) -> Diagnosis:
@@ -460,10 +472,13 @@ class FaultMonitor:
         if odds.of_single < 0.5:
             self._adopt_pair(evidence, int(odds.pairs.argmax()))
             return
-        loses = odds.kind in (LOST, REVERSED) and self._kind[k] not in (LOST, REVERSED)
+        kind = odds.kind
+        if kind == LOST and float(odds.by_kind[k, LOST] - odds.by_kind[k, WEAK]) < LOST_LOG_ODDS:
+            kind = WEAK
+        loses = kind in (LOST, REVERSED) and self._kind[k] not in (LOST, REVERSED)
         if loses and self._is_lost.sum() >= self.layout.n - 1:
             return  # the last one that works
-        self._adopt(evidence, k, odds.kind, share * odds.of_kind)
+        self._adopt(evidence, k, kind, share * odds.of_kind)
 
     def _note_probability(self, odds: "_Odds") -> None:
         """The probabilities of actuators not being whole."""

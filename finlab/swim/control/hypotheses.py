@@ -26,6 +26,7 @@ from finlab.swim.control.jump_evidence import (
 )
 from finlab.swim.control.monitor_settings import MonitorSettings
 from finlab.swim.control.motion_model import (
+    BIAS,
     COUPLING,
     CURRENT,
     DAMPING,
@@ -104,6 +105,7 @@ class Hypotheses:
         variance[COUPLING] = s.coupling**2
         variance[DAMPING] = s.damping**2
         variance[RIGHTING] = s.damping**2
+        variance[BIAS] = s.acceleration_bias**2
         variance[model.strength] = s.strength**2
         variance[model.place] = s.place**2
         self._variance_at_start = variance
@@ -117,6 +119,7 @@ class Hypotheses:
         noise[UNKNOWN] = np.square(s.unknown_drift * self._by_acceleration)
         noise[INERTIA] = noise[DAMPING] = noise[RIGHTING] = s.body_drift**2
         noise[COUPLING] = (s.body_drift * s.coupling / s.inertia) ** 2
+        noise[BIAS] = s.acceleration_bias_drift**2
         noise[model.strength] = s.strength_drift**2
         self._noise = noise
         self._misfit_noise = np.square(MISFIT_ACCELERATION * self._by_acceleration / inertia)
@@ -130,6 +133,8 @@ class Hypotheses:
         """Squared innovation of the last measurement, in variances."""
         self.age_s = 0.0
         """Time since the beginning [s]."""
+        self.acceleration_variance = np.zeros(6)
+        """Of mean accelerations over the last period, beside those of the state (6,)."""
         # Columns of a jump: strengths, what stuck ones give, an unknown wrench.
         columns = np.concatenate(
             [
@@ -216,6 +221,7 @@ class Hypotheses:
         weights = np.array([of_terms, of_products, s.lag_s**2, dt**2])
         noise = self._noise * dt
         noise[MOTION] += weights @ step.noise + self._misfit_noise * ((self.misfit - 1.0) * dt)
+        self.acceleration_variance = noise[MOTION] / dt**2
         library().fl_jumps_predict(
             step.transition.ctypes.data,
             noise.ctypes.data,
