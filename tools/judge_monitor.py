@@ -39,8 +39,8 @@ N_ROBOTS = 24
 """Of all of them; the others are random frames."""
 KINDS = ("lost", "weak", "reversed", "stuck")
 """Kinds of fault."""
-SENSORS = ("dvl", "imu", "accelerometer")
-"""With a velocity log, without, and without but with an accelerometer."""
+SENSORS = ("dvl", "imu", "accelerometer", "esc")
+"""With a velocity log; without; without, but with an accelerometer, or with telemetry of drives."""
 PERIOD_S = 0.1
 """Of the loop [s]."""
 FAULT_RUN_S = 12.5
@@ -233,12 +233,15 @@ def judged_or_failed(run: Run) -> dict[str, Any]:
 
 def is_right(result: dict[str, Any], until: float) -> bool:
     """Whether the last word on the broken actuator by a time [s] is right; a stuck one may be
-    called lost."""
+    called lost, a weak one fouled."""
     said = None
     for moment, name, kind in result["events"]:
         if name == result["actuator"] and moment <= until + 1e-9:
             said = kind
-    return said == result["kind"] or (result["kind"], said) == ("stuck", "lost")
+    return said == result["kind"] or (result["kind"], said) in (
+        ("stuck", "lost"),
+        ("weak", "fouled"),
+    )
 
 
 def _percent(flags: Sequence[bool]) -> str:

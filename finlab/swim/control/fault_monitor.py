@@ -18,7 +18,7 @@ from finlab.layout.damage import NO_DAMAGE, Damage
 from finlab.physics import plant_of
 from finlab.swim.control.accelerometer import specific_force
 from finlab.swim.control.contract import Measurement, asked_of_weak
-from finlab.swim.control.hypotheses import Hypotheses
+from finlab.swim.control.hypotheses import LOST_BELOW, REVERSED_BELOW, WEAK_BELOW, Hypotheses
 from finlab.swim.control.jump_evidence import (
     KINDS,
     LOST,
@@ -33,14 +33,8 @@ from finlab.swim.control.monitor_settings import MonitorSettings
 from finlab.swim.control.motion_model import DEPTH, N_MOVING, VELOCITY, ModelStep, MotionModel
 from finlab.swim.control.probe import Probe
 
-LOST_BELOW = 0.15
-"""A strength below which an actuator is given up as lost."""
 GONE_BELOW = 0.2
 """A strength below which it lies within a standard deviation, too."""
-REVERSED_BELOW = -0.3
-"""A strength below which it pushes the other way than the layout says."""
-WHOLE_ABOVE = 0.9
-"""A strength from which one that was weak is whole again."""
 TORN_BELOW = 0.7
 """Share of its force below which one that is stuck at an angle is torn, too."""
 CONFIRM_S = 0.2
@@ -52,7 +46,7 @@ KIND_WAIT_S = 2.0
 """Time in which these odds go down to 1: one whose kind is in doubt is then taken for the likeliest
 [s]."""
 LOST_LOG_ODDS = math.log(KIND_ODDS)
-"""Logarithm of the odds of lost against weak below which one is called weak: it is used on, and asked
+"""Logarithm of the odds of lost against weak below which one is called weak: it is used on, asked
 for more, and soon shows which of both it is; one that is called lost rests, and shows nothing."""
 CAUTION_S = 15.0
 """Time after a fault was named in which another actuator is named more cautiously: the robot moves
@@ -88,13 +82,18 @@ STEEP_COSINE = 0.3
 anything."""
 
 
+FOULED = "fouled"
+"""What a weak actuator is called whose drive drags something."""
+
+
 class Finding(NamedTuple):
     """One actuator that is not whole."""
 
     name: str
     """Of the actuator."""
     kind: str
-    """`lost`, `weak`, `reversed` or `stuck`."""
+    """`lost`, `weak`, `fouled`, `reversed` or `stuck`; a fouled one is a weak one whose drive says
+    that it turns slowly and takes more current than belongs to that."""
     since_s: float
     """When it happened, as far as is known, by the clock of the measurements [s]."""
     probability: float
@@ -241,6 +240,10 @@ class FaultMonitor:
         if not self._follow(m, step):
             hypotheses.restart(self._moving(m))
             return self.verdict()
+        drives = hypotheses.drives
+        drives.note_force(m.time)
+        if m.drives is not None:
+            drives.take(m.drives, m.time)
         self._decide(duration)
         return self.verdict()
 
@@ -319,7 +322,7 @@ class FaultMonitor:
                 kind = REVERSED
             elif strength < LOST_BELOW or not math.isnan(stuck):
                 kind = LOST
-            elif strength < WHOLE_ABOVE:
+            elif strength < WEAK_BELOW:
                 kind = WEAK
         self._mark(k, kind, self._clock_s, 1.0)
         self._is_announced[k] = kind in (LOST, REVERSED)
@@ -389,6 +392,7 @@ class FaultMonitor:
         return float(held[0]) if len(held) == 1 else math.atan2(held[1], held[0])
 
     def _finding(self, k: int) -> Finding:
+        hypotheses = self._hypotheses
         kind = int(self._kind[k])
         value = {LOST: 0.0, REVERSED: -1.0}.get(kind, float(self._reported_strength[k]))
         if kind == STUCK:
@@ -397,7 +401,10 @@ class FaultMonitor:
         since_s = float(self._since[k])
         if not math.isnan(self._time):
             since_s += self._time - self._clock_s
-        return Finding(self.layout.names[k], KINDS[kind], since_s, float(self._certainty[k]), value)
+        name = KINDS[kind]
+        if kind == WEAK and hypotheses.drives.fouled[k]:
+            name = FOULED
+        return Finding(self.layout.names[k], name, since_s, float(self._certainty[k]), value)
 
     def _damage(self, strength: Array) -> Damage:
         """What an allocator should know; a table's thrust cannot be scaled."""
@@ -587,7 +594,7 @@ class FaultMonitor:
             if self._is_lost.sum() < self.layout.n - 1:
                 self._hypotheses.believe(k, 0.0)
                 self._kind[k] = LOST
-        self._kind[(self._kind == WEAK) & (strength > WHOLE_ABOVE)] = WHOLE
+        self._kind[(self._kind == WEAK) & (strength > WEAK_BELOW)] = WHOLE
 
     def _mark(self, k: int, kind: int, since: float, certainty: float) -> None:
         """Notes what an actuator is taken for."""

@@ -17,9 +17,15 @@ from numpy.typing import NDArray
 from finlab.arrays import Array
 from finlab.core import library
 from finlab.core.shared_array import SharedArray
+from finlab.swim.control.drive_telemetry import DriveEvidence
 from finlab.swim.control.jump_evidence import (
+    LOST,
     ONSET_EVERY_S,
     ONSETS,
+    REVERSED,
+    STUCK,
+    WEAK,
+    WHOLE,
     Evidence,
     GatheredJumps,
     JumpEvidence,
@@ -43,6 +49,12 @@ from finlab.swim.control.motion_model import (
     gyration_radius,
 )
 
+LOST_BELOW = 0.15
+"""A strength below which an actuator is given up as lost."""
+REVERSED_BELOW = -0.3
+"""A strength below which it pushes the other way than the layout says."""
+WEAK_BELOW = 0.9
+"""A strength below which an actuator is weak; one that was weak is whole again from there on."""
 NIS_MAX = 4.0
 """Largest squared innovation per measured number, in variances, that counts for the misfit."""
 MISFIT_ACCELERATION = 0.01
@@ -163,6 +175,8 @@ class Hypotheses:
         )
         self._jolt_variance = np.square(s.jolt * self._by_acceleration)
         self._evidence = JumpEvidence(model, s, self._jumps, self._jolt_variance)
+        self.drives = DriveEvidence(model, ONSETS)
+        """What drives say of themselves."""
         self.forget_jumps()
 
     @property
@@ -257,6 +271,7 @@ class Hypotheses:
         jumps.strength.array[slot] = self.strength
         jumps.held.array[slot] = self.held
         jumps.motion.array[slot] = self.model.held_now()
+        self.drives.begin(slot)
         self._age[slot] = 0.0
         self._best_onsets = []
         self._since_onset = 0.0
@@ -355,8 +370,11 @@ class Hypotheses:
 
     def evidence(self) -> Evidence:
         """How likely each jump is, compared with none."""
+        of_drives = None
+        if self.drives.has_samples:
+            of_drives = self.drives.log_ratios(self._slots, self._believed_kinds())
         evidence = self._evidence.now(
-            self._slots, self.onset_age, self.strength, self.held, self.misfit
+            self._slots, self.onset_age, self.strength, self.held, self.misfit, of_drives
         )
         # Of each actuator and of the pairs.
         span = evidence.span
@@ -365,6 +383,16 @@ class Hypotheses:
         pair = evidence.both.reshape(o, -1).max(axis=1) - span
         self._best_onsets = [int(self._slots[single.argmax()]), int(self._slots[pair.argmax()])]
         return evidence
+
+    def _believed_kinds(self) -> NDArray[np.int_]:
+        """What each actuator is taken for (n,), index in `KINDS`, by its strength and what it gives
+        where it sticks."""
+        strength = self.strength
+        kinds = np.where(strength < WEAK_BELOW, WEAK, WHOLE)
+        kinds[strength < LOST_BELOW] = LOST
+        kinds[strength < REVERSED_BELOW] = REVERSED
+        kinds[self.model.held_owner[self.held != 0.0]] = STUCK
+        return np.asarray(kinds)
 
     def _take_over(
         self, onset: int, columns: NDArray[np.int_], mean: Array, variance: Array

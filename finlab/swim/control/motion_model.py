@@ -117,6 +117,12 @@ class MotionModel:
         largest = [_largest_force(part) for part in parts]
         self.force_max = np.array(largest)
         """Largest forces (n,) of actuators whose command is a force [N]; 1 of others."""
+        self.force_limits = np.full((n, 2), np.nan)
+        """Least and largest forces (n, 2) of actuators whose command is a force alone [N]; NaN of
+        others."""
+        for k, part in enumerate(parts):
+            if part.type == "thruster":
+                self.force_limits[k] = part.lower[0], part.upper[0]
         owners = []
         for k in range(n):
             if can_stick[k]:
