@@ -48,6 +48,9 @@ KIND_WAIT_S = 2.0
 LOST_LOG_ODDS = math.log(KIND_ODDS)
 """Logarithm of the odds of lost against weak below which one is called weak: it is used on, asked
 for more, and soon shows which of both it is; one that is called lost rests, and shows nothing."""
+PAIR_LOG_ODDS = math.log(100.0)
+"""Logarithm of the odds of two losses at once against all else from which on both are named: a
+second actuator explains much that a body beside its drawing does."""
 CAUTION_S = 15.0
 """Time after a fault was named in which another actuator is named more cautiously: the robot moves
 as it never did before [s]."""
@@ -476,9 +479,8 @@ class FaultMonitor:
         self._doubtful_s += duration
         if not self._is_confirmed(odds):
             return
-        if odds.of_single < 0.5:
-            self._adopt_pair(evidence, int(odds.pairs.argmax()))
-            return
+        if odds.of_single < 0.5 and self._doubtful_s < KIND_WAIT_S:
+            return  # a pair that is not clear yet
         kind = odds.kind
         if kind == LOST and float(odds.by_kind[k, LOST] - odds.by_kind[k, WEAK]) < LOST_LOG_ODDS:
             kind = WEAK
@@ -497,7 +499,7 @@ class FaultMonitor:
     def _decide_on_pair(self, evidence: Evidence, odds: "_Odds", duration: float) -> bool:
         """Acts on two losses at one moment; returns whether they are all but certain."""
         is_calm = self._clock_s - self._last_named_s >= CAUTION_S
-        if not is_calm or odds.pair - odds.everything <= math.log(self.settings.threshold):
+        if not is_calm or odds.pair - odds.without_pairs <= PAIR_LOG_ODDS:
             return False
         pair = int(odds.pairs.argmax())
         self._hold((-2, pair), duration)
@@ -633,7 +635,9 @@ class _Odds:
         """Of any two."""
         jolt = float(np.logaddexp.reduce(evidence.jolt))
         single = float(np.logaddexp.reduce(by_actuator))
-        self.everything = float(np.logaddexp.reduce([0.0, single, jolt, self.pair]))
+        self.without_pairs = float(np.logaddexp.reduce([0.0, single, jolt]))
+        """Of anything but two at once, or nothing."""
+        self.everything = float(np.logaddexp(self.without_pairs, self.pair))
         """Of anything, or nothing."""
         self.actuator = int(by_actuator.argmax())
         """The likeliest."""
