@@ -67,6 +67,8 @@ class Run(NamedTuple):
     """None for no fault."""
     first_seed: int = JUDGED_SEED
     """Seed of the run of number 0, and of the first robot."""
+    tests: bool = False
+    """Whether the robot makes a test motion where an actuator is in doubt."""
 
     @property
     def seed(self) -> int:
@@ -76,7 +78,8 @@ class Run(NamedTuple):
     @property
     def key(self) -> str:
         """A name by which a file of results knows it."""
-        return f"{self.first_seed} {self.number} {self.sensors} {self.kind}"
+        tested = " tested" if self.tests else ""
+        return f"{self.first_seed} {self.number} {self.sensors} {self.kind}{tested}"
 
     def robot(self) -> Layout:
         """The layout that is believed."""
@@ -180,6 +183,8 @@ def judged(run: Run) -> dict[str, Any]:
         wanted = path.wrench(now, measurement, has_velocity)
         _, answer = command_for(wanted, verdict.damage)
         started = time.thread_time_ns()
+        if run.tests:
+            answer = monitor.tested(answer, axes)
         command = monitor.sent(answer)
         tick_ms.append((spent + time.thread_time_ns() - started) / 1e6)
         unknown += verdict.unknown

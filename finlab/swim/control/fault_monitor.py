@@ -6,13 +6,14 @@ allocator is told, and what is sent to the drives.
 """
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from finlab.allocation.rates import Rates
 from finlab.arrays import Array
-from finlab.axes import wrapped_angle
+from finlab.axes import AXES, wrapped_angle
 from finlab.layout import Layout
 from finlab.layout.damage import NO_DAMAGE, Damage
 from finlab.physics import plant_of
@@ -31,6 +32,7 @@ from finlab.swim.control.jump_evidence import (
 )
 from finlab.swim.control.monitor_settings import MonitorSettings
 from finlab.swim.control.motion_model import DEPTH, N_MOVING, VELOCITY, ModelStep, MotionModel
+from finlab.swim.control.null_space_motion import NullSpaceMotion
 from finlab.swim.control.probe import Probe
 
 GONE_BELOW = 0.2
@@ -51,6 +53,8 @@ for more, and soon shows which of both it is; one that is called lost rests, and
 PAIR_LOG_ODDS = math.log(100.0)
 """Logarithm of the odds of two losses at once against all else from which on both are named: a
 second actuator explains much that a body beside its drawing does."""
+DOUBTED_FROM = 0.1
+"""Probability of a fault from which on an actuator is in doubt."""
 CAUTION_S = 15.0
 """Time after a fault was named in which another actuator is named more cautiously: the robot moves
 as it never did before [s]."""
@@ -158,6 +162,9 @@ class FaultMonitor:
         self._model = MotionModel(layout)
         self._hypotheses = Hypotheses(self._model, self.settings)
         self._probe = Probe(layout, self.settings, self.period_s)
+        self._test_motion = NullSpaceMotion(layout)
+        self._doubted = -1
+        """A whole actuator that may be broken; -1 for none."""
         # Rows of what is measured by the state, those of rates and tilt first, and variances.
         self._rows = np.zeros((MEASURED_MAX, self._model.size))
         self._rows[range(5), range(3, 8)] = 1.0
@@ -337,9 +344,37 @@ class FaultMonitor:
         self.layout = layout
         self._model.adopt(layout)
         self._rates = Rates(plant_of(layout), layout.rates * self.period_s)
+        self._test_motion = NullSpaceMotion(layout)
         for k in np.flatnonzero(self._kind != LOST):
             self._hypotheses.believe(int(k), 1.0)
             self._kind[k] = WHOLE
+
+    def tested(
+        self, command: Array, axes: Sequence[str] = AXES, most_n: float | None = None
+    ) -> Array:
+        """The command (n, 3) with a short test motion where a thruster is in doubt: forces go up
+        and down for a second and a half in a way that leaves the wrench as it is, and what the
+        suspect does not give of it shows. To be called before `sent`, where the task can bear it:
+        if the suspect is lost, the robot feels the force that it was told more.
+
+        It keeps to limits and rates. Thrusters with a fixed axis take part; without redundancy
+        there is no such motion, and the command stays as it is.
+
+        Args:
+            command: of the allocator.
+            axes: names of the axes along which the wrench has to stay; along the others it changes
+                as little as can be.
+            most_n: largest force that the suspect may be told more or less [N]; None for a tenth of
+                its largest.
+        """
+        motion = self._test_motion
+        works = self._kind == WHOLE
+        if not motion.is_under_way and self._doubted >= 0:
+            motion.begin(command, self._doubted, works, axes, most_n)
+        if not motion.is_under_way:
+            return command
+        box = self._rates.box(self._sent)
+        return motion.added(command, box.lower[:, 0], box.upper[:, 0], works, self.period_s)
 
     def sent(self, command: Array) -> Array:
         """The command (n, 3) for the drives, of what the allocator answers: a weak thruster is
@@ -470,6 +505,8 @@ class FaultMonitor:
             return
         k = odds.actuator
         share = math.exp(float(odds.with_pairs[k]) - odds.everything)
+        is_doubted = share > DOUBTED_FROM and self._kind[k] == WHOLE and hypotheses.settled
+        self._doubted = k if is_doubted else -1
         if share < self.settings.threshold:
             self._certain_s = 0.0
             self._doubtful_s = 0.0
