@@ -329,8 +329,8 @@ class MujocoRobot:
             seed: of the robot, its water and its sensors.
             spread: how far it is from its layout.
             noise: of the sensors.
-            sensors: `dvl` for rates, tilt, depth and velocity, `imu` for no velocity; `accelerometer`
-                and `esc` are as `imu` with an accelerometer, or telemetry of the drives.
+            sensors: `dvl` for rates, tilt, depth and velocity, `imu` for no velocity; `+accelerometer`
+                and `+esc` add an accelerometer, and telemetry of the drives.
         """
         rng = np.random.default_rng([seed, 0x60])
         self.layout = layout
@@ -471,13 +471,13 @@ class MujocoRobot:
             pitch=float(tilt[1]),
             ages=(0.0, 0.0, self.time - self._velocity_time, 0.0),
             acceleration=self._measured_acceleration(),
-            drives=self.actuators.telemetry() if self.sensors == "esc" else None,
+            drives=self.actuators.telemetry() if "esc" in self.sensors.split("+") else None,
         )
 
     def _measured_acceleration(self) -> Array:
         """Mean specific force (3,) since the last measurement; NaN without an accelerometer."""
         mean = self._specific_force / max(self._steps, 1)
-        has_sample = self._steps > 0 and self.sensors == "accelerometer"
+        has_sample = self._steps > 0 and "accelerometer" in self.sensors.split("+")
         self._specific_force = np.zeros(3)
         self._steps = 0
         if not has_sample:

@@ -57,7 +57,7 @@ def test_at_rest_it_shows_the_way_up_and_its_bias() -> None:
 def test_it_is_what_a_robot_in_mujoco_feels() -> None:
     """A robot as its layout says, with exact sensors, that accelerates and turns."""
     layout = load_layout("bluerov2_heavy")
-    robot = MujocoRobot(layout, 1, NO_SPREAD, NO_NOISE, sensors="accelerometer")
+    robot = MujocoRobot(layout, 1, NO_SPREAD, NO_NOISE, sensors="imu+accelerometer")
     model = MotionModel(layout)
     command = np.zeros((8, 3))
     command[:, 0] = 6.0, 2.0, -4.0, 5.0, 3.0, 3.0, 3.0, -2.0
