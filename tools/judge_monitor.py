@@ -316,7 +316,8 @@ def _wrong_names(result: dict[str, Any]) -> set[str]:
 def planned(
     n_faults: int, quiet_h: float, first_seed: int, kinds: Sequence[str], sensors: Sequence[str]
 ) -> list[Run]:
-    """The runs of a judgement: faults of some kinds with some sets of sensors, and hours without."""
+    """The runs of a judgement: faults of some kinds with some sets of sensors, and hours without
+    a fault."""
     runs = []
     for number in range(math.ceil(n_faults / (len(kinds) * len(sensors)))):
         for kind in kinds:

@@ -201,7 +201,8 @@ class FaultMonitor:
         self._velocity: tuple[float, ...] | None = None
         self._velocity_time = -math.inf
         self._depth = math.nan
-        self._accelerometer = np.array(self.settings.accelerometer_place)
+        self.accelerometer_place: Array = np.zeros(3)
+        """Where the accelerometer sits, from the centre of gravity (3,), body frame [m]."""
         self.evidence: Evidence | None = None
         """How likely each jump was at the last call; None before there is any."""
 
@@ -226,7 +227,8 @@ class FaultMonitor:
 
         Args:
             measurement: of now. Samples of velocity and depth count as new where their numbers
-                have changed, and a velocity is that of its age; NaN is no sample.
+                have changed, those of drives where they were taken later than the ones before, and
+                all as old as their ages say; NaN is no sample.
             command: (n, 3) [rad, Hz, rad] in force since the last call, as it was sent to the
                 drives, NaN for actuators at rest; None before the first.
         """
@@ -297,15 +299,16 @@ class FaultMonitor:
             variance[5:8] = self.settings.velocity_noise**2
             count = 8
         if math.isfinite(m.depth) and m.depth != self._depth:
-            rows[count] = 0.0
-            rows[count, DEPTH] = 1.0
-            innovation[count] = m.depth - state[DEPTH]
+            age = m.ages[1]
+            innovation[count] = m.depth - (state[DEPTH] - age * step.acceleration[DEPTH])
+            rows[count] = -age * step.acceleration_slope[DEPTH]
+            rows[count, DEPTH] += 1.0
             variance[count] = self.settings.depth_noise**2
             count += 1
         self._depth = m.depth
         if np.isfinite(m.acceleration).all():
             seen = slice(count, count + 3)
-            expected, rows[seen] = specific_force(state, step, self._accelerometer)
+            expected, rows[seen] = specific_force(state, step, self.accelerometer_place)
             innovation[seen] = m.acceleration - expected
             of_motion = self._hypotheses.acceleration_variance[VELOCITY]
             variance[seen] = self.settings.acceleration_noise**2 + of_motion

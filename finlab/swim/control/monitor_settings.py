@@ -22,9 +22,6 @@ class MonitorSettings:
     [m/s^2]."""
     acceleration_bias_drift: float = 0.001
     """Of its change [m/s^2], per root of a second."""
-    accelerometer_place: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Where the accelerometer sits, from the centre of gravity, body frame [m]; no standard
-    deviation."""
     term_share: float = 0.01
     """Share by which each term of the equation of motion is off, for about a second."""
     lag_s: float = 0.02
