@@ -83,7 +83,8 @@ class NullSpaceMotion:
     def added(
         self, command: Array, lower: Array, upper: Array, works: NDArray[np.bool_], period_s: float
     ) -> Array:
-        """Returns a command with the next step of the motion, which goes on for a whole period.
+        """Returns a command with the next step of the motion, which goes on for a whole period, or
+        until it is back within the limits.
 
         Args:
             command: (n, 3), of the allocator.
@@ -93,19 +94,27 @@ class NullSpaceMotion:
             period_s: time between calls [s].
         """
         self._phase_s += period_s
+        if not works[self._direction != 0.0].all():
+            # One of them has been named meanwhile; the others go back.
+            self._direction[~works] = 0.0
+            self._phase_s = PERIOD_S
         moves = self._direction != 0.0
-        if self._phase_s >= PERIOD_S - 0.5 * period_s or not works[moves].all():
+        is_over = self._phase_s >= PERIOD_S - 0.5 * period_s
+        change = 0.0
+        if not is_over:
+            change = self._amplitude * math.sin(2.0 * math.pi * self._phase_s / PERIOD_S)
+        along = self._direction[moves]
+        force = command[moves, 0]
+        ends = np.stack([lower[moves] - force, upper[moves] - force]) / along
+        least = float(ends.min(axis=0).max(initial=-math.inf))
+        most = float(ends.max(axis=0).min(initial=math.inf))
+        # Where the task itself takes more than the limits leave, nothing is added.
+        change = min(max(change, least), most) if least <= most else 0.0
+        if is_over and change == 0.0:
             self._suspect = -1
             return command
-        change = self._amplitude * math.sin(2.0 * math.pi * self._phase_s / PERIOD_S)
-        along = math.copysign(1.0, change) * self._direction[moves]
-        force = command[moves, 0]
-        limit = np.where(along > 0.0, upper[moves], lower[moves])
-        room = float(((limit - force) / along).min())
-        if not room > 0.0:
-            return command
         result = command.copy()
-        result[moves, 0] += min(abs(change), room) * along
+        result[moves, 0] += change * along
         return result
 
     def _direction_of(
