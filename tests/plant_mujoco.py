@@ -17,7 +17,7 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.physics import plant_of
-from finlab.swim.control import Measurement
+from finlab.swim.control import DriveTelemetry, Measurement
 from finlab.swim.vehicle.actuator_motion import ActuatorMotion
 from finlab.swim.vehicle.fossen import complete_body
 
@@ -81,10 +81,12 @@ class SensorNoise:
     yaw: float = 0.02
     """[rad]."""
     acceleration: float = 0.05
+    """Of the mean of a tenth of a second [m/s^2]."""
+    acceleration_bias: float = 0.03
     """[m/s^2]."""
 
 
-NO_NOISE = SensorNoise(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.2, 0.0, 0.0, 0.0, 0.0, 0.0)
+NO_NOISE = SensorNoise(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 """Exact sensors."""
 
 
@@ -173,11 +175,61 @@ def model_of(body: TrueBody, places: Array) -> mujoco.MjModel:
     </mujoco>""")
 
 
+class TrueDrives:
+    """Speeds and currents of thrusters: speeds go with the root of the force, currents with the
+    third power of the speed. What a fault does to them depends on its cause, which is drawn."""
+
+    def __init__(self, layout: Layout, rng: np.random.Generator) -> None:
+        """Draws drives near those of a layout."""
+        n = layout.n
+        self._rng = rng
+        self._lower = layout.lower[:, 0]
+        self._upper = layout.upper[:, 0]
+        self._speed = 3000.0 * (1.0 + rng.uniform(-0.1, 0.1, n))
+        self._current = 20.0 * (1.0 + rng.uniform(-0.2, 0.2, n))
+        self._of_speed = np.ones(n)
+        self._of_current = np.ones(n)
+        self._causes = rng.uniform(size=n)
+
+    def fail(self, fault: TrueFault) -> None:
+        """Something becomes of an actuator: a motor stands, or a propeller has gone; wires are
+        swapped, or blades; weed drags, or a drive is slow."""
+        k = fault.index
+        is_first = self._causes[k] < 0.6
+        slow = math.sqrt(fault.share)
+        factors = {
+            "lost": (0.0, 0.0) if is_first else (1.15, 0.12),
+            "reversed": (-1.0, 1.0) if is_first else (1.0, 1.0),
+            "weak": (slow, 2.5) if is_first else (slow, 1.0),
+            "stuck": (1.0, 1.0),
+        }
+        self._of_speed[k], self._of_current[k] = factors[fault.kind]
+
+    def telemetry(self, force: Array, is_force: Array) -> DriveTelemetry:
+        """What drives say whose propellers would give forces (n,) if they were whole [N]."""
+        rng = self._rng
+        n = len(force)
+        limits = np.where(force > 0.0, self._upper, -self._lower)
+        root = np.sign(force) * np.sqrt(np.abs(force) / np.maximum(limits, 1e-9))
+        share = root * self._of_speed
+        speed = self._speed * share + 15.0 * rng.normal(size=n)
+        current = self._current * np.abs(share) ** 3 * self._of_current
+        current = current * (1.0 + 0.05 * rng.normal(size=n)) + 0.05 * rng.normal(size=n)
+        speed[~is_force] = np.nan
+        return DriveTelemetry(speed, current, np.zeros(n))
+
+
 class TrueActuators:
     """Actuators that are a little stronger or slower than drawn, and sit a little askew."""
 
-    def __init__(self, layout: Layout, spread: Spread, rng: np.random.Generator) -> None:
-        """Draws actuators near those of a layout."""
+    def __init__(
+        self,
+        layout: Layout,
+        spread: Spread,
+        rng: np.random.Generator,
+        rng_of_more: np.random.Generator,
+    ) -> None:
+        """Draws actuators near those of a layout, and from another generator their drives."""
         self.layout = layout
         n = layout.n
         self.strength = 1.0 + rng.uniform(-spread.strength, spread.strength, n)
@@ -200,6 +252,7 @@ class TrueActuators:
         self._plant = plant_of(layout)
         self._motion = ActuatorMotion(layout)
         self._force_of_thrusters = np.zeros(n)
+        self.drives = TrueDrives(layout, rng_of_more)
         self.gain = np.ones(n)
         """Share of its force that each gives by its fault (n,)."""
         self.stuck_at = np.full(n, np.nan)
@@ -208,6 +261,7 @@ class TrueActuators:
     def fail(self, fault: TrueFault) -> None:
         """Something becomes of an actuator, now."""
         k = fault.index
+        self.drives.fail(fault)
         if fault.kind == "stuck":
             value = self._motion.direction[k]
             self.stuck_at[k] = self._force_of_thrusters[k] if self._is_force[k] else value
@@ -232,6 +286,10 @@ class TrueActuators:
         self._force_of_thrusters += np.where(is_free, decay * (asked - self._force_of_thrusters), 0)
         force[self._is_force, 0] = self._force_of_thrusters[self._is_force]
         return np.asarray(force * (self.strength * self.gain)[:, None])
+
+    def telemetry(self) -> DriveTelemetry:
+        """What the drives say now."""
+        return self.drives.telemetry(self._force_of_thrusters, self._is_force)
 
     def nominal(self, command: Array, water: Array, whole: bool = False) -> Array:
         """The wrench (6,) that a command would give by the layout with the faults of now, once it
@@ -271,13 +329,16 @@ class MujocoRobot:
             seed: of the robot, its water and its sensors.
             spread: how far it is from its layout.
             noise: of the sensors.
-            sensors: `dvl` for all, `imu` for no velocity.
+            sensors: `dvl` for rates, tilt, depth and velocity, `imu` for no velocity; `+accelerometer`
+                and `+esc` add an accelerometer, and telemetry of the drives.
         """
         rng = np.random.default_rng([seed, 0x60])
         self.layout = layout
         spread = Spread() if spread is None else spread
         self.body = TrueBody(layout, spread, rng)
-        self.actuators = TrueActuators(layout, spread, rng)
+        # What is drawn for sensors that not every run has leaves the other numbers as they are.
+        self._rng_of_more = np.random.default_rng([seed, 0x63])
+        self.actuators = TrueActuators(layout, spread, rng, self._rng_of_more)
         self._model = model_of(self.body, self.actuators.places)
         self.data = mujoco.MjData(self._model)
         self.time = 0.0
@@ -288,6 +349,9 @@ class MujocoRobot:
         self._rate_bias = noise.rate_bias * rng.normal(size=3)
         self._tilt_bias = noise.tilt_bias * rng.normal(size=2)
         self._velocity_bias = noise.velocity_bias * rng.normal(size=3)
+        self._acceleration_bias = noise.acceleration_bias * self._rng_of_more.normal(size=3)
+        self._specific_force = np.zeros(3)  # summed over the steps since the last measurement
+        self._steps = 0
         self._velocity = np.zeros(3) if sensors == "dvl" else np.full(3, np.nan)
         self._velocity_time = 0.0
         self._in_transit: list[tuple[float, Array]] = []
@@ -366,6 +430,8 @@ class MujocoRobot:
         self.data.qfrc_applied[3:] = of_water[3:]
         mujoco.mj_step(self._model, self.data)
         self.acceleration = np.concatenate([acceleration[:3] + turning, acceleration[3:]])
+        self._specific_force += self.acceleration[:3] + GRAVITY * up
+        self._steps += 1
         self.time += STEP_S
 
     def _sample_velocity(self) -> None:
@@ -404,7 +470,20 @@ class MujocoRobot:
             roll=float(tilt[0]),
             pitch=float(tilt[1]),
             ages=(0.0, 0.0, self.time - self._velocity_time, 0.0),
+            acceleration=self._measured_acceleration(),
+            drives=self.actuators.telemetry() if "esc" in self.sensors.split("+") else None,
         )
+
+    def _measured_acceleration(self) -> Array:
+        """Mean specific force (3,) since the last measurement; NaN without an accelerometer."""
+        mean = self._specific_force / max(self._steps, 1)
+        has_sample = self._steps > 0 and "accelerometer" in self.sensors.split("+")
+        self._specific_force = np.zeros(3)
+        self._steps = 0
+        if not has_sample:
+            return np.full(3, np.nan)
+        noise = self.noise.acceleration * self._rng_of_more.normal(size=3)
+        return np.asarray(mean + self._acceleration_bias + noise)
 
 
 class Path:

@@ -21,8 +21,8 @@ NAMES = {
     "finlab.analysis": "AXES AttainableSet Authority Bounds Capability GOALS Improvement Loss "
     "Progress ScoreCard SecondLoss Ship attainable_set authority capability dp_capability "
     "least_power losses mirror_pairs optimize_layout read_ship score_card second_losses",
-    "finlab.swim.control": "CONTROLLERS Completion Controller Diagnosis FaultMonitor Finding Foresighted "
-    "Learner Measurement MonitorSettings MotionObserver Setpoint TrackingController "
+    "finlab.swim.control": "CONTROLLERS Completion Controller Diagnosis DriveTelemetry FaultMonitor "
+    "Finding Foresighted Learner Measurement MonitorSettings MotionObserver Setpoint TrackingController "
     "VelocityController WaypointController gains_for make_controller steerable_loss steers",
     "finlab.exchange": "Answers Choice Exchange FOREIGN Note Question QuestionError Reading "
     "convert is_robot_table mujoco_control read_any read_asking read_robot",

@@ -39,8 +39,9 @@ N_ROBOTS = 24
 """Of all of them; the others are random frames."""
 KINDS = ("lost", "weak", "reversed", "stuck")
 """Kinds of fault."""
-SENSORS = ("dvl", "imu")
-"""With a velocity log, and without."""
+SENSORS = ("dvl", "imu", "imu+test", "imu+accelerometer", "imu+esc")
+"""With a velocity log, and without: there alone, with a test motion where an actuator is in doubt,
+with an accelerometer, or with telemetry of the drives."""
 PERIOD_S = 0.1
 """Of the loop [s]."""
 FAULT_RUN_S = 12.5
@@ -180,6 +181,8 @@ def judged(run: Run) -> dict[str, Any]:
         wanted = path.wrench(now, measurement, has_velocity)
         _, answer = command_for(wanted, verdict.damage)
         started = time.thread_time_ns()
+        if "test" in run.sensors.split("+"):
+            answer = monitor.tested(answer, axes)
         command = monitor.sent(answer)
         tick_ms.append((spent + time.thread_time_ns() - started) / 1e6)
         unknown += verdict.unknown
@@ -233,12 +236,15 @@ def judged_or_failed(run: Run) -> dict[str, Any]:
 
 def is_right(result: dict[str, Any], until: float) -> bool:
     """Whether the last word on the broken actuator by a time [s] is right; a stuck one may be
-    called lost."""
+    called lost, a weak one fouled."""
     said = None
     for moment, name, kind in result["events"]:
         if name == result["actuator"] and moment <= until + 1e-9:
             said = kind
-    return said == result["kind"] or (result["kind"], said) == ("stuck", "lost")
+    return said == result["kind"] or (result["kind"], said) in (
+        ("stuck", "lost"),
+        ("weak", "fouled"),
+    )
 
 
 def _percent(flags: Sequence[bool]) -> str:
@@ -307,14 +313,17 @@ def _wrong_names(result: dict[str, Any]) -> set[str]:
     return names
 
 
-def planned(n_faults: int, quiet_h: float, first_seed: int) -> list[Run]:
-    """The runs of a judgement: faults of all kinds with both sets of sensors, and hours without."""
+def planned(
+    n_faults: int, quiet_h: float, first_seed: int, kinds: Sequence[str], sensors: Sequence[str]
+) -> list[Run]:
+    """The runs of a judgement: faults of some kinds with some sets of sensors, and hours without
+    a fault."""
     runs = []
-    for number in range(math.ceil(n_faults / (len(KINDS) * len(SENSORS)))):
-        for kind in KINDS:
-            runs += [Run(number, sensors, kind, first_seed) for sensors in SENSORS]
-    for number in range(math.ceil(quiet_h * 3600.0 / QUIET_RUN_S / len(SENSORS))):
-        runs += [Run(5000 + number, sensors, None, first_seed) for sensors in SENSORS]
+    for number in range(math.ceil(n_faults / (len(kinds) * len(sensors)))):
+        for kind in kinds:
+            runs += [Run(number, each, kind, first_seed) for each in sensors]
+    for number in range(math.ceil(quiet_h * 3600.0 / QUIET_RUN_S / len(sensors))):
+        runs += [Run(5000 + number, each, None, first_seed) for each in sensors]
     return runs
 
 
@@ -325,6 +334,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--faults", type=int, default=400)
     parser.add_argument("--quiet-h", type=float, default=10.0)
     parser.add_argument("--first-seed", type=int, default=JUDGED_SEED)
+    parser.add_argument("--kinds", nargs="+", choices=KINDS, default=KINDS)
+    parser.add_argument("--sensors", nargs="+", choices=SENSORS, default=SENSORS[:2])
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--table", action="store_true")
     options = parser.parse_args(arguments)
@@ -334,7 +345,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         results = [json.loads(line) for line in lines]
     if not options.table:
         done = {result["key"] for result in results}
-        all_runs = planned(options.faults, options.quiet_h, options.first_seed)
+        all_runs = planned(
+            options.faults, options.quiet_h, options.first_seed, options.kinds, options.sensors
+        )
         runs = [run for run in all_runs if run.key not in done]
         with Pool(options.workers) as pool, options.results.open("a", encoding="utf-8") as file:
             for result in pool.imap_unordered(judged_or_failed, runs):

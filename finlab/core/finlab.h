@@ -543,7 +543,7 @@ void fl_kalman_correct(const fl_real *variance, const fl_real *innovation, int f
 /* Carries the state of the fault monitor's model on over a period, and says its derivatives.
 
    @param body        numbers of the body; finlab/core/src/motion_model.c has their order, and that
-                      of a state of d = 46 + 4 strengths + held numbers
+                      of a state of d = 49 + 4 strengths + held numbers
    @param wrenches    of each actuator at full strength, then of each unit of what stuck ones give
                       (strengths + held, 6), body frame [N, N m]
    @param owners      actuator of each of these (strengths + held,)
@@ -580,7 +580,7 @@ void fl_jumps_predict(const fl_real *transition, const fl_real *noise, const fl_
                       const int *columns, int most, int used, int d, int active, int c,
                       fl_real *covariance, fl_real *sensitivity);
 
-/* Corrects that filter by at most 9 measured numbers, and weighs the jumps by them. Nothing is
+/* Corrects that filter by at most 12 measured numbers, and weighs the jumps by them. Nothing is
    changed where the model says nothing of the measurement.
 
    @param rows           derivatives of what is measured by the state (measured, d)

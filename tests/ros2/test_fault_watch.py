@@ -9,7 +9,7 @@ import pytest
 from finlab_allocator.commander import Commander
 from finlab_allocator.fault_watch import FaultWatch
 from finlab_allocator.frames import StaticFrames
-from finlab_allocator.input_checks import NO_STAMP, ImuSample, StampedInput
+from finlab_allocator.input_checks import NO_STAMP, DriveSample, ImuSample, StampedInput
 from finlab_allocator.parameters import Parameters
 from finlab_allocator.status_report import WARN, AuthorityLeft, status_report
 from scipy.spatial.transform import Rotation
@@ -135,7 +135,7 @@ def test_a_bad_sample_is_refused(
 def test_an_imu_in_another_frame_is_turned() -> None:
     frames = StaticFrames()
     frames.add("base_link", "imu", (0.1, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))  # upside down
-    watch = FaultWatch(finlab.load_layout(ROBOT), "base_link", frames)
+    watch = FaultWatch(finlab.load_layout(ROBOT), Parameters(), frames)
     robot = Rotation.from_euler("ZYX", [0.4, 0.2, -0.3])
     of_imu = robot * Rotation.from_euler("x", math.pi)
     rates = np.array([0.1, 0.2, 0.3])
@@ -201,6 +201,57 @@ def test_samples_are_as_old_as_their_stamps_and_count_once(monkeypatch: pytest.M
     commander.on_imu(imu_at(clock_s - 1.0), 2.2, clock_s + 0.2)
     assert commander.last_refusal.startswith("imu: its stamp is 1.2 s old")
     assert len(seen) == 1
+
+
+def test_other_sensors_are_heard_where_a_parameter_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The mean of an accelerometer's samples in the robot's frame, depths, and drives by name, all
+    as old as their stamps say."""
+    commander = watching(accelerometer=True, pressure=True, drives="unsigned")
+    assert commander.watch is not None
+    commander._frames.add("base_link", "imu", (0.1, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))  # upside down
+    seen: list[Measurement] = []
+    step = commander.watch._monitor.step
+    monkeypatch.setattr(
+        commander.watch._monitor, "step", lambda m, c: (seen.append(m), step(m, c))[1]
+    )
+    clock_s = 500.0
+    upside_down = np.array([1.0, 0.0, 0.0, 0.0])
+    for force in (-9.0, -10.0):
+        acceleration = np.array([0.0, 0.5, force])
+        sample = ImuSample(np.zeros(3), upside_down, "imu", clock_s, acceleration)
+        commander.on_imu(sample, 2.0, clock_s)
+    commander.on_pressure(29430.0, clock_s - 0.1, 2.0, clock_s)
+    names = ("rear_left", LOST)
+    drives = DriveSample(names, np.array([900.0, 0.0]), np.array([1.5, math.nan]), clock_s - 0.05)
+    commander.on_drives(drives, 2.0, clock_s)
+    commander.on_watch(2.01)
+    (measurement,) = seen
+    np.testing.assert_allclose(measurement.acceleration, [0.0, -0.5, 9.5])
+    np.testing.assert_allclose(commander.watch._monitor.accelerometer_place, [0.1, 0.0, 0.0])
+    assert measurement.depth == pytest.approx(3.0)
+    assert measurement.ages[1] == pytest.approx(0.1)
+    telemetry = measurement.drives
+    assert telemetry is not None and not telemetry.is_signed
+    index = commander.layout.index("rear_left")
+    assert (telemetry.speed[index], telemetry.current[index]) == (900.0, 1.5)
+    assert telemetry.ages[index] == pytest.approx(0.05)
+    assert np.isnan(telemetry.current[commander.layout.index(LOST)])
+    commander.on_drives(drives._replace(names=("bow", "stern")), 2.1, clock_s)
+    assert commander.last_refusal.startswith("drives: no actuator 'bow', expected names of")
+    commander.on_pressure(math.nan, NO_STAMP, 2.1, clock_s)
+    assert commander.last_refusal == "pressure: expected a finite number of Pa, got nan"
+
+
+def test_other_sensors_are_off_by_default() -> None:
+    commander = watching()
+    assert commander.watch is not None
+    sample = imu_at(NO_STAMP)._replace(acceleration=np.array([0.0, 0.0, 9.81]))
+    commander.on_imu(sample, 1.0, 1.0)
+    commander.on_pressure(29430.0, NO_STAMP, 1.0, 1.0)
+    speeds = DriveSample((LOST,), np.zeros(1), np.zeros(1), NO_STAMP)
+    commander.on_drives(speeds, 1.0, 1.0)
+    assert not commander.watch._force_count and math.isnan(commander.watch._depth)
+    assert np.isnan(commander.watch._drive_speed).all()
 
 
 def test_the_monitor_is_told_the_command_that_was_in_force() -> None:

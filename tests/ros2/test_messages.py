@@ -12,6 +12,7 @@ from builtin_interfaces.msg import Time
 from finlab_allocator import messages
 from finlab_allocator.status_report import WARN, Report
 from geometry_msgs.msg import TwistStamped, WrenchStamped
+from sensor_msgs.msg import FluidPressure, Imu, JointState
 from visualization_msgs.msg import Marker
 
 import finlab
@@ -64,6 +65,25 @@ def test_numbers_go_in_and_out_in_order() -> None:
     twist.twist.linear.x, twist.twist.angular.z = 1.0, 2.0
     np.testing.assert_array_equal(messages.velocity_of(twist).numbers, [1, 0, 0, 0, 0, 2])
     assert messages.wrench_of(WrenchStamped()).stamp_s == 0.0
+
+
+def test_samples_of_drives_are_speeds_and_currents_by_name() -> None:
+    """What a driver of ESCs leaves out is no number."""
+    message = JointState(name=["a", "b"], velocity=[1200.0, -300.0], effort=[2.5])
+    message.header.stamp = STAMP
+    sample = messages.drives_of(message)
+    assert sample.names == ("a", "b") and sample.stamp_s == 12.5
+    np.testing.assert_array_equal(sample.speed, [1200.0, -300.0])
+    np.testing.assert_array_equal(sample.current, [2.5, math.nan])
+    assert messages.pressure_of(FluidPressure(fluid_pressure=2e5)) == (2e5, 0.0)
+
+
+def test_an_imu_without_an_accelerometer_says_so() -> None:
+    message = Imu()
+    message.linear_acceleration.z = 9.8
+    np.testing.assert_array_equal(messages.imu_of(message).acceleration, [0.0, 0.0, 9.8])
+    message.linear_acceleration_covariance[0] = -1.0
+    assert np.isnan(messages.imu_of(message).acceleration).all()
 
 
 def test_arrows_begin_at_the_actuators_and_show_their_forces() -> None:

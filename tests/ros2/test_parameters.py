@@ -35,6 +35,9 @@ def test_each_parameter_is_described_and_has_a_default() -> None:
         ("power_w", float("inf"), None),
         ("power_w", 250.0, 250.0),
         ("autostart", False, False),
+        ("accelerometer", True, True),
+        ("pressure", True, True),
+        ("drives", "signed", "signed"),
     ],
 )
 def test_a_value_is_taken(name: str, value: Any, taken: Any) -> None:

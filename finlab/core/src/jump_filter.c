@@ -9,7 +9,7 @@
    (c, c), its score eta (c,). The moments stand in slots, and `slots` names those that count. */
 #include "internal.h"
 
-enum { MOVING = 9, MOST_MEASURED = 9, MOST_STATES = 46 + 6 * FL_MOST, TILE = 300 };
+enum { MOVING = 9, MOST_MEASURED = 12, MOST_STATES = 49 + 6 * FL_MOST, TILE = 300 };
 
 typedef struct {
   const int *columns; /* numbers of the state that jump (c,) */

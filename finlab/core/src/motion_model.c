@@ -1,7 +1,7 @@
 /* The motion of a robot of which much is not known, linearized, for the fault monitor;
    finlab/swim/control/motion_model.py calls it and has the equation with its source.
 
-   A state z is d = 46 + 4 n + h numbers, in the order of the enum below: those that move by
+   A state z is d = 49 + 4 n + h numbers, in the order of the enum below: those that move by
    themselves, then what only drifts, then the strengths of n actuators, how far each is from its
    place in the layout (3 numbers), and the h numbers of what stuck ones give. Derivatives by z are
    rows of d numbers. */
@@ -20,7 +20,8 @@ enum {
   COUPLING = 24, /* entries of M beside it, over the geometric mean of two diagonal ones */
   DAMPING = 39,  /* shares of the damping above the layout's */
   RIGHTING = 45, /* the same of the righting moment */
-  FIRST_ACTUATOR = 46
+  BIAS = 46,     /* of an accelerometer [m/s^2]: it moves nothing */
+  FIRST_ACTUATOR = 49
 };
 
 #define SHARE_MIN R(-0.7)       /* least share of inertia and damping above the layout's */

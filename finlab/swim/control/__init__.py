@@ -9,6 +9,7 @@ from finlab.swim.control.body_frame import WaypointController as WaypointControl
 from finlab.swim.control.body_frame import make_controller as make_controller
 from finlab.swim.control.contract import Completion as Completion
 from finlab.swim.control.contract import Controller as Controller
+from finlab.swim.control.contract import DriveTelemetry as DriveTelemetry
 from finlab.swim.control.contract import Foresighted as Foresighted
 from finlab.swim.control.contract import Learner as Learner
 from finlab.swim.control.contract import Measurement as Measurement
@@ -28,6 +29,7 @@ __all__ = [
     "Completion",
     "Controller",
     "Diagnosis",
+    "DriveTelemetry",
     "FaultMonitor",
     "Finding",
     "Foresighted",

@@ -22,6 +22,21 @@ from finlab.layout.effectiveness import layout_effectiveness
 
 NO_WRENCH = np.zeros(6)
 """Wrench of actuators that have given nothing [N, N m]."""
+NOT_MEASURED = np.full(3, math.nan)
+"""Of a sensor that is not there."""
+
+
+class DriveTelemetry(NamedTuple):
+    """The newest samples of n drives, as ESCs send them; NaN where there is none."""
+
+    speed: Array
+    """Speeds (n,), positive as commands of a force are, in a unit that all have in common."""
+    current: Array
+    """Currents (n,) [A]."""
+    ages: Array
+    """How old each is (n,) [s]."""
+    is_signed: bool = True
+    """Whether the sign of the speed says which way a drive turns; few ESCs know."""
 
 
 class Measurement(NamedTuple):
@@ -45,6 +60,12 @@ class Measurement(NamedTuple):
     """Pitch [rad], positive with the nose down, from the IMU."""
     ages: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
     """How old the samples of markers, pressure, DVL and IMU are by their time stamps [s]."""
+    acceleration: Array = NOT_MEASURED
+    """Specific force (3,) in the body frame [m/s^2] as accelerometers show it, (0, 0, 9.81) at
+    rest: the mean of all samples of the IMU since the measurement before; NaN where there is
+    none."""
+    drives: DriveTelemetry | None = None
+    """What the drives say of themselves; None where they say nothing."""
 
     def as_array(self) -> Array:
         """Position, roll, pitch, yaw, velocity and rates side by side (12,), as a log keeps

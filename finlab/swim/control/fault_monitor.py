@@ -6,18 +6,20 @@ allocator is told, and what is sent to the drives.
 """
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from finlab.allocation.rates import Rates
 from finlab.arrays import Array
-from finlab.axes import wrapped_angle
+from finlab.axes import AXES, wrapped_angle
 from finlab.layout import Layout
 from finlab.layout.damage import NO_DAMAGE, Damage
 from finlab.physics import plant_of
+from finlab.swim.control.accelerometer import specific_force
 from finlab.swim.control.contract import Measurement, asked_of_weak
-from finlab.swim.control.hypotheses import Hypotheses
+from finlab.swim.control.hypotheses import LOST_BELOW, REVERSED_BELOW, WEAK_BELOW, Hypotheses
 from finlab.swim.control.jump_evidence import (
     KINDS,
     LOST,
@@ -30,16 +32,11 @@ from finlab.swim.control.jump_evidence import (
 )
 from finlab.swim.control.monitor_settings import MonitorSettings
 from finlab.swim.control.motion_model import DEPTH, N_MOVING, VELOCITY, ModelStep, MotionModel
+from finlab.swim.control.null_space_motion import NullSpaceMotion
 from finlab.swim.control.probe import Probe
 
-LOST_BELOW = 0.15
-"""A strength below which an actuator is given up as lost."""
 GONE_BELOW = 0.2
 """A strength below which it lies within a standard deviation, too."""
-REVERSED_BELOW = -0.3
-"""A strength below which it pushes the other way than the layout says."""
-WHOLE_ABOVE = 0.9
-"""A strength from which one that was weak is whole again."""
 TORN_BELOW = 0.7
 """Share of its force below which one that is stuck at an angle is torn, too."""
 CONFIRM_S = 0.2
@@ -50,6 +47,14 @@ KIND_ODDS = 10.0
 KIND_WAIT_S = 2.0
 """Time in which these odds go down to 1: one whose kind is in doubt is then taken for the likeliest
 [s]."""
+LOST_LOG_ODDS = math.log(KIND_ODDS)
+"""Logarithm of the odds of lost against weak below which one is called weak: it is used on, asked
+for more, and soon shows which of both it is; one that is called lost rests, and shows nothing."""
+PAIR_LOG_ODDS = math.log(100.0)
+"""Logarithm of the odds of two losses at once against all else from which on both are named: a
+second actuator explains much that a body beside its drawing does."""
+DOUBTED_FROM = 0.1
+"""Probability of a fault from which on an actuator is in doubt."""
 CAUTION_S = 15.0
 """Time after a fault was named in which another actuator is named more cautiously: the robot moves
 as it never did before [s]."""
@@ -77,9 +82,15 @@ PERIOD_MAX_S = 0.25
 """Longest step of the model [s]; a longer period is cut."""
 GAP_MAX_S = 2.0
 """A pause between samples after which the motion is unknown [s]."""
+MEASURED_MAX = 12
+"""Most numbers of one measurement: rates, tilt, velocity, depth, specific force."""
 STEEP_COSINE = 0.3
 """Cosine of the pitch below which roll and heading say too little of the attitude to tell
 anything."""
+
+
+FOULED = "fouled"
+"""What a weak actuator is called whose drive drags something."""
 
 
 class Finding(NamedTuple):
@@ -88,7 +99,8 @@ class Finding(NamedTuple):
     name: str
     """Of the actuator."""
     kind: str
-    """`lost`, `weak`, `reversed` or `stuck`."""
+    """`lost`, `weak`, `fouled`, `reversed` or `stuck`; a fouled one is a weak one whose drive says
+    that it turns slowly and takes more current than belongs to that."""
     since_s: float
     """When it happened, as far as is known, by the clock of the measurements [s]."""
     probability: float
@@ -150,13 +162,15 @@ class FaultMonitor:
         self._model = MotionModel(layout)
         self._hypotheses = Hypotheses(self._model, self.settings)
         self._probe = Probe(layout, self.settings, self.period_s)
+        self._test_motion = NullSpaceMotion(layout)
+        self._doubted = -1
+        """A whole actuator that may be broken; -1 for none."""
         # Rows of what is measured by the state, those of rates and tilt first, and variances.
-        self._rows = np.zeros((9, self._model.size))
+        self._rows = np.zeros((MEASURED_MAX, self._model.size))
         self._rows[range(5), range(3, 8)] = 1.0
         s = self.settings
-        self._variance_of_imu = np.square([s.rate_noise] * 3 + [s.tilt_noise] * 2 + [0.0] * 4)
-        self._variance_of_all = self._variance_of_imu.copy()
-        self._variance_of_all[5:8] = s.velocity_noise**2
+        self._variance = np.zeros(MEASURED_MAX)
+        self._variance[:5] = np.square([s.rate_noise] * 3 + [s.tilt_noise] * 2)
         n = layout.n
         self._kind = np.full(n, WHOLE)
         """What each actuator is taken for, index in `KINDS`."""
@@ -187,6 +201,8 @@ class FaultMonitor:
         self._velocity: tuple[float, ...] | None = None
         self._velocity_time = -math.inf
         self._depth = math.nan
+        self.accelerometer_place: Array = np.zeros(3)
+        """Where the accelerometer sits, from the centre of gravity (3,), body frame [m]."""
         self.evidence: Evidence | None = None
         """How likely each jump was at the last call; None before there is any."""
 
@@ -211,7 +227,8 @@ class FaultMonitor:
 
         Args:
             measurement: of now. Samples of velocity and depth count as new where their numbers
-                have changed, and a velocity is that of its age; NaN is no sample.
+                have changed, those of drives where they were taken later than the ones before, and
+                all as old as their ages say; NaN is no sample.
             command: (n, 3) [rad, Hz, rad] in force since the last call, as it was sent to the
                 drives, NaN for actuators at rest; None before the first.
         """
@@ -235,6 +252,10 @@ class FaultMonitor:
         if not self._follow(m, step):
             hypotheses.restart(self._moving(m))
             return self.verdict()
+        drives = hypotheses.drives
+        drives.note_force(m.time)
+        if m.drives is not None:
+            drives.take(m.drives, m.time)
         self._decide(duration)
         return self.verdict()
 
@@ -263,11 +284,11 @@ class FaultMonitor:
         anything of the motion."""
         state = self._hypotheses.state
         rows = self._rows
-        innovation = np.zeros(9)
+        innovation = np.zeros(MEASURED_MAX)
         innovation[:5] = (*m.rates.tolist(), m.roll, m.pitch)
         innovation[:5] -= state[3:8]
         innovation[3] = wrapped_angle(innovation[3])
-        variance = self._variance_of_imu
+        variance = self._variance
         count = 5
         if self._is_new_velocity(m):
             age = m.ages[2]
@@ -275,16 +296,23 @@ class FaultMonitor:
             innovation[5:8] = m.velocity - (state[VELOCITY] - age * step.acceleration[VELOCITY])
             rows[5:8] = -age * step.acceleration_slope[VELOCITY]
             rows[(5, 6, 7), (0, 1, 2)] += 1.0
-            variance = self._variance_of_all
+            variance[5:8] = self.settings.velocity_noise**2
             count = 8
         if math.isfinite(m.depth) and m.depth != self._depth:
-            rows[count] = 0.0
-            rows[count, DEPTH] = 1.0
-            innovation[count] = m.depth - state[DEPTH]
-            variance = variance.copy()
+            age = m.ages[1]
+            innovation[count] = m.depth - (state[DEPTH] - age * step.acceleration[DEPTH])
+            rows[count] = -age * step.acceleration_slope[DEPTH]
+            rows[count, DEPTH] += 1.0
             variance[count] = self.settings.depth_noise**2
             count += 1
         self._depth = m.depth
+        if np.isfinite(m.acceleration).all():
+            seen = slice(count, count + 3)
+            expected, rows[seen] = specific_force(state, step, self.accelerometer_place)
+            innovation[seen] = m.acceleration - expected
+            of_motion = self._hypotheses.acceleration_variance[VELOCITY]
+            variance[seen] = self.settings.acceleration_noise**2 + of_motion
+            count += 3
         return self._hypotheses.update(rows[:count], innovation[:count], variance[:count])
 
     def tell(self, name: str, strength: float = 1.0, stuck: float = math.nan) -> Diagnosis:
@@ -307,7 +335,7 @@ class FaultMonitor:
                 kind = REVERSED
             elif strength < LOST_BELOW or not math.isnan(stuck):
                 kind = LOST
-            elif strength < WHOLE_ABOVE:
+            elif strength < WEAK_BELOW:
                 kind = WEAK
         self._mark(k, kind, self._clock_s, 1.0)
         self._is_announced[k] = kind in (LOST, REVERSED)
@@ -319,9 +347,37 @@ class FaultMonitor:
         self.layout = layout
         self._model.adopt(layout)
         self._rates = Rates(plant_of(layout), layout.rates * self.period_s)
+        self._test_motion = NullSpaceMotion(layout)
         for k in np.flatnonzero(self._kind != LOST):
             self._hypotheses.believe(int(k), 1.0)
             self._kind[k] = WHOLE
+
+    def tested(
+        self, command: Array, axes: Sequence[str] = AXES, most_n: float | None = None
+    ) -> Array:
+        """The command (n, 3) with a short test motion where a thruster is in doubt: forces go up
+        and down for a second and a half in a way that leaves the wrench as it is, and what the
+        suspect does not give of it shows. To be called before `sent`, where the task can bear it:
+        if the suspect is lost, the robot feels the force that it was told more.
+
+        It keeps to limits and rates. Thrusters with a fixed axis take part; without redundancy
+        there is no such motion, and the command stays as it is.
+
+        Args:
+            command: of the allocator.
+            axes: names of the axes along which the wrench has to stay; along the others it changes
+                as little as can be.
+            most_n: largest force that the suspect may be told more or less [N]; None for a tenth of
+                its largest.
+        """
+        motion = self._test_motion
+        works = self._kind == WHOLE
+        if not motion.is_under_way and self._doubted >= 0:
+            motion.begin(command, self._doubted, works, axes, most_n)
+        if not motion.is_under_way:
+            return command
+        box = self._rates.box(self._sent)
+        return motion.added(command, box.lower[:, 0], box.upper[:, 0], works, self.period_s)
 
     def sent(self, command: Array) -> Array:
         """The command (n, 3) for the drives, of what the allocator answers: a weak thruster is
@@ -377,6 +433,7 @@ class FaultMonitor:
         return float(held[0]) if len(held) == 1 else math.atan2(held[1], held[0])
 
     def _finding(self, k: int) -> Finding:
+        hypotheses = self._hypotheses
         kind = int(self._kind[k])
         value = {LOST: 0.0, REVERSED: -1.0}.get(kind, float(self._reported_strength[k]))
         if kind == STUCK:
@@ -385,7 +442,10 @@ class FaultMonitor:
         since_s = float(self._since[k])
         if not math.isnan(self._time):
             since_s += self._time - self._clock_s
-        return Finding(self.layout.names[k], KINDS[kind], since_s, float(self._certainty[k]), value)
+        name = KINDS[kind]
+        if kind == WEAK and hypotheses.drives.fouled[k]:
+            name = FOULED
+        return Finding(self.layout.names[k], name, since_s, float(self._certainty[k]), value)
 
     def _damage(self, strength: Array) -> Damage:
         """What an allocator should know; a table's thrust cannot be scaled."""
@@ -448,6 +508,8 @@ class FaultMonitor:
             return
         k = odds.actuator
         share = math.exp(float(odds.with_pairs[k]) - odds.everything)
+        is_doubted = share > DOUBTED_FROM and self._kind[k] == WHOLE and hypotheses.settled
+        self._doubted = k if is_doubted else -1
         if share < self.settings.threshold:
             self._certain_s = 0.0
             self._doubtful_s = 0.0
@@ -457,13 +519,15 @@ class FaultMonitor:
         self._doubtful_s += duration
         if not self._is_confirmed(odds):
             return
-        if odds.of_single < 0.5:
-            self._adopt_pair(evidence, int(odds.pairs.argmax()))
-            return
-        loses = odds.kind in (LOST, REVERSED) and self._kind[k] not in (LOST, REVERSED)
+        if odds.of_single < 0.5 and self._doubtful_s < KIND_WAIT_S:
+            return  # a pair that is not clear yet
+        kind = odds.kind
+        if kind == LOST and float(odds.by_kind[k, LOST] - odds.by_kind[k, WEAK]) < LOST_LOG_ODDS:
+            kind = WEAK
+        loses = kind in (LOST, REVERSED) and self._kind[k] not in (LOST, REVERSED)
         if loses and self._is_lost.sum() >= self.layout.n - 1:
             return  # the last one that works
-        self._adopt(evidence, k, odds.kind, share * odds.of_kind)
+        self._adopt(evidence, k, kind, share * odds.of_kind)
 
     def _note_probability(self, odds: "_Odds") -> None:
         """The probabilities of actuators not being whole."""
@@ -475,7 +539,7 @@ class FaultMonitor:
     def _decide_on_pair(self, evidence: Evidence, odds: "_Odds", duration: float) -> bool:
         """Acts on two losses at one moment; returns whether they are all but certain."""
         is_calm = self._clock_s - self._last_named_s >= CAUTION_S
-        if not is_calm or odds.pair - odds.everything <= math.log(self.settings.threshold):
+        if not is_calm or odds.pair - odds.without_pairs <= PAIR_LOG_ODDS:
             return False
         pair = int(odds.pairs.argmax())
         self._hold((-2, pair), duration)
@@ -572,7 +636,7 @@ class FaultMonitor:
             if self._is_lost.sum() < self.layout.n - 1:
                 self._hypotheses.believe(k, 0.0)
                 self._kind[k] = LOST
-        self._kind[(self._kind == WEAK) & (strength > WHOLE_ABOVE)] = WHOLE
+        self._kind[(self._kind == WEAK) & (strength > WEAK_BELOW)] = WHOLE
 
     def _mark(self, k: int, kind: int, since: float, certainty: float) -> None:
         """Notes what an actuator is taken for."""
@@ -611,7 +675,9 @@ class _Odds:
         """Of any two."""
         jolt = float(np.logaddexp.reduce(evidence.jolt))
         single = float(np.logaddexp.reduce(by_actuator))
-        self.everything = float(np.logaddexp.reduce([0.0, single, jolt, self.pair]))
+        self.without_pairs = float(np.logaddexp.reduce([0.0, single, jolt]))
+        """Of anything but two at once, or nothing."""
+        self.everything = float(np.logaddexp(self.without_pairs, self.pair))
         """Of anything, or nothing."""
         self.actuator = int(by_actuator.argmax())
         """The likeliest."""

@@ -17,15 +17,22 @@ from numpy.typing import NDArray
 from finlab.arrays import Array
 from finlab.core import library
 from finlab.core.shared_array import SharedArray
+from finlab.swim.control.drive_telemetry import DriveEvidence
 from finlab.swim.control.jump_evidence import (
+    LOST,
     ONSET_EVERY_S,
     ONSETS,
+    REVERSED,
+    STUCK,
+    WEAK,
+    WHOLE,
     Evidence,
     GatheredJumps,
     JumpEvidence,
 )
 from finlab.swim.control.monitor_settings import MonitorSettings
 from finlab.swim.control.motion_model import (
+    BIAS,
     COUPLING,
     CURRENT,
     DAMPING,
@@ -42,6 +49,12 @@ from finlab.swim.control.motion_model import (
     gyration_radius,
 )
 
+LOST_BELOW = 0.15
+"""A strength below which an actuator is given up as lost."""
+REVERSED_BELOW = -0.3
+"""A strength below which it pushes the other way than the layout says."""
+WEAK_BELOW = 0.9
+"""A strength below which an actuator is weak; one that was weak is whole again from there on."""
 NIS_MAX = 4.0
 """Largest squared innovation per measured number, in variances, that counts for the misfit."""
 MISFIT_ACCELERATION = 0.01
@@ -104,6 +117,7 @@ class Hypotheses:
         variance[COUPLING] = s.coupling**2
         variance[DAMPING] = s.damping**2
         variance[RIGHTING] = s.damping**2
+        variance[BIAS] = s.acceleration_bias**2
         variance[model.strength] = s.strength**2
         variance[model.place] = s.place**2
         self._variance_at_start = variance
@@ -117,6 +131,7 @@ class Hypotheses:
         noise[UNKNOWN] = np.square(s.unknown_drift * self._by_acceleration)
         noise[INERTIA] = noise[DAMPING] = noise[RIGHTING] = s.body_drift**2
         noise[COUPLING] = (s.body_drift * s.coupling / s.inertia) ** 2
+        noise[BIAS] = s.acceleration_bias_drift**2
         noise[model.strength] = s.strength_drift**2
         self._noise = noise
         self._misfit_noise = np.square(MISFIT_ACCELERATION * self._by_acceleration / inertia)
@@ -130,6 +145,8 @@ class Hypotheses:
         """Squared innovation of the last measurement, in variances."""
         self.age_s = 0.0
         """Time since the beginning [s]."""
+        self.acceleration_variance = np.zeros(6)
+        """Of mean accelerations over the last period, beside those of the state (6,)."""
         # Columns of a jump: strengths, what stuck ones give, an unknown wrench.
         columns = np.concatenate(
             [
@@ -158,6 +175,8 @@ class Hypotheses:
         )
         self._jolt_variance = np.square(s.jolt * self._by_acceleration)
         self._evidence = JumpEvidence(model, s, self._jumps, self._jolt_variance)
+        self.drives = DriveEvidence(model, ONSETS)
+        """What drives say of themselves."""
         self.forget_jumps()
 
     @property
@@ -216,6 +235,7 @@ class Hypotheses:
         weights = np.array([of_terms, of_products, s.lag_s**2, dt**2])
         noise = self._noise * dt
         noise[MOTION] += weights @ step.noise + self._misfit_noise * ((self.misfit - 1.0) * dt)
+        self.acceleration_variance = noise[MOTION] / dt**2
         library().fl_jumps_predict(
             step.transition.ctypes.data,
             noise.ctypes.data,
@@ -251,6 +271,7 @@ class Hypotheses:
         jumps.strength.array[slot] = self.strength
         jumps.held.array[slot] = self.held
         jumps.motion.array[slot] = self.model.held_now()
+        self.drives.begin(slot)
         self._age[slot] = 0.0
         self._best_onsets = []
         self._since_onset = 0.0
@@ -349,8 +370,11 @@ class Hypotheses:
 
     def evidence(self) -> Evidence:
         """How likely each jump is, compared with none."""
+        of_drives = None
+        if self.drives.has_samples:
+            of_drives = self.drives.log_ratios(self._slots, self._believed_kinds())
         evidence = self._evidence.now(
-            self._slots, self.onset_age, self.strength, self.held, self.misfit
+            self._slots, self.onset_age, self.strength, self.held, self.misfit, of_drives
         )
         # Of each actuator and of the pairs.
         span = evidence.span
@@ -359,6 +383,16 @@ class Hypotheses:
         pair = evidence.both.reshape(o, -1).max(axis=1) - span
         self._best_onsets = [int(self._slots[single.argmax()]), int(self._slots[pair.argmax()])]
         return evidence
+
+    def _believed_kinds(self) -> NDArray[np.int_]:
+        """What each actuator is taken for (n,), index in `KINDS`, by its strength and what it gives
+        where it sticks."""
+        strength = self.strength
+        kinds = np.where(strength < WEAK_BELOW, WEAK, WHOLE)
+        kinds[strength < LOST_BELOW] = LOST
+        kinds[strength < REVERSED_BELOW] = REVERSED
+        kinds[self.model.held_owner[self.held != 0.0]] = STUCK
+        return np.asarray(kinds)
 
     def _take_over(
         self, onset: int, columns: NDArray[np.int_], mean: Array, variance: Array

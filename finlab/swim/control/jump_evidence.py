@@ -70,6 +70,8 @@ STICKING = {"": 0.0, "near": 1.0, "any": 2.0}
 PAIR_SHARE = 0.1
 """How often two given actuators are lost at one moment (a cable, a collision), as a share of how
 often one is."""
+LOG_RATIO_MAX = 5.5
+"""Most that what drives say of a fault counts for: it alone names nothing."""
 NEAR_SHARE = 0.15
 """A thruster sticks within so much of its force of then, as a share of it."""
 NEAR_FLOOR = 0.002
@@ -212,13 +214,19 @@ class JumpEvidence:
         self._variance = SharedArray(np.zeros((ONSETS, n, t, 3)))
         self._both = SharedArray(np.zeros((ONSETS, n, n)))
         self._jolt = SharedArray(np.zeros(ONSETS))
-        kinds = np.array([target.kind for target in TARGETS])
-        groups = len(KINDS) * np.arange(n)[:, None] + kinds
+        self._kinds = np.array([target.kind for target in TARGETS])
+        groups = len(KINDS) * np.arange(n)[:, None] + self._kinds
         self._sum_kinds = LogSums(groups.ravel().astype(np.int32))
         self._sum_pairs = LogSums(np.arange(n * n, dtype=np.int32))
 
     def now(
-        self, slots: NDArray[np.int32], age: Array, strength: Array, held: Array, misfit: float
+        self,
+        slots: NDArray[np.int32],
+        age: Array,
+        strength: Array,
+        held: Array,
+        misfit: float,
+        of_drives: Array | None = None,
     ) -> Evidence:
         """Weighs all jumps.
 
@@ -228,6 +236,8 @@ class JumpEvidence:
             strength: what is taken for the strengths now (n,).
             held: the same of what stuck ones give (h,).
             misfit: how many times as much (a variance) the motion is disturbed as expected.
+            of_drives: logarithms of likelihood ratios of what drives say of each kind (o, n, 5), to
+                what is believed; None where they say nothing.
         """
         model = self._model
         settings = self._settings
@@ -282,6 +292,8 @@ class JumpEvidence:
             temper,
             self._jolt.address,
         )
+        if of_drives is not None:
+            self._add(of_drives)
         return Evidence(
             log_odds=self._log_odds.array[:o].copy(),
             jolt=self._jolt.array[:o].copy(),
@@ -292,6 +304,15 @@ class JumpEvidence:
             by_kind=self._sum_kinds.of(self._log_odds, o).reshape(n, len(KINDS)),
             of_pairs=self._sum_pairs.of(self._both, o).reshape(n, n),
         )
+
+    def _add(self, of_drives: Array) -> None:
+        """Adds logarithms of likelihood ratios (o, n, 5) that do not come from the motion."""
+        o = len(of_drives)
+        self._log_odds.array[:o] += of_drives[:, :, self._kinds]
+        lost = of_drives[:, :, LOST]
+        # One bus may lie for both.
+        of_both = np.minimum(lost[:, :, None] + lost[:, None, :], LOG_RATIO_MAX)
+        self._both.array[:o] += of_both
 
     def _possible(self, strength: Array, held: Array) -> NDArray[np.bool_]:
         """Which targets (n, t) an actuator may come to."""

@@ -17,6 +17,11 @@ class MonitorSettings:
     """Of a measured depth [m]."""
     acceleration_noise: float = 0.1
     """Of a measured specific force [m/s^2]."""
+    acceleration_bias: float = 0.08
+    """Of what an accelerometer shows too much, that of a tilt which is off by a little included
+    [m/s^2]."""
+    acceleration_bias_drift: float = 0.001
+    """Of its change [m/s^2], per root of a second."""
     term_share: float = 0.01
     """Share by which each term of the equation of motion is off, for about a second."""
     lag_s: float = 0.02

@@ -3,8 +3,8 @@ is unknown of it.
 
 Fossen's equations with the layout's body, actuators that lag, and a state z that holds, beside the
 motion, what nobody has measured: the current, a wrench that stays, how far inertia, damping and
-righting moment are from the layout's, the strength and the place of each actuator, and what one
-that is stuck gives. `hypotheses.py` is the filter that runs on it.
+righting moment are from the layout's, the bias of an accelerometer, the strength and the place of
+each actuator, and what one that is stuck gives. `hypotheses.py` is the filter that runs on it.
 """
 
 import math
@@ -47,7 +47,9 @@ DAMPING = slice(39, 45)
 """How far the damping along each axis is above the layout's, as a share."""
 RIGHTING = 45
 """The same of the righting moment."""
-FIRST_ACTUATOR = 46
+BIAS = slice(46, 49)
+"""What an accelerometer shows too much, body frame [m/s^2]; it moves nothing."""
+FIRST_ACTUATOR = 49
 """The strength of the first actuator; after the strengths their places, and what stuck ones
 give."""
 TURN_ABOUT_COSINE = -0.9
@@ -115,6 +117,12 @@ class MotionModel:
         largest = [_largest_force(part) for part in parts]
         self.force_max = np.array(largest)
         """Largest forces (n,) of actuators whose command is a force [N]; 1 of others."""
+        self.force_limits = np.full((n, 2), np.nan)
+        """Least and largest forces (n, 2) of actuators whose command is a force alone [N]; NaN of
+        others."""
+        for k, part in enumerate(parts):
+            if part.type == "thruster":
+                self.force_limits[k] = part.lower[0], part.upper[0]
         owners = []
         for k in range(n):
             if can_stick[k]:

@@ -38,6 +38,7 @@ from finlab_allocator.answer_times import AnswerTimes
 from finlab_allocator.fault_watch import FaultWatch
 from finlab_allocator.frames import StaticFrames
 from finlab_allocator.input_checks import (
+    DriveSample,
     ImuSample,
     StampedInput,
     Target,
@@ -193,7 +194,7 @@ class Commander:
         self.damage = None
         if not parameters.monitor:
             return
-        self.watch = FaultWatch(self.layout, parameters.frame, self._frames, parameters.period_s)
+        self.watch = FaultWatch(self.layout, parameters, self._frames)
         for name in self.lost:
             self.watch.tell(name, is_lost=True)
 
@@ -227,6 +228,34 @@ class Commander:
         try:
             age_s = age_of("imu", sample.stamp_s, clock_s, self.parameters.watchdog_s)
             self.watch.on_imu(sample, now_s - age_s)
+        except CommandError as error:
+            self.refuse(str(error))
+
+    def on_pressure(self, pressure_pa: float, stamp_s: float, now_s: float, clock_s: float) -> None:
+        """Takes a pressure of the water.
+
+        Args:
+            pressure_pa: [Pa].
+            stamp_s: when it was measured, by the clock of stamps [s]; `NO_STAMP` where that is
+                unknown.
+            now_s: now, by a clock that is never set [s].
+            clock_s: now, by the clock of stamps [s].
+        """
+        if self.watch is None or not self.parameters.pressure:
+            return
+        try:
+            age_s = age_of("pressure", stamp_s, clock_s, self.parameters.watchdog_s)
+            self.watch.on_pressure(pressure_pa, now_s - age_s)
+        except CommandError as error:
+            self.refuse(str(error))
+
+    def on_drives(self, sample: DriveSample, now_s: float, clock_s: float) -> None:
+        """Takes what drives say of themselves; arguments as of `on_imu`."""
+        if self.watch is None or self.parameters.drives == "off":
+            return
+        try:
+            age_s = age_of("drives", sample.stamp_s, clock_s, self.parameters.watchdog_s)
+            self.watch.on_drives(sample, now_s - age_s)
         except CommandError as error:
             self.refuse(str(error))
 
@@ -430,6 +459,7 @@ class Commander:
         )
 
 
-def _of_watch(parameters: Parameters) -> tuple[bool, str, float]:
+def _of_watch(parameters: Parameters) -> tuple[bool, str, float, bool, bool, str]:
     """The parameters with which the monitor begins anew."""
-    return parameters.monitor, parameters.frame, parameters.period_s
+    heard = (parameters.accelerometer, parameters.pressure, parameters.drives)
+    return parameters.monitor, parameters.frame, parameters.period_s, *heard

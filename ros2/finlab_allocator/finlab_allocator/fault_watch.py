@@ -1,4 +1,5 @@
-"""The fault monitor of `finlab.swim.control`, fed by what an IMU and a DVL send.
+"""The fault monitor of `finlab.swim.control`, fed by what an IMU, a DVL, a pressure sensor and the
+drives send.
 
 All times are by the node's clock that is never set. A sample is as old as its stamp says: the
 monitor's time is that of the newest sample of the IMU, and each sample is taken once.
@@ -12,12 +13,18 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.errors import CommandError
 from finlab.layout import Damage, Layout
-from finlab.swim.control import Diagnosis, FaultMonitor, Finding, Measurement
+from finlab.swim.control import Diagnosis, DriveTelemetry, FaultMonitor, Finding, Measurement
+from finlab.swim.vehicle import GRAVITY
 from finlab_allocator.frames import UNIT_TOLERANCE, StaticFrames, rotation_of
-from finlab_allocator.input_checks import ImuSample
+from finlab_allocator.input_checks import DriveSample, ImuSample
+from finlab_allocator.parameters import Parameters
 
 SUSPECTED = 0.5
 """Probability of a fault from which on an actuator that is not named yet is told of."""
+WATER_DENSITY = 1000.0
+"""Of the water, by which pressures are depths [kg/m^3]."""
+NEVER_S = 1e9
+"""Age of a sample that never came [s]."""
 COMMANDS_KEPT = 1000
 """How many commands are kept for the monitor, where no sample of the IMU comes."""
 
@@ -26,21 +33,19 @@ class FaultWatch:
     """Believes of each actuator that it is whole, lost, weak, reversed or stuck, by how the robot
     moves."""
 
-    def __init__(
-        self, layout: Layout, frame: str, frames: StaticFrames, period_s: float = 0.1
-    ) -> None:
+    def __init__(self, layout: Layout, parameters: Parameters, frames: StaticFrames) -> None:
         """Believes that all are whole.
 
         Args:
             layout: the robot; what its body does not say is U-CAT's.
-            frame: the robot's frame.
+            parameters: of the node: its frame, its period, and what is heard.
             frames: static transforms, of the IMU's frame and others.
-            period_s: time from one answer to the next [s].
         """
         self._layout = layout
-        self._frame = frame
+        self._frame = parameters.frame
         self._frames = frames
-        self._monitor = FaultMonitor(layout, period_s=period_s)
+        self._parameters = parameters
+        self._monitor = FaultMonitor(layout, period_s=parameters.period_s)
         self.diagnosis: Diagnosis | None = None
         """What is believed; None before the first step."""
         self._told: set[str] = set()
@@ -49,6 +54,13 @@ class FaultWatch:
         # The monitor takes a velocity for new where its numbers are others; NaN is none.
         self._velocity = np.full(3, np.nan)
         self._velocity_at_s = -math.inf
+        self._force_sum = np.zeros(3)  # of specific forces since the last step
+        self._force_count = 0
+        self._depth = math.nan
+        self._depth_at_s = -math.inf
+        self._drive_speed = np.full(layout.n, np.nan)
+        self._drive_current = np.full(layout.n, np.nan)
+        self._drives_at_s = np.full(layout.n, -NEVER_S)
         self._imu_at_s = -math.inf
         self._stepped_at_s = -math.inf
         self._commands: deque[tuple[float, Array]] = deque(maxlen=COMMANDS_KEPT)
@@ -86,6 +98,66 @@ class FaultWatch:
         self._attitude = (roll, pitch, yaw)
         self._rates = of_imu @ rates
         self._imu_at_s = taken_s
+        if self._parameters.accelerometer and np.isfinite(sample.acceleration).all():
+            place = self._frames.origin(self._frame, sample.frame or self._frame)
+            self._monitor.accelerometer_place = place
+            self._force_sum += of_imu @ sample.acceleration
+            self._force_count += 1
+
+    def on_pressure(self, pressure_pa: float, taken_s: float) -> None:
+        """Takes a pressure of the water.
+
+        Args:
+            pressure_pa: [Pa]; of the air or not.
+            taken_s: when it was measured [s].
+
+        Raises:
+            CommandError: it is no finite number.
+        """
+        if not math.isfinite(pressure_pa):
+            raise CommandError(f"pressure: expected a finite number of Pa, got {pressure_pa}")
+        self._depth = pressure_pa / (WATER_DENSITY * GRAVITY)
+        self._depth_at_s = taken_s
+
+    def on_drives(self, sample: DriveSample, taken_s: float) -> None:
+        """Takes what drives say of themselves.
+
+        Args:
+            sample: as it came.
+            taken_s: when it was taken [s].
+
+        Raises:
+            CommandError: it names no actuator of the robot.
+        """
+        for name, speed, current in zip(
+            sample.names, sample.speed.tolist(), sample.current.tolist(), strict=True
+        ):
+            if name not in self._layout.names:
+                known = ", ".join(self._layout.names)
+                raise CommandError(
+                    f"drives: no actuator {name!r:.60}, expected names of {known:.200}"
+                )
+            k = self._layout.index(name)
+            self._drive_speed[k] = speed
+            self._drive_current[k] = current
+            self._drives_at_s[k] = taken_s
+
+    def _telemetry(self, taken_s: float) -> DriveTelemetry | None:
+        """The newest samples of the drives at a time [s]; None where they are not heard."""
+        if self._parameters.drives == "off":
+            return None
+        ages = np.maximum(taken_s - self._drives_at_s, 0.0)
+        is_signed = self._parameters.drives == "signed"
+        return DriveTelemetry(self._drive_speed, self._drive_current, ages, is_signed)
+
+    def _specific_force(self) -> Array:
+        """The mean specific force (3,) since the last step [m/s^2]; NaN without a sample."""
+        if not self._force_count:
+            return np.full(3, np.nan)
+        mean = self._force_sum / self._force_count
+        self._force_sum = np.zeros(3)
+        self._force_count = 0
+        return np.asarray(mean)
 
     def on_velocity(self, twist: Array, taken_s: float) -> None:
         """Takes a velocity of the robot in its own frame.
@@ -141,11 +213,13 @@ class FaultWatch:
             position=np.zeros(3),
             yaw=yaw,
             velocity=self._velocity,
-            depth=math.nan,
+            depth=self._depth,
             rates=self._rates,
             roll=roll,
             pitch=pitch,
-            ages=(0.0, 0.0, age_of_velocity_s if math.isfinite(age_of_velocity_s) else 0.0, 0.0),
+            ages=(0.0, _finite(taken_s - self._depth_at_s), _finite(age_of_velocity_s), 0.0),
+            acceleration=self._specific_force(),
+            drives=self._telemetry(taken_s),
         )
         self.diagnosis = self._monitor.step(measurement, self._command_until(taken_s))
         self._stepped_at_s = taken_s
@@ -217,8 +291,10 @@ class FaultWatch:
     def _said_of(self, finding: Finding) -> str:
         """What is wrong with one, since when and how sure."""
         what = finding.kind
-        if finding.kind == "weak":
-            what = f"weak or fouled, at {100.0 * finding.value:.0f} %"
+        if finding.kind in ("weak", "fouled"):
+            # Without the drives' currents a fouled one is weak, and no more is known.
+            kind = "weak or fouled" if finding.kind == "weak" else "fouled"
+            what = f"{kind}, at {100.0 * finding.value:.0f} %"
         elif finding.kind == "stuck":
             what = f"stuck at {self._stuck_at(finding)}"
         if finding.name in self._told:
@@ -231,3 +307,8 @@ class FaultWatch:
         part = self._layout.actuators[self._layout.index(finding.name)]
         unit = "rad" if part.KIND.sticks_at_angle else "N"
         return f"{finding.value:.3g} {unit}"
+
+
+def _finite(age_s: float) -> float:
+    """An age [s], or 0 of what never came."""
+    return age_s if math.isfinite(age_s) else 0.0

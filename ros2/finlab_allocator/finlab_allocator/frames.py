@@ -109,6 +109,11 @@ class StaticFrames:
         for `wrench_in`."""
         return self._pose_in(base, frame)[0]
 
+    def origin(self, base: str, frame: str) -> Array:
+        """Returns the origin (3,) of a frame in that of the robot [m]; arguments and errors as for
+        `wrench_in`."""
+        return self._pose_in(base, frame)[1]
+
     def _pose_in(self, base: str, frame: str) -> tuple[Array, Array]:
         """Orientation (3, 3) and origin (3,) [m] of a frame in another one; errors as for
         `wrench_in`."""

@@ -10,6 +10,7 @@ from finlab.allocation.question import check_flow
 from finlab.arrays import Array
 from finlab.axes import AXES
 from finlab.errors import CommandError
+from finlab.swim.control.contract import NOT_MEASURED
 from finlab_allocator.frames import StaticFrames
 from finlab_allocator.parameters import Parameters
 
@@ -39,6 +40,21 @@ class ImuSample(NamedTuple):
     """The IMU's frame; empty for that of the robot."""
     stamp_s: float
     """When it was taken, by the clock of ROS [s]; `NO_STAMP` where it does not say."""
+    acceleration: Array = NOT_MEASURED
+    """Specific force (3,) in the IMU's frame [m/s^2]; NaN where there is none."""
+
+
+class DriveSample(NamedTuple):
+    """What some drives say of themselves, as it came."""
+
+    names: tuple[str, ...]
+    """Of the actuators."""
+    speed: Array
+    """Speeds, one of each name; NaN where there is none."""
+    current: Array
+    """Currents [A], in the same order."""
+    stamp_s: float
+    """When they were taken, by the clock of ROS [s]; `NO_STAMP` where it does not say."""
 
 
 class Target(NamedTuple):

@@ -7,13 +7,13 @@ import numpy as np
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Point, TwistStamped, Vector3, WrenchStamped
-from sensor_msgs.msg import Imu, JointState
+from sensor_msgs.msg import FluidPressure, Imu, JointState
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
 from finlab.arrays import Array
 from finlab.layout import Layout
-from finlab_allocator.input_checks import NO_STAMP, ImuSample, StampedInput
+from finlab_allocator.input_checks import NO_STAMP, DriveSample, ImuSample, StampedInput
 from finlab_allocator.status_report import Report
 from finlab_allocator.topics import number_names
 
@@ -42,12 +42,42 @@ def imu_of(message: Imu) -> ImuSample:
     orientation = np.array([turn.x, turn.y, turn.z, turn.w])
     if message.orientation_covariance[0] < 0.0:  # by sensor_msgs: it has none
         orientation[:] = 0.0
+    force = message.linear_acceleration
+    acceleration = np.array([force.x, force.y, force.z])
+    if message.linear_acceleration_covariance[0] < 0.0:
+        acceleration[:] = math.nan
     return ImuSample(
         np.array([rates.x, rates.y, rates.z]),
         orientation,
         message.header.frame_id,
         _stamp_s(message.header),
+        acceleration,
     )
+
+
+def drives_of(message: JointState) -> DriveSample:
+    """Returns what drives say as the node takes it: `velocity` are speeds, `effort` currents; those
+    that are missing are NaN."""
+    n = len(message.name)
+    return DriveSample(
+        tuple(message.name),
+        _padded(message.velocity, n),
+        _padded(message.effort, n),
+        _stamp_s(message.header),
+    )
+
+
+def pressure_of(message: FluidPressure) -> tuple[float, float]:
+    """Returns a pressure [Pa] and its stamp [s]."""
+    return float(message.fluid_pressure), _stamp_s(message.header)
+
+
+def _padded(numbers: Sequence[float], n: int) -> Array:
+    """The first n of some numbers, NaN where there are fewer."""
+    result = np.full(n, math.nan)
+    given = np.asarray(numbers[:n], float)
+    result[: len(given)] = given
+    return result
 
 
 def _stamp_s(header: Header) -> float:

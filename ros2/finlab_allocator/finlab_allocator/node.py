@@ -21,7 +21,7 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
-from sensor_msgs.msg import Imu, JointState
+from sensor_msgs.msg import FluidPressure, Imu, JointState
 from std_msgs.msg import Float64
 from visualization_msgs.msg import MarkerArray
 
@@ -161,7 +161,7 @@ class AllocatorNode(LifecycleNode):
         """What commands the robot; None while unconfigured."""
         self._robot_topics: RobotTopics | None = None
         self._watchdog: Any = None
-        self._imu: Any = None
+        self._sensors: list[Any] = []
         self._watch_timer: Any = None
         self._authority_of: object = None
         self.frames = StaticFrames()
@@ -285,6 +285,21 @@ class AllocatorNode(LifecycleNode):
         sample = messages.imu_of(message)
         self._guarded(partial(self.commander.on_imu, sample, self._now_s(), self._clock_s()))
 
+    def _on_pressure(self, message: FluidPressure) -> None:
+        if self.commander is None:
+            return
+        pressure_pa, stamp_s = messages.pressure_of(message)
+        now_s = self._now_s()
+        self._guarded(
+            partial(self.commander.on_pressure, pressure_pa, stamp_s, now_s, self._clock_s())
+        )
+
+    def _on_drives(self, message: JointState) -> None:
+        if self.commander is None:
+            return
+        sample = messages.drives_of(message)
+        self._guarded(partial(self.commander.on_drives, sample, self._now_s(), self._clock_s()))
+
     def _answer(self, message: WrenchStamped) -> None:
         """Answers a wrench."""
         if self.commander is None:
@@ -344,7 +359,7 @@ class AllocatorNode(LifecycleNode):
             self._robot_topics = RobotTopics(self, commander)
         if {"period_s", "watchdog_s"} & set(values):
             self._start_watchdog()
-        if {"robot", "monitor", "period_s"} & set(values):
+        if {"robot", "monitor", "period_s", "pressure", "drives"} & set(values):
             self._start_watch()
         if commander.parameters.power_w is not None and "power_w" in values:
             self.get_logger().warning(NO_POWER_BUDGET)
@@ -434,7 +449,14 @@ class AllocatorNode(LifecycleNode):
         self._stop_watch()
         if self.commander is None or self.commander.watch is None:
             return
-        self._imu = self.create_subscription(Imu, "imu", self._on_imu, NEWEST_OF_SENSOR)
+        parameters = self.commander.parameters
+        heard: list[tuple[type, str, Callable[[Any], None]]] = [(Imu, "imu", self._on_imu)]
+        if parameters.pressure:
+            heard.append((FluidPressure, "pressure", self._on_pressure))
+        if parameters.drives != "off":
+            heard.append((JointState, "drives", self._on_drives))
+        for kind, topic, callback in heard:
+            self._sensors.append(self.create_subscription(kind, topic, callback, NEWEST_OF_SENSOR))
         self._watch_timer = self.create_timer(
             self.commander.watch.period_s,
             partial(self._guarded, self._look_for_faults),
@@ -443,10 +465,11 @@ class AllocatorNode(LifecycleNode):
 
     def _stop_watch(self) -> None:
         """Ends both."""
-        if self._imu is not None:
-            self.destroy_subscription(self._imu)
+        for subscription in self._sensors:
+            self.destroy_subscription(subscription)
+        self._sensors = []
+        if self._watch_timer is not None:
             self.destroy_timer(self._watch_timer)
-        self._imu = None
         self._watch_timer = None
 
     def _look_for_faults(self) -> None:

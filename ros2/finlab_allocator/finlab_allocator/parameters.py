@@ -9,6 +9,8 @@ from typing import Any
 from finlab.allocation.policy import POLICY_NAMES
 from finlab.errors import CommandError
 
+DRIVES_CHOICES = ("off", "unsigned", "signed")
+"""Whether drives are heard, and whether the signs of their speeds say which way they turn."""
 NAN_CHOICES = ("refuse", "free")
 """What may be done with a component of a wrench that is NaN."""
 SHORTEST_S = 0.001
@@ -48,6 +50,15 @@ class Parameters:
     )
     monitor: bool = _parameter(
         False, "whether actuators that the monitor takes for broken are done without"
+    )
+    accelerometer: bool = _parameter(
+        False, "whether the monitor takes linear_acceleration of the IMU, gravity included"
+    )
+    pressure: bool = _parameter(False, "whether the monitor hears pressures, for depths")
+    drives: str = _parameter(
+        "off",
+        "whether the monitor hears speeds and currents of the drives: off, unsigned, or signed "
+        "where the signs of speeds say which way they turn",
     )
     autostart: bool = _parameter(
         True, "whether it configures and activates itself, without a lifecycle manager", True
@@ -91,7 +102,9 @@ def _checked(name: str, value: Any) -> Any:
         return None if _is_unset(value, math.isinf) else _number(name, value, 0.0, math.inf, "W")
     if name in ("lost", "free"):
         return _names(name, value)
-    if name in ("autostart", "monitor"):
+    if name == "drives":
+        return _one_of(name, value, DRIVES_CHOICES)
+    if name in ("autostart", "monitor", "accelerometer", "pressure"):
         if isinstance(value, bool):
             return value
         raise CommandError(f"{name}: expected true or false, got {value!r:.60}")
