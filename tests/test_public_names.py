@@ -18,9 +18,9 @@ NAMES = {
     "PowerLaw PowerTable Rudder Thruster Tilt load_layout save_layout",
     "finlab.allocation": "Allocation Allocator BatchAllocation Candidates METHODS MethodName "
     "Policy PolicyName Solution",
-    "finlab.analysis": "AXES AttainableSet Authority Bounds Capability GOALS Improvement Loss "
-    "Progress ScoreCard SecondLoss Ship attainable_set authority capability dp_capability "
-    "least_power losses mirror_pairs optimize_layout read_ship score_card second_losses",
+    "finlab.analysis": "AXES AttainableSet Authority Bounds Capability GOALS Improvement KeepOut "
+    "LayoutBound Loss Progress ScoreCard SecondLoss Ship attainable_set authority capability "
+    "dp_capability layout_bound least_power losses mirror_pairs optimize_layout read_ship score_card second_losses",
     "finlab.swim.control": "CONTROLLERS Completion Controller Diagnosis DriveTelemetry FaultMonitor "
     "Finding Foresighted Learner Measurement MonitorSettings MotionObserver Setpoint TrackingController "
     "VelocityController WaypointController gains_for make_controller steerable_loss steers",

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.allocation.power_budget import ALL, PowerBudget
 from finlab.arrays import Array
 from finlab.axes import axes_in, is_full_turn, wrapped
 from finlab.layout.effectiveness import own_effectiveness
@@ -13,10 +14,7 @@ from finlab.layout.layout import Layout
 
 if TYPE_CHECKING:
     from finlab.actuators.actuator import Actuator
-    from finlab.allocation.power_budget import PowerBudget
 
-ALL = "power"
-"""Name of the bus that feeds all actuators, where a layout names none."""
 
 WITHIN = 1e-3
 """Share of a range, or of what a rate allows in a tick, within which a command is at its end."""
@@ -174,7 +172,7 @@ def band_words(layout: Layout, command: Array) -> tuple[str, ...]:
     return tuple(words)
 
 
-def budget_words(budget: "PowerBudget", power: Array) -> tuple[str, ...]:
+def budget_words(budget: PowerBudget, power: Array) -> tuple[str, ...]:
     """Names the buses that take all that they have: `power` where one feeds all actuators.
 
     Args:
@@ -203,7 +201,7 @@ def what_binds(
     missing: Array,
     previous: Array | None,
     period_s: float,
-    budget: "PowerBudget | None" = None,
+    budget: PowerBudget | None = None,
     power: Array | None = None,
 ) -> tuple[str, ...]:
     """Says what keeps a robot from delivering what is missing.

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.binding import ALL
 from finlab.arrays import Array
 from finlab.core.calls import budget_record
 from finlab.core.fields import Record
@@ -21,6 +20,8 @@ from finlab.errors import AllocationError
 if TYPE_CHECKING:
     from finlab.layout.layout import Layout
 
+ALL = "power"
+"""Name of the bus that feeds all actuators, where a layout names none."""
 MOST_WATTS = 1e12
 """Largest budget [W]; beyond it something is wrong upstream."""
 

@@ -11,17 +11,16 @@ Method `dual` asks only where an answer takes more power than a bus has.
 
 from __future__ import annotations
 
-from functools import partial
 from threading import Lock
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finlab.actuators.response import Form, Line, RadialTable, price_grid
 from finlab.allocation.dual.block import BlockContents, block_of
-from finlab.allocation.dual.method import FinishedSolution
 from finlab.allocation.policy import Policy
+from finlab.allocation.solution import Solution, Solved
 from finlab.arrays import CLOSE, EXACT, NEARLY, NOTHING, AnyArray, Array
 from finlab.core.calls import Conditions, Core, CoreAnswer, budget_record
 from finlab.core.fields import actuators_of
@@ -29,10 +28,8 @@ from finlab.layout.effectiveness import wrench_of_forces
 from finlab.physics.plant import Plant
 
 if TYPE_CHECKING:
-    from finlab.allocation.dual.method import Dual
     from finlab.allocation.power_budget import PowerBudget
     from finlab.allocation.question import MethodQuestion
-    from finlab.allocation.solution import Solution, Solved
 
 AXES_MISSING = 6
 """Actuators that stand for what is missing along each axis; one along the ray follows them."""
@@ -253,8 +250,43 @@ class BudgetedCore:
         missing["effectiveness_normalized"][-1, 0] = normalized
 
 
+class BudgetMethod(Protocol):
+    """What `solve_within` asks of method `dual`, in the flow of a question."""
+
+    @property
+    def plant(self) -> Plant:
+        """The actuators' own laws."""
+
+    @property
+    def has_exact_power(self) -> bool:
+        """Whether the core's tables say the power of all actuators exactly."""
+
+    @property
+    def budgeted(self) -> BudgetedCore:
+        """The robot in the core with powers that have a scale."""
+
+    def solve_under(
+        self,
+        conditions: Conditions,
+        targets: Array,
+        policy: Policy,
+        multipliers: Array | None = None,
+    ) -> Solved:
+        """Solves for targets (N, 6) [N, N m]."""
+
+    def solution_of(
+        self,
+        conditions: Conditions,
+        targets: Array,
+        command: Array,
+        multipliers: Array,
+        is_unreached: NDArray[np.bool_] | None,
+    ) -> Solution:
+        """Returns the solution that commands (N, n, 3) for targets (N, 6) are."""
+
+
 def solve_within(
-    method: Dual, conditions: Conditions, question: MethodQuestion, budget: PowerBudget
+    method: BudgetMethod, conditions: Conditions, question: MethodQuestion, budget: PowerBudget
 ) -> Solved:
     """Solves for targets within a power budget.
 
@@ -284,11 +316,11 @@ def solve_within(
         command[row] = answer.command[0]
         if answer.multipliers is not None:
             multipliers[row] = answer.multipliers[0]
-    return _solution(method, conditions, targets, command, multipliers, exceeds)
+    return method.solution_of(conditions, targets, command, multipliers, exceeds)
 
 
 def _solve_one(
-    method: Dual,
+    method: BudgetMethod,
     conditions: Conditions,
     targets: Array,
     question: MethodQuestion,
@@ -303,7 +335,7 @@ def _solve_one(
     for _ in range(CORRECTIONS):
         asked = conditions._replace(budget=record)
         solved = method.solve_under(asked, targets, policy, multipliers)
-        if method.has_exact_power and isinstance(solved, FinishedSolution):
+        if method.has_exact_power and not isinstance(solved, Solution):
             return solved
         power = _power_of_buses(method, solved, budget)
         if _is_kept(power, budget.watts):
@@ -318,12 +350,12 @@ def _solve_one(
     if not (power > (1.0 + SLACK) * budget.watts).any():
         return solved
     answer = method.budgeted.answer(targets[0], policy, conditions, budget)
-    return _solution(
-        method, conditions, targets, answer.command[None], answer.multipliers[None], None
+    return method.solution_of(
+        conditions, targets, answer.command[None], answer.multipliers[None], None
     )
 
 
-def _power_of_buses(method: Dual, solved: Solved, budget: PowerBudget) -> Array:
+def _power_of_buses(method: BudgetMethod, solved: Solved, budget: PowerBudget) -> Array:
     """Power (b,) [W] of the buses at the command of a solution of one target."""
     return np.asarray(budget.power_of_buses(method.plant.power(solved.command))[0])
 
@@ -334,28 +366,6 @@ def _is_kept(power: Array, watts: Array) -> bool:
     share = power / watts
     is_short = (share > 1.0 - NEAR) & (share < 1.0 - ENOUGH)
     return bool((share <= 1.0 + SLACK).all()) and not is_short.any()
-
-
-def _solution(
-    method: Dual,
-    conditions: Conditions,
-    targets: Array,
-    command: Array,
-    multipliers: Array,
-    rows: NDArray[np.bool_] | None,
-) -> Solution:
-    """The solution of commands (N, n, 3) for targets (N, 6), of which some rows (N,), None for
-    all, are not met."""
-    problem = method.problem_under(conditions)
-    _, finite_command = method._without_nan(command, conditions)
-    return method.solution(
-        command,
-        problem.wrench(finite_command) * problem.error_scale,
-        multipliers,
-        np.zeros(len(targets)),
-        partial(method.notes_of, set(), targets if rows is None else targets[rows], conditions),
-        conditions,
-    )
 
 
 class _Asked:

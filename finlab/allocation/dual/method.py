@@ -519,6 +519,35 @@ class Dual(Method):
             notes=notes,
         )
 
+    def solution_of(
+        self,
+        conditions: Conditions,
+        targets: Array,
+        command: Array,
+        multipliers: Array,
+        is_unreached: NDArray[np.bool_] | None,
+    ) -> Solution:
+        """Returns the solution that commands are which were found within power budgets.
+
+        Args:
+            conditions: under which they were found.
+            targets: (N, 6) [N, N m].
+            command: (N, n, 3).
+            multipliers: lambda (N, 6) [W/N, W/(N m)].
+            is_unreached: which targets (N,) are out of reach; None for all.
+        """
+        problem = self.problem_under(conditions)
+        _, finite_command = self._without_nan(command, conditions)
+        unreached = targets if is_unreached is None else targets[is_unreached]
+        return self.solution(
+            command,
+            problem.wrench(finite_command) * problem.error_scale,
+            multipliers,
+            np.zeros(len(targets)),
+            partial(self.notes_of, set(), unreached, conditions),
+            conditions,
+        )
+
     def notes_of(
         self, sentences: set[str], unreached: Array, conditions: Conditions
     ) -> tuple[str, ...]:
