@@ -1,7 +1,7 @@
 // The core in C (finlab/core/finlab.h) as WebAssembly: one robot, questions and answers.
 import { constantsOf, fieldAt, structsOf } from "./fields.js";
 
-const math = { atan2: Math.atan2, cos: Math.cos, sin: Math.sin, exp: Math.exp, tanh: Math.tanh };
+const math = { atan2: Math.atan2, cos: Math.cos, sin: Math.sin, exp: Math.exp, pow: Math.pow, tanh: Math.tanh };
 
 export async function loadCore(url) {
   const { instance } = await WebAssembly.instantiateStreaming(fetch(url), { env: math });
