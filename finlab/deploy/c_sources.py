@@ -18,6 +18,7 @@ from finlab.allocation.allocator import Allocator
 from finlab.allocation.dual.compiled import core_policy
 from finlab.allocation.dual.method import Dual, DualSettings
 from finlab.allocation.policy import Policy, PolicyName
+from finlab.allocation.power_budget import budget_of
 from finlab.allocation.question import check_flow
 from finlab.arrays import Array
 from finlab.axes import AXES
@@ -31,6 +32,7 @@ from finlab.deploy.c_interaction import (
     coupled_source,
 )
 from finlab.deploy.thin_block import tables_of, thinned
+from finlab.errors import AllocationError
 from finlab.layout import Layout
 from finlab.physics.objective import wrench_scale_of
 from finlab.whole_file import write_folder
@@ -59,9 +61,10 @@ FILES_LEFT_OUT = (
     "kalman_filter.c",
     "motion_model.c",
     "path_wrench.c",
+    "power_budget.c",
 )
 """Files of the core that an export does not need: judgement by formulas, messages of networks,
-attainable sets, batches, what Python alone calls, and what swims in a simulation."""
+attainable sets, batches, what Python alone calls, what swims in a simulation, and power budgets."""
 QUESTIONS: tuple[tuple[PolicyName, float], ...] = (
     ("closest", 0.9),
     ("closest", 3.0),
@@ -103,10 +106,16 @@ def c_sources(
             holds: foils push by it, propellers lose to it. None for a robot at rest.
 
     Raises:
-        AllocationError: the actuators act on each other by no formula of the core.
+        AllocationError: the actuators act on each other by no formula of the core, or the layout
+            has a power budget.
         CommandError: `flow` is not six finite numbers.
         DataError: a force table cannot be read.
     """
+    if budget_of(layout) is not None:
+        raise AllocationError(
+            f"layout {layout.name!r}: has a power budget, which the C files do not keep; leave out "
+            "`power_w` and `buses`, or let `finlab-runtime serve` answer on the robot"
+        )
     water = check_flow(flow)
     method = Dual(layout, DualSettings(), wrench_scale_of(layout), None).at(water)
     is_coupled = layout.interaction is not None
@@ -184,6 +193,7 @@ def _with_size(header: str, count: int, foils: int, zones: int, is_coupled: bool
     arcs = min(foils, constant("FL_ARCS"))
     header = re.sub(r"(#define FL_ARCS) \d+", rf"\1 {arcs}", header, count=1)
     header = re.sub(r"(#define FL_ZONES) \d+", rf"\1 {zones}", header, count=1)
+    header = header.replace("#define FL_KEEPS_BUDGETS 1", "#define FL_KEEPS_BUDGETS 0", 1)
     if is_coupled:
         return header.replace("#ifdef FL_SINGLE\n", "#define FL_NO_LANES\n#ifdef FL_SINGLE\n", 1)
     single = (

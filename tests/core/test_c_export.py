@@ -6,6 +6,7 @@ import re
 import shlex
 import shutil
 import subprocess
+from dataclasses import replace
 from functools import cache
 from itertools import starmap
 from pathlib import Path
@@ -19,6 +20,7 @@ from finlab.cli import main
 from finlab.core.fields import actuators_of, constant
 from finlab.deploy.c_sources import c_sources, write_c
 from finlab.deploy.thin_block import tables_of, thinned
+from finlab.errors import AllocationError
 from finlab.layout import load_layout
 from tests.allocator_cache import AllocatorCache
 from tests.core.test_foil_arcs import beyond, tail
@@ -282,3 +284,9 @@ def test_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
         ["export", "torpedo", "-o", str(tmp_path / "e"), "--flow", *"100000"]
     )
     assert "no C sources" in refused(["export", "A", "--method", "mdn", "--c", str(tmp_path / "d")])
+
+
+def test_a_power_budget_is_refused() -> None:
+    layout = replace(load_layout("bluerov2_heavy"), power_w=216.0)
+    with pytest.raises(AllocationError, match="power budget"):
+        c_sources(layout)

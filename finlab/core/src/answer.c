@@ -101,15 +101,17 @@ static void find_multipliers(const fl_span *span, fl_answer *out) {
   }
 }
 
+#if FL_KEEPS_BUDGETS
 /* Finds other forces where these take more power than their buses have; returns whether they do. */
 static int keep_budget(const real *block, fl_work *work, const fl_question *q,
-                        const real *wrench_desired, fl_answer *out) {
+                       const real *wrench_desired, fl_answer *out) {
   if (!q->budget || !fl_exceeds_budget(block, work, q->budget, out->force)) return 0;
   real wrench[6];
   take_off_offset(&work->span, wrench_desired, wrench);
   out->exceeds_budget = !fl_keep_budget(block, work, wrench, q->policy, q->budget, out);
   return 1;
 }
+#endif
 
 /* Reduced multipliers to begin with [W]: those of a question, which go to `lambda`, or those of the
    commands before in a tick; 0 where there are none, or none of use. */
@@ -201,7 +203,10 @@ static void answer_question(const real *block, fl_work *work, const fl_question 
 
   real lambda[6];
   find_forces(block, work, wrench_desired, q->policy, first_multipliers(work, q, lambda), out);
-  const int is_budget_used_up = keep_budget(block, work, q, wrench_desired, out);
+  int is_budget_used_up = 0;
+#if FL_KEEPS_BUDGETS
+  is_budget_used_up = keep_budget(block, work, q, wrench_desired, out);
+#endif
   find_multipliers(span, out);
   for (int k = 0; k < 6; k++) {
     if (out->is_attainable) {
@@ -248,6 +253,7 @@ static int are_small_or_unknown(const real *values, int count) {
 
 /* Whether budgets are ones that are kept: power is that of the actuators alone, no drag. */
 static int is_valid_budget(const real *block, const fl_budget *budget) {
+  if (!FL_KEEPS_BUDGETS) return 0;
   if (budget->buses < 1 || budget->buses > FL_BUSES) return 0;
   for (int b = 0; b < budget->buses; b++) {
     if (!(budget->watts[b] > 0 && budget->watts[b] <= LARGEST)) return 0;

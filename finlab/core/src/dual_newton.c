@@ -27,9 +27,9 @@
 #include "step_control.h"
 #include "symmetric.h"
 
-#define JUMPS 4              /* trials with a jump after which Newton's method stands still */
-#define JUMP_STEP R(1e-3)    /* squared step, over squared multipliers, too long to judge */
-#define SHORT_STEP R(1e-7)   /* the same, in which any large change of a force is a jump */
+#define JUMPS 4            /* trials with a jump after which Newton's method stands still */
+#define JUMP_STEP R(1e-3)  /* squared step, over squared multipliers, too long to judge */
+#define SHORT_STEP R(1e-7) /* the same, in which any large change of a force is a jump */
 /* What squared multipliers count at least in these two, over NOTHING and the squared cost C. */
 #define MULTIPLIERS_MIN 100
 

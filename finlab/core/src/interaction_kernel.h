@@ -62,8 +62,8 @@ typedef struct {
 /* Pairs of one receiver, in lanes. */
 typedef struct {
   int source[LANES];
-  int count; /* of lanes that stand for a pair; the others repeat the last one */
-  pair p;    /* of messages */
+  int count;              /* of lanes that stand for a pair; the others repeat the last one */
+  pair p;                 /* of messages */
   vector way[3];          /* of the jets, in diameters of their outlets */
   vector ahead[3];        /* against which they flow */
   vector thrust;          /* [N] */
@@ -71,7 +71,7 @@ typedef struct {
   vector along;
   vector speed[MOST_FORMULAS]; /* of the jets by profile, where they meet the receiver [m/s] */
   vector slope[MOST_FORMULAS]; /* of these by `along` */
-  vector by_source[3][3]; /* derivatives of what the receiver has from them, by their forces */
+  vector by_source[3][3];      /* derivatives of what the receiver has from them, by their forces */
 } pair_group;
 
 /* Whether neither the jet nor the message of a pair is more than nothing. */
@@ -525,8 +525,8 @@ static inline void add_hull_messages(const interaction_model *model, int first, 
   for (int k = 0; k < HULL_VECTORS; k++) {
     vector gradient[HULL_FEATURES];
     const dual *vectors = of.vectors[k].c;
-    const vector factor = factor_of(model->hull_coefficients, HULL_VECTORS, k, HULL_FEATURES, 3,
-                                    feature, gradient);
+    const vector factor =
+        factor_of(model->hull_coefficients, HULL_VECTORS, k, HULL_FEATURES, 3, feature, gradient);
     for (int b = 0; b < 3; b++) message[b] += factor * vectors[b].value;
     for (int c = 0; c < 3 && effect->slope; c++) {
       vector by = lanes_of(0);

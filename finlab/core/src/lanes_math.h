@@ -38,9 +38,7 @@ static inline vector power_of_two(vector shifted) {
   return power;
 }
 #else
-static inline vector power_of_two(vector shifted) {
-  return (vector)(((mask)shifted + 1023) << 52);
-}
+static inline vector power_of_two(vector shifted) { return (vector)(((mask)shifted + 1023) << 52); }
 #endif
 
 /* exp x = 2^k exp r, |r| <= log 2 / 2, by the series of exp r up to its 13th power: off by a unit

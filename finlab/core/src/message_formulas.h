@@ -73,7 +73,7 @@ static inline void view_pair(const pair *p, pair_view *view) {
   view->scalar[RECEIVER_THRUST] = p->receiver_thrust;
 }
 
-#define BELL_GROWTH R(0.05) /* of a jet's squared width by that of the way along it */
+#define BELL_GROWTH R(0.05)               /* of a jet's squared width by that of the way along it */
 #define ONSET_SHARE R(0.1353352832366127) /* exp(-2): the onset is half a diameter upstream */
 
 /* exp(-a s / w) of s and x, w = 1 + 0.05 x^2, and its derivatives, of its value and 1 / w. */

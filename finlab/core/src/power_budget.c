@@ -18,15 +18,15 @@
 #include "step_control.h"
 #include "symmetric.h"
 
-#define MISS_COST R(1e6)   /* K over the robot's largest power, of a miss of the wrench scale */
-#define HELD_AXIS R(1e4)   /* weight of axes that are served over those that follow */
+#define MISS_COST R(1e6)      /* K over the robot's largest power, of a miss of the wrench scale */
+#define HELD_AXIS R(1e4)      /* weight of axes that are served over those that follow */
 #define BUDGET_KEPT TOLERANCE /* share of a budget by which a power may be off */
 #define BUDGET_STEPS FL_STEPS /* of Newton's method for one target */
-#define SHORT_SHARE R(0.1) /* of a step, from which on mu falls */
-#define BUDGET_IDLE 12 /* steps without progress after which it ends */
+#define SHORT_SHARE R(0.1)    /* of a step, from which on mu falls */
+#define BUDGET_IDLE 12        /* steps without progress after which it ends */
 /* There, of TOLERANCE, what may be left: rounding where multipliers lie far apart. */
 #define STANDSTILL 100
-#define EXPONENT_GUESS (R(2.0) / 3)   /* of forces over powers, to begin with: costs ~ T^1.5 */
+#define EXPONENT_GUESS (R(2.0) / 3) /* of forces over powers, to begin with: costs ~ T^1.5 */
 
 enum { NOTHING_MISSES, AXES_MISS, RAY_MISSES };
 
@@ -165,7 +165,6 @@ static void evaluate(const budget_problem *p, budget_point *at) {
   at->size = SQRT(squared);
 }
 
-
 /* Solves H x = right of so many unknowns in place, by the factor L D L' of the lower triangle; 0
    where H is singular to rounding. */
 static int solve_in_place(real H[UNKNOWNS][UNKNOWNS], int count, real *x) {
@@ -190,7 +189,7 @@ static int solve_in_place(real H[UNKNOWNS][UNKNOWNS], int count, real *x) {
 
 /* The Hessian of -g at a point, damped by mu as in Eq. 8. */
 typedef struct {
-  real G[6][6];              /* of lambda, lower triangle */
+  real G[6][6];                /* of lambda, lower triangle */
   real cross[FL_BUSES + 1][6]; /* c_b */
   real bend[FL_BUSES + 1];     /* d_b */
 } budget_hessian;
@@ -628,8 +627,8 @@ static int serve_closest(budget_problem *p, const fl_policy *policy, const real 
   return find_optimum(p, at);
 }
 
-static int serve_direction(budget_problem *p, const real *wrench,
-                           const budget_free_answer *before, budget_point *at) {
+static int serve_direction(budget_problem *p, const real *wrench, const budget_free_answer *before,
+                           budget_point *at) {
   budget_begin begin;
   let_ray_miss(p, wrench);
   begin_with_share(p, before, &begin);

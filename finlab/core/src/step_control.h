@@ -4,8 +4,8 @@
 #define FL_STEP_CONTROL_H
 #include "internal.h"
 
-#define OVERSHOT R(-0.3) /* share of the slope below which a kept step went too far, too */
-#define SEARCH_STEPS 12  /* of the search for where a step that went too far is to end */
+#define OVERSHOT R(-0.3)     /* share of the slope below which a kept step went too far, too */
+#define SEARCH_STEPS 12      /* of the search for where a step that went too far is to end */
 #define SLOPE_ENOUGH R(0.05) /* share of the slope that it may leave */
 
 /* What a trial step brought: slopes of the value along it at both of its ends, and its
