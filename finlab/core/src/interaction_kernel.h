@@ -310,12 +310,12 @@ typedef struct {
 
 /* Speeds of the jets of a group where they meet the receiver, and what water they bring. */
 static inline void add_water(const interaction_model *model, pair_group *group, brought *to) {
-  const jet_place place = place_of(model->formula[0]->behind, group->way, group->ahead);
-  group->along = place.along;
+  const jet_point point = point_of(model->formula[0]->behind, group->way, group->ahead);
+  group->along = point.along;
   for (int k = 0; k < model->profiles; k++) {
     const water *w = model->formula[model->formula_of[k]];
     vector by_along;
-    group->speed[k] = group->speed_at_outlet * rate_of_jet(w, &place, &by_along);
+    group->speed[k] = group->speed_at_outlet * rate_of_jet(w, &point, &by_along);
     group->slope[k] = group->speed_at_outlet * by_along;
     for (int l = 0; l < group->count; l++) {
       const real speed = lane_of(group->speed + k, l);

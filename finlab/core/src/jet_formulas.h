@@ -11,33 +11,33 @@ typedef struct {
   vector aside_squared;  /* the way off the axis, squared */
   vector onset;          /* how far jets have begun, from 0 to 1 */
   vector onset_by_along; /* logarithmic derivative */
-} jet_place;
+} jet_point;
 
-static inline jet_place place_of(real behind, const vector *way, const vector *ahead) {
-  jet_place place;
-  place.along = -dot_three(way, ahead);
-  place.squared = place.along * place.along;
-  place.aside_squared = dot_three(way, way) - place.squared;
-  place.onset = sigmoid_of(place.along / behind);
-  place.onset_by_along = 2 * (1 - place.onset) / behind;
-  return place;
+static inline jet_point point_of(real behind, const vector *way, const vector *ahead) {
+  jet_point point;
+  point.along = -dot_three(way, ahead);
+  point.squared = point.along * point.along;
+  point.aside_squared = dot_three(way, way) - point.squared;
+  point.onset = sigmoid_of(point.along / behind);
+  point.onset_by_along = 2 * (1 - point.onset) / behind;
+  return point;
 }
 
 /* Speed of jets where they meet actuators, over that where they begin: a Gaussian profile that
    widens along them. `by_along` becomes its derivative by the way along them. */
-static inline vector rate_of_jet(const water *w, const jet_place *place, vector *by_along) {
-  const vector x = place->along;
-  const vector per_width = 1 / (place->squared + w->width * w->width);
-  const vector aside = place->aside_squared * per_width;
+static inline vector rate_of_jet(const water *w, const jet_point *point, vector *by_along) {
+  const vector x = point->along;
+  const vector per_width = 1 / (point->squared + w->width * w->width);
+  const vector aside = point->aside_squared * per_width;
   const vector profile = exp_of(-w->spread * aside);
   const vector q = x * (1 / w->length);
   const vector cube = q * q * q;
   const vector decay = 1 + cube * q;
-  const vector rate = profile * place->onset / root_of(root_of(decay));
+  const vector rate = profile * point->onset / root_of(root_of(decay));
   /* Logarithmic derivatives of the profile and of the decay. */
   const vector by_profile = 2 * w->spread * x * (1 + aside) * per_width;
   const vector by_decay = cube / (decay * w->length);
-  *by_along = rate * (place->onset_by_along + by_profile - by_decay);
+  *by_along = rate * (point->onset_by_along + by_profile - by_decay);
   return rate;
 }
 

@@ -30,9 +30,9 @@ int fl_jet_meets(const water *w, const outlet *from, const jet *j, const outlet 
   for (int c = 0; c < 3; c++) way[c] = (to->position[c] - from->position[c]) * j->per_diameter;
   const real x = -dot(way, j->ahead, 3);
   if (is_nothing_of_jet(w, x, dot(way, way, 3) - x * x)) return 0;
-  const jet_place place = place_of(w->behind, way, j->ahead);
+  const jet_point point = point_of(w->behind, way, j->ahead);
   real by_along;
-  met->speed = j->speed * rate_of_jet(w, &place, &by_along);
+  met->speed = j->speed * rate_of_jet(w, &point, &by_along);
   met->along = x;
   met->slope = j->speed * by_along;
   return 1;
