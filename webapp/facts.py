@@ -81,8 +81,7 @@ def facts_of(
         "able": state.able,
         # The session: desk, display, draft, swim, loops ...
         **vars(session),
-        "saved": session.saved,
-        "is_edited": session.is_edited,
+        "is_edited": state.layout not in session.kept,
         "selected": session.selected,
         "selection": session.selection,
         "task": session.desk.task,

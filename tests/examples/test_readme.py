@@ -1,6 +1,7 @@
 """The README's Python runs as printed, and what it and the other pages name exists."""
 
 import re
+import shlex
 from pathlib import Path
 
 import pytest
@@ -77,5 +78,5 @@ def test_figures_of_pages_are_columns_of_experiments() -> None:
         marks += re.findall(r"<!-- figures: (\w+) ?([^>]*) -->", page.read_text())
     assert marks
     for name, keys in marks:
-        keys = {key for key in keys.split() if "=" not in key}
+        keys = {key for key in shlex.split(keys) if "=" not in key}
         assert keys <= {column.key for column in experiment_of(name).columns}, name

@@ -111,7 +111,8 @@ def test_a_robot_that_no_fins_can_steer_is_told_with_all_its_fins(swimming: Swim
     swimming.start(Plan(aligned, (), path=SHORT_PATH, method="analytic"))
     until(lambda: swimming.swimmer is not None)
     assert swimming.swimmer.visible_moment.believed_lost == ()
-    assert "With these actuators surge, heave and yaw are not free" in swim_card(*now(swimming))
+    said = swim_card(*now(swimming))
+    assert "With these actuators, not all of surge, heave and yaw come apart" in said
 
 
 def test_bad_plans_and_methods_out_of_order(worker: Pool) -> None:

@@ -57,8 +57,8 @@ class BaseSession:
         self.desk = Desk()
         self.selection_order: tuple[str, ...] = ()
         """The selected actuators, in the order in which they were chosen."""
-        self._kept: tuple[Layout, ...] = (layout,)
-        """Layouts as they were opened or saved, the newest last."""
+        self.kept: tuple[Layout, ...] = (layout,)
+        """Layouts as they were opened or saved, the newest last; undo may lead back to one."""
         self.draft = SearchRequest()
         """What the next search for a better layout is to do."""
         self.swim = SwimSettings()
@@ -82,18 +82,12 @@ class BaseSession:
     @property
     def saved(self) -> Layout:
         """The layout as it was opened or saved last."""
-        return self._kept[-1]
+        return self.kept[-1]
 
     @saved.setter
     def saved(self, layout: Layout) -> None:
-        others = [kept for kept in self._kept if kept is not layout]
-        self._kept = (*others, layout)[-MOST_KEPT:]
-
-    @property
-    def is_edited(self) -> bool:
-        """Whether the robot is none of those that were opened or saved: undo may lead back to an
-        earlier one of them."""
-        return self.state.layout not in self._kept
+        others = [kept for kept in self.kept if kept is not layout]
+        self.kept = (*others, layout)[-MOST_KEPT:]
 
     # The state and its undo.
 
