@@ -166,7 +166,7 @@ def logged(page: Page) -> None:
     page.page.locator(".fl-tasks").wait_for()
     page.tab("Log")
     page.page.get_by_role("button", name="PX4 (.ulg)").click()
-    page.page.locator(".fl-timeline svg").first.wait_for()
+    page.page.locator(".fl-timeline svg:visible").first.wait_for()
     page.page.get_by_role("button", name="Open the improved robot").first.wait_for()
 
 

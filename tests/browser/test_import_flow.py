@@ -79,7 +79,7 @@ def test_a_sample_log_shows_its_robot_and_its_moment(page: Any) -> None:
     session = page.session
     page.tab("Log")
     page.page.get_by_role("button", name="PX4 (.ulg)").click()
-    page.page.locator(".fl-timeline svg").first.wait_for()
+    page.page.locator(".fl-timeline svg:visible").first.wait_for()
     page.until(
         lambda: session.state.layout.name == "dive" and abs(session.state.target[5] - 18.0) < 0.01
     )

@@ -182,10 +182,10 @@ def test_a_robot_swims_and_one_fin_breaks(page: Any) -> None:
     start = page.pixel("/robot")
     page.until(lambda: page.pixel("/robot") != start)  # it moves on the screen
     page.until(
-        lambda: page.page.locator(".fl-timeline .plot").count() == 6,
+        lambda: page.page.locator(".fl-timeline .plot:visible").count() == 6,
         told=lambda: f"swum {swimming.time} s, running {swimming.running}, notes {page.notes()}",
     )
-    ends = page.page.locator(".fl-timeline .plot").evaluate_all(BOTTOMS_SCRIPT)
+    ends = page.page.locator(".fl-timeline .plot:visible").evaluate_all(BOTTOMS_SCRIPT)
     assert max(ends) <= page.page.viewport_size["height"], f"the last plots end at {ends}"
     page.page.get_by_role("button", name="2", exact=True).locator("visible=true").first.click()
     page.until(lambda: swimming.swimmer.visible_moment.believed_lost == ("front_left",))
