@@ -135,3 +135,11 @@ def page(opened: Any) -> Any:
     """The page, as at first sight."""
     opened.start_over()
     return opened
+
+
+@pytest.fixture
+def resized(page: Any) -> Iterator[Any]:
+    """The page; its window has its first size again afterwards."""
+    before = page.page.viewport_size
+    yield page
+    page.page.set_viewport_size(before)

@@ -3,8 +3,6 @@
 import re
 from typing import Any
 
-import pytest
-
 from tests.browser.test_frame import SCHEME_SCRIPT, findings
 from webapp.session.lessons import LESSONS
 from webapp.start_page import ROBOTS
@@ -67,14 +65,6 @@ def test_a_newcomer_sees_three_doors_and_six_robots(browser: Any, served: Any) -
     tab.locator("#fl-start").wait_for(state="hidden")
     assert session.state.layout.name == "catamaran"
     context.close()
-
-
-@pytest.fixture
-def resized(page: Any) -> Any:
-    """The page; its window has its first size again afterwards."""
-    before = page.page.viewport_size
-    yield page
-    page.page.set_viewport_size(before)
 
 
 def test_bar_and_status_have_all_at_every_width(resized: Any) -> None:

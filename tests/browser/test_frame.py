@@ -1,6 +1,5 @@
 """The frame: each task has its regions, nothing lies over anything else, keys do what is said."""
 
-from collections.abc import Iterator
 from importlib.resources import files
 from itertools import combinations
 from pathlib import Path
@@ -55,14 +54,6 @@ WIDE_CONTENT_SCRIPT = """() => {
 """Script: what is wider than the region in which it is."""
 CAMERA_SCRIPT = "() => window.__viserMutable.camera.position.toArray()"
 """Script: where the camera is."""
-
-
-@pytest.fixture
-def resized(page: Any) -> Iterator[Any]:
-    """The page; its window has its first size again afterwards."""
-    before = page.page.viewport_size
-    yield page
-    page.page.set_viewport_size(before)
 
 
 def settle(page: Any) -> None:
