@@ -109,6 +109,7 @@ def simulate(options: OmitArgPrefixes[Options]) -> None:
                 verdicts.append((loop.time - loop.period_s, verdict))
             bar.update(loop.period_s)
     lines = [excitation_summary(loop.log) if options.excite else summary(loop.log)]
+    lines += [] if options.plant == "finlab" else [f"plant: {options.plant}"]
     lines += [] if loop.learner is None else cast("OnlineFit", loop.learner).notes
     lines += [f"{time:.1f} s: the monitor takes {verdict}" for time, verdict in verdicts[1:]]
     if options.output is not None:

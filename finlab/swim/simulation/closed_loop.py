@@ -45,8 +45,9 @@ from finlab.swim.simulation.task import Trajectory
 from finlab.swim.simulation.truth import Fault, checked_truth, damage_of
 from finlab.swim.vehicle.actuator_motion import ActuatorMotion
 from finlab.swim.vehicle.attitude import quaternion_of
-from finlab.swim.vehicle.body_integrator import ActuatorLoad, body_integrator
+from finlab.swim.vehicle.body_integrator import ActuatorLoad
 from finlab.swim.vehicle.fin_motion import FinMotion
+from finlab.swim.vehicle.plants import body_integrator
 from finlab.swim.vehicle.vehicle import STATE_SIZE
 
 LOOKAHEAD_TICKS = 10

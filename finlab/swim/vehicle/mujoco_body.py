@@ -163,9 +163,7 @@ class MujocoBody:
         cu, cv, cw = to_body(rotation, *self._vehicle.current)
         nu_r = (u - cu, v - cv, w - cw, *data.qvel[ANGULAR].tolist())
         up = rotation[2::3]
-        water = water_wrench(
-            self._vehicle.dynamics, (self._mass, *self._moments), nu_r, up, tau
-        )
+        water = water_wrench(self._vehicle.dynamics, (self._mass, *self._moments), nu_r, up, tau)
         applied = [a + b for a, b in zip(water, without_motor, strict=True)]
         data.qfrc_applied[LINEAR] = to_world(rotation, *applied[:3])
         data.qfrc_applied[ANGULAR] = applied[3:]
