@@ -24,14 +24,3 @@ def test_both_nodes_answer_and_the_monitor_hears_a_robot_that_is_whole() -> None
     assert done.stdout.count("node, answer time: p50") == 2
     assert "the monitor has found: nothing" in done.stdout
     assert "with the monitor over without:" in done.stdout
-
-
-def test_a_robot_of_fins_is_refused() -> None:
-    done = subprocess.run(
-        [sys.executable, str(SCRIPT), "A", "--monitor"],
-        capture_output=True,
-        text=True,
-        timeout=60.0,
-    )
-    assert done.returncode == 2
-    assert "--monitor: expected a robot of thrusters, got A" in done.stderr
