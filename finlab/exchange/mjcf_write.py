@@ -18,6 +18,8 @@ from finlab.layout import Actuator, Body, Hull, Layout
 
 BASE = "base_link"
 """Name of the robot's body."""
+WORLD = "world"
+"""Name that MuJoCo has taken for the body of the world."""
 SERVO = "_angle"
 """What follows the name of an actuator in that of the servo that turns it."""
 DEFAULT_MASS = 10.0
@@ -79,9 +81,9 @@ def write_mjcf(layout: Layout, exchange: Exchange, _suffix: str) -> str:
     for actuator in layout.actuators:
         place = base
         if actuator in turning:
-            place = SubElement(
-                base, "body", name=actuator.name, pos=_text(actuator.position), gravcomp="1"
-            )
+            link = _link_name(actuator, layout.names)
+            position = _text(actuator.position)
+            place = SubElement(base, "body", name=link, pos=position, gravcomp="1")
             _add_hinge(place, actuator)
             link_mass = max(LINK_SHARE * mass, LEAST_LINK)
             link_moment = max(LINK_SHARE * min(moments), LEAST_LINK)
@@ -96,6 +98,14 @@ def write_mjcf(layout: Layout, exchange: Exchange, _suffix: str) -> str:
 def _base_name(layout: Layout) -> str:
     """The name of the robot's body, which no actuator has."""
     return BASE if BASE not in layout.names else f"{BASE} of {layout.name}"[:80]
+
+
+def _link_name(actuator: Actuator, names: Sequence[str]) -> str:
+    """The name of the body of an actuator that turns: its own, but for that of the world."""
+    name = actuator.name
+    while name == WORLD or (name != actuator.name and name in names):
+        name += "_"
+    return name
 
 
 def _add_inertial(body: Element, mass: float, moments: Sequence[float]) -> None:
