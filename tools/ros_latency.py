@@ -9,8 +9,8 @@ With `--monitor` a second node has the fault monitor on, and hears the IMU with 
 velocity log, pressures and the drives of a robot that swims in this process as that node commands.
 Both nodes are asked by turns, so that whatever else runs on the machine is the same for both. Their
 clock is a simulated one, `/clock`, that goes on with each wrench, so that a slow machine gives the
-monitor no other motion to judge. The wrenches then change as slowly as those of a path, since a
-monitor takes a robot's commands to be in force for a while.
+monitor no other motion to judge. The wrenches are then those of a gentle path: random ones would
+let the robot tumble, and a monitor takes commands to be in force for a while.
 """
 
 import argparse
@@ -43,8 +43,12 @@ SENSORS = ("monitor:=true", "accelerometer:=true", "pressure:=true", "drives:=si
 """Its parameters."""
 SIMULATED_TIME = "use_sim_time:=true"
 """Parameter of both nodes beside a robot that swims."""
-PACES = np.array([0.9, 0.7, 0.8, 1.3, 1.1, 0.6])
-"""Of the sines of wrenches that change slowly [rad/s]."""
+AMPLITUDE = np.array([0.25, 0.2, 0.15, 0.0, 0.0, 0.3])
+"""Of the velocities of the path, sines [m/s, rad/s]."""
+PACE = np.array([0.5, 0.7, 0.6, 0.0, 0.0, 0.8])
+"""Of the sines [rad/s]."""
+GAIN = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 1.5])
+"""Acceleration that is asked for, per error of the velocity [1/s]."""
 STEP_S = 0.02
 """A step of the robot that swims, and simulated time between wrenches [s]."""
 SAMPLE_STEPS = 5
@@ -176,6 +180,17 @@ class SwimmingRobot:
         pairs = zip(self._types, topics, strict=True)
         self._publishers = [publisher(kind, topic, 1) for kind, topic in pairs]
 
+    def wrench(self, time_s: float) -> Array:
+        """Returns the wrench (6,) that the path takes at a time [s]; the robot rights itself."""
+        angle = PACE * time_s
+        wanted = AMPLITUDE * np.sin(angle)
+        acceleration = AMPLITUDE * PACE * np.cos(angle) + GAIN * (wanted - self._state[7:])
+        body = self._vehicle.dynamics
+        damping = np.array(body.linear_damping) + np.array(body.quadratic_damping) * np.abs(wanted)
+        wrench = np.array(body.inertia) * acceleration + damping * wanted
+        wrench[3:5] = 0.0
+        return wrench
+
     def step(self, clock: SimulatedClock) -> None:
         """Swims for a step, and lets the clock go on by it."""
         self._swim()
@@ -284,12 +299,10 @@ def _measure_both(nodes: list[Asked], robot: str, count: int) -> int:
     swimmer = SwimmingRobot(watching)
     for each in nodes:
         _until_answered(each, clock)
-    phases = np.random.default_rng(0).uniform(0.0, 2.0 * np.pi, 6)
-    largest = np.sqrt(2.0) * SHARE * plain.allocator.scale
     start_s = clock.now_s
     for _ in range(count):
         swimmer.step(clock)
-        wrench = largest * np.sin(PACES * (clock.now_s - start_s) + phases)
+        wrench = swimmer.wrench(clock.now_s - start_s)
         for each in nodes:
             each.ask(wrench)
     _until_answered(plain, clock)
