@@ -173,15 +173,13 @@ def norms(vectors: AnyArray) -> AnyArray:
     return np.asarray(np.sqrt(np.einsum("ni,ni->n", vectors, vectors)))
 
 
-def exact_commands(problem: CommandProblem, answer: CoreAnswer, has_stepped: bool = False) -> Array:
+def exact_commands(problem: CommandProblem, answer: CoreAnswer) -> Array:
     """Makes commands exact by the plant: steps by the laws where the core's grids leave an error
     (Eq. 11).
 
     Args:
         problem: the robot under the conditions of the question.
         answer: of the core; its commands are overwritten.
-        has_stepped: whether the core's commands are as near as its steps come, whatever error they
-            leave.
 
     Returns:
         Commands (N, n, 3) that give the wrenches served, within the limits and rates; or as near to
@@ -195,10 +193,9 @@ def exact_commands(problem: CommandProblem, answer: CoreAnswer, has_stepped: boo
         return command
     # Where the core's grids say what the laws say, it has done all that steps can do.
     error = norms(missing)
-    is_rough = error > answer.error + EXACT
-    if not has_stepped:
-        is_rough |= answer.is_attainable & (error > NEARLY)
-    rough = np.flatnonzero(is_rough)
+    off_by_grids = error > answer.error + EXACT
+    off_within_reach = answer.is_attainable & (error > NEARLY)
+    rough = np.flatnonzero(off_by_grids | off_within_reach)
     if not len(rough):
         return command
     refined = refine(problem, wanted[rough], command[rough], ROUNDS, EXACT)

@@ -6,14 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scipy.optimize import least_squares, minimize
+from scipy.optimize import minimize
 
 import finlab
 from finlab import Allocator, Azimuth, Layout, PowerLaw
-from finlab.allocation.rates import Rates
 from finlab.arrays import Array
 from finlab.interaction.jets import Jets
-from finlab.interaction.linear import Linear
 from finlab.physics import Plant
 from finlab.research.random_layouts import (
     random_azimuth,
@@ -149,32 +147,6 @@ def test_ticks_stay_within_rates_and_arrive(heavy: Allocator) -> None:
         result = heavy.allocate([60, 0, 20, 0, 0, 1], previous=result)
         assert (np.abs(result.command - before.command) <= rates + 1e-9).all()
     assert result.err_norm <= 1e-6
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_a_tick_that_rates_hold_back_comes_as_near_as_they_allow(seed: int) -> None:
-    """Beside bounded least squares of scipy, from the answer itself and from the tick before."""
-    rng = np.random.default_rng([43, seed])
-    layout = random_jet_robot(rng, "robot", (6, 6), [random_azimuth])
-    allocator = Allocator(replace(layout, interaction=Linear()))
-    plant = Plant(allocator.layout)
-    first, last = plant.wrench(plant.sample(rng, (2,)))
-    before = allocator.allocate(0.5 * first)
-    result = allocator.allocate(0.5 * last, previous=before)
-    rates = Rates(plant, layout.rates * allocator.settings.period_s)
-    box = rates.box(before.command)
-    assert result.err_norm > 1e-3  # rates hold it back
-    lower = box.lower[:, :2].ravel()
-    upper = np.maximum(box.upper[:, :2].ravel(), lower + 1e-9)
-
-    def missed(x: Array) -> Array:
-        command = np.pad(x.reshape(-1, 2), ((0, 0), (0, 1)))
-        return (plant.wrench(command) - 0.5 * last) / allocator.scale
-
-    for start in (result.command, before.command):
-        inside = np.clip(box.clip(start)[:, :2].ravel(), lower, upper)
-        found = least_squares(missed, inside, bounds=(lower, upper))
-        assert result.err_norm <= 1.02 * np.linalg.norm(found.fun)
 
 
 def test_one_and_many_give_the_same(heavy: Allocator) -> None:

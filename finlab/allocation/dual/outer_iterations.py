@@ -79,8 +79,7 @@ def finished_answer(
         The same answers with commands that are exact by the laws. A target is attainable where its
         command gives it; nothing is proved of gaps.
     """
-    # In a tick the core has stepped as near as rates let it come.
-    command = exact_commands(problem, answer, has_stepped=problem.box is not None)
+    command = exact_commands(problem, answer)
     if policy.kind == "direction":
         # The core has gone along the ray by its grids: it has to be done again where these are off.
         served = answer.wrench_served / problem.error_scale

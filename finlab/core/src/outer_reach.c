@@ -62,8 +62,7 @@ void fl_serve_coupled(const fl_coupled_robot *robot, real *block, fl_work *work,
   fl_box box;
   fl_box_of_question(block, work, q, &box);
   if (answer->is_attainable) {
-    /* By the linear model. Rates may hold a tick back: then steps come as near as they can. Outside
-       of ticks, steps by the laws may yet find it. */
+    /* By the linear model. In a tick the last iteration may have stopped short of it. */
     if (!q->previous) return;
     answer->error =
         fl_refine_coupled(robot, block, work, &box, wrench, EXACT, TICK_STEPS, answer->command);

@@ -141,10 +141,11 @@ def posterior(terms: RobotTerms, prior: Weights) -> Weights:
 
 
 def left_out_spread(rows: Array, variance: Array, left: Array, noise_share: float) -> float:
-    """Returns the factor, at least 1, by which 90 % of samples lie within their 90 % intervals by the
-    others: how much more this robot differs from the model than the model knows. Each sample is
-    left out in closed form: with A = H_i V H_i^T / beta and the residuals e_i, its error by the
-    others is (I - A)^-1 e_i and the covariance of that beta (I - A)^-1.
+    """Returns the factor, at least 1, by which 90 % of samples lie within their 90 % intervals by
+    the others: how much more this robot differs from the model than the model knows.
+
+    Each sample is left out in closed form: with A = H_i V H_i^T / beta and the residuals e_i, its
+    error by the others is (I - A)^-1 e_i and the covariance of that beta (I - A)^-1.
 
     Args:
         rows: H (6 K, r), six rows for each sample.
