@@ -43,7 +43,10 @@ def _analysis_card(
         note += html(
             "<span class='dim'>The body lacks at most {} {} of the true set.</span>", gap, unit
         )
-    table = score_table(analysis.question.layout, analysis.card, analysis.before)
+    layout = analysis.question.layout
+    if layout.power_w is not None or layout.buses:
+        note += Markup("<span class='dim'>The power budget does not count here.</span>")
+    table = score_table(layout, analysis.card, analysis.before)
     return html("<div class='fl'>{}</div>{}", note, table)
 
 
