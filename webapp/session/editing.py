@@ -90,6 +90,7 @@ class Session(BaseSession):
         which was."""
         self._commit(step, state)
         self.selection_order = ()
+        self.given_loads = None
         self.saved = state.layout
 
     def new_layout(self, kind: str) -> None:
