@@ -111,6 +111,8 @@ def facts_of(
         "analysis_error": jobs.analyst.error,
         "is_analysing": jobs.analyst.busy,
         "improvement": jobs.improver.answer,
+        "bounded": jobs.improver.bounding.answer,
+        "bounding": jobs.improver.bounding.busy,
         "improvement_error": jobs.improver.error,
         "progress": jobs.improver.progress,
         "improving": jobs.improver.busy,

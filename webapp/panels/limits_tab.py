@@ -133,6 +133,8 @@ def _searched(
     progress: Progress | None,
     improving: bool,
     improvement_error: str | None,
+    bounded: Improvement | None,
+    bounding: bool,
     draft: SearchRequest,
 ) -> str:
     """What a search has found, or how far it is."""
@@ -140,7 +142,8 @@ def _searched(
     if improvement_error is not None:
         text = html("<div class='missing'>{}</div>", improvement_error)
     elif improvement is not None:
-        text = _before_and_after(improvement)
+        note = Markup("<span class='dim'>how far from the best: computing …</span> ")
+        text = (note if bounding else Markup()) + _before_and_after(bounded or improvement)
     elif progress is not None:
         goal = GOALS_BY_WORDS[draft.goal]
         best = goal_value(goal, progress.best)

@@ -75,6 +75,9 @@ def analyse(question: AnalysisQuestion) -> Analysis:
 def find_ranges(question: State) -> Ranges:
     """The range of each component of a state's target."""
     ranges = axis_ranges(question.layout, question.target, question.lost, question.flow)
+    layout = question.layout
+    if layout.power_w is None and not layout.buses:
+        return ranges
     return ranges_within_budget(question, ranges)
 
 

@@ -26,14 +26,11 @@ def ranges_within_budget(question: State, ranges: Ranges) -> Ranges:
 
     Returns:
         The ranges, too short by a share of 1/4096 at most; NaN where no value of a component is
-        within reach. Without a budget they are those that were given.
+        within reach.
 
     Raises:
         FinlabError: the budget cannot be kept for such a robot.
     """
-    layout = question.layout
-    if layout.power_w is None and not layout.buses:
-        return ranges
     low = np.full(len(AXES), np.nan)
     high = np.full(len(AXES), np.nan)
     for axis in range(len(AXES)):

@@ -106,6 +106,8 @@ class Jobs:
                 () if before is None else before.lost,
             )
             self.analyst.ask(question)
+        if task == "Design":
+            self.improver.ask_bound()
         kind = DRAWN[drawn]
         if task == "Design" and kind is not None:
             best = self.improver.best

@@ -359,7 +359,9 @@ class Solver:
 
 def _within_budget(candidates: Candidates, layout: Layout) -> Candidates:
     """Those candidates that keep the power budget of a layout."""
-    budget = budget_of(layout)
+    budget = None
+    if layout.power_w is not None or layout.buses:
+        budget = budget_of(layout)
     if budget is None:
         return candidates
     taken = budget.power_of_buses(plant_of(layout).power(candidates.command))
