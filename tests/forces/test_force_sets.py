@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from finlab import Azimuth, PowerLaw
 from finlab.analysis.capability import capability
 from finlab.core.ray_reach import block_of_planes
 from finlab.forces.force_sets import (
@@ -19,7 +20,6 @@ from finlab.forces.force_sets import (
     shapes_of,
 )
 from finlab.forces.reach import max_wrench_along_exactly
-from finlab import Azimuth, PowerLaw
 from finlab.layout import Fin, FinModelSpec, Layout, Limits
 from finlab.physics import Plant, plant_of
 

@@ -80,9 +80,7 @@ def polar_file(capability: Capability, names: Sequence[str]) -> str:
         "<rect width='100%' height='100%' fill='#fff'/>{}</svg>\n"
     )
     style = html(FILE_STYLE)
-    return html(
-        frame, WIDTH, HEIGHT, 2 * WIDTH, 2 * HEIGHT, style, _layers(capability, names)
-    )
+    return html(frame, WIDTH, HEIGHT, 2 * WIDTH, 2 * HEIGHT, style, _layers(capability, names))
 
 
 def curves_of(capability: Capability, names: Sequence[str]) -> list[Curve]:

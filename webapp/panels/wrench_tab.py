@@ -179,7 +179,9 @@ def add_target(page: Page) -> None:
 def _add_budgets(page: Page) -> None:
     """Boxes of the power that actuators may take: of all, or of those of each bus."""
     gui = page.gui
-    hint = "The most that all actuators may take together, which method dual keeps; empty: no limit."
+    hint = (
+        "The most that all actuators may take together, which method dual keeps; empty: no limit."
+    )
     total = gui.add_number(POWER, 0.0, step=10.0, hint=hint)
     page.bind_number(total, page.session.set_power, _budget_of_all, may_be_empty=True)
     page.board.show(total, visible=lambda layout: not layout.buses)

@@ -79,7 +79,5 @@ def _is_within(question: State, axis: int, value: float) -> bool:
     """Whether the target is within reach with another value of a component."""
     target: Array = np.array(question.target)
     target[axis] = value
-    answer = _allocator(question.layout).allocate(
-        target, lost=question.lost, flow=question.flow
-    )
+    answer = _allocator(question.layout).allocate(target, lost=question.lost, flow=question.flow)
     return bool(answer.reachable)

@@ -48,9 +48,7 @@ class Cancelled(FinlabError):
     """Nobody waits for the plot any more."""
 
 
-def find_capability(
-    question: CapabilityQuestion, work: Work[CapabilityQuestion]
-) -> Capability:
+def find_capability(question: CapabilityQuestion, work: Work[CapabilityQuestion]) -> Capability:
     """Returns what a robot can hold.
 
     Args:
@@ -70,9 +68,7 @@ def find_capability(
         return capability(layout, None, HEADINGS, lost, question.flow, progress=report)
     if loads.ship is not None:
         return dp_capability(layout, loads.ship, HEADINGS, lost, progress=report)
-    return capability(
-        layout, loads.wrenches, loads.headings, lost, question.flow, progress=report
-    )
+    return capability(layout, loads.wrenches, loads.headings, lost, question.flow, progress=report)
 
 
 def read_given_loads(name: str, content: bytes) -> GivenLoads:

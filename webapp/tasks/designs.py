@@ -294,9 +294,7 @@ class Designs:
         name = file_stem(answer.layout.name) + files.CANDIDATES
         self._export(name, partial(modes_csv, answer, modes))
 
-    def save_capability(
-        self, plot: Capability, make: Callable[[], tuple[str, bytes]]
-    ) -> None:
+    def save_capability(self, plot: Capability, make: Callable[[], tuple[str, bytes]]) -> None:
         """Send a capability plot as a file; `make` gives its suffix and content, on a thread."""
         stem = file_stem(plot.layout) + files.CAPABILITY
 
