@@ -5,11 +5,12 @@ A fin or an azimuth without limits of direction has a disc, whose radius is its 
 stops it has a sector of that disc. A sector wider than half a turn is not convex: it is replaced by
 its convex hull, the disc cut off along the chord between the stops, unless `convex_parts` has cut
 it in two. An azimuth with several arcs has the convex hull of their sectors, a polygon, unless
-`convex_parts` has taken one of them. All other sets are polygons: the line of a thruster; the convex hull of the forces of a
-fin that are larger in some directions than in others; the convex hull of forces by the flow, such
-as lift and drag of a foil between its limits. Dead bands, and the tiny thrust that a fin cannot go
-below, are neglected. An azimuth that cannot stop has the convex hull of its ring sector; one with
-thrust of both signs within an arc has the convex hull of both sectors.
+`convex_parts` has taken one of them. All other sets are polygons: the line of a thruster; the
+convex hull of the forces of a fin that are larger in some directions than in others; the convex
+hull of forces by the flow, such as lift and drag of a foil between its limits. Dead bands, and the
+tiny thrust that a fin cannot go below, are neglected. An azimuth that cannot stop has the convex
+hull of its ring sector; one with thrust of both signs within an arc has the convex hull of both
+sectors.
 
 Wrenches are scaled: torques are divided by `LEVER`, so that all six entries are in newton.
 """
@@ -476,9 +477,9 @@ def convex_parts(sets: ForceSets) -> ForceSets:
     choices = np.array(list(product(*(range(k) for k in sets.n_parts[0, cut]))), np.intp)
     robots, n = sets.radius.shape
     # Which part of each actuator is used, from 1; 0 for all of it.
-    part = np.zeros((len(choices), 1, n), np.intp)
-    part[:, 0, cut] = choices.reshape(len(choices), len(cut)) + 1
-    part = np.repeat(part, robots, axis=1).reshape(-1, n)
+    chosen = np.zeros((len(choices), n), np.intp)
+    chosen[:, cut] = choices.reshape(len(choices), len(cut)) + 1
+    part = np.repeat(chosen, robots, axis=0)
     parts = sets.tile(len(choices))
     # In the block, the polygon of a set is followed by those of its parts.
     has_polygon = parts.polygon_offset > 0.0
