@@ -4,7 +4,7 @@ import math
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from finlab.analysis import Bounds, Improvement, Progress, layout_bound, optimiz
 from finlab.analysis.authority import named_axes
 from finlab.analysis.layout_bound import check_bounded
 from finlab.arrays import Array
+from finlab.axes import MotionAxis
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.swim.hull import hull_of
@@ -191,7 +192,7 @@ def with_bound(found: Found, work: Work[Found]) -> Improvement:
         search.state.layout.without(search.state.lost),
         tuple(search.bounds),
         search.bounds,
-        axes=named_axes(improvement.axes),
+        axes=named_axes(cast("tuple[MotionAxis, ...]", improvement.axes)),
         after_loss=search.goal == "worst_single_failure",
         cancelled=work.cancelled.is_set,
     )
