@@ -20,6 +20,7 @@ from finlab.analysis.layout_bound import LayoutBound, check_bounded, layout_boun
 from finlab.analysis.moves import Bounds, Moves, mirror_pairs
 from finlab.analysis.score_card import ScoreCard, score_card
 from finlab.analysis.slopes import GoalPoint, MissionPower, SlopedGoal, WeakestDirection
+from finlab.analysis.soft_ascent import SoftAscent
 from finlab.arrays import Array
 from finlab.axes import MotionAxis
 from finlab.forces.force_sets import force_sets
@@ -37,6 +38,10 @@ MAX_DRAWS = 20
 """Most times that random vectors are drawn until enough of them keep all rules."""
 RANKED_PER_START = 6
 """Most vectors that are ranked for each start."""
+ASCENTS = 16
+"""Random vectors, and as many mirrored ones, from which the smooth goal of thrusters is raised."""
+MIN_ASCENT = 20
+"""Fewest free numbers from which on it is raised: with fewer, the climbs are many."""
 STARTS_SCALE = 2800
 """Number of climbs times the square of the free numbers: a step's time grows with that square."""
 MIN_STARTS = 3
@@ -380,6 +385,17 @@ class _Search:
                 continue
             for k in np.argsort(-goal.guess(valid), kind="stable")[:n_best]:
                 yield goal.evaluate(valid[k])
+            if len(moves.start) >= MIN_ASCENT and SoftAscent.applies(goal, moves.layout):
+                valid = self._valid(vectors, mirrored, ASCENTS, random)
+                yield from self._raised_starts(goal, valid, n_best)
+
+    def _raised_starts(self, goal: SlopedGoal, vectors: Array, count: int) -> Iterator[GoalPoint]:
+        """Yields the best of some vectors (P, D) after an ascent of a smooth goal."""
+        ascent = SoftAscent(goal, self._rules)
+        raised = ascent.raised(vectors, self._cancelled)
+        raised = raised[self._rules.violation(raised) <= 0.0]
+        for k in np.argsort(-ascent.least_distances(raised), kind="stable")[:count]:
+            yield goal.evaluate(raised[k])
 
     def _valid(
         self, vectors: Array, mirrored: bool, count: int, random: np.random.Generator
