@@ -1,7 +1,8 @@
 """Improves a layout: moves chosen actuators within bounds to raise a goal.
 
-`climb` follows the goal's slopes from several starts; where it finds nothing better, or the goal
-has no slopes, SciPy's differential evolution searches.
+`climb` follows the goal's slopes from several starts, of many free thrusters also from those of
+`soft_ascent`; where it finds nothing better, or the goal has no slopes, SciPy's differential
+evolution searches.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
