@@ -154,7 +154,8 @@ class ClosedLoop:
         self._no_beliefs = _constant(np.full(n, np.nan))
         self.verdict: Diagnosis | None = None
         """What the monitor believed at the last step; None without one."""
-        self._completion: dict[tuple[str, ...], Completion] = {}
+        self._completion: Completion | None = None
+        self._completed_damage: Damage | None = None
         self._ticks: list[Tick] = []
         self._setpoints: deque[Setpoint] = deque()
         """Of this tick and the next ones."""
@@ -321,7 +322,7 @@ class ClosedLoop:
         self._note_faults()
         if self.monitor is not None:
             self.monitor.adopt(layout)
-        self._completion.clear()
+        self._completion = None
 
     def run(self) -> RunLog:
         """Swims to the end of the task."""
@@ -364,14 +365,15 @@ class ClosedLoop:
         return 0.5 * (before + self._wrench_before)
 
     def _current_completion(self) -> Completion:
-        """What completes the controller's wrench for the actuators that work now."""
-        lost = tuple(self.damage.lost)
-        if lost not in self._completion:
+        """What completes the controller's wrench for what the actuators can do now."""
+        damage = self.damage
+        if self._completion is None or damage != self._completed_damage:
             controller = self.controller
-            self._completion[lost] = Completion(
-                self.allocator.layout, lost, controller.axes, controller.free
+            self._completion = Completion(
+                self.allocator.layout, damage, controller.axes, controller.free
             )
-        return self._completion[lost]
+            self._completed_damage = damage
+        return self._completion
 
     def _for_drives(self, command: Array) -> Array:
         """What drives make of a command (n, 3): a lost actuator is not moved, a stuck one does not

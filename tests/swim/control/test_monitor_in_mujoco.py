@@ -12,7 +12,7 @@ import pytest
 from finlab.allocation.allocator import Allocator
 from finlab.layout import load_layout
 from finlab.swim.control import FaultMonitor
-from finlab.swim.control.contract import axes_of
+from finlab.swim.control.completion import axes_of
 from tests.plant_mujoco import NO_NOISE, NO_SPREAD, MujocoRobot, Path, TrueFault, random_frame
 from tools.judge_monitor import Run, is_right, judged
 
