@@ -78,6 +78,11 @@ SAME_DIRECTION = 0.9
 """Cosine from which one that pushes again, while it is tried, pushes where it is asked to."""
 STUCK_STEP = 0.005
 """The same of the force of a stuck one, as a share of its largest, and of an angle [rad]."""
+TOLD_OF_STUCK = -0.5
+"""What a thruster that is taken for stuck is told, over its force: of one that obeys the robot then
+feels something else than of one that is stuck, lost, or pushes the other way."""
+TOLD_LEAST = 0.03
+"""Least size of that, as a share of its largest force."""
 PERIOD_MAX_S = 0.25
 """Longest step of the model [s]; a longer period is cut."""
 GAP_MAX_S = 2.0
@@ -176,7 +181,7 @@ class FaultMonitor:
         """What each actuator is taken for, index in `KINDS`."""
         self._since = np.zeros(n)
         self._certainty = np.zeros(n)
-        self._is_announced = np.zeros(n, dtype=bool)  # lost by what was said, and left alone
+        self._is_announced = np.zeros(n, dtype=bool)  # lost or stuck by what was said, left alone
         self._is_returning = np.zeros(n, dtype=bool)  # from a probe to what is commanded
         self._rates = Rates(plant_of(layout), layout.rates * self.period_s)
         self._sent = np.full((n, 3), np.nan)
@@ -318,7 +323,8 @@ class FaultMonitor:
     def tell(self, name: str, strength: float = 1.0, stuck: float = math.nan) -> Diagnosis:
         """The state of an actuator is known: its strength, and where it is stuck [rad, N] if it is.
 
-        One that is said to be lost is left alone until another state is said: no probe moves it.
+        One that is said to be lost or stuck is left alone until another state is said: nothing
+        tries it.
         Raises LayoutError: there is no actuator of that name."""
         k = self.layout.index(name)
         model = self._model
@@ -338,7 +344,7 @@ class FaultMonitor:
             elif strength < WEAK_BELOW:
                 kind = WEAK
         self._mark(k, kind, self._clock_s, 1.0)
-        self._is_announced[k] = kind in (LOST, REVERSED)
+        self._is_announced[k] = kind in (LOST, REVERSED, STUCK)
         return self.verdict()
 
     def adopt(self, layout: Layout) -> None:
@@ -390,13 +396,14 @@ class FaultMonitor:
 
         Now and then one that the monitor has called lost is tried for two seconds: if it gives
         nothing by it, it is lost, and of one that has been repaired the robot feels it, and takes
-        it back. Fins that all but rest push a little, see `MonitorSettings.least_push`. Both change
-        no faster than the rates of the drives allow from what was returned last, as does the way
-        back to what is commanded.
+        it back. For the same reason a thruster that it has called stuck is told something else than
+        what it gives: one that is stuck does not heed it. Fins that all but rest push a little, see
+        `MonitorSettings.least_push`. All change no faster than the rates of the drives allow from
+        what was returned last, as does the way back to what is commanded.
         """
         lost = self._is_lost & ~self._is_announced
         direction = self._model.motion.direction if lost.any() else self._no_direction
-        probed = self._probe.added(command, lost, direction)
+        probed = self._probe.added(self._with_stuck_ones_told(command), lost, direction)
         if probed is command and not self._is_returning.any():
             self._sent = command
             return command
@@ -409,6 +416,19 @@ class FaultMonitor:
             result = np.where(is_limited[:, None], box.clip(probed), probed)
         self._is_returning = (np.isfinite(result) & ~(result == command)).any(axis=1)
         self._sent = result
+        return result
+
+    def _with_stuck_ones_told(self, command: Array) -> Array:
+        """The command (n, 3) where thrusters that were found to be stuck are told what shows
+        whether they are; an answer for them asks for the force that they give anyway."""
+        told = (self._kind == STUCK) & ~self._is_announced & ~self._model.sticks_at_angle
+        if not told.any():
+            return command
+        result = command.copy()
+        for k in np.flatnonzero(told).tolist():
+            stuck_at = self._stuck_value(k)
+            size = max(abs(TOLD_OF_STUCK * stuck_at), TOLD_LEAST * self._model.force_max[k])
+            result[k, 0] = self._within(k, math.copysign(size, TOLD_OF_STUCK * stuck_at))
         return result
 
     def verdict(self) -> Diagnosis:
@@ -484,7 +504,7 @@ class FaultMonitor:
         return shares
 
     def _within(self, k: int, value: float) -> float:
-        """A stuck force within what the thruster can give; angles as they are."""
+        """A force within what the thruster can give; angles as they are."""
         part = self.layout.actuators[k]
         if part.KIND.sticks_at_angle:
             return value

@@ -356,7 +356,7 @@ class ClosedLoop:
         if self._command is None:
             return NO_WRENCH
         believed = self._believed_motion
-        believed.step(self._command, self.period_s)
+        believed.step(self._as_believed(self._command), self.period_s)
         force = self._plant.force(believed.command, flow=self._flow) * believed.pushes[:, None]
         if lost := self.damage.lost:
             force[list(self.layout.indices(lost))] = 0.0
@@ -374,6 +374,15 @@ class ClosedLoop:
             )
             self._completed_damage = damage
         return self._completion
+
+    def _as_believed(self, command: Array) -> Array:
+        """What a command (n, 3) is taken to have the actuators do: stuck ones do not heed it."""
+        stuck = self.damage.stuck
+        if not stuck:
+            return command
+        stuck_at = np.full(self.layout.n, np.nan)
+        stuck_at[list(self.layout.indices(stuck))] = list(stuck.values())
+        return self.motion.turned_to(command, stuck_at)
 
     def _for_drives(self, command: Array) -> Array:
         """What drives make of a command (n, 3): a lost actuator is not moved, a stuck one does not
@@ -417,7 +426,7 @@ class ClosedLoop:
             reference=setpoint.position,
             reference_surge=setpoint.surge,
             asked=wrench,
-            allocated=self._allocated(command),
+            allocated=self._allocated(self._as_believed(command)),
             delivered=mean.wrench,
             command=sent,
             fin_motion=self.motion.command,
