@@ -78,11 +78,6 @@ SAME_DIRECTION = 0.9
 """Cosine from which one that pushes again, while it is tried, pushes where it is asked to."""
 STUCK_STEP = 0.005
 """The same of the force of a stuck one, as a share of its largest, and of an angle [rad]."""
-TOLD_OF_STUCK = -0.5
-"""What a thruster that is taken for stuck is told, over its force: of one that obeys the robot then
-feels something else than of one that is stuck, lost, or pushes the other way."""
-TOLD_LEAST = 0.03
-"""Least size of that, as a share of its largest force."""
 PERIOD_MAX_S = 0.25
 """Longest step of the model [s]; a longer period is cut."""
 GAP_MAX_S = 2.0
@@ -186,6 +181,7 @@ class FaultMonitor:
         self._rates = Rates(plant_of(layout), layout.rates * self.period_s)
         self._sent = np.full((n, 3), np.nan)
         self._no_direction = np.zeros(n)  # of actuators that are not tried
+        self._never_stuck = np.full(n, np.nan)
         self._suspect = (-1, -1)
         """Actuator and kind that are likeliest to be a new fault."""
         self._last_named_s = -math.inf
@@ -396,14 +392,21 @@ class FaultMonitor:
 
         Now and then one that the monitor has called lost is tried for two seconds: if it gives
         nothing by it, it is lost, and of one that has been repaired the robot feels it, and takes
-        it back. For the same reason a thruster that it has called stuck is told something else than
-        what it gives: one that is stuck does not heed it. Fins that all but rest push a little, see
-        `MonitorSettings.least_push`. All change no faster than the rates of the drives allow from
-        what was returned last, as does the way back to what is commanded.
+        it back. A thruster that it has called stuck is tried by another force than the one at which
+        it is stuck, as the allocator asks it for that one. Fins that all but rest push a little,
+        see `MonitorSettings.least_push`. Both change no faster than the rates of the drives allow
+        from what was returned last, as does the way back to what is commanded.
         """
-        lost = self._is_lost & ~self._is_announced
-        direction = self._model.motion.direction if lost.any() else self._no_direction
-        probed = self._probe.added(self._with_stuck_ones_told(command), lost, direction)
+        gives_stuck_force = (self._kind == STUCK) & ~self._model.sticks_at_angle
+        tried = (self._is_lost | gives_stuck_force) & ~self._is_announced
+        direction = self._no_direction
+        stuck_at = self._never_stuck
+        if tried.any():
+            direction = self._model.motion.direction
+            stuck_at = stuck_at.copy()
+            for k in np.flatnonzero(gives_stuck_force).tolist():
+                stuck_at[k] = self._stuck_value(k)
+        probed = self._probe.added(command, tried, direction, stuck_at)
         if probed is command and not self._is_returning.any():
             self._sent = command
             return command
@@ -416,19 +419,6 @@ class FaultMonitor:
             result = np.where(is_limited[:, None], box.clip(probed), probed)
         self._is_returning = (np.isfinite(result) & ~(result == command)).any(axis=1)
         self._sent = result
-        return result
-
-    def _with_stuck_ones_told(self, command: Array) -> Array:
-        """The command (n, 3) where thrusters that were found to be stuck are told what shows
-        whether they are; an answer for them asks for the force that they give anyway."""
-        told = (self._kind == STUCK) & ~self._is_announced & ~self._model.sticks_at_angle
-        if not told.any():
-            return command
-        result = command.copy()
-        for k in np.flatnonzero(told).tolist():
-            stuck_at = self._stuck_value(k)
-            size = max(abs(TOLD_OF_STUCK * stuck_at), TOLD_LEAST * self._model.force_max[k])
-            result[k, 0] = self._within(k, math.copysign(size, TOLD_OF_STUCK * stuck_at))
         return result
 
     def verdict(self) -> Diagnosis:
