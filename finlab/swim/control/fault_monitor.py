@@ -562,8 +562,11 @@ class FaultMonitor:
         k = odds.actuator
         waited = min(self._doubtful_s / KIND_WAIT_S, 1.0)
         odds_needed = KIND_ODDS + (1.0 - KIND_ODDS) * waited
-        # What the likeliest explanation has of all those of this actuator.
-        of_best = max(odds.of_kind * odds.of_single, 1.0 - odds.of_single)
+        # What the likeliest explanation has of all those of this actuator; one that is lost with
+        # another is no less lost.
+        of_alone = odds.of_kind * odds.of_single
+        in_pairs = 1.0 - odds.of_single
+        of_best = of_alone + in_pairs if odds.kind == LOST else max(of_alone, in_pairs)
         is_clear = of_best > (1.0 - of_best) * odds_needed or waited == 1.0
         confirm_s = CONFIRM_S
         if self._clock_s - self._last_named_s < CAUTION_S and self._kind[k] == WHOLE:
