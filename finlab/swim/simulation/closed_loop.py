@@ -381,7 +381,7 @@ class ClosedLoop:
         if not stuck:
             return command
         stuck_at = np.full(self.layout.n, np.nan)
-        stuck_at[list(self.layout.indices(stuck))] = list(stuck.values())
+        stuck_at[list(self.layout.indices(list(stuck)))] = list(stuck.values())
         return self.motion.turned_to(command, stuck_at)
 
     def _for_drives(self, command: Array) -> Array:
