@@ -389,6 +389,7 @@ def parse_layout(
                 Bus(name, bus.power_w, tuple(bus.actuators))
                 for name, bus in (file.buses or {}).items()
             ),
+            mirror_pairs=tuple(file.mirror_pairs or ()),
         )
 
 

@@ -56,7 +56,7 @@ def robot_and_free_axes(layout: Layout) -> tuple[str, tuple[str, ...]]:
     """What the script opens, and which axes it frees: a robot that is shipped but for those is
     still opened by its name."""
     for name, known in shipped().items():
-        if replace(layout, axes=known.axes) != known:
+        if replace(layout.unpaired, axes=known.axes) != known.unpaired:
             continue
         freed = known.commanded & ~layout.commanded
         is_freed_alone = not (layout.commanded & ~known.commanded).any()
