@@ -268,9 +268,13 @@ def _figures(
     sentence = refined or verdict_sentence(allocation, in_reach)
     pill = "pill long" if len(sentence) > LONG else "pill"
     unallocated = allocation.unallocated.tolist()
-    unallocated = [value if abs(value) >= ROUNDING else 0.0 for value in unallocated]
     missing = zip(AXES, unallocated, UNITS, strict=True)
-    rest = ", ".join([f"{axis} {signed(value)} {unit}" for axis, value, unit in missing])
+    rest = ", ".join(
+        [
+            f"{axis} {signed(value if abs(value) >= ROUNDING else 0.0)} {unit}"
+            for axis, value, unit in missing
+        ]
+    )
     method = allocation.method
     err_norm = allocation.err_norm
     power = allocation.power
