@@ -137,6 +137,7 @@ def facts_of(
         "moment": None if swimmer is None else swimmer.visible_moment,
         "visible_layout": state.layout if swimmer is None else swimmer.layout,
         "paused": swimming.active and not swimming.running and not swimming.done,
+        "swim_goes_on": swimming.active and not swimming.done,
         "pace": pace_words(swimming) if swimming.active else "",
         "dragged": dragged,
         "pulled": pulled,
