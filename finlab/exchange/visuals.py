@@ -1,7 +1,7 @@
 """The hull of a robot description: what its visuals draw, as one shape.
 
-Boxes, cylinders, balls, ellipsoids and capsules are read, and meshes are not, since no other file is
-opened. Where no visual is one of these, collisions stand for them.
+Boxes, cylinders, balls, ellipsoids and capsules are read, and meshes are not, since no other file
+is opened. Where no visual is one of these, collisions stand for them.
 """
 
 from collections.abc import Sequence

@@ -284,10 +284,7 @@ def _figures(
         f"<span title='missing, as a share of what the robot can push: {rest}'><span class='dim'>"
         f"error</span> <b class='err'>{err_digits}</b></span>"
     ]
-    kinds = (
-        ("power", "watts", watts),
-        ("effort", "effort", three_digits(allocation.effort)),
-    )
+    kinds = (("power", "watts", watts), ("effort", "effort", three_digits(allocation.effort)))
     for word, kind, figure in kinds:
         if word == "effort" and allocation.effort is None:  # it is of fins
             continue

@@ -170,7 +170,9 @@ class RobotScene:
         )
         if pair is not None:  # the camera sees both
             return
-        if not shows_swim and not 0.75 < view_size(visible_layout) / self._size < 1.34:  # another robot
+        if (
+            not shows_swim and not 0.75 < view_size(visible_layout) / self._size < 1.34
+        ):  # another robot
             self.look_from("3D")
 
     def _place(

@@ -177,9 +177,7 @@ def _angle(value: Any, name: str, low: float, high: float) -> float:
 def is_same_robot(one: State, other: State) -> bool:
     """Whether two states have the same robot with the same damage; which actuators move together
     while it is edited does not count."""
-    is_same_layout = (
-        one.layout is other.layout or one.layout.unpaired == other.layout.unpaired
-    )
+    is_same_layout = one.layout is other.layout or one.layout.unpaired == other.layout.unpaired
     return is_same_layout and one.damage == other.damage
 
 
