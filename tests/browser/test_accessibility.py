@@ -23,6 +23,10 @@ from webapp.session.looking import DRAWERS, TASKS, TWO_ROBOTS
 
 SIZES = ((1400, 860), (933, 573), (390, 844))
 """Widths and heights of the window [px]: a laptop, the same at 150 %, a phone."""
+CLOSE_SCRIPT = """() => document.querySelectorAll('[role=dialog] button').forEach((button) => {
+  if (['Close', 'Cancel'].includes(button.textContent)) button.click();
+})"""
+"""Script: closes all dialogs."""
 EVERY = 13
 """Of so many cases `make test` runs one."""
 URDF_NAME = "sub.urdf"
@@ -43,6 +47,17 @@ def show(page: Page, name: str) -> None:
     session = page.session
     is_task = name in TASKS
     act(page, partial(session.show_task if is_task else session.show_drawer, name))
+    if not is_task:
+        bring(page, name)
+
+
+def bring(page: Page, word: str) -> None:
+    """Brings the list, the values or a tab of the drawer of a phone, which has room for one of
+    them."""
+    button = page.page.locator(".fl-strip").get_by_role("button", name=word, exact=True)
+    if button.is_visible():
+        button.click()
+        page.rest(300)
 
 
 def select(page: Page, robot: str, task: str = "Design") -> None:
@@ -56,6 +71,7 @@ def select(page: Page, robot: str, task: str = "Design") -> None:
 def body(page: Page) -> None:
     """The values of the robot as a whole, with its hull."""
     show(page, "Design")
+    bring(page, "Values")
     page.unfold("Hull", "Shape")
 
 
@@ -67,6 +83,7 @@ def damage(page: Page) -> None:
     act(page, partial(session.select, "front_right"))
     act(page, partial(session.damage, "front_right", "stuck", 0.1))
     act(page, partial(session.damage, "front_left", "running", (0.3, 1.0, 0.2)))
+    bring(page, "List")
     page.unfold("Damage", "Which")
 
 
@@ -140,6 +157,7 @@ def granted(page: Page, folder: Path) -> None:
     page.page.locator(".fl-inquiry").get_by_role("button", name="Open").click()
     page.until(lambda: page.session.state.source is not None)
     show(page, "Design")
+    bring(page, "List")
 
 
 def asked(page: Page, folder: Path) -> None:
@@ -257,9 +275,7 @@ def leave(page: Page) -> None:
     for _ in range(2):
         page.page.keyboard.press("Escape")
     page.page.evaluate("document.querySelectorAll('[popover]').forEach(e => e.hidePopover())")
-    for close in page.page.get_by_role("dialog").get_by_role("button", name="Close").all():
-        if close.is_visible():
-            close.click()
+    page.page.evaluate(CLOSE_SCRIPT)
 
     def reset() -> None:
         page.session.guide.end()

@@ -24,6 +24,7 @@ from finlab.analysis.card_text import (
     held_remarks,
 )
 from finlab.analysis.score_card import QuickCheck
+from finlab.axes import MotionAxis
 from finlab.display import Column
 from finlab.layout import Layout
 from finlab.swim.hull import hull_of
@@ -137,7 +138,7 @@ def _axes(card: ScoreCard, old_card: ScoreCard | None) -> str:
     return html("<table>{}{}</table>", heads, rows)
 
 
-def _width(rows: Mapping[str, AxisRow], axis: str) -> float | None:
+def _width(rows: Mapping[MotionAxis, AxisRow], axis: MotionAxis) -> float | None:
     """What can be given along an axis, both ways together [N or N m]; None where it is free."""
     axis_row = rows.get(axis)
     return None if axis_row is None else axis_row.largest + axis_row.most_negative
