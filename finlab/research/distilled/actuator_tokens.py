@@ -29,7 +29,7 @@ from finlab.errors import AllocationError
 from finlab.layout.layout import Layout
 
 LEVELS = (0.05, 0.3, 1.0)
-"""Prices at which responses are asked for, over the price of the largest force by quadratic costs."""
+"""Prices at which responses are asked for, over that of the largest force by quadratic costs."""
 DIRECTIONS = 8
 """Directions of these prices in an actuator's plane; of a line their cosines count."""
 TOKEN_SIZE = 12 + 2 + 2 * len(LEVELS) * DIRECTIONS
@@ -54,7 +54,7 @@ class RobotTokens:
     column: Array
     """Whitened effectiveness sqrt(d_i) K b_i (m, 2, 6) of the largest force [1]."""
     root_stiffness: Array
-    """sqrt(d_i) (m,): the share of its largest force is sqrt(d_i) times the price along `column`."""
+    """sqrt(d_i) (m,): share of the largest force over the whitened price, by quadratic costs."""
     force_max: Array
     """F_i (m, 2) [N]."""
     power_max: float
@@ -121,7 +121,7 @@ class RobotTokens:
 def _inverse_root(M: Array) -> Array:
     """M^(-1/2) (6, 6) of a symmetric matrix, 0 along directions that nothing drives."""
     values, vectors = np.linalg.eigh(M)
-    is_driven = values > np.sqrt(NOTHING) * values.max()
+    is_driven = values > NOTHING * values.max()
     roots = np.where(is_driven, 1.0 / np.sqrt(np.where(is_driven, values, 1.0)), 0.0)
     return np.asarray((vectors * roots) @ vectors.T)
 

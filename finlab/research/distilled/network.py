@@ -53,10 +53,10 @@ def graph_shapes(width: int, heads: int, graph_layers: int) -> Shapes:
     return shapes
 
 
-def graph_features(w: Weights, graph_layers: int, token: Values, mask: Values | None) -> Values:
-    """Returns features (R, m, width) of actuators, from tokens (R, m, TOKEN_SIZE); with a mask
-    (R, m), as of `RobotBatch`, those of padding mean nothing."""
-    padding = None if mask is None else Padding.of(mask)
+def graph_features(w: Weights, graph_layers: int, token: Values, mask: Values) -> Values:
+    """Returns features (R, m, width) of actuators, from tokens (R, m, TOKEN_SIZE), by the
+    mask (R, m) of `RobotBatch`; those of padding mean nothing."""
+    padding = None if bool(mask.all()) else Padding.of(mask)
     hidden = layers.linear(w, "enter", token if padding is None else padding.rows(token))
     for i in range(graph_layers):
         name = f"graph.{i}"
@@ -106,8 +106,10 @@ class HeadConfig:
         """Shape of each array by name. Raises ValueError: there is no network of these sizes."""
         check_sizes(*vars(self).values(), heads=(self.width, self.heads))
         shapes = graph_shapes(self.width, self.heads, self.graph_layers)
-        return shapes | norm_shapes("norm", self.width) | linear_shapes(
-            "head", self.width, 36 * self.units
+        return (
+            shapes
+            | norm_shapes("norm", self.width)
+            | linear_shapes("head", self.width, 36 * self.units)
         )
 
     def head(self, w: Weights, batch: RobotBatch) -> Head:

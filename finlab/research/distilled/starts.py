@@ -82,7 +82,8 @@ class FittedStart:
         features = self._features(stored.wrench)
         whitened = np.linalg.solve(
             robot.unwhiten_multipliers.T @ robot.unwhiten_multipliers
-            + 1e-12 * np.trace(robot.unwhiten_multipliers.T @ robot.unwhiten_multipliers)
+            + 1e-12
+            * np.trace(robot.unwhiten_multipliers.T @ robot.unwhiten_multipliers)
             * np.eye(6),
             robot.unwhiten_multipliers.T @ stored.multipliers.T,
         ).T

@@ -10,19 +10,18 @@ makes it as large as the multipliers' relative error. The network of forces is t
 forces, and on what its own leave of the wrench.
 """
 
-import hashlib
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from finlab.arrays import Array
-from finlab.errors import CommandError, DataError
+from finlab.errors import CommandError
 from finlab.research.distilled.exact_answers import ACTUATORS, ExactAnswers, robots_with_answers
 from finlab.research.distilled.network import ForceConfig, HeadConfig, RobotBatch
 from finlab.research.distilled.trained_policy import NetworkName, write_policy
@@ -61,11 +60,16 @@ PRESETS: dict[str, dict[NetworkName, PolicyRecipe]] = {
         "forces": PolicyRecipe(LoopSettings(20, 32, 1e-3, warmup=10), 12, 16, 4),
     },
     "default": {
-        "head": PolicyRecipe(LoopSettings(8000, 256, 2e-3, warmup=200, ema=0.999), 500, 128),
-        "forces": PolicyRecipe(LoopSettings(2500, 128, 1e-3, warmup=200, ema=0.999), 500, 128),
+        "head": PolicyRecipe(LoopSettings(2000, 256, 2e-3, warmup=100, ema=0.995), 250, 64),
+        "forces": PolicyRecipe(LoopSettings(800, 128, 1e-3, warmup=100, ema=0.995), 250, 64),
+    },
+    "long": {
+        "head": PolicyRecipe(LoopSettings(12_000, 512, 2e-3, warmup=200, ema=0.999), 1500, 128),
+        "forces": PolicyRecipe(LoopSettings(4000, 256, 1e-3, warmup=200, ema=0.999), 1500, 128),
     },
 }
-"""Recipe by preset and network: `smoke` takes seconds, `default` two minutes of a core."""
+"""Recipe by preset and network: `smoke` takes seconds, `default` half a minute of a core, `long`
+five minutes."""
 
 
 @dataclass(frozen=True)
@@ -122,7 +126,9 @@ class DualGap(torch.autograd.Function):
     """How far the dual lies below its maximum, and the gradient of that: the core's residual."""
 
     @staticmethod
-    def forward(ctx: Any, multipliers: Tensor, answers: Sequence[ExactAnswers], wrenches: Tensor) -> Tensor:
+    def forward(
+        ctx: Any, multipliers: Tensor, answers: Sequence[ExactAnswers], wrenches: Tensor
+    ) -> Tensor:
         """Evaluates whitened multipliers (R, T, 6) of robots at some of their wrenches (R, T).
 
         Returns:
@@ -145,22 +151,26 @@ class DualGap(torch.autograd.Function):
         return _tensor(np.stack(gaps))
 
     @staticmethod
-    def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor, None, None]:  # type: ignore[override]
+    def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor, None, None]:
         """The gradient by the multipliers."""
         (slope,) = ctx.saved_tensors
         return gradient[..., None] * slope, None, None
 
 
-def head_loss(weights: Weights, config: HeadConfig, data: PolicyData, robots: Tensor, wrenches: Tensor) -> Tensor:
+def head_loss(
+    weights: Weights, config: HeadConfig, data: PolicyData, robots: Tensor, wrenches: Tensor
+) -> Tensor:
     """Mean root of the relative dual gap of a network's multipliers."""
     batch = data.batch(robots, wrenches)
     multipliers = config.head(weights, batch).multipliers(batch.wrench)
     answers = [data.answers[k] for k in robots.tolist()]
-    gap: Tensor = DualGap.apply(multipliers, answers, wrenches)
+    gap: Tensor = DualGap.apply(multipliers, answers, wrenches)  # type: ignore[no-untyped-call]
     return (gap.clamp(min=0.0) + LEAST_GAP).sqrt().mean()
 
 
-def force_loss(weights: Weights, config: ForceConfig, data: PolicyData, robots: Tensor, wrenches: Tensor) -> Tensor:
+def force_loss(
+    weights: Weights, config: ForceConfig, data: PolicyData, robots: Tensor, wrenches: Tensor
+) -> Tensor:
     """Mean squared error of a network's forces over the largest ones, and of what they leave of the
     whitened wrench."""
     batch = data.batch(robots, wrenches)
@@ -169,7 +179,8 @@ def force_loss(weights: Weights, config: ForceConfig, data: PolicyData, robots: 
     columns = batch.column / batch.root_stiffness[..., None, None]
     # The exact forces give the wrench: what is left is what the error of the forces gives.
     missed = torch.einsum("rtma,rmak->rtk", error, columns)
-    return error.square().sum((2, 3)).mean() + missed.square().sum(-1).mean()
+    loss: Tensor = error.square().sum((2, 3)).mean() + missed.square().sum(-1).mean()
+    return loss
 
 
 def train_policy(
@@ -180,7 +191,7 @@ def train_policy(
     steps: int | None = None,
     resume: bool = False,
 ) -> dict[str, float]:
-    """Trains a network, and writes its file, a log and a state into a folder.
+    """Trains a network, and writes its file into a folder, log, curves and state into one below.
 
     Args:
         folder: where to; made if need be.
@@ -221,7 +232,7 @@ def train_policy(
         write_policy(folder, network, vars(config), shipped, {**identity, **made, "preset": preset})
 
     with workplace("cpu", recipe.loop.batch_size) as place:
-        run = Training(weights, recipe.loop, folder, identity, place)
+        run = Training(weights, recipe.loop, folder / network, identity, place)
         if resume:
             run.resume()
         run.run(terms_of, save)

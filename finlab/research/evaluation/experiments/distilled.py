@@ -8,6 +8,7 @@ take turns, each the least of several.
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
@@ -51,6 +52,10 @@ JET_ROBOTS = ("bluerov2_heavy", "A")
 """Robots whose answers are timed with and without jets."""
 
 
+JET_WRENCHES = 64
+"""Wrenches of each of them."""
+
+
 class Judged(NamedTuple):
     """What one policy does on one robot with N wrenches."""
 
@@ -84,7 +89,7 @@ def run(
         wrenches: of a batch.
         folder: of networks that `finlab train policy` has written; without it they are trained
             first.
-        preset: recipe of that training, default or smoke.
+        preset: recipe of that training: default, long or smoke.
         seed: of robots and wrenches, and of the training.
     """
     check_names("policies", policies, POLICIES)
@@ -102,7 +107,7 @@ def run(
         if (group, policy) in judged
     ]
     if "exact" in policies:
-        rows.append(_row_of_jets(wrenches // 64))
+        rows.append(_row_of_jets(JET_WRENCHES))
     return rows
 
 
@@ -122,10 +127,7 @@ def _networks(
 
 
 def _judge_robot(
-    answers: ExactAnswers,
-    policies: Sequence[str],
-    networks: dict[str, TrainedPolicy],
-    seed: int,
+    answers: ExactAnswers, policies: Sequence[str], networks: dict[str, TrainedPolicy], seed: int
 ) -> dict[str, Judged]:
     """What policies do on one robot. Its first answers are those that may be stored."""
     stored = _rows(answers, slice(STORED))
@@ -151,13 +153,11 @@ def _judge_robot(
     judged = {}
     for policy, propose in proposals.items():
         error, residual = _errors(asked, plant, propose(asked.wrench))
-        points = core.dual_points(
-            asked.wrench, propose(asked.wrench), MOST_STEPS, robot.conditions
-        )
+        points = core.dual_points(asked.wrench, propose(asked.wrench), MOST_STEPS, robot.conditions)
         judged[policy] = Judged(
             error=error,
             residual=residual,
-            steps=points.steps,
+            steps=points.steps.astype(np.float64),
             excess=_excess(asked, plant, answer(policy)),
             time=times[policy] / times["dual"],
             proposing=proposing[policy] / times["dual"],
@@ -179,9 +179,7 @@ def _judge_forces(
     times = _least_times(
         {"whole": 0, "proposing": 0},
         lambda part: (
-            policy.commands(few.wrench, STEPS[-1])
-            if part == "whole"
-            else policy.forces(few.wrench)
+            policy.commands(few.wrench, STEPS[-1]) if part == "whole" else policy.forces(few.wrench)
         ),
     )
     error = np.array([each.error for each in refined])
@@ -290,9 +288,8 @@ def _row_of_jets(wrenches: int) -> Row:
             "with": Allocator(replace(layout, interaction=Jets())),
             "without": Allocator(layout),
         }
-        times = _least_times(
-            allocators, lambda key, of=allocators, asked=wrench: of[key].allocate_batch(asked)
-        )
+        answer = partial(_answer_batch, allocators, wrench)
+        times = _least_times(allocators, answer)
         shares.append(1.0 - times["without"] / times["with"])
     return {
         "group": "jets",
@@ -302,6 +299,11 @@ def _row_of_jets(wrenches: int) -> Row:
         "time": float(np.exp(np.log(shares).mean())),
         "time_least": float(min(shares)),
     }
+
+
+def _answer_batch(allocators: dict[str, Allocator], wrench: Array, key: str) -> object:
+    """The answers of one of some allocators."""
+    return allocators[key].allocate_batch(wrench)
 
 
 experiment = Experiment(
