@@ -75,7 +75,7 @@ class Judged(NamedTuple):
 
 def run(
     policies: tuple[str, ...] = POLICIES,
-    robots: int = 12,
+    robots: int = 8,
     wrenches: int = 4096,
     folder: str | None = None,
     preset: str = "default",
