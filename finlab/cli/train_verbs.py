@@ -169,7 +169,8 @@ def policy(
         output: folder for the networks, and of each log, curves and state.
         network: head, which a network makes for a robot and which gives multipliers, forces, which
             a Transformer gives for each wrench, or both.
-        preset: recipe: default (half a minute of a core each), long (five minutes) or smoke (seconds).
+        preset: recipe: default (half a minute of a core each), long (five minutes) or smoke
+            (seconds).
         seed: of robots, wrenches and first weights.
         steps: optimizer steps instead of the recipe's.
         resume: go on from the last state in the folder.
