@@ -32,6 +32,7 @@ SIGNATURES = {
     "fl_conjugates": "ippppipp",
     "fl_power_bounds": "ipppppipp",
     "fl_power_bound_of_row": "rppppp",
+    "fl_dual_points": "ippppiipppppp",
     "fl_reach": "vpppppirppp",
     "fl_jets": "vppipppp",
     "fl_line_jets_length": "ip",

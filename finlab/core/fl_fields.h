@@ -84,7 +84,7 @@ FL_FIELD(fl_real, wrench, [6], "N, N m",
          "desired; behind it all is zeros where there is nothing to say")
 FL_FIELD(fl_policy_at, policy, , "address", "what to give beyond reach; 0: nothing else")
 FL_FIELD(fl_reals, multipliers, , "address",
-         "lambda (6,) of the wrench [W/N, W/(N m)] to begin with; 0 for none")
+         "lambda (6,) of the wrench [W/N, W/(N m)] to begin with, of many (count, 6); 0 for none")
 FL_FIELD(fl_reals, previous, , "address",
          "commands (n, 3) of the tick before, NaN for an unknown one; 0 for none")
 FL_FIELD(fl_bytes, lost, , "address", "(n,) which actuators do not work; 0 for none")
