@@ -228,6 +228,7 @@ typedef struct {
   int command_table; /* what fl_actuator.command_table is: BEAT_TABLE ... */
   int has_law_grid;  /* whether the law is a grid */
   int has_drag;      /* whether the second axis of the law is drag */
+  int reverses_straight; /* whether in reverse it pushes against its first axis, at any angle */
 } command_form;
 const command_form *fl_form_of(const fl_actuator *a);
 int fl_aims_force(const fl_actuator *a);
