@@ -6,7 +6,7 @@ deflection 0, and the direction of the thrust), and shaft x zero.
 Behind a disc of area A that gives the thrust T, the water is faster than the flow V that meets the
 disc from ahead: V_inf^2 = V^2 + 2 T / (rho A), by momentum theory (Brix, 1993, section 1.2.4;
 Bertram, 2012, section 6.4). Of what the slipstream adds to the dynamic pressure the share k meets
-the rudder, of area S: 1/2 rho V_R^2 = 1/2 rho V^2 + k T / A. With the coefficients of lift and drag
+the rudder, on the mean over its area S: 1/2 rho V_R^2 = 1/2 rho V^2 + k T / A. With the coefficients of lift and drag
 of `rudder.py` at the deflection d, the force is
 
     F = (T, 0) + 1/2 rho V_R^2 S (-CD(d), CL(d)).
@@ -91,10 +91,12 @@ CURVE_ANGLES = 1025
 are turned into deflections."""
 LAW_ANGLES = 2049
 """Deflections from -90 to 90 deg of the grid from which the core evaluates the law."""
+BEYOND = 3
+"""Points of the gauge beyond each end of the arc that go on along its tangent."""
 SEARCHED = 65
 """Deflections in each of the searches for the one that is worth most at a price."""
 
-Share = Annotated[float, Meta(ge=0.05, le=1.0)]
+Share = Annotated[float, Meta(ge=1e-3, le=1.0)]
 """A share of the slipstream's dynamic pressure [1]."""
 
 
@@ -353,11 +355,19 @@ def _arc_of(rudder: Rudder, race_area: float) -> Arc:
     ends = direction(np.array([used_low, used_high]))
     first, last = np.arctan2(ends[:, 1], ends[:, 0]).tolist()
 
-    # The deflection for a force in each of POINTS directions around the circle.
+    # Deflection and |g| for a force in each of POINTS directions around the circle. Beyond both ends
+    # they go on along their tangents for some points, by which the core interpolates at the ends.
     around = wrapped(np.arange(POINTS) * (TURN / POINTS))
-    rising = np.maximum.accumulate(angle)
-    needed = np.interp(around, rising, deflection)
-    gauge = np.hypot(*direction(needed).T)
+    within = np.clip(around, angle[0], angle[-1])
+    beyond = np.clip(around - within, -BEYOND * TURN / POINTS, BEYOND * TURN / POINTS)
+    needed = np.interp(within, angle, deflection)
+    size = np.hypot(*direction(needed).T)
+    sizes = np.hypot(*g.T)
+    at_end = np.where(around > 0.0, -1, 0)  # the last or the first point of the curve
+    d_deflection = np.gradient(deflection, angle)[at_end]
+    d_size = np.gradient(sizes, angle)[at_end]
+    needed = needed + beyond * d_deflection
+    gauge = size + beyond * d_size
 
     knots = np.linspace(-0.5 * np.pi, 0.5 * np.pi, LAW_ANGLES)
     no_axis = np.zeros(1)
@@ -407,11 +417,12 @@ class PropellerRudder(Propeller):
         force: least and most thrust [N]; in reverse nothing meets the rudder.
         model: electrical power over the thrust [W]: `PowerLaw` or `PowerTable`.
         diameter: diameter D of the propeller, whose disc is pi D^2 / 4 [m].
-        area: area of the rudder that lies in the slipstream [m^2].
+        area: area S of the rudder [m^2].
         aspect_ratio: effective aspect ratio of the rudder, 2 span^2 / area for one on a hull [1].
         deflection: least and greatest deflection [rad].
         slipstream: share k of the dynamic pressure that the slipstream adds, far behind the
-            propeller, which meets the rudder [1].
+            propeller, which meets the rudder, on the mean over its area [1]: 1 of one that lies
+            in it whole.
         lift_slope: derivative of the lift coefficient by the angle [1/rad]; None: by the aspect
             ratio, after Whicker and Fehlner.
         drag: drag coefficient without lift [1].
@@ -460,6 +471,7 @@ class PropellerRudder(Propeller):
         drawn_as="pod",
         faults=("weak", "stuck", "running"),
         arc="deflection",
+        described=False,
         models=FORMULAS,
     )
     dead_band: ClassVar[float] = 0.0  # type: ignore[misc]
@@ -510,9 +522,8 @@ class PropellerRudder(Propeller):
             raise LayoutError(
                 f"the rudder would push aside with {aside:.3g} times the thrust, more than the "
                 f"slipstream's momentum allows, got {self.area:g} m^2 behind a propeller of "
-                f"{self.diameter:g} m; give the area that lies in the slipstream, or less of its "
-                "pressure (slipstream)",
-                "area",
+                f"{self.diameter:g} m; say with `slipstream` what share of it lies in the slipstream",
+                "slipstream",
             )
 
     @property
