@@ -91,6 +91,8 @@ CURVE_ANGLES = 1025
 are turned into deflections."""
 LAW_ANGLES = 2049
 """Deflections from -90 to 90 deg of the grid from which the core evaluates the law."""
+OFFSET = -1.0
+"""Drag coefficient by which the core takes the offset (-p, 0) of a lost one off."""
 BEYOND = 3
 """Points of the gauge beyond each end of the arc that go on along its tangent."""
 SEARCHED = 65
@@ -145,9 +147,10 @@ class SteeredLaw(ActuatorLaw):
         g = np.where(is_ahead[..., None], g, straight)
         slope = np.where(is_ahead[..., None], slope, 0.0)
 
+        # (T + p) g - (p, 0) = (T, 0) + (T + p) (g - (1, 0)), without the difference of two p.
         force = np.zeros((*slipstream.shape, 3))
-        force[..., 1:] = slipstream[..., None] * g
-        force[..., 1] -= p
+        force[..., 1:] = slipstream[..., None] * (g - straight)
+        force[..., 1] += T
         jacobian = np.zeros((*slipstream.shape, 3, 3))
         jacobian[..., 0, 1:] = slipstream[..., None] * slope
         jacobian[..., 1, 1:] = g
@@ -293,7 +296,14 @@ class SteeredGroup(Group):
     def forms(self) -> list[Form]:
         forms = []
         for arc, p in zip(self._arcs, self._slipstream.tolist(), strict=True):
-            forms.append(Form("steered", law=arc.law, deflection=arc.lean, pressure_area=p))
+            form = Form(
+                "steered",
+                law=arc.law,
+                deflection=arc.lean,
+                pressure_area=p,
+                zero_lift_drag=OFFSET,
+            )
+            forms.append(form)
         return forms
 
 

@@ -367,7 +367,7 @@ class Form(NamedTuple):
     zero_lift_angle: float = 0.0
     """Of a foil: command at which it has no lift [rad]."""
     zero_lift_drag: float = 0.0
-    """Of a foil: drag coefficient there [1]."""
+    """Of a foil: drag coefficient there [1]. Of a propeller with a rudder -1: p pushes ahead."""
 
 
 class Group(ABC):
