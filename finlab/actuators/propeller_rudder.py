@@ -62,7 +62,6 @@ from finlab.actuators.propeller import (
 )
 from finlab.actuators.response import POINTS, Form, Group, Plane, RadialTable
 from finlab.actuators.rudder import (
-    PEAK,
     Area,
     AspectRatio,
     Coefficient,
@@ -386,12 +385,12 @@ def _arc_of(rudder: Rudder, race_area: float) -> Arc:
 
 
 def _angle_of_peak(law: RudderLaw) -> float:
-    """The deflection [rad] at which a foil has `PEAK` of its largest lift before stall."""
+    """The deflection [rad] at which a foil has its largest lift before stall. It may be used whole:
+    as the thrust changes, too, the marginal cost of a force aside has a bound there."""
     angle = np.linspace(0.0, 0.5 * np.pi, LAW_ANGLES)
     lift = law.coefficients(angle[:, None]).lift[:, 0]
     falls = np.append(np.diff(lift) <= 0.0, True)
-    largest = lift[int(np.argmax(falls))]
-    return float(angle[int(np.argmax(lift >= PEAK * largest))])
+    return float(angle[int(np.argmax(falls))])
 
 
 class SteeredCommand(
