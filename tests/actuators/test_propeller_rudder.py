@@ -197,8 +197,6 @@ def test_damage(boat: Layout) -> None:
     assert weak.command[0, 1] == pytest.approx(5.0)
     running = allocator.allocate([0] * 6, damage=Damage(running={"screw": (0.1, 2.0)}))
     np.testing.assert_allclose(running.command, [[0.1, 2.0, 0.0]])
-    lost = allocator.allocate([1, 0, 0, 0, 0, 0], lost=["screw"])
-    assert lost.commands["screw"] is None
 
 
 def test_a_mirrored_one_gives_the_mirrored_wrench(boat: Layout) -> None:
