@@ -138,6 +138,15 @@ class OracleSet:
         force, earned = self.rays[0].answer(size * uneven * math.cos(phi + lean - towards))
         return force * uneven * np.array([math.cos(phi + lean), math.sin(phi + lean)]), earned
 
+    def watts_at(self, numbers: Array, costs: Any) -> float:
+        """Watts at the numbers of `_polar`, with a spline of the costs over sizes."""
+        actuator = self.actuator
+        if actuator.kind == "propeller_rudder":
+            return float(actuator.propeller_watts(numbers[1]))
+        if actuator.kind in ("thruster", "rudder"):
+            return float(actuator.watts(np.array([numbers[0], 0.0, 0.0])))
+        return float(costs(numbers[0]))
+
     def _direction(self, towards: float) -> float:
         """The zero direction [rad] at which a force is worth most, the price pointing at
         `towards`."""
@@ -364,12 +373,7 @@ def least_known(plant: OraclePlant, wrench: Array, starts: int = 8, seed: int = 
     def watts(x: Array) -> float:
         total = 0.0
         for each, spline, a in zip(sets, splines, parts[:-1], strict=True):
-            one_number = each.actuator.kind in ("thruster", "rudder")
-            command = np.array([x[a], 0.0, 0.0])
-            if each.actuator.kind == "propeller_rudder":
-                total += float(each.actuator.propeller_watts(x[a + 1]))
-                continue
-            total += float(each.actuator.watts(command) if one_number else spline(x[a]))
+            total += each.watts_at(x[a:], spline)
         return total
 
     pulled = [_polar(sets, _dual(plant, halves, wrench)[1]) for halves in _halves(plant, 2)]

@@ -296,11 +296,7 @@ class SteeredGroup(Group):
         forms = []
         for arc, p in zip(self._arcs, self._slipstream.tolist(), strict=True):
             form = Form(
-                "steered",
-                law=arc.law,
-                deflection=arc.lean,
-                pressure_area=p,
-                zero_lift_drag=OFFSET,
+                "steered", law=arc.law, deflection=arc.lean, pressure_area=p, zero_lift_drag=OFFSET
             )
             forms.append(form)
         return forms
@@ -323,13 +319,7 @@ def _plane(unit: PropellerRudder, arc: Arc, p: float, matrix: Array) -> Plane:
     if least + p < 0.0:
         reverse = _table(unit.model, p, -1, max(-most - p, 0.0), -least - p)
     return Plane(
-        matrix,
-        ahead,
-        arc.center,
-        arc.half_angle,
-        arc.gauge,
-        reverse=reverse,
-        high=most + p,
+        matrix, ahead, arc.center, arc.half_angle, arc.gauge, reverse=reverse, high=most + p
     )
 
 
@@ -347,9 +337,7 @@ def _arc_of(rudder: Rudder, race_area: float) -> Arc:
     def direction(deflection: Array) -> Array:
         """g (K, 2) of deflections (K,) [rad]."""
         foil = law.coefficients(deflection[:, None])
-        return np.stack(
-            [1.0 - race_area * foil.drag[:, 0], race_area * foil.lift[:, 0]], axis=-1
-        )
+        return np.stack([1.0 - race_area * foil.drag[:, 0], race_area * foil.lift[:, 0]], axis=-1)
 
     # The core uses a rudder up to the peak of its lift; beyond it the same force takes more drag.
     peak = _angle_of_peak(law)

@@ -336,8 +336,8 @@ class Form(NamedTuple):
     core, where `finlab/core/src/command_law.c` reads them."""
 
     kind: Literal["thruster", "pod", "fin", "foil", "steered"]
-    """What a command is: a force; an angle and a force; a beat of a fin; an angle of a foil; that of a
-    rudder, and the force of the propeller before it."""
+    """What a command is: a force; an angle and a force; a beat of a fin; an angle of a foil;
+    that of a rudder, and the force of the propeller before it."""
     axes: Array | None = None
     """Axes (3, 3) of the law's forces in the actuator's own ones; None where they are the same."""
     law: Array | None = None

@@ -69,9 +69,7 @@ def _pairs(actuators: Sequence[Actuator]) -> list[tuple[int, int]]:
                 found.append((i, k))
     thrusters = [i for i, _ in found]
     rudders = [k for _, k in found]
-    return [
-        (i, k) for i, k in found if thrusters.count(i) == 1 and rudders.count(k) == 1
-    ]
+    return [(i, k) for i, k in found if thrusters.count(i) == 1 and rudders.count(k) == 1]
 
 
 def _is_behind(thruster: Thruster, rudder: Rudder) -> bool:

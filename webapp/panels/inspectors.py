@@ -153,9 +153,7 @@ POWER_LAW: tuple[Box, ...] = (
 """Boxes of a propeller's power law."""
 FOIL_LAW: tuple[Box, ...] = (
     NumberBox(label="Area [m²]", key="area", hint="Of the foil.", step=0.001),
-    NumberBox(
-        label="Aspect ratio", key="aspect_ratio", hint="2 span²/area for a foil on a hull."
-    ),
+    NumberBox(label="Aspect ratio", key="aspect_ratio", hint="2 span²/area for a foil on a hull."),
     NumberBox(
         label="Lift slope [1/rad]",
         key="lift_slope",

@@ -289,8 +289,8 @@ static void fin_force(const real *block, const fl_actuator *a, const real *comma
 /* Force of a propeller with a rudder in its slipstream, by deflection and thrust T, beyond that
    at T = -p: (T + p) g, where g = (1 - sigma CD, sigma CL) is the law's grid and p the thrust
    whose slipstream is as fast as the flow. In reverse nothing meets the rudder. */
-static void steered_force(const real *block, const fl_actuator *a, const real *command,
-                          real *force, real (*slope)[3], int has_slope) {
+static void steered_force(const real *block, const fl_actuator *a, const real *command, real *force,
+                          real (*slope)[3], int has_slope) {
   const real slipstream = command[1] + a->pressure_area;
   if (slipstream < 0) {
     force[1] = slipstream;
