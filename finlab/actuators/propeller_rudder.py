@@ -4,10 +4,10 @@ Command: (deflection [rad], thrust [N], 0). Own frame: shaft of the rudder, zero
 deflection 0, and the direction of the thrust), and shaft x zero.
 
 Behind a disc of area A that gives the thrust T, the water is faster than the flow V that meets the
-disc from ahead: V_inf^2 = V^2 + 2 T / (rho A), by momentum theory (Brix, 1993, section 1.2.4;
-Bertram, 2012, section 6.4). Of what the slipstream adds to the dynamic pressure the share k meets
-the rudder, on the mean over its area S: 1/2 rho V_R^2 = 1/2 rho V^2 + k T / A. With the coefficients of lift and drag
-of `rudder.py` at the deflection d, the force is
+disc from ahead: V_inf^2 = V^2 + 2 T / (rho A), by momentum theory (Brix, 1993;
+Bertram, 2012, chapter 6). Of what the slipstream adds to the dynamic pressure the share k meets
+the rudder, on the mean over its area S: 1/2 rho V_R^2 = 1/2 rho V^2 + k T / A. With the
+coefficients of lift and drag of `rudder.py` at the deflection d, the force is
 
     F = (T, 0) + 1/2 rho V_R^2 S (-CD(d), CL(d)).
 
@@ -352,7 +352,7 @@ def _arc_of(rudder: Rudder, race_area: float) -> Arc:
     ends = direction(np.array([used_low, used_high]))
     first, last = np.arctan2(ends[:, 1], ends[:, 0]).tolist()
 
-    # Deflection and |g| for a force in each of POINTS directions around the circle. Beyond both ends
+    # Deflection and |g| for a force in each of POINTS directions around the circle. Beyond the ends
     # they go on along their tangents for some points, by which the core interpolates at the ends.
     around = wrapped(np.arange(POINTS) * (TURN / POINTS))
     within = np.clip(around, angle[0], angle[-1])
@@ -519,7 +519,7 @@ class PropellerRudder(Propeller):
             raise LayoutError(
                 f"the rudder would push aside with {aside:.3g} times the thrust, more than the "
                 f"slipstream's momentum allows, got {self.area:g} m^2 behind a propeller of "
-                f"{self.diameter:g} m; say with `slipstream` what share of it lies in the slipstream",
+                f"{self.diameter:g} m; say with `slipstream` what share of it lies there",
                 "slipstream",
             )
 
