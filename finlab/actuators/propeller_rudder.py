@@ -62,6 +62,7 @@ from finlab.actuators.propeller import (
 )
 from finlab.actuators.response import POINTS, Form, Group, Plane, RadialTable
 from finlab.actuators.rudder import (
+    PEAK,
     Area,
     AspectRatio,
     Coefficient,
@@ -373,12 +374,13 @@ def _arc_of(rudder: Rudder, race_area: float) -> Arc:
 
 
 def _angle_of_peak(law: RudderLaw) -> float:
-    """The deflection [rad] at which a foil has its largest lift before stall. It may be used whole:
-    as the thrust changes, too, the marginal cost of a force aside has a bound there."""
+    """The deflection [rad] at which a foil has `PEAK` of its largest lift before stall: from there on
+    drag grows so fast beside lift that |g| falls within less than a step of the gauge."""
     angle = np.linspace(0.0, 0.5 * np.pi, LAW_ANGLES)
     lift = law.coefficients(angle[:, None]).lift[:, 0]
     falls = np.append(np.diff(lift) <= 0.0, True)
-    return float(angle[int(np.argmax(falls))])
+    largest = lift[int(np.argmax(falls))]
+    return float(angle[int(np.argmax(lift >= PEAK * largest))])
 
 
 class SteeredCommand(

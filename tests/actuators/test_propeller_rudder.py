@@ -135,7 +135,7 @@ def test_derivatives_are_those_of_differences(boat: Layout, V: float) -> None:
 
 def least_power_by_search(plant: OraclePlant, Tz: float) -> float:
     """Least power [W] of the commands of a boat of one unit that give a torque, surge being free:
-    of each deflection the thrust that gives it."""
+    of each deflection the thrust that gives it, up to 99.5 % of the largest lift."""
     unit = plant.actuators[0]
     low, high = unit.limits
     deflection = np.linspace(low[0], high[0], 20001)
@@ -143,7 +143,8 @@ def least_power_by_search(plant: OraclePlant, Tz: float) -> float:
     per_newton = unit.steered(deflection, np.ones(20001))[:, 1] - none
     with np.errstate(divide="ignore", invalid="ignore"):
         thrust = (Tz / unit.position[0] - none) / per_newton
-    is_possible = (thrust >= 0.0) & (thrust <= high[1])
+    is_used = np.abs(per_newton) <= 0.995 * np.abs(per_newton).max()
+    is_possible = (thrust >= 0.0) & (thrust <= high[1]) & is_used
     return float(unit.propeller_watts(thrust[is_possible]).min())
 
 
