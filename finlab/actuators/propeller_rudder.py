@@ -374,7 +374,7 @@ def _arc_of(rudder: Rudder, race_area: float) -> Arc:
 
 
 def _angle_of_peak(law: RudderLaw) -> float:
-    """The deflection [rad] at which a foil has `PEAK` of its largest lift before stall: from there on
+    """The deflection [rad] at which a foil has `PEAK` of its largest lift before stall: beyond it
     drag grows so fast beside lift that |g| falls within less than a step of the gauge."""
     angle = np.linspace(0.0, 0.5 * np.pi, LAW_ANGLES)
     lift = law.coefficients(angle[:, None]).lift[:, 0]
