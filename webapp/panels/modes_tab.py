@@ -237,6 +237,7 @@ LEFT_OUT = {
     "CasADi": "CasADi is not installed",
     "checkpoint": "has no network here",
     "flow": "knows no moving water",
+    "power:": "keeps no power budget",
 }
 """Words of the reason why a method has no answer -> what the table says of it, in four words."""
 NO_ANSWER = "has no answer here"

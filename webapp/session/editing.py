@@ -90,6 +90,7 @@ class Session(BaseSession):
         which was."""
         self._commit(step, state)
         self.selection_order = ()
+        self.given_loads = None
         self.saved = state.layout
 
     def new_layout(self, kind: str) -> None:
@@ -118,6 +119,21 @@ class Session(BaseSession):
     def describe_robot(self, text: str) -> None:
         """Another description of the robot."""
         self._edit("Describe the robot", replace(self.state.layout, description=text.strip()))
+
+    def set_power(self, watts: float | None) -> None:
+        """Another power budget of all actuators together [W]; None for no limit."""
+        layout = layout_edits.with_power(self.state.layout, watts)
+        self._edit("Power budget" if watts is not None else "No power budget", layout)
+
+    def set_bus_power(self, place: int, watts: float | None) -> None:
+        """Another power budget of a bus [W], by its place among those of the layout; without a
+        limit (None) there is no such bus any more."""
+        layout = self.state.layout
+        if place >= len(layout.buses):
+            raise FinlabError("that bus is gone")
+        name = layout.buses[place].name
+        step = f"Power of bus {name}" if watts is not None else f"No limit of bus {name}"
+        self._edit(step, layout_edits.with_bus_power(layout, name, watts))
 
     def set_hull(self, shape: str, size: Vector3) -> None:
         """A parametric hull of a size [m]."""

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from finlab.actuators.kinds import KINDS
+from finlab.allocation.power_budget import MOST_WATTS
 from finlab.analysis.moves import is_mirrored
 from finlab.arrays import Array
 from finlab.axes import Vector3, rotation, wrapped
@@ -38,6 +39,8 @@ AZIMUTHS = (180, 150, -150, 120, -120, 90, -90, 60, -60, 30, -30, 0)
 STAND_OFF = 0.02
 """Distance of a new actuator from the hull: room for the servo [m]."""
 
+LEAST_BUDGET = 1e-6
+"""Smallest power budget that the page may ask for [W]."""
 DYNAMICS = tuple(field.name for field in fields(Body) if field.name != "hull")
 """Fields of a body that say how it moves."""
 
@@ -266,6 +269,30 @@ def balanced(layout: Layout, center: Vector3) -> Layout:
         replace(actuator, position=shifted(actuator.position)) for actuator in layout.actuators
     ]
     return replace(layout, actuators=tuple(actuators), body=body)
+
+
+def with_power(layout: Layout, watts: float | None) -> Layout:
+    """The layout with another budget of all actuators together [W]; None for no limit."""
+    return replace(layout, power_w=_checked_budget(watts, "power budget [W]"), buses=())
+
+
+def with_bus_power(layout: Layout, name: str, watts: float | None) -> Layout:
+    """The layout with another budget of a bus [W]; without a limit (None) there is no such bus."""
+    budget = _checked_budget(watts, f"power budget of bus {name} [W]")
+    buses = []
+    for bus in layout.buses:
+        if bus.name != name:
+            buses.append(bus)
+        elif budget is not None:
+            buses.append(replace(bus, power_w=budget))
+    return replace(layout, buses=tuple(buses))
+
+
+def _checked_budget(watts: float | None, name: str) -> float | None:
+    """A power that actuators may take together [W], within what a page may ask for."""
+    if watts is None:
+        return None
+    return number(watts, name, LEAST_BUDGET, MOST_WATTS)
 
 
 def with_dynamics(layout: Layout, **values: Any) -> Layout:

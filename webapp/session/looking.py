@@ -21,7 +21,7 @@ NULL_SPACE = "Null space"
 TWO_ROBOTS = "Two robots"
 """Tab of the drawer that compares two robots; the view shows both."""
 DRAWERS: dict[str, tuple[str, ...]] = {
-    "Design": ("Reach", "Improve"),
+    "Design": ("Reach", "Improve", "Capability"),
     "Allocate": (CANDIDATES, NULL_SPACE, "Comparison", TWO_ROBOTS),
     "Simulate": ("Swim over time",),
     "Export": (),

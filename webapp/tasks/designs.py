@@ -8,6 +8,7 @@ from pathlib import PurePath
 import viser
 
 from finlab.allocation.allocation import Allocation
+from finlab.analysis.capability import Capability
 from finlab.deploy.bundle import make_bundle
 from finlab.deploy.robot_graph import graph_text
 from finlab.errors import FinlabError
@@ -292,6 +293,16 @@ class Designs:
         """Send the candidates of an answer as CSV."""
         name = file_stem(answer.layout.name) + files.CANDIDATES
         self._export(name, partial(modes_csv, answer, modes))
+
+    def save_capability(self, plot: Capability, make: Callable[[], tuple[str, bytes]]) -> None:
+        """Send a capability plot as a file; `make` gives its suffix and content, on a thread."""
+        stem = file_stem(plot.layout) + files.CAPABILITY
+
+        def send(made: tuple[str, bytes]) -> None:
+            suffix, content = made
+            self._download(f"{stem}.{suffix}", content)
+
+        self._deferred.make(make, send, stem)
 
     def swim(self, swimming: Swimming) -> None:
         """Send the log of the robot that swims as NPZ."""

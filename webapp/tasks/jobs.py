@@ -15,6 +15,7 @@ from webapp.tasks.analysing import (
     find_set,
 )
 from webapp.tasks.answering import Answering, Refining
+from webapp.tasks.capability import CapabilityPlot
 from webapp.tasks.comparing import Comparison
 from webapp.tasks.context import Context
 from webapp.tasks.fitting import Fitting
@@ -53,6 +54,7 @@ class Jobs:
             pools.brief, bell, analyse, rest_s=CARD_REST_S
         )
         self.improver = Improver(context)
+        self.capability = CapabilityPlot(context)
         self.growing: Slot[SetQuestion, AttainableSet] = Slot(
             pools.brief, bell, find_set, live=True
         )
@@ -104,6 +106,8 @@ class Jobs:
                 () if before is None else before.lost,
             )
             self.analyst.ask(question)
+        if task == "Design":
+            self.improver.ask_bound()
         kind = DRAWN[drawn]
         if task == "Design" and kind is not None:
             best = self.improver.best
@@ -132,7 +136,14 @@ class Jobs:
         """The page has gone."""
         self.swimming.halt()
         self.refining.stop()
-        for slot in (self.comparison, self.improver, self.growing, self.fitting, self.log):
+        for slot in (
+            self.comparison,
+            self.improver,
+            self.capability,
+            self.growing,
+            self.fitting,
+            self.log,
+        ):
             slot.forget()
         self.pairing.forget()
         self.offers.forget()
