@@ -9,7 +9,7 @@ from typing import TypeVar
 
 from finlab.errors import FinlabError
 
-VERSION = 29
+VERSION = 30
 """What `fl_version()` of the C files returns; both rise together where a signature or a struct
 changes."""
 SIGNATURES = {

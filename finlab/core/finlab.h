@@ -83,7 +83,7 @@ typedef double fl_wide; /* where differences of large numbers matter, in single 
 #define FL_BUDGETS (13 * FL_STEPS)
 #define FL_BOUND (2 * (FL_FORCES + FL_FOILS) + FL_BUDGETS)
 
-#define FL_VERSION 29  /* of all structs and functions here */
+#define FL_VERSION 30  /* of all structs and functions here */
 #define FL_MAGIC 41721 /* first number of a block */
 
 /* The structs that cross the border of the library. */
@@ -127,6 +127,7 @@ enum {
   FL_POD,      /* an angle and a force */
   FL_FIN,      /* amplitude, frequency and direction of a beat */
   FL_FOIL,     /* an angle */
+  FL_STEERED,  /* deflection of a rudder, and the force of the propeller before it */
   FL_KINDS     /* how many kinds there are */
 };
 

@@ -57,7 +57,9 @@ FL_FIELD(fl_real, command_sign, , "1",
 FL_FIELD(fl_real, lean_angle, , "rad", "of a fin or foil: angle from command to force")
 FL_FIELD(fl_real, unevenness, , "1", "of a fin: 1 + unevenness cos(angle - unevenness_angle)")
 FL_FIELD(fl_real, unevenness_angle, , "rad", "see unevenness")
-FL_FIELD(fl_real, pressure_area, , "N", "of a foil: dynamic pressure times area")
+FL_FIELD(fl_real, pressure_area, , "N",
+         "of a foil: dynamic pressure times area; of a steered propeller: p, the thrust whose "
+         "slipstream is as fast as the flow")
 FL_FIELD(fl_real, zero_lift_angle, , "rad", "of a foil: angle without lift")
 FL_FIELD(fl_real, zero_lift_drag, , "1", "of a foil: coefficient of drag there")
 FL_FIELD(fl_real, uncertainty_cost, , "W/N^2",
