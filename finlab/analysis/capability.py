@@ -10,7 +10,7 @@ DP capability number (Beaufort's), and finds the highest number up to which all 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -208,6 +208,8 @@ def capability(
     headings: Sequence[float] = HEADINGS,
     lost: Collection[str] = (),
     flow: ArrayLike | None = None,
+    *,
+    progress: Callable[[float], object] | None = None,
 ) -> Capability:
     """Returns how much of a load a robot can hold by heading, and after each single loss.
 
@@ -220,6 +222,8 @@ def capability(
         headings: where the loads come from (H,) [deg], clockwise from ahead.
         lost: names of actuators that do not work already.
         flow: velocity of the robot relative to the water (6,) [m/s, rad/s]; None at rest.
+        progress: called with the share that is done before each case; what it raises ends the
+            computation.
 
     Raises:
         LayoutError: there is no actuator of a name, or the loads do not fit.
@@ -259,6 +263,7 @@ def capability(
         conditions=("load",),
         loads=wrench[:, None, :],
         scales=full,
+        progress=progress,
     )
 
 
@@ -268,6 +273,8 @@ def dp_capability(
     headings: Sequence[float] = HEADINGS,
     lost: Collection[str] = (),
     losses: Collection[str] = LOSSES,
+    *,
+    progress: Callable[[float], object] | None = None,
 ) -> Capability:
     """Returns the DP capability numbers of a ship by heading, and after each single loss, by
     DNV-ST-0111 (December 2021), level 1.
@@ -278,6 +285,7 @@ def dp_capability(
         headings: where the weather comes from (H,) [deg], clockwise from ahead.
         lost: names of actuators that do not work already.
         losses: which of `LOSSES` of thrust count besides the constant one; the standard has all.
+        progress: as in `capability`.
 
     Raises:
         LayoutError: there is no actuator of a name, or the standard has no rule for one.
@@ -312,6 +320,7 @@ def dp_capability(
         conditions=tuple(f"BF {k}" for k in range(len(WEATHER))),
         loads=loads,
         scales=scales,
+        progress=progress,
     )
     # The first condition that is not held, or the last of all.
     limiting = np.minimum(answered.values[0].astype(np.intp) + 1, len(WEATHER) - 1)
@@ -365,12 +374,16 @@ def _answered(
     conditions: tuple[str, ...],
     loads: Array,
     scales: Sequence[Array],
+    progress: Callable[[float], object] | None,
 ) -> Capability:
-    """A plot, by its loads (H, K, 6) and what is left of each case's actuators (C of (H, K, n))."""
+    """A plot, by its loads (H, K, 6) and what is left of each case's actuators (C of (H, K, n));
+    `progress` as in `capability`."""
     n_headings, n_conditions, _ = loads.shape
     share = np.zeros((len(cases), n_headings, n_conditions))
     refusals = []
     for c, (case, scale) in enumerate(zip(cases, scales, strict=True)):
+        if progress is not None:
+            progress(c / len(cases))
         # The actuators' wrench is to be the opposite of the load.
         flat_scale = scale.reshape(n_headings * n_conditions, -1)
         answer = largest_shares(case.sets, -loads.reshape(-1, 6), flat_scale)

@@ -64,8 +64,8 @@ def _bound_remarks(improvement: Improvement) -> list[Remark]:
         return []
     value = goal_value(improvement.goal, improvement.bound.value)
     words = f"no layout of these thrusters within these bounds has more than {value}"
-    if improvement.gap is not None:
-        words += f", {100.0 * improvement.gap:.1f} % more than this one"
+    if improvement.below is not None:
+        words = f"at most {100.0 * improvement.below:.1f} % below the best possible: {words}"
     return [Remark(as_sentence(words))]
 
 

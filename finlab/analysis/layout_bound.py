@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -81,6 +81,7 @@ def layout_bound(
     keep_outs: Sequence[KeepOut] = (),
     after_loss: bool = False,
     rounds: int = ROUNDS,
+    cancelled: Callable[[], bool] | None = None,
 ) -> LayoutBound:
     """Returns what the weakest direction of no layout exceeds.
 
@@ -97,6 +98,8 @@ def layout_bound(
         keep_outs: boxes in which none of those that move may stand.
         after_loss: whether to bound the weakest direction after the worst loss of a thruster.
         rounds: most rounds of the search for the best metric.
+        cancelled: called after each round; when it returns True, the bound is that of the best
+            metric so far, which holds as well.
 
     Raises:
         LayoutError: an actuator is no thruster, is unknown, or has no place left.
@@ -130,6 +133,8 @@ def layout_bound(
                 rounds=n_rounds,
             )
         if longest.sum() <= (1.0 + SETTLED) ** 2 * design.attained(metric):
+            break
+        if cancelled is not None and cancelled():
             break
         design.improve()
     return certificate

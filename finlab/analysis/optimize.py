@@ -104,6 +104,12 @@ class Improvement:
             return None
         return self.bound.value / self.value_after - 1.0
 
+    @property
+    def below(self) -> float | None:
+        """Share by which the goal is below the best possible at most [1], as `gap`."""
+        gap = self.gap
+        return None if gap is None else max(gap, 0.0) / (1.0 + max(gap, 0.0))
+
     def to_dict(self) -> dict[str, Any]:
         """Returns it as values for JSON: lengths in m, forces in N, powers in W; the powers of a
         mission are negative."""

@@ -15,7 +15,7 @@ from finlab.arrays import Array
 from finlab.axes import MotionAxis
 from finlab.display import html, text
 from finlab.display.pictures import ranges_picture
-from finlab.forces.force_sets import MAX_CUT, force_sets, wide_arcs
+from finlab.forces.force_sets import cut_actuators, force_sets, not_convex
 from finlab.layout import Layout
 from finlab.physics.objective import REACHED
 
@@ -148,15 +148,15 @@ def _notes(layout: Layout, lost: Collection[str], flow: Array | None) -> tuple[s
     """Sentences on where the numbers of the card are not exact."""
     sets = force_sets(layout, lost, flow)
     notes = []
-    n_wide = len(wide_arcs(sets))
-    if n_wide:
+    n_split = len(not_convex(sets))
+    if n_split:
         subject = "The weakest direction is"
-        if n_wide > MAX_CUT:
+        if n_split > len(cut_actuators(sets)):
             subject = "Largest wrenches, the weakest direction and energies are"
-        notes.append(
-            f"{subject} of the convex hull: some arcs are wider than half a turn but not full "
-            "circles."
-        )
+        reason = "some arcs are wider than half a turn but not full circles"
+        if any(getattr(each, "barred", ()) for each in layout.actuators):
+            reason = "some actuators have several arcs"
+        notes.append(f"{subject} of the convex hull: {reason}.")
     pushed_by_flow = [name for name in layout.flow_driven if name not in lost]
     if flow is not None and pushed_by_flow:
         notes.append("Forces of the flow count with the convex hull of their lift and drag.")

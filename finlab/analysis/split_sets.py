@@ -100,7 +100,8 @@ class SplitSet(NamedTuple):
 
 
 def split_set(name: str, effectiveness: Array, shape: Shape) -> SplitSet:
-    """Returns the set of an actuator by its shape; an arc wider than half a turn has two parts.
+    """Returns the set of an actuator by its shape; an arc wider than half a turn has two parts, and
+    one with several arcs a part for each.
 
     Args:
         name: of the actuator.
@@ -233,6 +234,7 @@ class _Search:
             radius=self._radius[piece],
             sector_center=self._center[piece],
             sector_half_angle=self._half_angle[piece],
+            n_parts=np.ones_like(piece),
             polygon_offset=self._offset[piece],
             block=self._block,
         )

@@ -4,11 +4,13 @@ sets as wrenches. `finlab.forces.reach`, the attainable sets and the analyses us
 A fin or an azimuth without limits of direction has a disc, whose radius is its largest thrust. With
 stops it has a sector of that disc. A sector wider than half a turn is not convex: it is replaced by
 its convex hull, the disc cut off along the chord between the stops, unless `convex_parts` has cut
-it in two. All other sets are polygons: the line of a thruster; the convex hull of the forces of a
-fin that are larger in some directions than in others; the convex hull of forces by the flow, such
-as lift and drag of a foil between its limits. Dead bands, and the tiny thrust that a fin cannot go
-below, are neglected. An azimuth that cannot stop has the convex hull of its ring sector; one with
-thrust of both signs within an arc has the convex hull of both sectors.
+it in two. An azimuth with several arcs has the convex hull of their sectors, a polygon, unless
+`convex_parts` has taken one of them. All other sets are polygons: the line of a thruster; the
+convex hull of the forces of a fin that are larger in some directions than in others; the convex
+hull of forces by the flow, such as lift and drag of a foil between its limits. Dead bands, and the
+tiny thrust that a fin cannot go below, are neglected. An azimuth that cannot stop has the convex
+hull of its ring sector; one with thrust of both signs within an arc has the convex hull of both
+sectors.
 
 Wrenches are scaled: torques are divided by `LEVER`, so that all six entries are in newton.
 """
@@ -17,7 +19,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
-from itertools import product
+from itertools import pairwise, product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,7 +31,7 @@ from finlab.actuators.response import Plane, Response
 from finlab.arrays import Array
 from finlab.axes import TURN
 from finlab.core.ray_reach import block_of_planes, ray_reach
-from finlab.layout import Layout
+from finlab.layout import Actuator, Layout
 from finlab.layout.effectiveness import own_effectiveness
 from finlab.physics.plant import plant_of
 
@@ -47,13 +49,15 @@ SIDES_OF_GAUGE = 193
 by at most 0.01 % of the width."""
 SIDES_OF_AZIMUTH = 48
 """Sides of the polygon of an azimuth: inside by at most 0.2 % of the width."""
+LEAST_RANGE = 1e-12
+"""Least range of a force by which is divided [N]."""
 SIDES_OF_FLOW = 24
 """Sides of the polygon of forces by the flow: inside by at most 1 % of the width."""
 MIN_ASPECT = 1e-3
 """Width over length below which a set counts as a line [1]."""
-MAX_CUT = 3
-"""Most actuators whose wide sectors are cut and give two parts each: every one doubles the number
-of parts."""
+MAX_PARTS = 12
+"""Most convex parts of a robot: every actuator whose set is cut has a factor of two or more in
+it."""
 
 
 class ForceSets(NamedTuple):
@@ -69,6 +73,8 @@ class ForceSets(NamedTuple):
     sector_half_angle: Array
     """Half of the arc (R, n) [rad]; pi for a full circle, 0 for a line, and for any polygon of an
     actuator of one command, such as a foil."""
+    n_parts: NDArray[np.intp]
+    """How many convex parts each set has (R, n); 1 of a convex one."""
     polygon_offset: Array
     """Offset of the polygon in the block (R, n); 0 for a sector."""
     block: Array
@@ -195,8 +201,15 @@ class Shape(NamedTuple):
     sector_half_angle: float
     """Half of the arc [rad]."""
     polygons: tuple[Array, ...] = ()
-    """Corners (K, 2) [N] of a polygon and, where its arc is wide, of those of the upper and the
-    lower half of it; none for a sector."""
+    """Corners (K, 2) [N] of a polygon and, where the set is not convex, of those of its convex
+    parts; none for a sector."""
+
+    @property
+    def n_parts(self) -> int:
+        """How many convex parts the set has; 1 of a convex one."""
+        if self.polygons:
+            return max(len(self.polygons) - 1, 1)
+        return 2 if is_wide(self.sector_half_angle) else 1
 
     @property
     def axes(self) -> int:
@@ -251,6 +264,7 @@ def assembled(shapes: Sequence[Sequence[Shape]], effectiveness: Array) -> ForceS
     radius = np.empty((robots, n))
     sector_center = np.empty((robots, n))
     sector_half_angle = np.empty((robots, n))
+    n_parts = np.ones((robots, n), np.intp)
     polygon_offset = np.zeros((robots, n))
     tables = [block_of_planes(n)]
     end_of_block = len(tables[0])
@@ -260,6 +274,7 @@ def assembled(shapes: Sequence[Sequence[Shape]], effectiveness: Array) -> ForceS
             radius[row, i] = shape.radius
             sector_center[row, i] = shape.sector_center
             sector_half_angle[row, i] = shape.sector_half_angle
+            n_parts[row, i] = shape.n_parts
             if shape.polygons:
                 polygon_offset[row, i] = end_of_block
             for corners in shape.polygons:
@@ -272,6 +287,7 @@ def assembled(shapes: Sequence[Sequence[Shape]], effectiveness: Array) -> ForceS
         radius=radius,
         sector_center=sector_center,
         sector_half_angle=sector_half_angle,
+        n_parts=n_parts,
         polygon_offset=polygon_offset,
         block=np.concatenate(tables),
     )
@@ -305,15 +321,33 @@ def _flow_shapes(layout: Layout, flow: ArrayLike | None) -> dict[str, Shape]:
         if not law.feels_flow:
             continue
         inflow = plant_of(layout).inflow(body_flow)
+        share = _shares_of_limits(layout.actuators[indices[0]])
         lower = layout.lower[indices]
         upper = layout.upper[indices]
-        share = np.linspace(0.0, 1.0, N_SAMPLES)[:, None, None]
-        command = lower + share * (upper - lower)
+        command = lower + share[:, None] * (upper - lower)
         force = law.force(command, None if inflow is None else inflow[indices])[..., 1:]
         for k, i in enumerate(indices):
             plane = np.eye(3)[1:]
-            shapes[layout.names[i]] = _polygon(plane, force[:, k], 0.0, SIDES_OF_FLOW)
+            is_line = len(layout.actuators[i].KIND.push_rows) == 1
+            half_angle = 0.0 if is_line else np.pi
+            shapes[layout.names[i]] = _polygon(plane, force[:, k], half_angle, SIDES_OF_FLOW)
     return shapes
+
+
+def _shares_of_limits(actuator: Actuator) -> Array:
+    """Shares (S, 3) of the range of a command at which forces by the flow are asked: along an angle
+    `N_SAMPLES`, at each of them both ends of a force and rest between."""
+    angle = np.linspace(0.0, 1.0, N_SAMPLES)
+    number = actuator.KIND.force_number
+    if number is None:
+        return np.repeat(angle[:, None], 3, axis=1)
+    low = actuator.lower[number]
+    high = actuator.upper[number]
+    at_rest = np.clip(-low / max(high - low, LEAST_RANGE), 0.0, 1.0)
+    share = np.zeros((3, N_SAMPLES, 3))
+    share[..., 0] = angle
+    share[..., number] = np.array([0.0, at_rest, 1.0])[:, None]
+    return share.reshape(-1, 3)
 
 
 def _shape(response: Response, is_fin: bool) -> Shape:
@@ -327,6 +361,8 @@ def _shape(response: Response, is_fin: bool) -> Shape:
     if response.gauge is not None or half_angle == 0.0:
         gauge = np.ones(1) if response.gauge is None else response.gauge
         return _gauge_shape(directions, center, half_angle, force_max, gauge)
+    if response.barred:
+        return _zoned_shape(response, directions)
     turn = half_angle * np.linspace(-1.0, 1.0, N_SAMPLES)
     if force_min < 0.0 and half_angle < np.pi:
         # Two opposite sectors.
@@ -373,6 +409,35 @@ def _gauge_shape(
     )
 
 
+def _zoned_shape(response: Plane, directions: Array) -> Shape:
+    """Forces of an azimuth that pushes ahead, within several arcs: the convex hull of them all, and
+    each arc as a part, of one wider than half a turn its halves."""
+    force_min, force_max = response.ends
+    ends = [response.sector_center - response.sector_half_angle]
+    for begin, end in response.barred:
+        ends += [begin, end]
+    ends.append(response.sector_center + response.sector_half_angle)
+    sectors = []
+    for low, high in zip(ends[::2], ends[1::2], strict=True):
+        n_pieces = 2 if is_wide(0.5 * (high - low)) else 1
+        cuts = np.linspace(low, high, n_pieces + 1)
+        sectors += [_ring_sector(a, b, force_min, force_max) for a, b in pairwise(cuts)]
+    half_angle = response.sector_half_angle
+    polygons = []
+    for points in (np.concatenate(sectors), *sectors):
+        shape = _polygon(directions, points, half_angle, SIDES_OF_GAUGE)
+        polygons.append(shape.polygons[0])
+    return Shape(directions, force_max, response.sector_center, half_angle, tuple(polygons))
+
+
+def _ring_sector(low: float, high: float, force_min: float, force_max: float) -> Array:
+    """Forces (S, 2) [N] whose convex hull is that of all between two angles [rad] and sizes [N]:
+    the outer arc, and the ends of the inner one, or none where that is small."""
+    outer = _polar(np.linspace(low, high, N_SAMPLES), np.full(N_SAMPLES, force_max))
+    inner_size = force_min if force_min > MIN_ASPECT * force_max else 0.0
+    return np.concatenate([outer, _polar(np.array([low, high]), np.full(2, inner_size))])
+
+
 def _polar(angle: Array, size: Array) -> Array:
     """Forces (S, 2) [N] of angles (S,) [rad] and sizes (S,) [N]."""
     return np.asarray(size[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1))
@@ -407,35 +472,46 @@ def is_wide(half_angle: Any) -> Any:
     return (half_angle > np.pi / 2 + HALF_TURN_TOLERANCE) & (half_angle < np.pi)
 
 
-def wide_arcs(sets: ForceSets) -> NDArray[np.intp]:
-    """Returns the indices of working actuators whose arcs are wider than half a turn and no full
-    circle."""
+def not_convex(sets: ForceSets) -> NDArray[np.intp]:
+    """Returns the indices of working actuators whose sets are not convex: with an arc wider than
+    half a turn that is no full circle, or with several arcs."""
     is_working = (sets.radius > 0.0).any(axis=0)
-    return np.flatnonzero(is_wide(sets.sector_half_angle[0]) & is_working)
+    return np.flatnonzero((sets.n_parts[0] > 1) & is_working)
+
+
+def cut_actuators(sets: ForceSets) -> NDArray[np.intp]:
+    """Returns the indices of those whose sets `convex_parts` cuts: as many of the first ones as
+    give no more than `MAX_PARTS`."""
+    split = not_convex(sets)
+    total = np.cumprod(sets.n_parts[0, split])
+    return split[total <= MAX_PARTS]
 
 
 def convex_parts(sets: ForceSets) -> ForceSets:
     """Returns P convex parts of each of R robots with the same arcs, robots fastest (P * R rows).
 
-    Wide sectors are cut along their middle. Of the first `MAX_CUT` both halves are used, in all
-    combinations; further ones are not cut and have their hulls.
+    Of the sets that are cut (`cut_actuators`) all parts are used, in all combinations: of a wide
+    sector its halves along its middle. Further ones are not cut and have their hulls.
     """
-    cut = wide_arcs(sets)[:MAX_CUT]
-    n_parts = 2 ** len(cut)
-    # Shift of the sector's centre over its half angle: 0 where it is not cut.
-    shift = np.zeros((n_parts, 1, sets.radius.shape[1]))
-    shift[:, 0, cut] = list(product((-0.5, 0.5), repeat=len(cut)))
-    shift = np.repeat(shift, len(sets.radius), axis=1)
-    shift = shift.reshape(-1, shift.shape[-1])
-    parts = sets.tile(n_parts)
-    # In the block, the polygon of a wide arc is followed by those of its upper and its lower half.
+    cut = cut_actuators(sets)
+    choices = np.array(list(product(*(range(k) for k in sets.n_parts[0, cut]))), np.intp)
+    robots, n = sets.radius.shape
+    # Which part of each actuator is used, from 1; 0 for all of it.
+    chosen = np.zeros((len(choices), n), np.intp)
+    chosen[:, cut] = choices.reshape(len(choices), len(cut)) + 1
+    part = np.repeat(chosen, robots, axis=0)
+    parts = sets.tile(len(choices))
+    # In the block, the polygon of a set is followed by those of its parts.
     has_polygon = parts.polygon_offset > 0.0
-    for is_later in (shift != 0.0, shift < 0.0):
-        skipped = is_later & has_polygon
+    for k in range(1, part.max(initial=0) + 1):
+        skipped = (part >= k) & has_polygon
         corners = sets.block[parts.polygon_offset[skipped].astype(np.intp)]
         parts.polygon_offset[skipped] += 1.0 + 2.0 * corners
-    half_angle_share = np.where(shift == 0.0, 1.0, 0.5)
+    # Shift of the sector's centre over its half angle: 0 where it is not cut.
+    shift = np.select([part == 1, part == 2], [0.5, -0.5], 0.0)
+    half_angle_share = np.where(part == 0, 1.0, 0.5)
     return parts._replace(
         sector_center=parts.sector_center + shift * parts.sector_half_angle,
         sector_half_angle=half_angle_share * parts.sector_half_angle,
+        n_parts=np.where(part == 0, parts.n_parts, 1),
     )

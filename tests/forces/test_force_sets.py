@@ -1,15 +1,31 @@
-"""What single fins can push: the farthest point of a sector, and sectors cut into convex parts."""
+"""What single actuators can push: the farthest point of a sector, sectors cut into convex parts, and
+arcs with zones between them."""
+
+from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from finlab import Azimuth, PowerLaw
+from finlab.analysis.capability import capability
 from finlab.core.ray_reach import block_of_planes
-from finlab.forces.force_sets import MAX_CUT, ForceSets, Shape, assembled, convex_parts, force_sets
+from finlab.forces.force_sets import (
+    ForceSets,
+    Shape,
+    assembled,
+    convex_parts,
+    force_sets,
+    shapes_of,
+)
+from finlab.forces.reach import max_wrench_along_exactly
 from finlab.layout import Fin, FinModelSpec, Layout, Limits
-from finlab.physics import Plant
+from finlab.physics import Plant, plant_of
 
 Array = NDArray[np.float64]
+CUT = 3
+"""How many of several wide sectors are cut."""
 HALF_ANGLES = [0.4, np.pi / 2, 1.9, 2.9, np.pi]
 """Half of the angle of a sector [rad]: narrow to a whole disc."""
 
@@ -17,8 +33,9 @@ HALF_ANGLES = [0.4, np.pi / 2, 1.9, 2.9, np.pi]
 def sectors(effectiveness: Array, radius: Array, middle: Array, half: float) -> ForceSets:
     """Robots of fins with arcs of one width."""
     none = np.zeros_like(middle)
+    n_parts = np.full(middle.shape, 2 if 0.5 * np.pi < half < np.pi else 1)
     return ForceSets(
-        effectiveness, radius, middle, none + half, none, block_of_planes(middle.shape[1])
+        effectiveness, radius, middle, none + half, n_parts, none, block_of_planes(middle.shape[1])
     )
 
 
@@ -119,19 +136,19 @@ def five_fins(half: float) -> ForceSets:
     return sectors(effectiveness, np.ones((2, 5)), middle, half)
 
 
-@pytest.mark.parametrize(("half", "parts"), [(np.pi / 2, 1), (np.pi, 1), (2.0, 2**MAX_CUT)])
+@pytest.mark.parametrize(("half", "parts"), [(np.pi / 2, 1), (np.pi, 1), (2.0, 2**CUT)])
 def test_only_wide_sectors_are_cut(half: float, parts: int) -> None:
     sets = five_fins(half)
     assert len(convex_parts(sets).radius) == 2 * parts
     # The same directions reach as far in the best part as in all of the sectors that were cut.
-    cut = sets._replace(radius=np.where(np.arange(5) < MAX_CUT, sets.radius, 0.0))
+    cut = sets._replace(radius=np.where(np.arange(5) < CUT, sets.radius, 0.0))
     normal = np.random.default_rng(3).standard_normal((2, 6))
     in_parts = convex_parts(cut).farthest(np.tile(normal, (parts, 1)))[0].reshape(parts, 2)
     assert in_parts.max(axis=0) == pytest.approx(cut.farthest(normal)[0])
 
 
 def test_fins_beyond_the_first_few_keep_their_hulls() -> None:
-    assert (convex_parts(five_fins(2.0)).sector_half_angle[:, MAX_CUT:] == 2.0).all()
+    assert (convex_parts(five_fins(2.0)).sector_half_angle[:, CUT:] == 2.0).all()
 
 
 def test_a_fin_whose_stops_coincide_has_one_column() -> None:
@@ -140,3 +157,85 @@ def test_a_fin_whose_stops_coincide_has_one_column() -> None:
     unit = np.stack([np.cos(sets.sector_center), np.sin(sets.sector_center)], axis=-1)
     assert full[:, :, 0] == pytest.approx((unit[..., None] * sets.effectiveness).sum(2))
     assert (full[:, :, 1] == 0.0).all()
+
+
+ZONED = Azimuth(
+    "pod",
+    (0.0, 0.0, 0.0),
+    turn_axis=(0.0, 0.0, 1.0),
+    zero=(1.0, 0.0, 0.0),
+    force=(0.0, 10.0),
+    model=PowerLaw(1.0),
+    arc=tuple(tuple(np.deg2rad(ends)) for ends in ((-170.0, -70.0), (20.0, 50.0), (90.0, 175.0))),
+)
+"""A pod with three arcs."""
+
+
+def zoned_robot(seed: int, count: int) -> Layout:
+    """Some pods with three arcs and a free one, at random places."""
+    random = np.random.default_rng(seed)
+    free = replace(ZONED, name="free", position=(0.3, 0.1, 0.0), arc=(-np.pi, np.pi))
+    pods = []
+    for k in range(count):
+        place = tuple(random.uniform(-1.0, 1.0, 2)) + (0.0,)
+        pods.append(replace(ZONED, name=f"pod_{k}", position=place))
+    return Layout("zoned", (*pods, free), axes=("Fx", "Fy", "Tz"))
+
+
+def test_a_set_with_zones_holds_what_its_arcs_hold() -> None:
+    """Forces of random commands lie in a part; what each part has at its rim is within an arc."""
+    shape = shapes_of(Layout("one", (ZONED,)))[0]
+    hull, *parts = shape.polygons
+    assert shape.n_parts == len(parts) == 3
+    command = commands_within(Layout("one", (ZONED,)), 4000)
+    force = plant_of(Layout("one", (ZONED,))).force(command)[:, 0, 1:]
+    inside = np.array([contains(corners, force) for corners in parts])
+    assert inside.any(axis=0).all() and (inside.sum(axis=0) == 1).mean() > 0.99
+    assert contains(hull, force).all()
+    for corners, ends in zip(parts, ZONED.arcs, strict=True):
+        angle = np.arctan2(corners[:, 1], corners[:, 0])
+        is_rim = np.linalg.norm(corners, axis=1) > 1.0
+        assert (angle[is_rim] >= ends[0] - 1e-9).all() and (angle[is_rim] <= ends[1] + 1e-9).all()
+        assert np.linalg.norm(corners, axis=1).max() == pytest.approx(10.0)
+        assert (angle[is_rim].min(), angle[is_rim].max()) == pytest.approx(ends, abs=0.02)
+
+
+def commands_within(layout: Layout, count: int) -> Array:
+    """Random commands within all arcs and limits, as the plant samples them."""
+    return plant_of(layout).sample(np.random.default_rng(0), (count,))
+
+
+def contains(corners: Array, points: Array) -> NDArray[np.bool_]:
+    """Which points are within a convex polygon, but for a thousandth of its size."""
+    ahead = np.roll(corners, -1, axis=0) - corners
+    offset = points[:, None] - corners
+    left = ahead[:, 0] * offset[..., 1] - ahead[:, 1] * offset[..., 0]
+    side = np.linalg.norm(ahead, axis=1) * 0.02
+    return (left >= -side).all(axis=1) | (left <= side).all(axis=1)
+
+
+@pytest.mark.parametrize(("seed", "count"), [(0, 1), (1, 2)])
+def test_zones_are_left_out_of_reach_and_of_the_plot(seed: int, count: int) -> None:
+    """Beside the best of the answers of all choices of arcs, one arc each."""
+    layout = zoned_robot(seed, count)
+    turn = np.linspace(0.0, 2.0 * np.pi, 13)[:-1]
+    directions = np.zeros((len(turn), 6))
+    directions[:, 0] = np.cos(turn)
+    directions[:, 1] = np.sin(turn)
+    best = np.zeros(len(turn))
+    for chosen in product(ZONED.arcs, repeat=count):
+        robot = layout
+        for pod, arc in zip(layout.names, chosen, strict=False):
+            robot = robot.replace_actuator(pod, arc=arc)
+        best = np.maximum(best, max_wrench_along_exactly(force_sets(robot), directions)[0][0])
+    found = max_wrench_along_exactly(force_sets(layout), directions)[0][0]
+    assert found == pytest.approx(best, rel=5e-4, abs=1e-3)
+    ends = layout
+    for pod in layout.names[:count]:
+        ends = ends.replace_actuator(pod, arc=ZONED.turn_range)
+    without_zones = max_wrench_along_exactly(force_sets(ends), directions)[0][0]
+    assert (without_zones > found + 0.1).any(), "no zone matters in this case"
+    # A load from a heading, clockwise from ahead, is held by a push towards it.
+    headings = np.rad2deg(-turn) % 360.0
+    plot = capability(layout, None, headings)
+    assert plot.values[0] == pytest.approx(best, rel=5e-4, abs=1e-3)

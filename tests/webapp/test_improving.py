@@ -7,17 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from finlab.analysis import mirror_pairs
+from finlab.analysis import layout_bound, mirror_pairs
+from finlab.analysis.improvement_text import improvement_remarks
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import Damage, Fin, load_layout
 from tests.webapp.stand_in import LoneBell, context_of, until
 from webapp.markup.score_card import warnings
 from webapp.session import Session
-from webapp.session.looking import SearchRequest
+from webapp.session.looking import GOALS_BY_WORDS, SearchRequest
 from webapp.session.state import State
 from webapp.tasks.analysing import Analysis, AnalysisQuestion, analyse
-from webapp.tasks.improving import Clearance, Improver
+from webapp.tasks.improving import Clearance, Improver, Search, has_bound
 from webapp.tasks.slot import Pool, Slot
 
 NO_YAW = load_layout(shipped_layouts()["no_yaw"])
@@ -151,3 +152,47 @@ def test_any_robot_is_improved_without_what_is_lost(robot: str, lost: int, worke
     left = found.layout.without(state.lost)
     assert clearance.violation(left.position[None], left.frames[None])[0] == 0.0
     assert mirror_pairs(left) == mirror_pairs(layout.without(state.lost))
+
+
+def test_what_is_found_is_said_to_be_so_far_from_the_best(worker: Pool) -> None:
+    """The bound is not below the layout that was found, nor below others within the bounds."""
+    rov = load_layout("bluerov2_heavy")
+    improver = Improver(context_of(worker))
+    request = SearchRequest().with_move_range((0.1, 0.1, 0.02, 90.0))
+    improver.start(State(rov), request)
+    until(lambda: improver.progress is not None)
+    improver.stop()
+    until(lambda: improver.answer is not None)
+    improver.ask_bound()
+    question = improver.bounding.question
+    improver.ask_bound()
+    assert improver.bounding.question is question, "it is asked once"
+    until(lambda: not improver.bounding.busy)
+    found = improver.bounding.answer
+    assert found is not None and found.bound is not None and found.below is not None
+    assert found.value_before <= found.value_after <= found.bound.value
+    assert found.below == pytest.approx(1.0 - found.value_after / found.bound.value)
+    words = " ".join(remark.text for remark in improvement_remarks(found))
+    assert f"At most {100.0 * found.below:.1f} % below the best possible" in words
+    improver.forget()
+    assert improver.bounding.answer is None and improver.bounding.question is None
+
+
+@pytest.mark.parametrize(
+    ("robot", "goal", "speed"),
+    [
+        ("ucat", "weakest direction", 0.0),
+        ("bluerov2_heavy", "power for a mission", 0.0),
+        ("torpedo", "weakest direction", 1.0),
+    ],
+)
+def test_nothing_is_said_where_no_bound_holds(robot: str, goal: str, speed: float) -> None:
+    state = State(load_layout(robot), speed=speed)
+    assert not has_bound(Search(state, GOALS_BY_WORDS[goal], {}))
+
+
+def test_a_cancelled_bound_is_valid() -> None:
+    rov = load_layout("bluerov2_heavy")
+    sharp = layout_bound(rov, rov.names)
+    early = layout_bound(rov, rov.names, cancelled=lambda: True)
+    assert early.rounds == 1 < sharp.rounds and early.value >= sharp.value

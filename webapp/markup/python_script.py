@@ -1,6 +1,7 @@
 """The question on the page as a script in Python that prints the same answer."""
 
 from dataclasses import replace
+from typing import NamedTuple
 
 from finlab.axes import AXES
 from finlab.layout import Layout
@@ -17,7 +18,8 @@ def script_of(state: State, checkpoint: str | None = None) -> str:
         checkpoint: the checkpoint that the method answers with, as a name or folder; None for the
             shipped one, and for methods without networks.
     """
-    robot, free = robot_and_free_axes(state.layout)
+    opened = opened_robot(state.layout)
+    free = opened.free
     made_of = ["robot"]
     if state.method != "dual":
         made_of.append(repr(state.method))
@@ -34,6 +36,8 @@ def script_of(state: State, checkpoint: str | None = None) -> str:
         asked.append(f"policy={state.policy!r}")
     if state.flow is not None:
         asked.append(f"flow={list(state.flow)!r}")
+    if opened.power:
+        asked.append(f"power={opened.power}")
     if len(asked) == 1:
         call = ["answer = allocator.allocate(wrench)"]
     else:
@@ -41,7 +45,7 @@ def script_of(state: State, checkpoint: str | None = None) -> str:
     lines = [
         "import finlab",
         "",
-        f"robot = finlab.load_layout({robot!r})",
+        f"robot = finlab.load_layout({opened.robot!r})",
         f"allocator = finlab.Allocator({', '.join(made_of)})",
         "# Fx, Fy, Fz [N], Tx, Ty, Tz [N m]",
         f"wrench = {list(state.target)!r}",
@@ -52,17 +56,41 @@ def script_of(state: State, checkpoint: str | None = None) -> str:
     return "\n".join(lines) + "\n"
 
 
-def robot_and_free_axes(layout: Layout) -> tuple[str, tuple[str, ...]]:
-    """What the script opens, and which axes it frees: a robot that is shipped but for those is
-    still opened by its name."""
+class OpenedRobot(NamedTuple):
+    """What the script opens, and how its question differs from what the file says."""
+
+    robot: str
+    """Name of a shipped layout, or of the file that this page makes."""
+    free: tuple[str, ...] = ()
+    """Axes that it frees."""
+    power: str = ""
+    """Its power budget in Python; empty for that of the file."""
+
+
+def opened_robot(layout: Layout) -> OpenedRobot:
+    """What the script opens, which axes it frees, and its power budget: a robot that is shipped but
+    for those is still opened by its name."""
     for name, known in shipped().items():
-        if replace(layout, axes=known.axes) != known:
+        budget_apart = replace(layout.unpaired, power_w=known.power_w, buses=known.buses)
+        if replace(budget_apart, axes=known.axes) != known.unpaired:
             continue
+        power = _power_argument(layout, known)
         freed = known.commanded & ~layout.commanded
         is_freed_alone = not (layout.commanded & ~known.commanded).any()
-        if is_freed_alone:
-            return name, tuple([AXES[k] for k in range(len(AXES)) if freed[k]])
-    return robot_file(layout), ()
+        if is_freed_alone and power is not None:
+            free = tuple([AXES[k] for k in range(len(AXES)) if freed[k]])
+            return OpenedRobot(name, free, power)
+    return OpenedRobot(robot_file(layout))
+
+
+def _power_argument(layout: Layout, known: Layout) -> str | None:
+    """The power budget of a layout in Python, beside a shipped one without buses; empty where that
+    has the same, None where no argument says it."""
+    if layout.buses != known.buses:
+        return None
+    if layout.power_w == known.power_w:
+        return ""
+    return "float('inf')" if layout.power_w is None else repr(layout.power_w)
 
 
 def _damage_arguments(damage: Damage) -> str:

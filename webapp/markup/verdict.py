@@ -10,8 +10,9 @@ from markupsafe import Markup
 
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.binding import NOT_APART
+from finlab.allocation.power_budget import ALL
 from finlab.allocation.report import bound_words, missing_words, share_words
-from finlab.display import as_sentence
+from finlab.display import as_sentence, listed
 from finlab.physics.objective import REACHED
 from webapp.markup.words import authority_sentence, in_app, unlearned_sentence
 from webapp.session.state import State
@@ -20,6 +21,8 @@ from webapp.theme import DELIVERED, MISSING, NEARLY, UNLEARNED, Rgb
 
 WORKING = "Working …"
 """What stands in place of a verdict while the present question has no answer."""
+BUS = "bus "
+"""How what binds begins where it is the power budget of a bus."""
 AT_REST = "(flow)"
 """How a note ends that the panel beside the speed tells in its own words."""
 
@@ -66,7 +69,19 @@ def verdict_sentence(allocation: Allocation, in_reach: bool) -> str:
         return f"{verdict.value}{within}"
     if verdict is Verdict.APPROXIMATE:
         return f"{verdict.value}: the robot can, {allocation.method} does not"
-    return f"{verdict.value}, {allocation.policy.kind}"
+    budgets = [_budget_words(words) for words in allocation.binding if _is_budget(words)]
+    limit = f": {listed(budgets)}" if budgets else ""
+    return f"{verdict.value}{limit}, {allocation.policy.kind}"
+
+
+def _is_budget(words: str) -> bool:
+    """Whether what binds is a power budget."""
+    return words == ALL or words.startswith(BUS)
+
+
+def _budget_words(words: str) -> str:
+    """What binds, in the words of the page."""
+    return "power budget" if words == ALL else words
 
 
 def answer_sentence(
@@ -112,7 +127,7 @@ def _remarks_sentence(allocation: Allocation, searching: bool, is_blind: bool) -
     for words in allocation.binding:
         is_told = is_blind and words.endswith(NOT_APART)
         if not is_told:
-            remarks.append(words)
+            remarks.append(f"{_budget_words(words)} used up" if _is_budget(words) else words)
     if not searching:
         remarks += allocation.notes
     words = "; ".join([remark for remark in remarks if not remark.endswith(AT_REST)])

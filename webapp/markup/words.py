@@ -88,9 +88,14 @@ DASH = "–"
 """What stands in place of a number that there is none of."""
 SPEED = "Speed through the water [m/s]"
 """Label of the control that tells how the robot moves."""
+POWER = "Power budget [W]"
+"""Label of the box of the power that all actuators may take."""
 CONTROLS = {
     "(--flow)": f"({SPEED[:-6]})",
     "(flow)": f"({SPEED[:-6]})",
+    ", or power=inf where the layout has one": f", or empty {POWER[:-4]}",
+    "leave out `power`, or": f"empty {POWER[:-4]}, or",
+    "`result.power`": "its power",
     "(--force LEAST MOST)": "(Force, at Limits of each)",
     "--robot LAYOUT": "By this page's robot, at Log",
     "leave it out of the layout's axes, or name it in free": "switch it off beside its slider",

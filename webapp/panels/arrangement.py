@@ -11,6 +11,7 @@ from webapp.page import Page
 from webapp.panels.actuator_inspector import add_actuator
 from webapp.panels.actuator_list import add_actuator_list
 from webapp.panels.body_inspector import add_body
+from webapp.panels.capability_tab import add_capability
 from webapp.panels.cards import (
     add_answering,
     add_file,
@@ -103,6 +104,7 @@ PANELS = (
     Panel(RIGHT, (DESIGN,), "Check", card(check)),
     Panel(DRAWER, (DESIGN,), "Reach", add_reach),
     Panel(DRAWER, (DESIGN,), "Improve", add_improving),
+    Panel(DRAWER, (DESIGN,), "Capability", add_capability),
     Panel(LEFT, (ALLOCATE,), TWO_ROBOTS, add_two_robots, need=NEEDS_TWO),
     Panel(LEFT, (ALLOCATE,), "Actuators", add_commands, need=NEEDS_ONE),
     Panel(LEFT, (ALLOCATE,), "Damage", add_damage, is_folded=True, need=NEEDS_ONE),

@@ -43,7 +43,10 @@ def _analysis_card(
         note += html(
             "<span class='dim'>The body lacks at most {} {} of the true set.</span>", gap, unit
         )
-    table = score_table(analysis.question.layout, analysis.card, analysis.before)
+    layout = analysis.question.layout
+    if layout.power_w is not None or layout.buses:
+        note += Markup("<span class='dim'>The power budget does not count here.</span>")
+    table = score_table(layout, analysis.card, analysis.before)
     return html("<div class='fl'>{}</div>{}", note, table)
 
 
@@ -130,6 +133,8 @@ def _searched(
     progress: Progress | None,
     improving: bool,
     improvement_error: str | None,
+    bounded: Improvement | None,
+    bounding: bool,
     draft: SearchRequest,
 ) -> str:
     """What a search has found, or how far it is."""
@@ -137,7 +142,8 @@ def _searched(
     if improvement_error is not None:
         text = html("<div class='missing'>{}</div>", improvement_error)
     elif improvement is not None:
-        text = _before_and_after(improvement)
+        note = Markup("<span class='dim'>how far from the best: computing …</span> ")
+        text = (note if bounding else Markup()) + _before_and_after(bounded or improvement)
     elif progress is not None:
         goal = GOALS_BY_WORDS[draft.goal]
         best = goal_value(goal, progress.best)

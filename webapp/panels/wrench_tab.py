@@ -1,6 +1,7 @@
 """The question and its answer: the target wrench, bars, losses, commands, and what jets
 change."""
 
+import math
 import operator
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -22,6 +23,7 @@ from webapp.markup.answer import bars_of, fin_table
 from webapp.markup.reach import reach_style
 from webapp.markup.verdict import answer_sentence
 from webapp.markup.words import (
+    POWER,
     ROUNDING,
     SPEED,
     error_digits,
@@ -45,6 +47,8 @@ from webapp.session.targets import (
 )
 from webapp.tasks.solver import JetComparison
 
+MOST_BUSES = 6
+"""Buses with a box of their own; ships have two to four."""
 DIGITS = 4
 """Digits behind the point that sliders of the wrench show."""
 
@@ -169,6 +173,61 @@ def add_target(page: Page) -> None:
     )
     box = gui.add_dropdown("Out of reach", POLICY_NAMES, hint=policies)
     page.bind(box, partial(session.set_setting, "policy"), lambda policy: policy)
+    _add_budgets(page)
+
+
+def _add_budgets(page: Page) -> None:
+    """Boxes of the power that actuators may take: of all, or of those of each bus."""
+    gui = page.gui
+    hint = (
+        "The most that all actuators may take together, which method dual keeps; empty: no limit."
+    )
+    total = gui.add_number(POWER, 0.0, step=10.0, hint=hint)
+    page.bind_number(total, page.session.set_power, _budget_of_all, may_be_empty=True)
+    page.board.show(total, visible=lambda layout: not layout.buses)
+    for place in range(MOST_BUSES):
+        box = gui.add_number("Bus", 0.0, step=10.0, hint="Empty: no limit, and no such bus.")
+        act = partial(page.session.set_bus_power, place)
+        page.bind_number(box, act, partial(_budget_of_bus, place), may_be_empty=True)
+        page.board.show(
+            box,
+            visible=lambda layout, place=place: place < len(layout.buses),
+            label=partial(_bus_label, place),
+            hint=partial(_bus_hint, place),
+        )
+    page.add_html(_unlisted_buses)
+
+
+def _budget_of_all(layout: Layout) -> float:
+    """The power that all actuators may take together [W]; NaN, an empty box, where there is no
+    limit."""
+    return math.nan if layout.power_w is None else layout.power_w
+
+
+def _budget_of_bus(place: int, layout: Layout) -> float:
+    """The power that the actuators of a bus may take [W]; NaN where there is no such bus."""
+    return layout.buses[place].power_w if place < len(layout.buses) else math.nan
+
+
+def _bus_label(place: int, layout: Layout) -> str:
+    """Label of the box of a bus."""
+    return f"Bus {layout.buses[place].name} [W]" if place < len(layout.buses) else "Bus"
+
+
+def _bus_hint(place: int, layout: Layout) -> str:
+    """What a bus feeds."""
+    if place >= len(layout.buses):
+        return ""
+    fed = listed(layout.buses[place].actuators)
+    return f"The most that {fed} may take together; empty: no limit, and no such bus."
+
+
+def _unlisted_buses(layout: Layout) -> str:
+    """What is said of buses that have no box."""
+    n_more = len(layout.buses) - MOST_BUSES
+    if n_more <= 0:
+        return ""
+    return html("<div class='fl dim'>{} more buses keep the budgets of their file.</div>", n_more)
 
 
 def add_speed(page: Page) -> None:

@@ -12,6 +12,7 @@ from finlab.axes import AXES, axes_in
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.layout.damage import Damage
+from webapp.session.given_loads import GivenLoads
 from webapp.session.looking import (
     CANDIDATES,
     DRAWERS,
@@ -61,6 +62,8 @@ class BaseSession:
         """Layouts as they were opened or saved, the newest last; undo may lead back to one."""
         self.draft = SearchRequest()
         """What the next search for a better layout is to do."""
+        self.given_loads: GivenLoads | None = None
+        """Loads that capability plots are about; None for a force from each heading."""
         self.swim = SwimSettings()
         self.mode = 0
         """Which of the answer's modes is shown; 0 is the best one."""

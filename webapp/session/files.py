@@ -41,6 +41,7 @@ MAX_LINK = 16_000
 PLAIN, ARCHIVE = "y", "a"
 """First character: a layout's YAML, compressed, or a ZIP archive with the files that it names."""
 BUNDLE, GRAPH, CANDIDATES = "_bundle.zip", ".graph.json", "_candidates.csv"
+CAPABILITY = "_capability"
 """Ends of the names of files, after the layout's."""
 NO_DESIGN = "the link holds no whole design; copy all of it, or ask for the file"
 

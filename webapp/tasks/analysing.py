@@ -9,6 +9,7 @@ from finlab.forces.reach import Ranges, axis_ranges
 from finlab.layout import Layout
 from webapp.session.looking import DRAWN
 from webapp.session.state import Flow, State
+from webapp.tasks.budget_ranges import ranges_within_budget
 
 
 @dataclass(frozen=True)
@@ -73,7 +74,11 @@ def analyse(question: AnalysisQuestion) -> Analysis:
 @lru_cache(maxsize=32)
 def find_ranges(question: State) -> Ranges:
     """The range of each component of a state's target."""
-    return axis_ranges(question.layout, question.target, question.lost, question.flow)
+    ranges = axis_ranges(question.layout, question.target, question.lost, question.flow)
+    layout = question.layout
+    if layout.power_w is None and not layout.buses:
+        return ranges
+    return ranges_within_budget(question, ranges)
 
 
 @dataclass(frozen=True)

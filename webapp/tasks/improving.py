@@ -4,11 +4,15 @@ import math
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import NamedTuple, cast
 
 import numpy as np
 
-from finlab.analysis import Bounds, Improvement, Progress, optimize_layout
+from finlab.analysis import Bounds, Improvement, Progress, layout_bound, optimize_layout
+from finlab.analysis.authority import named_axes
+from finlab.analysis.layout_bound import check_bounded
 from finlab.arrays import Array
+from finlab.axes import MotionAxis
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.swim.hull import hull_of
@@ -104,6 +108,23 @@ class Improver(Slot[Search, Improvement]):
 
     def __init__(self, context: Context) -> None:
         super().__init__(context.pools.long, context.bell, improve, watched=True)
+        self.bounding: Slot[Found, Improvement] = Slot(
+            context.pools.long, context.bell, with_bound, watched=True
+        )
+        """The answer with what no layout of the search exceeds, once that is known."""
+
+    def ask_bound(self) -> None:
+        """Have it found how far from the best the answer of a search is, where that can be
+        said."""
+        search = self.question
+        answer = self.answer
+        if search is not None and answer is not None and has_bound(search):
+            self.bounding.ask(Found(search, answer))
+
+    def forget(self) -> None:
+        """Drop the search, what it found, and the bound of that."""
+        super().forget()
+        self.bounding.forget()
 
     @property
     def best(self) -> Layout | None:
@@ -137,6 +158,45 @@ class Improver(Slot[Search, Improvement]):
         bounds = request.bounds(state.layout.without(state.lost))
         self.forget()
         self.ask(Search(state, GOALS_BY_WORDS[request.goal], bounds))
+
+
+class Found(NamedTuple):
+    """A search that is done."""
+
+    search: Search
+    improvement: Improvement
+    """Its answer."""
+
+
+def has_bound(search: Search) -> bool:
+    """Whether it is known how good the layouts of a search can be at most."""
+    state = search.state
+    flow = None if state.flow is None else np.array(state.flow)
+    try:
+        check_bounded(state.layout.without(state.lost), search.goal, flow)
+    except FinlabError:
+        return False
+    return True
+
+
+def with_bound(found: Found, work: Work[Found]) -> Improvement:
+    """Returns what a search has found, with what no layout within its bounds exceeds.
+
+    Args:
+        found: the search.
+        work: ends it where it is cancelled.
+    """
+    search = found.search
+    improvement = found.improvement
+    limit = layout_bound(
+        search.state.layout.without(search.state.lost),
+        tuple(search.bounds),
+        search.bounds,
+        axes=named_axes(cast("tuple[MotionAxis, ...]", improvement.axes)),
+        after_loss=search.goal == "worst_single_failure",
+        cancelled=work.cancelled.is_set,
+    )
+    return replace(improvement, bound=limit)
 
 
 def improve(search: Search, work: Work[Search]) -> Improvement:

@@ -14,6 +14,7 @@ from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import MethodChoice, choose_method
 from finlab.allocation.policy import POLICY_NAMES, Policy
+from finlab.allocation.power_budget import budget_of
 from finlab.allocation.report import is_proved_least
 from finlab.allocation.solution import Candidates
 from finlab.errors import FinlabError
@@ -142,7 +143,10 @@ def _resting_words(mode: Mode) -> str:
         phrases.append(f"{fins_words(still)} {'rest' if len(still) > 1 else 'rests'}")
     if weak:
         phrases.append(f"{fins_words(weak)} hardly {'push' if len(weak) > 1 else 'pushes'}")
-    return ", ".join(phrases) or "all fins push"
+    if phrases:
+        return ", ".join(phrases)
+    has_lost = bool(np.isnan(mode.command).any())
+    return "all that work push" if has_lost else "all fins push"
 
 
 Load = Callable[..., MethodChoice]
@@ -151,6 +155,8 @@ MAX_ALLOCATORS = 24
 """Most allocators in the cache: to make one takes as long as a hundred answers."""
 ALTERNATIVE_ERROR = 1e-4
 """Normalized error up to which another answer is an alternative."""
+OVER_BUDGET = 1e-6
+"""Share by which rounding may exceed a power budget."""
 SHIPPED = NetworkConfig.shipped
 """Name of the shipped network of method `paper`."""
 POLICIES: dict[str, Policy] = {kind: Policy(kind) for kind in POLICY_NAMES}
@@ -340,7 +346,8 @@ class Solver:
             )
             badge = "optimum" if is_proved_least(answer) else state.method
         ways = self.allocator(replace(state, method="mdn")).refinement(answer)
-        return modes_of(answer, own.followed_by(ways[-1].exact(ALTERNATIVE_ERROR)), badge, ways)
+        others = _within_budget(ways[-1].exact(ALTERNATIVE_ERROR), answer.layout)
+        return modes_of(answer, own.followed_by(others), badge, ways)
 
     def solve(self, state: State) -> Allocation:
         """The answer to a state. FinlabError: the method cannot be loaded or cannot answer."""
@@ -351,6 +358,18 @@ class Solver:
             flow=state.flow,
             seed=0,
         )
+
+
+def _within_budget(candidates: Candidates, layout: Layout) -> Candidates:
+    """Those candidates that keep the power budget of a layout."""
+    budget = None
+    if layout.power_w is not None or layout.buses:
+        budget = budget_of(layout)
+    if budget is None:
+        return candidates
+    taken = budget.power_of_buses(plant_of(layout).power(candidates.command))
+    is_kept = (taken <= budget.watts * (1.0 + OVER_BUDGET)).all(axis=-1)
+    return candidates.rows(np.flatnonzero(is_kept).tolist())
 
 
 def _is_papers(folder: Path) -> bool:

@@ -456,12 +456,13 @@ static real power_of(const real *block, const fl_work *work, int i, const real *
   if (work->span.is_lost[i]) return 0;
   if (!is_plane(a)) return fl_power_of_force(block, i, force[0]);
   real size = size_of(force);
-  if (a->gauge_table > 0) {
-    size /= fl_gauge_radius(block + (int)a->gauge_table, ATAN2(force[1], force[0]));
-  }
   const real along_middle = force[0] * set->cos_center + force[1] * set->sin_center;
   const int goes_either_way = set->force_max_reverse > 0;
-  if (set->is_flipped || (goes_either_way && along_middle < 0)) size = -size;
+  if (set->is_flipped || (goes_either_way && along_middle < 0)) {
+    size = -size;
+  } else if (a->gauge_table > 0) {
+    size /= fl_gauge_radius(block + (int)a->gauge_table, ATAN2(force[1], force[0]));
+  }
   return fl_power_of_force(block, i, clipped(size, a->force_min, a->force_max));
 }
 
