@@ -22,7 +22,7 @@
 #define HELD_AXIS R(1e4)      /* weight of axes that are served over those that follow */
 #define BUDGET_KEPT TOLERANCE /* share of a budget by which a power may be off */
 #define BUDGET_STEPS FL_STEPS /* of Newton's method for one target */
-#define DEAR 1000             /* multiple of a usual price that only what is missing explains */
+#define DEAR 100              /* multiple of a usual price that only what is missing explains */
 #define SHORT_SHARE R(0.1)    /* of a step, from which on mu falls */
 #define BUDGET_IDLE 12        /* steps without progress after which it ends */
 /* There, of TOLERANCE, what may be left: rounding where multipliers lie far apart. */
