@@ -122,7 +122,9 @@ def power_from(texts: Sequence[str]) -> float | dict[str, float] | None:
                 f"{text!r:.60}"
             ) from None
         if name in watts_of:
-            raise AllocationError(f"power: {name or 'all actuators'!r:.60} has two numbers; give one")
+            raise AllocationError(
+                f"power: {name or 'all actuators'!r:.60} has two numbers; give one"
+            )
         watts_of[name] = watts
     if "" not in watts_of:
         return watts_of

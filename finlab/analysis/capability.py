@@ -353,7 +353,7 @@ def _refuse_budget(layout: Layout) -> None:
     """Raises LayoutError: a layout has a power budget, which no plot counts."""
     if layout.power_w is not None or layout.buses:
         raise LayoutError(
-            f"layout {layout.name}: has a power budget, which a capability plot does not count yet; "
+            f"layout {layout.name}: has a power budget, which a capability plot does not count; "
             "leave out power_w and buses, or see `finlab layout show`, which counts them"
         )
 

@@ -160,8 +160,8 @@ def _notes(layout: Layout, lost: Collection[str], flow: Array | None) -> tuple[s
         )
     if budget_of(layout) is not None:
         notes.append(
-            "Largest wrenches and powers are within the layout's power budget; the weakest direction "
-            "is that of the forces alone."
+            "Largest wrenches and powers are within the layout's power budget; the weakest "
+            "direction is that of the forces alone."
         )
     pushed_by_flow = [name for name in layout.flow_driven if name not in lost]
     if flow is not None and pushed_by_flow:

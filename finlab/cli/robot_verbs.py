@@ -82,7 +82,13 @@ def allocate(
     answer = policy_from(policy, axis_weights, priority, falling)
     damage = Damage.parse(robot, gone, weak, torn, stuck, running)
     result = allocator.allocate(
-        wrench, damage=damage, free=axes, policy=answer, flow=flow, seed=seed, power=power_from(power)
+        wrench,
+        damage=damage,
+        free=axes,
+        policy=answer,
+        flow=flow,
+        seed=seed,
+        power=power_from(power),
     )
     lines = [str(result)]
     if bound and result.bound is None:

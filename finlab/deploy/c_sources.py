@@ -230,7 +230,9 @@ def _budget_margin(method: Dual, budget: PowerBudget) -> float:
         conditions = Conditions(budget=budget_record(budget.members, watts))
         command = method.compiled.forces(target, CLOSEST, None, conditions).command
         kept = budget.power_of_buses(method.plant.power(command))[0] / watts
-        if kept.max() < MOST_MARGIN:  # else the core has found nothing within the budget, and says so
+        if (
+            kept.max() < MOST_MARGIN
+        ):  # else the core has found nothing within the budget, and says so
             most = max(most, float(kept.max()) - 1.0)
     return 2.0 * most
 
@@ -249,8 +251,8 @@ def _budget_words(budget: PowerBudget | None, margin: float) -> str:
     )
     words = (
         f"`question.budget = ROBOT_BUDGET;` keeps the power within the layout's budget ({buses}), "
-        "as the function `allocate` of the plain header does. `answer.exceeds_budget` says where that was not found, "
-        "or rates forbid it."
+        "as the function `allocate` of the plain header does. `answer.exceeds_budget` says where "
+        "that was not found, or rates forbid it."
     )
     if margin > 0.0:
         words += (

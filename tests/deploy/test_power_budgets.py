@@ -17,7 +17,9 @@ from finlab.layout.layout import Bus, Layout
 HEAVY = load_layout("bluerov2_heavy")
 LAYOUTS = (
     replace(HEAVY, power_w=100.0),
-    replace(HEAVY, buses=(Bus("front", 60.0, HEAVY.names[:2]), Bus("rear", 40.0, HEAVY.names[2:4]))),
+    replace(
+        HEAVY, buses=(Bus("front", 60.0, HEAVY.names[:2]), Bus("rear", 40.0, HEAVY.names[2:4]))
+    ),
 )
 """One bus for all, and two that leave thrusters without a limit."""
 
