@@ -24,6 +24,7 @@ EXTRA_OF_PACKAGE = {
     "trimesh": "app",
     "casadi": "ipopt",
     "distributed": "cluster",
+    "mujoco": "mujoco",
 }
 """Optional package -> the extra of the distribution that brings it."""
 PAPER_LAYOUTS = ("A", "B", "C", "D")

@@ -65,6 +65,9 @@ class Options:
     default."""
     current: Annotated[tuple[float, float, float], arg(metavar="VX VY VZ")] = (0.0, 0.0, 0.0)
     """velocity of the water in the world [m/s]."""
+    plant: Annotated[str, arg(metavar="NAME")] = "finlab"
+    """what integrates the robot's body: finlab, or mujoco with the robot as `finlab layout convert
+    --to mjcf` writes it (needs extra mujoco)."""
     noise: bool = True
     """whether the sensors are noisy."""
     seed: Annotated[int, arg(metavar="N")] = 0
@@ -106,6 +109,7 @@ def simulate(options: OmitArgPrefixes[Options]) -> None:
                 verdicts.append((loop.time - loop.period_s, verdict))
             bar.update(loop.period_s)
     lines = [excitation_summary(loop.log) if options.excite else summary(loop.log)]
+    lines += [] if options.plant == "finlab" else [f"plant: {options.plant}"]
     lines += [] if loop.learner is None else cast("OnlineFit", loop.learner).notes
     lines += [f"{time:.1f} s: the monitor takes {verdict}" for time, verdict in verdicts[1:]]
     if options.output is not None:
@@ -176,6 +180,7 @@ def _world(options: Options) -> dict[str, Any]:
         "truth": None if options.truth is None else open_robot(options.truth)[0],
         "sensors": None if options.noise else NO_NOISE,
         "current": options.current,
+        "plant": options.plant,
         "seed": options.seed,
     }
 

@@ -114,7 +114,7 @@ def interaction(
     seen.
 
     What is learned are the weights of a model that is linear in them, and how they differ from
-    robot to robot, in closed form and in half a minute. A layout names them: interaction: {type:
+    robot to robot, in closed form and in about a minute. A layout names them: interaction: {type:
     linear, path: FILE}. With --network it is a network in place of that: {type: learned, path:
     FILE}.
 

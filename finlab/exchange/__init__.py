@@ -9,7 +9,7 @@ from finlab.exchange.exchange import Exchange as Exchange
 from finlab.exchange.inquiry import Reading as Reading
 from finlab.exchange.inquiry import read_asking as read_asking
 from finlab.exchange.matrix_table import is_robot_table as is_robot_table
-from finlab.exchange.mjcf_write import mujoco_control as mujoco_control
+from finlab.exchange.mjcf_control import mujoco_control as mujoco_control
 from finlab.exchange.notes import Note as Note
 from finlab.exchange.questions import Answers as Answers
 from finlab.exchange.questions import Choice as Choice

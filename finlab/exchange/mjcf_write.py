@@ -1,4 +1,4 @@
-"""Writes layouts as models of MuJoCo (MJCF), and turns answers into the ctrl of such a model.
+"""Writes layouts as models of MuJoCo (MJCF); `mjcf_control.py` has the ctrl of such a model.
 
 The robot is one body with a free joint, whose frame is the layout's: x forward, y left, z up, at
 the centre of gravity. A thruster is a site whose z is its axis, and a motor in newtons. What turns
@@ -7,20 +7,19 @@ for the thrust and a servo for the angle. The weight is compensated; the water's
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple, Protocol
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
-import numpy as np
-
-from finlab.arrays import Array
 from finlab.axes import is_full_turn
 from finlab.exchange.description_text import DEFAULT_INERTIA
 from finlab.exchange.exchange import Exchange
+from finlab.exchange.mjcf_control import drive_of
 from finlab.layout import Actuator, Body, Hull, Layout
 
 BASE = "base_link"
 """Name of the robot's body."""
+WORLD = "world"
+"""Name that MuJoCo has taken for the body of the world."""
 SERVO = "_angle"
 """What follows the name of an actuator in that of the servo that turns it."""
 DEFAULT_MASS = 10.0
@@ -52,71 +51,6 @@ GEOMS = {"box": "box", "ucat": "box", "ellipsoid": "ellipsoid", "torpedo": "elli
 """Types of geoms by the shape of a hull."""
 
 
-class Answers(Protocol):
-    """What `Allocator.allocate` or `allocate_batch` has returned."""
-
-    @property
-    def layout(self) -> Layout:
-        """The robot that was asked."""
-
-    @property
-    def command(self) -> Array:
-        """Commands (..., n, 3)."""
-
-    @property
-    def forces(self) -> Array:
-        """Forces (..., n, 3) in the body frame [N]."""
-
-
-class _Drive(NamedTuple):
-    """How an actuator is driven in a model."""
-
-    row: int
-    """The row of the actuator's frame along which it pushes; -1 of one that pushes nothing."""
-    turns: bool
-    """Whether a servo turns it about the first row of its frame."""
-
-
-def mujoco_control(answer: Answers) -> Array:
-    """Returns the ctrl of a model that `finlab layout convert ROBOT out.xml` has written.
-
-    A thruster has one number, its force [N]. An azimuth, a tilt and a fin have two, the force of
-    their thrust [N] and the angle to which it turns [rad]; of a fin these are its mean over a beat.
-    A rudder has its deflection [rad]. What is lost has zeros.
-
-    Args:
-        answer: what `Allocator.allocate` or `allocate_batch` has returned.
-
-    Returns:
-        (nu,), of a batch (N, nu): the actuators in the order of the layout.
-
-    Example:
-        >>> import finlab
-        >>> from finlab.exchange import mujoco_control
-        >>> rov = finlab.Allocator(finlab.load_layout("bluerov2"))
-        >>> mujoco_control(rov.allocate([0, 0, 10, 0, 0, 0])).shape
-        (6,)
-    """
-    layout = answer.layout
-    commands = np.nan_to_num(answer.command)
-    forces = np.nan_to_num(answer.forces)
-    columns = []
-    for i, actuator in enumerate(layout.actuators):
-        drive = _drive(actuator)
-        own = forces[..., i, :] @ layout.frames[i].T  # (..., 3) [N] along its own axes
-        if not drive.turns:
-            columns.append(own[..., drive.row])
-            continue
-        if drive.row < 0:
-            columns.append(commands[..., i, actuator.KIND.aiming_number or 0])
-        elif actuator.KIND.force_number is None:
-            columns += [np.hypot(own[..., 1], own[..., 2]), np.arctan2(own[..., 2], own[..., 1])]
-        else:
-            angle = commands[..., i, actuator.KIND.aiming_number or 0]
-            columns += [own[..., 1] * np.cos(angle) + own[..., 2] * np.sin(angle), angle]
-    return np.stack(columns, axis=-1)
-
-
 def write_mjcf(layout: Layout, exchange: Exchange, _suffix: str) -> str:
     """Returns the text of a model of MuJoCo.
 
@@ -125,7 +59,7 @@ def write_mjcf(layout: Layout, exchange: Exchange, _suffix: str) -> str:
         exchange: gets notes on what the model cannot hold.
     """
     body = layout.body or Body()
-    turning = [actuator for actuator in layout.actuators if _drive(actuator).turns]
+    turning = [actuator for actuator in layout.actuators if drive_of(actuator).turns]
     moments = body.inertia_kgm2 or DEFAULT_INERTIA
     mass = body.mass_kg or DEFAULT_MASS
     root = Element("mujoco", model=layout.name)
@@ -147,9 +81,9 @@ def write_mjcf(layout: Layout, exchange: Exchange, _suffix: str) -> str:
     for actuator in layout.actuators:
         place = base
         if actuator in turning:
-            place = SubElement(
-                base, "body", name=actuator.name, pos=_text(actuator.position), gravcomp="1"
-            )
+            link = _link_name(actuator, layout.names)
+            position = _text(actuator.position)
+            place = SubElement(base, "body", name=link, pos=position, gravcomp="1")
             _add_hinge(place, actuator)
             link_mass = max(LINK_SHARE * mass, LEAST_LINK)
             link_moment = max(LINK_SHARE * min(moments), LEAST_LINK)
@@ -161,17 +95,17 @@ def write_mjcf(layout: Layout, exchange: Exchange, _suffix: str) -> str:
     return ElementTree.tostring(root, encoding="unicode") + "\n"
 
 
-def _drive(actuator: Actuator) -> _Drive:
-    """How an actuator is driven."""
-    kind = actuator.KIND
-    if kind.driven_by_flow:
-        return _Drive(-1, True)
-    return _Drive(kind.push_rows[0], len(kind.push_rows) > 1)
-
-
 def _base_name(layout: Layout) -> str:
     """The name of the robot's body, which no actuator has."""
     return BASE if BASE not in layout.names else f"{BASE} of {layout.name}"[:80]
+
+
+def _link_name(actuator: Actuator, names: Sequence[str]) -> str:
+    """The name of the body of an actuator that turns: its own, but for that of the world."""
+    name = actuator.name
+    while name == WORLD or (name != actuator.name and name in names):
+        name += "_"
+    return name
 
 
 def _add_inertial(body: Element, mass: float, moments: Sequence[float]) -> None:
@@ -232,7 +166,7 @@ def _add_drive(place: Element, drives: Element, actuator: Actuator, names: Seque
         actuator: the actuator.
         names: names of all actuators.
     """
-    drive = _drive(actuator)
+    drive = drive_of(actuator)
     if drive.row >= 0:
         site = SubElement(
             place,
@@ -303,7 +237,7 @@ def _note_what_is_left_out(layout: Layout, exchange: Exchange) -> None:
 def _words_of(actuator: Actuator) -> tuple[str, str] | None:
     """What is to be known of how an actuator stands in a model, and what to do about it; None of a
     thruster."""
-    drive = _drive(actuator)
+    drive = drive_of(actuator)
     if drive.row < 0:
         return "A rudder is a joint with a servo: the flow's force on it is not MuJoCo's", ""
     if drive.turns and actuator.KIND.force_number is None:

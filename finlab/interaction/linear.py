@@ -5,8 +5,8 @@ The wrench that comes beside the forces of a robot is a sum of
 - the formula of jets (`finlab.interaction.jets`) with its usual constants, and with each of them
   doubled: what its constants are, and how jets add up where several meet, and
 - messages between pairs of actuators, and of the hull to each actuator
-  (`finlab.interaction.messages`), whose factors are polynomials of their features: of degree 2 for
-  pairs, of degree 3 for the hull,
+  (`finlab.interaction.messages`), whose factors are polynomials of their features: of degree 3 in
+  those of a place in the jet and in those of the hull, of degree 2 in all,
 
 - what a flow takes from each actuator: a share of its force by the speed along it over that of its
   jet, and by the square of this ratio, and a force across it by the momentum of the water taken in,
@@ -54,8 +54,9 @@ FLOW_TERMS = ("propeller", "propeller_squared", "fin", "fin_squared", "side")
 open-water line and of others, and the force across."""
 SMALL_RATIO = 1e-2
 """Ratio of speeds to which its size is rounded off [1]."""
-DEGREES = {"pair": 2, "hull": 3}
-"""Degrees of the polynomials of features that are factors of messages."""
+CUBIC = {"pair": 6, "hull": 7}
+"""The polynomials that are factors of messages are of degree 2 in all features, of degree 3 in so
+many of the first ones: of pairs, those of the place of the receiver in the jet."""
 DOUBLED = ("length", "width", "spread", "lag", "most", "side", "housing", "hull")
 """Constants of the formula of jets of which there is a term with twice the usual value."""
 LINEAR_CONSTANTS = ("side", "housing", "hull")
@@ -81,11 +82,12 @@ MAX_LATENTS = 512
 
 def monomials(kind: str) -> list[tuple[int, ...]]:
     """Returns the monomials of the features of a kind of message, as indices of their factors: the
-    constant, all features, all products of two, and so on up to the degree of the kind."""
+    constant, all features, all products of two, and those of three of the first ones."""
     features = range(ROW_SIZES[kind].features)
     result: list[tuple[int, ...]] = []
-    for degree in range(DEGREES[kind] + 1):
+    for degree in range(3):
         result += combinations_with_replacement(features, degree)
+    result += combinations_with_replacement(range(CUBIC[kind]), 3)
     return result
 
 
@@ -384,17 +386,17 @@ def coefficients(kind: str, weights: Array) -> Array:
         weights: of the vectors' monomials (k, t).
 
     Returns:
-        The constants (k,), and for each degree d from 1 on, by the first d - 1 factors of a
-        monomial in order, an array (k, f): with x their product, x times it adds up to the
-        polynomials' gradients over d. Flat.
+        The constants (k,), and for each degree d from 1 to 3, by the first d - 1 factors of a
+        monomial in order, an array (k, f) of the f features that have monomials of this degree:
+        with x their product, x times it adds up to the polynomials' gradients over d. Flat.
     """
     vectors, features = ROW_SIZES[kind].vectors, ROW_SIZES[kind].features
     result = [weights[:, 0]]
     index = {monomial: k for k, monomial in enumerate(MONOMIALS[kind])}
-    for degree in range(1, DEGREES[kind] + 1):
-        for first in combinations_with_replacement(range(features), degree - 1):
-            array = np.zeros((vectors, features))
-            for last in range(features):
+    for degree, count in ((1, features), (2, features), (3, CUBIC[kind])):
+        for first in combinations_with_replacement(range(count), degree - 1):
+            array = np.zeros((vectors, count))
+            for last in range(count):
                 monomial = tuple(sorted((*first, last)))
                 # The share of the monomial's derivative that falls to this order of its factors.
                 share = len(set(permutations(first))) / len(set(permutations(monomial)))

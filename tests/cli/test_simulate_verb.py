@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from finlab.cli import main
@@ -100,9 +101,35 @@ def test_without_matplotlib_a_picture_is_refused_before_the_swim(
     assert "matplotlib is not installed; run: pip install" in said.err and not said.out
 
 
+def test_a_swim_in_mujoco(
+    line: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Nearly the swim of the own plant; without the package a sentence, before the swim."""
+    pytest.importorskip("mujoco", reason="mujoco is an optional extra")
+    logs = []
+    for plant in ("finlab", "mujoco"):
+        out = tmp_path / plant
+        assert main([*line, "--lost", "front_left@4", "--plant", plant, "-o", str(out)]) == 0
+        assert ("plant: mujoco" in capsys.readouterr().out) == (plant == "mujoco")
+        logs.append(load_log(out / "log.npz"))
+    own, other = logs
+    off = np.abs(own.position - other.position).max()
+    assert 0.0 < off < 2e-3
+    np.testing.assert_array_equal(own.alive, other.alive)
+
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    monkeypatch.delitem(sys.modules, "finlab.swim.vehicle.mujoco_body")
+    sentence = refused([*line, "--plant", "mujoco"])
+    assert "mujoco is not installed; run: pip install 'finlab-marine[mujoco]'" in sentence
+
+
 @pytest.mark.parametrize(
     ("argv", "message"),
     [
+        (["--plant", "gazebo"], "plant: expected one of finlab, mujoco, got 'gazebo'"),
         (["--controller", "pd"], "one of tracking, waypoint, velocity, got 'pd'"),
         (["--plot", "path.doc"], "ends in .png, .svg, .pdf"),
         (["--lost", "front_left@soon"], "lost: expected NAME@SECONDS"),

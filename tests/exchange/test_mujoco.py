@@ -12,6 +12,7 @@ from finlab.arrays import Array
 from finlab.assets import shipped_layouts
 from finlab.errors import LayoutError
 from finlab.exchange import Exchange, convert, mujoco_control, read_any, read_robot
+from finlab.exchange.mjcf_write import write_mjcf
 from finlab.layout import Azimuth, Fin, Layout, Thruster, own_effectiveness
 from tests.random_robots import KINDS, load, random_robot
 
@@ -557,3 +558,13 @@ def test_includes_stand_in_the_folder(tmp_path: Path) -> None:
     np.testing.assert_allclose(ours, wrench_of_mujoco(model, np.array([3.0, 1.0])), atol=TIGHT)
     with pytest.raises(LayoutError, match="did not come along; paste it in"):
         read(file.read_text())
+
+
+def test_a_fin_may_have_the_name_of_mujocos_world() -> None:
+    layout = finlab.load_layout("A")
+    names = ("world", "world_", "base_link", "world_joint")
+    parts = [replace(part, name=name) for part, name in zip(layout.actuators, names, strict=True)]
+    named = layout.with_actuators(tuple(parts))
+    model = mujoco.MjModel.from_xml_string(write_mjcf(named, Exchange(), ""))
+    assert [model.actuator(2 * i).name for i in range(4)] == list(names)
+    assert len({model.body(i).name for i in range(model.nbody)}) == 6

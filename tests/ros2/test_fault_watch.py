@@ -240,6 +240,9 @@ def test_other_sensors_are_heard_where_a_parameter_says_so(monkeypatch: pytest.M
     assert commander.last_refusal.startswith("drives: no actuator 'bow', expected names of")
     commander.on_pressure(math.nan, NO_STAMP, 2.1, clock_s)
     assert commander.last_refusal == "pressure: expected a finite number of Pa, got nan"
+    values = dict(status_report(commander).values)
+    assert values["depth [m]"] == "3.000"
+    assert values["drives heard"] == f"{LOST}, rear_left"
 
 
 def test_other_sensors_are_off_by_default() -> None:
@@ -252,6 +255,7 @@ def test_other_sensors_are_off_by_default() -> None:
     commander.on_drives(speeds, 1.0, 1.0)
     assert not commander.watch._force_count and math.isnan(commander.watch._depth)
     assert np.isnan(commander.watch._drive_speed).all()
+    assert not {"depth [m]", "drives heard"} & set(dict(status_report(commander).values))
 
 
 def test_the_monitor_is_told_the_command_that_was_in_force() -> None:

@@ -316,6 +316,49 @@ def test_the_monitor_hears_the_imu(node: NodeProcess, listener: Listener) -> Non
     listener.node.destroy_publisher(publisher)
 
 
+def test_the_monitor_hears_pressures_and_drives(node: NodeProcess, listener: Listener) -> None:
+    """On topics that are there where parameters say so; what is wrong with a sample is said."""
+    from sensor_msgs.msg import FluidPressure, JointState
+
+    subscribers = listener.node.count_subscribers
+    assert not subscribers("pressure") and not subscribers("drives")
+    assert listener.set(monitor=True, pressure=True, drives="signed")[0]
+    no_sample = "the monitor has no sample of the pressure yet; the monitor has no sample of the"
+    listener.next_status(lambda: f"{no_sample} drives yet" in listener.words)
+    pressures = listener.node.create_publisher(FluidPressure, "pressure", 10)
+    drives = listener.node.create_publisher(JointState, "drives", 10)
+    pressure = FluidPressure(fluid_pressure=29430.0)
+    telemetry = JointState(name=["front_left", "rear_right"], velocity=[900.0, -700.0])
+    telemetry.effort = [1.5, 1.2]
+
+    def said(key: str, value: str) -> bool:
+        """Sends both, and a wrench, and looks."""
+        pressures.publish(pressure)
+        drives.publish(telemetry)
+        listener.ask([0] * 6, wait_s=0.05)
+        return value in listener.values.get(key, "")
+
+    assert listener.until(lambda: said("depth [m]", "3.000"))
+    assert listener.until(lambda: said("drives heard", "front_left, rear_right"))
+    assert "the pressure yet" not in listener.words and "the drives yet" not in listener.words
+    telemetry.header.stamp = (listener.node.get_clock().now()).to_msg()
+    telemetry.header.stamp.sec -= 60
+    assert listener.until(lambda: said("last refusal", "drives: its stamp is 6"))
+    telemetry = JointState(name=["bow"], velocity=[1.0], effort=[1.0])
+    assert listener.until(lambda: said("last refusal", "drives: no actuator 'bow', expected names"))
+    telemetry = JointState()
+    pressure.fluid_pressure = math.nan
+    assert listener.until(lambda: said("last refusal", "pressure: expected a finite number of Pa"))
+    assert listener.values["depth [m]"] == "3.000", "a bad sample changes nothing"
+
+    assert listener.set(pressure=False, drives="off")[0]
+    assert listener.until(lambda: not subscribers("pressure") and not subscribers("drives"))
+    listener.next_status(lambda: "depth [m]" not in listener.values)
+    assert listener.set(monitor=False)[0]
+    for publisher in (pressures, drives):
+        listener.node.destroy_publisher(publisher)
+
+
 def test_a_second_node_is_told_of(node: NodeProcess, listener: Listener) -> None:
     """Then SIGTERM ends it with a neutral command."""
     second_robot = finlab.load_layout("A")

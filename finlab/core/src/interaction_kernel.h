@@ -18,11 +18,11 @@ static inline real lane_of(const vector *x, int lane) { return ((const real *)x)
 
      value = c + x.g1 + x.g2 + x.g3,  gradient = g1 + 2 g2 + 3 g3,
 
-   where g1 (k, f) is constant, g2 = sum_j x_j A_j and g3 = sum_{j <= l} x_j x_l C_jl. Constants are
-   c (k,), g1, the A_j (f, k, f) and, of degree 3, the C_jl (f (f + 1) / 2, k, f). One factor is
-   evaluated. */
+   where g1 (k, f) is constant, g2 = sum_j x_j A_j and g3 = sum_{j <= l} x_j x_l C_jl, of the first
+   `cubic` features q alone. Constants are c (k,), g1, the A_j (f, k, f) and the C_jl
+   (q (q + 1) / 2, k, q). One factor is evaluated. */
 static inline vector factor_of(const real *coefficients, int factors, int factor, int features,
-                               int degree, const vector *x, vector *gradient) {
+                               int cubic, const vector *x, vector *gradient) {
   const int entries = factors * features;
   const real *linear = coefficients + factors + factor * features;
   const real *next = linear + entries;
@@ -35,10 +35,11 @@ static inline vector factor_of(const real *coefficients, int factors, int factor
   for (int j = 0; j < features; j++, next += entries) {
     for (int i = 0; i < features; i++) once[i] += x[j] * next[i];
   }
-  for (int j = 0; j < features && degree == 3; j++) {
-    for (int l = j; l < features; l++, next += entries) {
+  next += factor * (cubic - features);
+  for (int j = 0; j < cubic; j++) {
+    for (int l = j; l < cubic; l++, next += factors * cubic) {
       const vector both = x[j] * x[l];
-      for (int i = 0; i < features; i++) twice[i] += both * next[i];
+      for (int i = 0; i < cubic; i++) twice[i] += both * next[i];
     }
   }
   vector value = lanes_of(coefficients[factor]);
@@ -272,8 +273,8 @@ static inline void add_messages(const interaction_model *model, pair_group *grou
   }
   for (int k = 0; k < PAIR_VECTORS; k++) {
     vector gradient[PAIR_FEATURES];
-    const vector factor = factor_of(model->pair_coefficients, PAIR_VECTORS, k, PAIR_FEATURES, 2,
-                                    of.feature, gradient);
+    const vector factor = factor_of(model->pair_coefficients, PAIR_VECTORS, k, PAIR_FEATURES,
+                                    FEATURES_OF_PLACE, of.feature, gradient);
     m.scaled[k] = of.strength * factor;
     const vector *vectors = view.vectors + 3 * k;
     for (int b = 0; b < 3; b++) message[b] += m.scaled[k] * vectors[b];
@@ -525,8 +526,8 @@ static inline void add_hull_messages(const interaction_model *model, int first, 
   for (int k = 0; k < HULL_VECTORS; k++) {
     vector gradient[HULL_FEATURES];
     const dual *vectors = of.vectors[k].c;
-    const vector factor =
-        factor_of(model->hull_coefficients, HULL_VECTORS, k, HULL_FEATURES, 3, feature, gradient);
+    const vector factor = factor_of(model->hull_coefficients, HULL_VECTORS, k, HULL_FEATURES,
+                                    HULL_FEATURES, feature, gradient);
     for (int b = 0; b < 3; b++) message[b] += factor * vectors[b].value;
     for (int c = 0; c < 3 && effect->slope; c++) {
       vector by = lanes_of(0);

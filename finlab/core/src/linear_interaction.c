@@ -31,7 +31,10 @@ typedef struct {
 /* Numbers of the coefficients of the polynomials of pairs' messages: interaction_kernel.h. */
 enum {
   PAIR_ENTRIES = PAIR_VECTORS * PAIR_FEATURES,
-  PAIR_COEFFICIENTS = PAIR_VECTORS + PAIR_ENTRIES + PAIR_FEATURES * PAIR_ENTRIES
+  PAIR_CUBIC_ENTRIES = PAIR_VECTORS * FEATURES_OF_PLACE,
+  PAIRS_OF_PLACE = FEATURES_OF_PLACE * (FEATURES_OF_PLACE + 1) / 2,
+  PAIR_COEFFICIENTS = PAIR_VECTORS + PAIR_ENTRIES + PAIR_FEATURES * PAIR_ENTRIES +
+      PAIRS_OF_PLACE * PAIR_CUBIC_ENTRIES
 };
 
 /* Adds what a velocity v [m/s] through the water takes of an actuator. */

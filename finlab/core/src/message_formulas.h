@@ -32,10 +32,9 @@ typedef struct {
   vector radius; /* softened [diameters] */
 } pair_view;
 
-/* A feature of along and squared radius is one of the first six, and those from the fourth on
-   depend on both; the eighth and ninth are of the thrusts. */
+/* Of the features of place, those from the fourth on depend on along and squared radius; the eighth
+   and ninth features are of the thrusts. */
 #define FIRST_OF_RADIUS 3
-#define FEATURES_OF_PLACE 6
 #define FIRST_OF_THRUSTS 8
 #define FEATURES_OF_THRUSTS 2
 

@@ -6,6 +6,7 @@
 #include "internal.h"
 
 #define PAIR_FEATURES 11
+#define FEATURES_OF_PLACE 6 /* the first ones, of along and squared radius alone */
 #define PAIR_VECTORS 4
 #define PAIR_NUMBERS (PAIR_FEATURES + 3 * PAIR_VECTORS)
 #define PAIR_FORCES 6 /* numbers of two forces: of the source, of the receiver */

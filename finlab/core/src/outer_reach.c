@@ -4,6 +4,7 @@
 #include "internal.h"
 
 #define SERVED_STEPS 30 /* steps on commands to a wrench */
+#define TICK_STEPS 10   /* the same to a wrench that rates hold back */
 #define RAY_ROUNDS 12   /* shares of a ray that are tried */
 
 /* Finds the largest share of a wrench that steps on commands come to, by bisection, and makes the
@@ -58,9 +59,16 @@ void fl_serve_coupled(const fl_coupled_robot *robot, real *block, fl_work *work,
     memcpy(answer->wrench_served, wrench, sizeof wrench);
     return;
   }
-  if (answer->is_attainable) return; /* by the linear model: steps by the laws may yet find it */
   fl_box box;
   fl_box_of_question(block, work, q, &box);
+  if (answer->is_attainable) {
+    /* By the linear model. In a tick the last iteration may have stopped short of it. */
+    if (!q->previous) return;
+    answer->error =
+        fl_refine_coupled(robot, block, work, &box, wrench, EXACT, TICK_STEPS, answer->command);
+    fl_clip_commands(block, &box, answer->command);
+    return;
+  }
   answer->error = fl_refine_coupled(robot, block, work, &box, answer->wrench_served, EXACT,
                                     SERVED_STEPS, answer->command);
   if (q->policy && q->policy->kind == FL_DIRECTION) {

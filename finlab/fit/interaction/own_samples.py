@@ -7,6 +7,7 @@ what `m` leaves of them over the same,
     z ~ N(V H^T y, V),  H = Phi L,  V = (I + H^T H)^-1.
 
 The noise of a sample is that of the measurement and that of the messages, which no weights explain.
+Samples left out one by one say by what factor the deviations are too small for this robot.
 """
 
 from typing import NamedTuple
@@ -24,6 +25,8 @@ MEASUREMENT_NOISE = 0.02
 LEAST_NOISE = 1e-4
 """The same of an axis on which there is next to nothing, over the wrench scale."""
 
+NORMAL_90 = 1.645
+"""Half width of a 90 % interval, in standard deviations of a normal number."""
 SHARES = np.geomspace(1.0 / 64.0, 64.0, 25)
 """Factors of the variances of latent numbers and of noise, of which a robot has one each [1]."""
 SHARE_DEVIATION = 1.5
@@ -128,10 +131,39 @@ def posterior(terms: RobotTerms, prior: Weights) -> Weights:
     # V = (I / alpha + H^T H / beta)^-1, in the basis of the eigenvectors of H^T H.
     variance = 1.0 / (1.0 / weight_share + values / noise_share)
     by_vector = prior.factor @ vectors
-    mean = prior.mean + by_vector @ (variance * projected / noise_share)
+    latent = variance * projected / noise_share
+    mean = prior.mean + by_vector @ latent
+    rows = by_noise @ by_vector
+    spread = left_out_spread(rows, variance / noise_share, left - rows @ latent, noise_share)
     root = float(np.sqrt(noise_share))
     noise = {kind: root * share for kind, share in prior.noise.items()}
-    return Weights(mean, by_vector * np.sqrt(variance), noise, 1.0)
+    return Weights(mean, by_vector * np.sqrt(variance), noise, spread)
+
+
+def left_out_spread(rows: Array, variance: Array, left: Array, noise_share: float) -> float:
+    """Returns the factor, at least 1, by which 90 % of samples lie within their 90 % intervals by
+    the others: how much more this robot differs from the model than the model knows.
+
+    Each sample is left out in closed form: with A = H_i V H_i^T / beta and the residuals e_i, its
+    error by the others is (I - A)^-1 e_i and the covariance of that beta (I - A)^-1.
+
+    Args:
+        rows: H (6 K, r), six rows for each sample.
+        variance: diagonal of V / beta (r,).
+        left: residuals (6 K,) of all samples, over the deviations of their noise.
+        noise_share: beta.
+    """
+    by_sample = rows.reshape(-1, 6, rows.shape[-1])
+    residual = left.reshape(-1, 6)
+    hat = (by_sample * variance) @ by_sample.swapaxes(1, 2)
+    inverse = np.linalg.inv(np.eye(6) - hat)
+    error = (inverse @ residual[..., None])[..., 0]
+    deviation = np.sqrt(noise_share * np.diagonal(inverse, axis1=1, axis2=2))
+    # Axes that nothing pushes along say nothing.
+    ratio = np.abs(error / deviation)[residual != 0.0]
+    if len(ratio) == 0:
+        return 1.0
+    return max(1.0, float(np.quantile(ratio, 0.9)) / NORMAL_90)
 
 
 def _likeliest_shares(values: Array, projected: Array, left: Array) -> tuple[float, float]:

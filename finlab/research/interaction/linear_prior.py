@@ -1,11 +1,13 @@
 """Learns the weights of an interaction from forward data of many robots, in closed form.
 
-The mean is ridge regression on all samples. How much robots differ, the covariance of their
+A first mean is ridge regression on all samples. How much robots differ, the covariance of their
 weights, and how large the noise is that no weights explain are those that make the samples most
 likely (empirical Bayes): first a few numbers, one deviation for each kind of term and the noise of
 each kind of message, by steps on each in turn; then the whole covariance by the algorithm EM, held
 near the former by as much as some robots would say. Of the covariance the directions that matter
-most for wrenches are kept. Robots held out say by what factor intervals are too wide.
+most for wrenches are kept. The mean is then estimated again by generalized least squares: what
+robots do not have in common counts less where they differ much. Robots held out say by what factor
+intervals are too wide.
 """
 
 from collections.abc import Sequence
@@ -18,6 +20,7 @@ from finlab.errors import DataError
 from finlab.fit.interaction.own_samples import (
     LEAST_NOISE,
     MEASUREMENT_NOISE,
+    NORMAL_90,
     RobotTerms,
     terms_of,
     whitened,
@@ -39,6 +42,8 @@ LEAST_ROBOTS = 10
 """Fewest robots to learn from."""
 RIDGE = 1e-5
 """Penalty of the regression, over the mean square of the terms."""
+LEAST_SQUARE = 1e-12
+"""Floor of the mean square of a term, by which it is divided."""
 LATENTS = 200
 """Latent numbers that are kept."""
 ROBOTS_OF_DEVIATIONS = 40
@@ -63,8 +68,6 @@ GAIN = 0.2
 """Least gain of the logarithm of the likelihood for which a deviation is changed."""
 LEAST_DEVIATION = 1e-5
 """Least deviation."""
-NORMAL_90 = 1.645
-"""Half width of a 90 % interval, in standard deviations of a normal number."""
 
 
 def train_weights(samples: Sequence[Samples], seed: int = 0) -> tuple[Weights, float]:
@@ -89,12 +92,8 @@ def train_weights(samples: Sequence[Samples], seed: int = 0) -> tuple[Weights, f
     held = robots[:held_count]
     known = robots[held_count:]
     gram, moment = _normal_equations(known)
-    unit = np.sqrt(np.diag(gram) / len(known) + 1e-12)
-    scaled = gram / unit / unit[:, None]
-    ridge = RIDGE * len(known) * np.eye(WEIGHT_COUNT)
-    # What data do not say stays as usual: the ridge is about these weights.
-    left = (moment - gram @ USUAL_WEIGHTS) / unit
-    mean = USUAL_WEIGHTS + np.linalg.solve(scaled + ridge, left) / unit
+    unit = np.sqrt(np.diag(gram) / len(known) + LEAST_SQUARE)
+    mean = USUAL_WEIGHTS + _ridge_regression(gram, moment, len(known))
 
     noise = dict.fromkeys(ROW_SIZES, FIRST_NOISE)
     start = Weights(mean, np.zeros((WEIGHT_COUNT, 0)), noise, 1.0)
@@ -104,6 +103,7 @@ def train_weights(samples: Sequence[Samples], seed: int = 0) -> tuple[Weights, f
         covariance = _expected(known[:ROBOTS_OF_COVARIANCE], weights, covariance, deviations)
     metric = gram / len(known) + RIDGE * np.diag(unit**2)
     weights = weights._replace(factor=_leading_factor(covariance, metric, LATENTS))
+    weights = weights._replace(mean=_generalized_mean(known, weights))
     return _calibrated(held, weights)
 
 
@@ -113,19 +113,45 @@ def _single(terms: RobotTerms) -> RobotTerms:
 
 
 def _normal_equations(robots: Sequence[RobotTerms]) -> tuple[Array, Array]:
-    """Gram matrix (w, w) of all terms, and their products (w,) with what the laws leave."""
+    """Gram matrix (w, w) of all terms, and their products (w,) with what the usual weights
+    leave."""
     gram = np.zeros((WEIGHT_COUNT, WEIGHT_COUNT))
     moment = np.zeros(WEIGHT_COUNT)
     for robot in robots:
         rows = robot.by_weight.reshape(-1, WEIGHT_COUNT).astype(np.float64)
         gram += rows.T @ rows
-        moment += rows.T @ robot.missed.ravel()
+        moment += rows.T @ (robot.missed.ravel() - rows @ USUAL_WEIGHTS)
     return gram, moment
+
+
+def _ridge_regression(gram: Array, moment: Array, robots: int) -> Array:
+    """Weights (w,) beside the usual ones, of the normal equations of so many robots: what data do
+    not say stays as usual."""
+    unit = np.sqrt(np.diag(gram) / robots + LEAST_SQUARE)
+    scaled = gram / unit / unit[:, None]
+    ridge = RIDGE * robots * np.eye(WEIGHT_COUNT)
+    return np.asarray(np.linalg.solve(scaled + ridge, moment / unit) / unit)
+
+
+def _generalized_mean(robots: Sequence[RobotTerms], weights: Weights) -> Array:
+    """The mean (w,) of the weights by generalized least squares: with N the covariance of the noise
+    of a robot's samples, their covariance is N + Phi L L^T Phi^T."""
+    usual = weights._replace(mean=USUAL_WEIGHTS)
+    gram = np.zeros((WEIGHT_COUNT, WEIGHT_COUNT))
+    moment = np.zeros(WEIGHT_COUNT)
+    for robot in robots:
+        rows, left, _ = whitened(robot, usual)
+        by_latent = rows @ weights.factor
+        root = cholesky(np.eye(len(rows)) + by_latent @ by_latent.T, lower=True)
+        rows = solve_triangular(root, rows, lower=True)
+        gram += rows.T @ rows
+        moment += rows.T @ solve_triangular(root, left, lower=True)
+    return np.asarray(USUAL_WEIGHTS + _ridge_regression(gram, moment, len(robots)))
 
 
 def _groups() -> Array:
     """Which deviation each weight has: of formulas, of the flow, of the hull, and of pairs by
-    degree."""
+    whether their degree is above 1."""
     groups = [0] * len(FORMULAS) + [1] * len(FLOW_TERMS)
     for kind, size in ROW_SIZES.items():
         for _ in range(size.vectors):
@@ -133,7 +159,7 @@ def _groups() -> Array:
                 if kind == "hull":
                     groups.append(2)
                 else:
-                    groups.append(3 + (len(monomial) == 2))
+                    groups.append(3 + (len(monomial) > 1))
     return np.array(groups)
 
 

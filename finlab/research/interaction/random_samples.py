@@ -15,11 +15,13 @@ from finlab.interaction.jets import Jets
 from finlab.layout.layout import Layout
 from finlab.physics.plant import Plant
 from finlab.research.interaction.random_plants import random_plant
-from finlab.research.random_layouts import random_jet_robot
+from finlab.research.random_layouts import log_uniform, random_jet_robot
 
 JETS = Jets()
 """The constants of the formula of jets that are shipped."""
 
+APART = (0.5, 2.0)
+"""Factors of the distances of actuators and of the hull of these robots, log-uniform."""
 SPEED = 1.2
 """Largest speed through the water of robots that a prior is learned from [m/s]."""
 NOISE = 0.02
@@ -50,6 +52,7 @@ def random_samples(
     noise: float,
     count: tuple[int, int],
     speed: float = 0.0,
+    apart: float = 1.0,
 ) -> list[Samples]:
     """Returns samples of random robots; they depend on the seed and their number alone.
 
@@ -62,6 +65,7 @@ def random_samples(
         count: least and most actuators of a robot.
         speed: most of the robots through the water [m/s], in any direction and at any speed up to
             it; at rest by default. The oracle is given the flow as well where it is above 0.
+        apart: distances of actuators and size of the hull, over those of `random_jet_robot`.
 
     Raises:
         DataError: the oracle gives wrenches of another shape.
@@ -69,7 +73,7 @@ def random_samples(
     result = []
     for k in range(layouts):
         rng = np.random.default_rng([31_000, seed, k])
-        layout = random_jet_robot(rng, f"robot_{k + 1}", count)
+        layout = spread_apart(random_jet_robot(rng, f"robot_{k + 1}", count), apart)
         command = Plant(layout).sample(rng, (commands,))
         flow = None if speed == 0.0 else random_flows(rng, commands, speed)
         given = oracle(layout, command) if flow is None else oracle(layout, command, flow)
@@ -84,6 +88,22 @@ def random_samples(
     return result
 
 
+def spread_apart(layout: Layout, factor: float) -> Layout:
+    """Returns a robot with so many times the distances and the size of the hull, of the same
+    actuators."""
+    if factor == 1.0:
+        return layout
+    assert layout.body is not None and layout.body.hull is not None
+    hull = layout.body.hull
+    size = tuple(factor * side for side in hull.size_m or ())
+    actuators = [
+        replace(part, position=tuple(factor * coordinate for coordinate in part.position))
+        for part in layout.actuators
+    ]
+    body = replace(layout.body, hull=replace(hull, size_m=size))
+    return replace(layout, actuators=tuple(actuators), body=body)
+
+
 def random_flows(rng: np.random.Generator, count: int, speed: float) -> Array:
     """Returns velocities (count, 6) [m/s, rad/s] of a body that does not turn: in any direction, at
     speeds that are uniform up to the largest one [m/s]."""
@@ -94,11 +114,15 @@ def random_flows(rng: np.random.Generator, count: int, speed: float) -> Array:
 
 
 def samples_of_families(layouts: int, commands: int, seed: int) -> list[Samples]:
-    """Returns samples of random robots of 3 to 8 actuators, each with a random plant of its own, a
-    half of the robots at speeds of up to `SPEED`, with noise of `NOISE`."""
+    """Returns samples of random robots of 3 to 8 actuators, each with a random plant of its own,
+    from half to twice as far apart, a half of the robots at speeds of up to `SPEED`, with noise of
+    `NOISE`."""
     result = []
     for k in range(layouts):
-        plant = random_plant(np.random.default_rng([33_000, seed, k]))
+        rng = np.random.default_rng([33_000, seed, k])
+        plant = random_plant(rng)
+        apart = log_uniform(rng, *APART)
         speed = SPEED if k % 2 else 0.0
-        result += random_samples(plant, 1, commands, seed * layouts + k, NOISE, (3, 8), speed)
+        number = seed * layouts + k
+        result += random_samples(plant, 1, commands, number, NOISE, (3, 8), speed, apart)
     return result

@@ -45,9 +45,10 @@ from finlab.swim.simulation.task import Trajectory
 from finlab.swim.simulation.truth import Fault, checked_truth, damage_of
 from finlab.swim.vehicle.actuator_motion import ActuatorMotion
 from finlab.swim.vehicle.attitude import quaternion_of
+from finlab.swim.vehicle.body_integrator import ActuatorLoad
 from finlab.swim.vehicle.fin_motion import FinMotion
-from finlab.swim.vehicle.fossen import complete_body
-from finlab.swim.vehicle.vehicle import STATE_SIZE, Vehicle
+from finlab.swim.vehicle.plants import body_integrator
+from finlab.swim.vehicle.vehicle import STATE_SIZE
 
 LOOKAHEAD_TICKS = 10
 """Ticks whose wrenches the allocator is given in advance."""
@@ -81,11 +82,13 @@ class ClosedLoop:
         learner: finds out what the actuators really are; allocator and monitor then work with that.
         truth: the robot that really swims, such as `perturbed(layout, damping=2.0)`, where `layout`
             is only what allocator, controller and monitor believe of it; it has the same actuators.
+        plant: what integrates its body, a name in `PLANTS`: `finlab`, the library's own, or
+            `mujoco`, which needs that extra.
         seed: of the sensors' noise and of the allocator.
 
     Raises:
         FinlabError: an allocator of another robot, an unknown actuator or kind of failure, a time
-            that is none, or a truth that has other actuators.
+            that is none, a truth that has other actuators, or an unknown plant.
     """
 
     def __init__(
@@ -103,6 +106,7 @@ class ClosedLoop:
         monitor: FaultMonitor | None = None,
         learner: Learner | None = None,
         truth: Layout | None = None,
+        plant: str = "finlab",
         seed: int = 0,
     ) -> None:
         """Puts the robot at rest at the start of its task."""
@@ -126,7 +130,7 @@ class ClosedLoop:
         under_way = "closest" if layout.flow_driven else allocator.policy_under_way
         self.policy = as_policy(under_way if policy is None else policy)
         truth = layout if truth is None else checked_truth(layout, truth)
-        self.vehicle = Vehicle(complete_body(truth), current)
+        self.vehicle = body_integrator(plant, truth, current)
         """The body that really swims, and the current; it may be replaced on the way."""
         self.fin_motion = FinMotion(truth)
         """The fins' motion: amplitude, frequency, zero direction and phase of each."""
@@ -477,7 +481,8 @@ class ClosedLoop:
         if not forces.feels_flow:
             output = forces.output(moved, dt, self._share, None)
             wrench = forces.wrench(output[..., FORCE], None)
-            return output, wrench, vehicle.steps(self.state, wrench, dt)[1:]
+            load = ActuatorLoad(wrench, output[..., FORCE], moved.others)
+            return output, wrench, vehicle.advance(self.state, load, dt)
         n_steps = len(moved.others)
         wrench = np.empty((n_steps, 6))
         states = np.empty((n_steps, STATE_SIZE))
@@ -492,7 +497,8 @@ class ClosedLoop:
             if forces.laws_feel_flow:
                 output[step] = forces.output(moved.at(k), dt, self._share, water)
             wrench[step] = forces.wrench(output[step, :, FORCE], water)
-            state = vehicle.step(state, wrench[k], dt)
+            load = ActuatorLoad(wrench[step], output[step, :, FORCE], moved.others[step])
+            state = vehicle.advance(state, load, dt)[0]
             states[k] = state
         return output, wrench, states
 

@@ -269,6 +269,7 @@ def excitation(
     truth: Layout | None = None,
     sensors: SensorSettings | None = None,
     current: Sequence[float] = (0.0, 0.0, 0.0),
+    plant: str = "finlab",
     seed: int = 0,
 ) -> ClosedLoop:
     """The swim, ready to be run. Raises DataError: the duration is too short to tell anything, or
@@ -280,6 +281,7 @@ def excitation(
         truth: the robot that really swims, where it is not as drawn.
         sensors: rates and noise; the defaults of `SensorSettings`.
         current: velocity (3,) of the water in the world [m/s].
+        plant: what integrates its body, see `ClosedLoop`.
         seed: of the excitation and of the sensors' noise.
     """
     if layout.flow_driven:
@@ -297,5 +299,6 @@ def excitation(
         truth=truth,
         sensors=sensors,
         current=current,
+        plant=plant,
         seed=seed,
     )

@@ -89,6 +89,45 @@ def accelerations(body: Dynamics, nu_r: Any, up: Any, tau: Any) -> Any:
     return (force_x / mx, force_y / my, force_z / mz, torque_x / ix, torque_y / iy, torque_z / iz)
 
 
+def water_wrench(body: Dynamics, rigid_inertia: Vector, nu_r: Any, up: Any, tau: Any) -> Any:
+    """Returns what the water gives a body whose rigid part and whose weight somebody else accounts
+    for, six numbers [N, N m] in the body frame.
+
+    The rigid body alone, of mass m and moments I, moves by M_RB nu_r' + C_RB(nu_r) nu_r, which
+    `tau` and the water give together, the weight compensated:
+
+        -(M_A nu_r' + C_A(nu_r) nu_r + D(nu_r) nu_r + g(eta)) = M_RB nu_r' + C_RB(nu_r) nu_r - tau
+
+    with nu_r' of the whole, so that the added mass is felt in the same moment. A current that is
+    steady in the world moves this frame at a constant velocity (property 8.1 of Fossen).
+
+    Args:
+        body: numbers of the whole, added mass and net buoyancy included.
+        rigid_inertia: m and the three moments of the rigid body (4) [kg, kg m^2].
+        nu_r: velocity through the water and angular rates (6), body frame [m/s, rad/s].
+        up: the world's z axis (3) in the body frame.
+        tau: wrench (6) of all else, body frame [N, N m].
+    """
+    u, v, w, p, q, r = nu_r
+    m, ix, iy, iz = rigid_inertia
+    u_dot, v_dot, w_dot, p_dot, q_dot, r_dot = accelerations(body, nu_r, up, tau)
+    # m (v_r' + omega x v_r) and I omega' + omega x I omega
+    force_x = m * (u_dot + q * w - r * v)
+    force_y = m * (v_dot + r * u - p * w)
+    force_z = m * (w_dot + p * v - q * u)
+    torque_x = ix * p_dot + (iz - iy) * q * r
+    torque_y = iy * q_dot + (ix - iz) * r * p
+    torque_z = iz * r_dot + (iy - ix) * p * q
+    return (
+        force_x - tau[0],
+        force_y - tau[1],
+        force_z - tau[2],
+        torque_x - tau[3],
+        torque_y - tau[4],
+        torque_z - tau[5],
+    )
+
+
 def jacobian(body: Dynamics, nu_r: Any) -> list[list[Any]]:
     """Returns the derivatives (6, 6) of `accelerations` by nu_r.
 

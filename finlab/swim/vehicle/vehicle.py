@@ -19,9 +19,10 @@ from finlab.arrays import Array
 from finlab.core import library
 from finlab.core.shared_array import SharedArray
 from finlab.errors import LayoutError
-from finlab.layout import Body
+from finlab.layout import Body, Layout
 from finlab.swim.vehicle.attitude import rotation_of_quaternion, to_body
-from finlab.swim.vehicle.fossen import dynamics_of
+from finlab.swim.vehicle.body_integrator import ActuatorLoad
+from finlab.swim.vehicle.fossen import complete_body, dynamics_of
 
 STATE_SIZE = 13
 STABLE_STEP = 1.5
@@ -32,8 +33,22 @@ MAX_SUBSTEPS = 500
 in the core."""
 
 
+def vehicle_of(layout: Layout, current: Sequence[float] = (0.0, 0.0, 0.0)) -> "Vehicle":
+    """Returns the vehicle of a robot.
+
+    Args:
+        layout: the robot; what its body does not say is U-CAT's.
+        current: velocity (3,) of the water in the world [m/s].
+
+    Raises:
+        LayoutError: the current is no velocity.
+    """
+    return Vehicle(complete_body(layout), current)
+
+
 class Vehicle:
-    """The dynamics of one vehicle; it keeps nothing from one call to the next."""
+    """The dynamics of one vehicle; it keeps nothing from one call to the next. It is a
+    `BodyIntegrator`."""
 
     def __init__(self, body: Body, current: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
         """Makes the dynamics of a body in water.
@@ -160,6 +175,16 @@ class Vehicle:
         if taken < count:
             self.n_steps(states[taken, 7:], dt)  # says what is wrong
         return states
+
+    def advance(self, state: Array, load: ActuatorLoad, dt: float) -> Array:
+        """Returns the states (K, 13) after each of K periods; errors as of `steps`.
+
+        Args:
+            state: at the beginning (13,).
+            load: what the actuators give in each period, of which the wrenches alone count.
+            dt: a period [s].
+        """
+        return self.steps(state, load.wrench, dt)[1:]
 
     def step(self, state: ArrayLike, wrench: ArrayLike, dt: float) -> Array:
         """Returns the state (13,) after one period; arguments and errors as of `steps`, which takes

@@ -258,6 +258,21 @@ class FaultWatch:
         phrases = [f"{each.name} {self._said_of(each)}" for each in self.findings]
         return phrases + [f"{name} in doubt ({share:.2f})" for name, share in self._suspected()]
 
+    def heard(self) -> list[tuple[str, str]]:
+        """Returns what the sensors have said last that parameters let the monitor hear, by name;
+        an empty value of one that has said nothing."""
+        values = []
+        if self._parameters.pressure:
+            depth = f"{self._depth:.3f}" if math.isfinite(self._depth_at_s) else ""
+            values.append(("depth [m]", depth))
+        if self._parameters.drives != "off":
+            is_heard = self._drives_at_s > -NEVER_S
+            names = [
+                name for name, is_it in zip(self._layout.names, is_heard, strict=True) if is_it
+            ]
+            values.append(("drives heard", ", ".join(names)))
+        return values
+
     def values(self) -> list[tuple[str, str]]:
         """Returns the evidence: names and values for each actuator that is not whole."""
         if self.diagnosis is None:

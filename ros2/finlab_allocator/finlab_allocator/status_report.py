@@ -20,6 +20,8 @@ MOVES_UNEXPLAINED = (
     "is not as the layout says"
 )
 """What is said where the monitor cannot name a fault."""
+SENSOR_OF_VALUE = {"depth [m]": "the pressure", "drives heard": "the drives"}
+"""What says each value that the monitor has heard."""
 MUCH_LEFT = 0.999
 """Share of an axis' wrench from which on it counts as whole."""
 
@@ -75,6 +77,10 @@ def status_report(commander: Commander, warnings: Sequence[str] = ()) -> Report:
         values += commander.watch.values()
         if commander.watch.diagnosis is None:
             warnings = (*warnings, "the monitor has no sample of the IMU yet")
+        for name, value in (heard := commander.watch.heard()):
+            if not value:
+                warnings = (*warnings, f"the monitor has no sample of {SENSOR_OF_VALUE[name]} yet")
+        values += heard
         if commander.watch.findings:
             warnings = (*warnings, f"found: {'; '.join(phrases)}")
         if commander.watch.is_unknown:

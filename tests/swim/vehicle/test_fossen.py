@@ -20,6 +20,7 @@ from finlab.swim.vehicle.fossen import (
     damping_rates,
     dynamics_of,
     jacobian,
+    water_wrench,
 )
 from finlab.swim.vehicle.vehicle import Vehicle
 
@@ -133,6 +134,31 @@ def test_derivatives_agree_on_random_states(buoyancy: float | None, layout_a: La
         np.testing.assert_allclose(
             ours_later, rotation_of(*(eta[3:] + h * eta_rate[3:])), atol=1e-9
         )
+
+
+def test_what_the_water_gives_is_what_fossens_matrices_say(layout_a: Layout) -> None:
+    """Added mass, its Coriolis terms, damping and buoyancy, the weight compensated."""
+    rng = np.random.default_rng(3)
+    base = complete_body(layout_a)
+    for _ in range(20):
+        offset = tuple(rng.uniform(-0.05, 0.05, 3))
+        p = replace(base, center_of_buoyancy_m=offset, buoyancy_n=200.0)
+        nu_r = rng.uniform(-1, 1, 6)
+        tau = rng.uniform(-10, 10, 6)
+        up = rng.standard_normal(3)
+        up /= np.linalg.norm(up)
+        dynamics = dynamics_of(p)
+        nu_rate = np.array(accelerations(dynamics, nu_r, up, tau))
+        rigid_inertia = (p.mass_kg, *p.inertia_kgm2)
+        found = np.array(water_wrench(dynamics, rigid_inertia, nu_r, up, tau))
+
+        mass_added = np.diag(p.added_mass)
+        damping = np.diag(np.array(p.linear_damping) + np.array(p.quadratic_damping) * abs(nu_r))
+        lift = 200.0 * up
+        buoyancy = np.concatenate([lift - p.mass_kg * 9.81 * up, np.cross(offset, lift)])
+        expected = buoyancy - mass_added @ nu_rate - damping @ nu_r
+        expected -= coriolis(mass_added, nu_r) @ nu_r
+        np.testing.assert_allclose(found, expected, atol=1e-10)
 
 
 def test_the_jacobian_is_that_of_the_accelerations(layout_a: Layout) -> None:

@@ -5,7 +5,6 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from copy import copy
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -38,6 +37,7 @@ from finlab.research.interaction.random_samples import (
     WrenchOracle,
     random_flows,
     random_samples,
+    spread_apart,
 )
 from finlab.research.random_layouts import ActuatorMaker, random_jet_robot, random_shaft_fin
 
@@ -74,17 +74,7 @@ AT_REST = {
     "12 actuators": Group((12, 12)),
     "half as far apart": Group(apart=0.5),
     "twice as far apart": Group(apart=2.0),
-    "shipped robots": Group(
-        shipped=(
-            "bluerov2",
-            "bluerov2_heavy",
-            "octo",
-            "hexa",
-            "turtle_hybrid",
-            "catamaran",
-            "penta",
-        )
-    ),
+    "shipped robots": Group(shipped=SHIPPED_ROBOTS),
 }
 """Groups of robots at rest, which any plant can judge."""
 GROUPS = AT_REST | {
@@ -158,7 +148,7 @@ def _cases(
             layout = load_layout(group.shipped[k])
         else:
             layout = random_jet_robot(rng, f"robot_{k + 1}", group.actuators, group.kinds)
-        layout = _spread(layout, group.apart)
+        layout = spread_apart(layout, group.apart)
         tested = Plant(layout).sample(rng, (targets,))
         # A row of targets is one question in one flow: all have the same.
         flow = random_flows(rng, 1, 1.0)[0]
@@ -172,21 +162,6 @@ def _cases(
         own_samples = Samples(layout, command, measured, flows)
         cases.append(Case(layout, flow, tested, wrench, own_samples))
     return cases
-
-
-def _spread(layout: Layout, apart: float) -> Layout:
-    """A robot with so many times the distances and the size of the hull, of the same actuators."""
-    if apart == 1.0:
-        return layout
-    assert layout.body is not None and layout.body.hull is not None
-    hull = layout.body.hull
-    size = tuple(apart * side for side in hull.size_m or ())
-    actuators = [
-        replace(part, position=tuple(apart * coordinate for coordinate in part.position))
-        for part in layout.actuators
-    ]
-    body = replace(layout.body, hull=replace(hull, size_m=size))
-    return replace(layout, actuators=tuple(actuators), body=body)
 
 
 class Case(NamedTuple):
