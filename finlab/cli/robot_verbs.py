@@ -67,7 +67,6 @@ def allocate(
     """
     from finlab.allocation import Allocator
     from finlab.allocation.policy import policy_from
-    from finlab.allocation.power_budget import power_from
     from finlab.allocation.report import allocation_record
     from finlab.display import prefix_of
     from finlab.layout.damage import Damage
@@ -80,15 +79,14 @@ def allocate(
     axes = cast("tuple[Axis, ...]", free)
     allocator = Allocator(robot, name, checkpoint=checkpoint, **options)
     answer = policy_from(policy, axis_weights, priority, falling)
+    watts = None
+    if power:
+        from finlab.allocation.power_budget import power_from
+
+        watts = power_from(power)
     damage = Damage.parse(robot, gone, weak, torn, stuck, running)
     result = allocator.allocate(
-        wrench,
-        damage=damage,
-        free=axes,
-        policy=answer,
-        flow=flow,
-        seed=seed,
-        power=power_from(power),
+        wrench, damage=damage, free=axes, policy=answer, flow=flow, seed=seed, power=watts
     )
     lines = [str(result)]
     if bound and result.bound is None:

@@ -359,8 +359,8 @@ def _solve_one(
     power = _power_of_buses(method, solved, budget)
     if not (power > (1.0 + SLACK) * budget.watts).any():
         return solved
-    answer, over = _answer_kept(method, conditions, targets[0], policy, budget)
-    sentences = {_EXCEEDS} if over > 1.0 + EXACT else set()
+    answer, most_over = _answer_kept(method, conditions, targets[0], policy, budget)
+    sentences = {_EXCEEDS} if most_over > 1.0 + EXACT else set()
     return method.solution_of(
         conditions, targets, answer.command[None], answer.multipliers[None], None, sentences
     )
