@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from finlab.layout import Fin as Fin
     from finlab.layout import Layout as Layout
     from finlab.layout import Limits as Limits
+    from finlab.layout import PropellerRudder as PropellerRudder
     from finlab.layout import Rudder as Rudder
     from finlab.layout import Thruster as Thruster
     from finlab.layout import Tilt as Tilt
@@ -48,6 +49,7 @@ __all__ = [
     "Policy",
     "PowerLaw",
     "PowerTable",
+    "PropellerRudder",
     "Rudder",
     "Thruster",
     "Tilt",
@@ -68,6 +70,7 @@ _MODULE_OF_NAME = {
     "Policy": "finlab.allocation.policy",
     "PowerLaw": "finlab.actuators.thrust_model",
     "PowerTable": "finlab.actuators.thrust_model",
+    "PropellerRudder": "finlab.layout",
     "Rudder": "finlab.layout",
     "Thruster": "finlab.layout",
     "Tilt": "finlab.layout",

@@ -43,6 +43,9 @@ class OracleSet:
             self.curve, self.taken = actuator.foil(self.angles)
             self.rays = [_Ray(np.array([0.0, 1.0]), np.full(2, self.taken.max()))]
             return
+        if actuator.kind == "propeller_rudder":
+            self._take_steered(actuator, low, high)
+            return
         if actuator.kind == "fin":
             sizes, costs = fin_costs(actuator)
         else:
@@ -54,6 +57,40 @@ class OracleSet:
         self.middle = 0.5 * (first + last)
         self.half = 0.5 * (last - first)
         self.rays = [_Ray(sizes, costs)]
+
+    def _take_steered(self, actuator: OracleActuator, low: Array, high: Array) -> None:
+        """Takes a propeller with a rudder: forces of deflections (4001,) at no thrust and per newton
+        of it, and the costs of thrusts, ahead and astern."""
+        self.angles = np.linspace(low[0], high[0], 4001)
+        none = actuator.steered(self.angles, np.zeros(4001))
+        self.curve = none
+        self.per_newton = actuator.steered(self.angles, np.ones(4001)) - none
+        ahead = max(low[1], 0.0) + SHARES * (high[1] - max(low[1], 0.0))
+        self.rays = [_Ray(ahead, actuator.propeller_watts(ahead))]
+        if low[1] < 0.0 and not actuator.flow.any():
+            astern = -SHARES * low[1]
+            self.rays.append(_Ray(astern, actuator.propeller_watts(-astern)))
+
+    def _steered_answer(self, price: Array) -> tuple[Array, float]:
+        """See `answer`, of a propeller with a rudder: the best of all deflections ahead, by the
+        parabola through the best three, and straight astern."""
+        paid = self.per_newton @ price
+        ends = [int(paid.argmax()), int((self.curve @ price).argmax())]
+        tried = {0, 4000}
+        for end in ends:
+            tried |= set(range(max(end - 2, 0), min(end + 3, 4001)))
+        tried |= set(range(0, 4001, 40))
+        best = (np.zeros(2), -np.inf)
+        for k in sorted(tried):
+            size, earned = self.rays[0].answer(float(paid[k]))
+            total = earned + float(self.curve[k] @ price)
+            if total > best[1]:
+                best = (self.curve[k] + size * self.per_newton[k], total)
+        if len(self.rays) > 1:
+            size, earned = self.rays[1].answer(-float(price[0]))
+            if earned > best[1]:
+                best = (np.array([-size, 0.0]), earned)
+        return best
 
     @staticmethod
     def _ray(actuator: OracleActuator, sign: float, low: float, high: float) -> "_Ray":
@@ -88,6 +125,8 @@ class OracleSet:
                 if ahead[1] >= back[1]
                 else (np.array([-back[0]]), back[1])
             )
+        if self.actuator.kind == "propeller_rudder":
+            return self._steered_answer(price)
         if self.actuator.kind == "rudder":
             best = int((self.curve @ price - self.taken).argmax())
             return self.curve[best], float(self.curve[best] @ price - self.taken[best])
@@ -98,6 +137,15 @@ class OracleSet:
         uneven = float(self.actuator.unevenness(phi))
         force, earned = self.rays[0].answer(size * uneven * math.cos(phi + lean - towards))
         return force * uneven * np.array([math.cos(phi + lean), math.sin(phi + lean)]), earned
+
+    def watts_at(self, numbers: Array, costs: Any) -> float:
+        """Watts at the numbers of `_polar`, with a spline of the costs over sizes."""
+        actuator = self.actuator
+        if actuator.kind == "propeller_rudder":
+            return float(actuator.propeller_watts(numbers[1]))
+        if actuator.kind in ("thruster", "rudder"):
+            return float(actuator.watts(np.array([numbers[0], 0.0, 0.0])))
+        return float(costs(numbers[0]))
 
     def _direction(self, towards: float) -> float:
         """The zero direction [rad] at which a force is worth most, the price pointing at
@@ -232,6 +280,12 @@ def _polar(sets: tuple[OracleSet, ...], forces: list[Array]) -> Array:
         if len(force) == 1:
             parts.append(force)
             continue
+        if each.actuator.kind == "propeller_rudder":
+            size = max(float(force[0]), 0.0)
+            offset = force - each.curve - size * each.per_newton
+            place = np.square(offset).sum(axis=1).argmin()
+            parts.append(np.array([each.angles[place], force[0]]))
+            continue
         turned = math.atan2(force[1], force[0]) - each.actuator.lean
         phi = each.middle + (turned - each.middle + math.pi) % (2.0 * math.pi) - math.pi
         parts.append(np.array([np.hypot(*force) / each.actuator.unevenness(phi), phi]))
@@ -305,6 +359,8 @@ def least_known(plant: OraclePlant, wrench: Array, starts: int = 8, seed: int = 
                 out.append(each.actuator.foil(part)[0][0])
             elif len(part) == 1:
                 out.append(part)
+            elif each.actuator.kind == "propeller_rudder":
+                out.append(each.actuator.steered(part[0], part[1]))
             else:
                 size = part[0] * each.actuator.unevenness(part[1])
                 angle = part[1] + each.actuator.lean
@@ -317,9 +373,7 @@ def least_known(plant: OraclePlant, wrench: Array, starts: int = 8, seed: int = 
     def watts(x: Array) -> float:
         total = 0.0
         for each, spline, a in zip(sets, splines, parts[:-1], strict=True):
-            one_number = each.actuator.kind in ("thruster", "rudder")
-            command = np.array([x[a], 0.0, 0.0])
-            total += float(each.actuator.watts(command) if one_number else spline(x[a]))
+            total += each.watts_at(x[a:], spline)
         return total
 
     pulled = [_polar(sets, _dual(plant, halves, wrench)[1]) for halves in _halves(plant, 2)]
@@ -351,6 +405,13 @@ def _ends(sets: tuple[OracleSet, ...]) -> tuple[list[Array], list[Array]]:
             ends = each.actuator.limits
             low.append(ends[0][:1])
             high.append(ends[1][:1])
+            continue
+        if each.actuator.kind == "propeller_rudder":
+            ends = each.actuator.limits
+            low.append(ends[0][:2])
+            high.append(ends[1][:2])
+            if each.actuator.flow.any():
+                low[-1] = low[-1].clip([-np.inf, 0.0])
             continue
         sizes = each.rays[0].sizes
         span = 3.0 * math.pi if each.full else each.half

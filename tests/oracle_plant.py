@@ -3,7 +3,8 @@ answers.
 
 It reads a layout file's mapping as a stranger would and follows the formulas in the documentation.
 Commands are arrays (n, 3): fin (half amplitude [rad], frequency [Hz], zero direction [rad]),
-thruster (force [N], 0, 0), azimuth (angle [rad], force [N], 0), rudder (deflection [rad], 0, 0).
+thruster (force [N], 0, 0), azimuth (angle [rad], force [N], 0), rudder (deflection [rad], 0, 0),
+propeller with a rudder (deflection [rad], thrust [N], 0).
 """
 
 import math
@@ -94,6 +95,9 @@ class OracleActuator:
             ends = [np.radians(spec.get("arc_deg", [-180.0, 180.0])), spec["force_n"], (0.0, 0.0)]
         elif self.kind == "thruster":
             ends = [spec["force_n"], (0.0, 0.0), (0.0, 0.0)]
+        elif self.kind == "propeller_rudder":
+            deflection = np.radians(spec.get("deflection_deg", [-30.0, 30.0]))
+            ends = [deflection, spec["force_n"], (0.0, 0.0)]
         else:
             ends = [np.radians(spec["deflection_deg"]), (0.0, 0.0), (0.0, 0.0)]
         low, high = np.array(ends, np.float64).T
@@ -184,10 +188,18 @@ class OracleActuator:
         if speed == 0.0:
             return np.zeros((*deflection.shape, 2)), np.zeros(deflection.shape)
         course = np.array([ahead, aside]) / speed
+        lift, drag = self.foil_coefficients(deflection - math.atan2(aside, ahead))
+        pressure = 0.5 * spec.get("density_kg_m3", DENSITY) * speed**2 * spec["area_m2"]
+        across = np.array([-course[1], course[0]])
+        force = pressure * (lift[..., None] * across - drag[..., None] * course)
+        return force, pressure * drag * speed
+
+    def foil_coefficients(self, angle: Array) -> tuple[Array, Array]:
+        """Lift and drag coefficients (...,) of a foil at angles (...,) from the flow [rad]."""
+        spec = self.spec
         ratio = spec["aspect_ratio"]
         slope = 1.8 * math.pi * ratio / (math.sqrt(ratio**2 + 4.0) + 1.8)
         stall = math.radians(spec.get("stall_deg", math.degrees(0.47)))
-        angle = deflection - math.atan2(aside, ahead)
         angle = np.arctan(np.tan(angle))  # astern is as good as ahead
         ends = (
             np.exp(np.clip(-50.0 * (angle - stall), -600, 600)),
@@ -199,10 +211,26 @@ class OracleActuator:
         ) ** 2 * np.cos(angle)
         drag = spec.get("drag_coefficient", 0.0065) + parted * 2.0 * np.sin(angle) ** 2
         drag = drag + (1.0 - parted) * (slope * angle) ** 2 / (0.9 * math.pi * ratio)
-        pressure = 0.5 * spec.get("density_kg_m3", DENSITY) * speed**2 * spec["area_m2"]
-        across = np.array([-course[1], course[0]])
-        force = pressure * (lift[..., None] * across - drag[..., None] * course)
-        return force, pressure * drag * speed
+        return lift, drag
+
+    def steered(self, deflection: Array, thrust: Array) -> Array:
+        """Force (..., 2) [N] of a propeller and of the rudder in its slipstream, in the own plane.
+
+        The slipstream has the speed sqrt(V^2 + 2 T / (rho A)), by momentum theory; a share of the
+        dynamic pressure that it adds meets the rudder.
+        """
+        spec = self.spec
+        density = spec.get("density_kg_m3", DENSITY)
+        disc = math.pi * spec["diameter_m"] ** 2 / 4.0
+        share = spec.get("slipstream", 1.0)
+        through = self.flow[:3] + np.cross(self.flow[3:], self.position)
+        V = max(float(through @ self.first), 0.0)
+        slipstream_squared = V**2 + 2.0 * thrust / (density * disc)
+        added = 0.5 * density * (slipstream_squared - V**2)
+        pressure = np.maximum(0.5 * density * V**2 + share * added, 0.0)
+        lift, drag = self.foil_coefficients(deflection)
+        along = thrust - pressure * spec["area_m2"] * drag
+        return np.stack([along, pressure * spec["area_m2"] * lift], axis=-1)
 
     # ---- any kind
     # -------------------------------------------------------------------------------------
@@ -221,6 +249,8 @@ class OracleActuator:
             return np.stack([force, np.zeros_like(force)], axis=-1)
         if self.kind == "rudder":
             return self.foil(command[..., 0])[0]
+        if self.kind == "propeller_rudder":
+            return self.steered(command[..., 0], command[..., 1])
         if self.kind == "azimuth":
             size = command[..., 1]
             angle = command[..., 0]
@@ -263,9 +293,8 @@ class OracleActuator:
         turn = math.radians(spec.get("turn_rate_deg_s", np.inf))
         if self.kind == "rudder":
             return np.array([math.radians(spec.get("rate_deg_s", np.inf)), np.inf, np.inf])
-        return np.array(
-            [turn, force, np.inf] if self.kind == "azimuth" else [force, np.inf, np.inf]
-        )
+        turns = self.kind in ("azimuth", "propeller_rudder")
+        return np.array([turn, force, np.inf] if turns else [force, np.inf, np.inf])
 
     def rate_excess(self, previous: Array, command: Array, period_s: float) -> float:
         """By what share of its largest step a command (3,) goes beyond what may follow a previous
@@ -302,6 +331,9 @@ class OracleActuator:
             top[:2] = low[:2] + share * (high - low)[:2]
         elif self.kind == "azimuth":
             top[1] = low[1] + share * (high - low)[1]
+        elif self.kind == "propeller_rudder":
+            low = low * [1.0, share, 1.0]
+            top[1] = share * high[1]
         elif low[0] < 0.0 < high[0]:
             low = share * low
             top = share * high
@@ -402,6 +434,7 @@ COMMAND_KEYS = {
     "thruster": ("force",),
     "azimuth": ("angle", "force"),
     "rudder": ("deflection",),
+    "propeller_rudder": ("deflection", "force"),
 }
 """Kind of actuator -> names of its command's numbers, in their order."""
 
@@ -414,6 +447,11 @@ def edge_forces(actuator: OracleActuator, count: int) -> Array:
         return np.array([[low[0]], [high[0]], [min(max(0.0, low[0]), high[0])]])
     if actuator.kind == "rudder":
         return actuator.foil(np.linspace(low[0], high[0], count))[0]
+    if actuator.kind == "propeller_rudder":
+        deflection = np.linspace(low[0], high[0], 4 * count)
+        ahead = actuator.steered(deflection, np.full(4 * count, high[1]))
+        least = max(low[1], 0.0) if actuator.flow.any() else low[1]
+        return np.concatenate([ahead, actuator.steered(deflection, np.full(4 * count, least))])
     if actuator.kind == "azimuth":
         angle = np.linspace(low[0], high[0], count)
         ring = np.stack([np.cos(angle), np.sin(angle)], axis=-1)

@@ -33,8 +33,10 @@ KINDS = (
     "rudders",
     "mixed",
     "all",
+    "slipstreams",
 )
-"""Kinds of robot; in `holes` fins cannot rest, their least force is up to 5 % of the largest."""
+"""Kinds of robot; in `holes` fins cannot rest, their least force is up to 5 % of the largest; in
+`slipstreams` propellers have a rudder behind them."""
 T200 = {"type": "power_law", "forward": 0.997, "reverse": 1.449, "exponent": 1.5}
 """A T200 thruster at 16 V: watts over N^1.5."""
 T200_FORCE = [-39.91, 51.44]
@@ -50,7 +52,7 @@ def random_robot(kind: str, number: int, seed: int) -> dict[str, Any]:
     """Robot `number` of a seed, of one of `KINDS`, as the mapping of a layout file."""
     rng = np.random.default_rng([DOMAIN, KINDS.index(kind), seed, number])
     while True:
-        makers = _makers(kind, rng)
+        makers = _makers(kind, rng, number)
         scale = 10.0 ** rng.uniform(-0.5, 0.5)
         actuators = [make(rng, f"a{i + 1}", scale) for i, make in enumerate(makers)]
         layout = {
@@ -81,7 +83,7 @@ def fins_with_a_tail(number: int, seed: int) -> dict[str, Any]:
 
 def random_flow(kind: str, number: int, seed: int) -> Array | None:
     """Velocity (6,) through the water [m/s, rad/s] for a robot with rudders; None for others."""
-    if kind != "rudders":
+    if kind != "rudders" and not (kind == "slipstreams" and number % 2):
         return None
     rng = np.random.default_rng([DOMAIN, KINDS.index(kind), seed, number, 1])
     along: Array = rng.uniform(0.3, 2.0) * np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
@@ -140,14 +142,17 @@ Maker = Callable[[np.random.Generator, str, float], dict[str, Any]]
 """Makes an actuator of a layout file of a generator, a name and a scale of forces."""
 
 
-def _makers(kind: str, rng: np.random.Generator) -> list[Maker]:
-    """What a robot of a kind is made of."""
+def _makers(kind: str, rng: np.random.Generator, number: int = 0) -> list[Maker]:
+    """What robot `number` of a kind is made of."""
     if kind == "thrusters":
         return [_thruster] * int(rng.integers(4, 11))
     if kind == "azimuths":
         return [_azimuth] * int(rng.integers(3, 7))
     if kind == "rudders":
         return [_rudder] * int(rng.integers(2, 5)) + [_thruster] * int(rng.integers(4, 8))
+    if kind == "slipstreams":
+        steered = [_steered_in_flow if number % 2 else _steered]
+        return steered * int(rng.integers(2, 5)) + [_thruster] * int(rng.integers(3, 6))
     if kind == "wide arcs":
         wide = int(rng.integers(1, 3))
         return (
@@ -221,9 +226,9 @@ def with_rates(layout: Mapping[str, Any]) -> dict[str, Any]:
     rated = []
     for each in layout["actuators"]:
         more: dict[str, Any] = {}
-        if each["type"] in ("thruster", "azimuth"):
+        if each["type"] in ("thruster", "azimuth", "propeller_rudder"):
             more["rate_n_s"] = each["force_n"][1] - each["force_n"][0]
-        if each["type"] == "azimuth":
+        if each["type"] in ("azimuth", "propeller_rudder"):
             more["turn_rate_deg_s"] = 180.0
         rated.append({**each, **more})
     return {**layout, "actuators": rated}
@@ -262,6 +267,30 @@ def _rudder(rng: np.random.Generator, name: str, scale: float) -> dict[str, Any]
     }
     spec |= {"zero": zero, "area_m2": float(0.005 * scale * rng.uniform(0.5, 2.0))}
     return spec | {"aspect_ratio": float(rng.uniform(1.0, 4.0)), "deflection_deg": [-most, most]}
+
+
+def _steered(rng: np.random.Generator, name: str, scale: float) -> dict[str, Any]:
+    """A random propeller with a rudder in its slipstream, at rest."""
+    rudder = _rudder(rng, name, scale)
+    diameter = float(rng.uniform(0.05, 0.12))
+    share = float(rng.uniform(0.3, 1.0))
+    disc = math.pi * diameter**2 / 4.0
+    deflection = [-float(rng.uniform(10.0, 22.0)), float(rng.uniform(10.0, 22.0))]
+    return rudder | {
+        "type": "propeller_rudder",
+        "deflection_deg": deflection,
+        "diameter_m": diameter,
+        "area_m2": disc * float(rng.uniform(0.2, 0.55)) / share,
+        "slipstream": share,
+        "force_n": [-float(scale * rng.uniform(2.0, 10.0)), float(scale * rng.uniform(4.0, 30.0))],
+        "model": _law(rng),
+    }
+
+
+def _steered_in_flow(rng: np.random.Generator, name: str, scale: float) -> dict[str, Any]:
+    """The same that pushes ahead alone, as all do in a flow."""
+    spec = _steered(rng, name, scale)
+    return spec | {"force_n": [0.0, spec["force_n"][1]]}
 
 
 def _arc(rng: np.random.Generator, least: float, most: float) -> list[float]:

@@ -43,7 +43,7 @@ WINGS: dict[str, Levels] = {
     "research": (
         ("research/executor", "research/networks", "research/random_layouts"),
         ("research/training",),
-        ("research/paper", "research/interaction"),
+        ("research/paper", "research/interaction", "research/distilled"),
         ("research/mdn",),
         ("research/evaluation",),
     ),

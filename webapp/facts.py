@@ -12,6 +12,7 @@ from webapp.session.two_robots import Pair
 from webapp.tasks.answering import ShownAnswer
 from webapp.tasks.jobs import Jobs
 from webapp.tasks.solver import Reply
+from webapp.tasks.swimmer import Swimmer
 from webapp.tasks.take_home import HomeQuestion
 
 
@@ -49,6 +50,7 @@ def facts_of(
     session: Session,
     jobs: Jobs,
     answer: ShownAnswer,
+    swimmer: Swimmer | None,
     dragged: int | None,
     pulled: Grip | None,
     scale: Scale,
@@ -60,6 +62,7 @@ def facts_of(
         session: its state, and what is looked at.
         jobs: questions of the page, and their answers.
         answer: what is seen of the newest answer.
+        swimmer: the robot that is seen to swim; None for none.
         dragged: index of the actuator that is dragged; None for none.
         pulled: what of the wrench is in the user's hand; None for nothing.
         scale: what lengths in the view stand for.
@@ -67,7 +70,6 @@ def facts_of(
     """
     state = session.state
     swimming = jobs.swimming
-    swimmer = swimming.swimmer
     opened = session.opened
     jet_comparison = jobs.jet_comparison.answer
     if jet_comparison is not None and jet_comparison.state != state:
@@ -137,10 +139,12 @@ def facts_of(
         ),
         # A swim, and the view.
         "swims": swimming.active,
+        "shows_swim": swimmer is not None or (swimming.active and swimming.swimmer is None),
         "swimmer": swimmer,
         "moment": None if swimmer is None else swimmer.visible_moment,
         "visible_layout": state.layout if swimmer is None else swimmer.layout,
         "paused": swimming.active and not swimming.running and not swimming.done,
+        "swim_goes_on": swimming.active and not swimming.done,
         "pace": pace_words(swimming) if swimming.active else "",
         "dragged": dragged,
         "pulled": pulled,

@@ -209,6 +209,16 @@
     [stop, isPraised] = [title, !!praise];
   }
 
+  // On a phone a region may hold nothing but text: the arrow keys scroll it once Tab has come to it.
+  function scroll() {
+    for (const region of document.querySelectorAll('[data-fl~=region]')) {
+      const isLong = region.scrollHeight > region.clientHeight + 1;
+      const isReached = [...region.querySelectorAll('button, input, a, [tabindex="0"]')].some((one) => one.checkVisibility());
+      region.toggleAttribute('tabindex', isLong && !isReached);
+      if (region.hasAttribute('tabindex')) region.tabIndex = 0;
+    }
+  }
+
   function name() {
     asked = 0;
     inspect();
@@ -216,6 +226,12 @@
     const list = document.querySelector('.mantine-Spotlight-content');
     list?.setAttribute('aria-label', 'Commands');
     list?.querySelector('[data-scrollarea-viewport]')?.setAttribute('tabindex', '0');
+    for (const close of document.querySelectorAll('.mantine-Notification-closeButton:not([aria-label])'))
+      close.setAttribute('aria-label', 'Close the note');
+    // What explains a box stands outside of all regions: it is one of its own while it is shown.
+    const hint = document.querySelector('.mantine-Tooltip-tooltip')?.closest('[data-portal]');
+    if (hint && !hint.hasAttribute('role')) Object.assign(hint, { role: 'region', ariaLabel: 'Hint' });
+    if (innerWidth <= 600) scroll();
     for (const label of document.querySelectorAll('label[for]')) {
       const row = label.closest('.mantine-Flex-root');
       const found = row ? [...row.querySelectorAll('input:not([type=hidden]):not([type=file]), textarea, [role=slider]')] : [];

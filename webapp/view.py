@@ -221,11 +221,14 @@ class View:
                 guide.take(answer.shown_allocation)
             self.scenery.follow_guide()
             pair = pair_facts(session, self.jobs)
+            swimmer = self.jobs.visible_swimmer
             scale = self.scenery.fit(
-                session.state.target, answer.shown_allocation, pair.pair_allocations
+                session.state.target, answer.shown_allocation, swimmer, pair.pair_allocations
             )
             robot = self.scenery.robot
-            facts = facts_of(session, self.jobs, answer, robot.dragged, robot.pulled, scale, pair)
+            facts = facts_of(
+                session, self.jobs, answer, swimmer, robot.dragged, robot.pulled, scale, pair
+            )
             facts |= self.page.following.facts._asdict()
         except Exception as error:
             board.fail(error)

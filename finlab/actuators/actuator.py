@@ -155,6 +155,8 @@ class Kind:
         arc: field with the angles that it turns through, which change sign in a mirror; empty
             where there is none.
         driven_by_flow: whether its force is that of the water that flows past: none at rest.
+        described: whether robot descriptions of other programs, and their parameters, can say what
+            it is; `finlab layout convert` refuses others.
         models: formulas that its law may follow, by the type of its `model`; none where there is
             one law.
     """
@@ -170,6 +172,7 @@ class Kind:
     faults: tuple[str, ...] = ()
     arc: str = ""
     driven_by_flow: bool = False
+    described: bool = True
     models: tuple[str, ...] = ()
 
     @cached_property

@@ -65,6 +65,7 @@ KINDS = Kinds(
         "azimuth": "finlab.actuators.azimuth:Azimuth",
         "tilt": "finlab.actuators.azimuth:Tilt",
         "rudder": "finlab.actuators.rudder:Rudder",
+        "propeller_rudder": "finlab.actuators.propeller_rudder:PropellerRudder",
     }
 )
 """Type of an actuator in a layout -> its class."""

@@ -134,7 +134,7 @@ class Propeller(Actuator):
             force=(share * self.force[0], share * self.force[1]),
             dead_band=share * self.dead_band,
             rate=None if self.rate is None else share * self.rate,
-            model=_scaled(self.model, share),
+            model=scaled_model(self.model, share),
         )
 
     def command(self, row: Array) -> Command | None:
@@ -235,8 +235,8 @@ def _factor(force: float, power: float) -> float | None:
     return float(f"{max(factor, LEAST_FACTOR):.4g}")
 
 
-def _scaled(model: ThrustModel, share: float) -> ThrustModel:
-    """The model of a propeller with `share` of the force at each power."""
+def scaled_model(model: ThrustModel, share: float) -> ThrustModel:
+    """Returns the model of a propeller with `share` of the force at each power."""
     if isinstance(model, PowerTable):
         rows = tuple((command, share * force, power) for command, force, power in model.rows)
         return replace(model, rows=rows)

@@ -335,8 +335,9 @@ class Form(NamedTuple):
     """How a force of one actuator becomes a command, and a command a force, as numbers for the
     core, where `finlab/core/src/command_law.c` reads them."""
 
-    kind: Literal["thruster", "pod", "fin", "foil"]
-    """What a command is: a force; an angle and a force; a beat of a fin; an angle of a foil."""
+    kind: Literal["thruster", "pod", "fin", "foil", "steered"]
+    """What a command is: a force; an angle and a force; a beat of a fin; an angle of a foil;
+    that of a rudder, and the force of the propeller before it."""
     axes: Array | None = None
     """Axes (3, 3) of the law's forces in the actuator's own ones; None where they are the same."""
     law: Array | None = None
@@ -348,7 +349,7 @@ class Form(NamedTuple):
     """K of `command_table`, which the core reads before its rows: cells of a fin, points of a
     foil."""
     deflection: Array | None = None
-    """Of a fin with a gauge: angles (POINTS,) [rad] from the command's direction to the force's."""
+    """With a gauge: angles (POINTS,) [rad] from the command's direction to the force's."""
     turning_costs: bool = False
     """Whether a change of the command's angle has a cost in a tick (Eq. 16), as of a pod."""
     command_sign: float = 1.0
@@ -361,11 +362,12 @@ class Form(NamedTuple):
     unevenness_angle: float = 0.0
     """Of a fin: phi_e of that factor [rad]."""
     pressure_area: float = 1.0
-    """Of a foil: dynamic pressure times area [N]."""
+    """Of a foil: dynamic pressure times area [N]. Of a propeller with a rudder: the thrust whose
+    slipstream is as fast as the flow [N]."""
     zero_lift_angle: float = 0.0
     """Of a foil: command at which it has no lift [rad]."""
     zero_lift_drag: float = 0.0
-    """Of a foil: drag coefficient there [1]."""
+    """Of a foil: drag coefficient there [1]. Of a propeller with a rudder -1: p pushes ahead."""
 
 
 class Group(ABC):

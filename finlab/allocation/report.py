@@ -18,7 +18,7 @@ from msgspec import to_builtins
 from finlab.actuators.actuator import Actuator
 from finlab.actuators.fin.fin_laws import make_law
 from finlab.actuators.fin.fin_model import DOUBT, FinModelSpec, Limits
-from finlab.actuators.kinds import KINDS
+from finlab.actuators.kinds import KINDS, laws_of
 from finlab.actuators.law import FinLaw
 from finlab.arrays import NEARLY, Array
 from finlab.axes import AXES, MOTIONS, UNITS
@@ -420,7 +420,8 @@ def _flow_notes(layout: Layout, flow: Array | None) -> tuple[str, ...]:
         if not guessed:
             return ()
         return (f"what speed takes from {guessed} is guessed: no open_water is known of them",)
-    if not foils:
+    feels_flow = any(law.feels_flow for _, law in laws_of(layout.actuators))
+    if not feels_flow:
         kind_by_flow = next(name for name, kind in KINDS.items() if kind.KIND.driven_by_flow)
         return (
             f"the flow is without effect: layout {layout.name} has no {kind_by_flow}, and what "

@@ -696,15 +696,19 @@ def _shape(actuator: ProofActuator, part: Part, radius: float, *, is_hull: bool)
         return Shape(directions, radius, 0.0, 0.0, (ends,))
     center = part.sector_center
     half_angle = part.sector_half_angle
-    is_narrow = half_angle < 0.5 * math.pi
     angle = center + half_angle * np.linspace(-1.0, 1.0, RIM_POINTS)
     rim = radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     if is_hull and least < 0.0 and half_angle < math.pi:
         corners = np.concatenate([rim, least / radius * rim])
         return Shape(directions, radius, center, half_angle, (_convex_hull(corners),))
-    if not is_hull and is_narrow and part.least_ahead > SMALL_LEAST * radius:
-        # Beyond the chord along which the force ahead is the least one.
-        width = part.least_ahead * math.tan(half_angle)
+    if not is_hull and part.least_ahead > SMALL_LEAST * radius:
+        # Beyond the chord along which the force ahead is the least one: up to the ends of the arc,
+        # or up to the rim where that is nearer.
+        to_rim = math.acos(min(part.least_ahead / radius, 1.0))
+        used_angle = min(half_angle, to_rim)
+        angle = center + used_angle * np.linspace(-1.0, 1.0, RIM_POINTS)
+        rim = radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+        width = part.least_ahead * math.tan(used_angle)
         cos = math.cos(center)
         sin = math.sin(center)
         turn = np.array([[cos, sin], [-sin, cos]])

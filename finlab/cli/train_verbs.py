@@ -1,12 +1,12 @@
-"""`finlab data generate|interaction`, `finlab train mdn|surrogate|allocator|interaction`: data,
-networks."""
+"""`finlab data generate|interaction`, `finlab train mdn|surrogate|allocator|interaction|policy`:
+data, networks."""
 
 from __future__ import annotations
 
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from tyro.conf import OmitArgPrefixes, Positional, arg
 
@@ -150,6 +150,41 @@ def interaction(
         output.mkdir(parents=True, exist_ok=True)
         write_weights(file, weights)
     print(f"{file}: error {error:.3g} of the wrench scale on robots held out, noise included")
+
+
+def policy(
+    output: _Output,
+    network: Literal["both", "head", "forces"] = "both",
+    preset: _Preset = "default",
+    seed: Count = 0,
+    steps: _Count = None,
+    resume: bool = False,
+) -> None:
+    """Distil method `dual` into policies for all robots, and write their networks.
+
+    They propose where an answer begins, for robots of thrusters, pods and fins that were never
+    seen: `finlab eval distilled --folder FOLDER` judges them (docs/theory/distilled.md).
+
+    Args:
+        output: folder for the networks, and of each log, curves and state.
+        network: head, which a network makes for a robot and which gives multipliers, forces, which
+            a Transformer gives for each wrench, or both.
+        preset: recipe: default (half a minute of a core each), long (five minutes) or smoke
+            (seconds).
+        seed: of robots, wrenches and first weights.
+        steps: optimizer steps instead of the recipe's.
+        resume: go on from the last state in the folder.
+    """
+    from finlab.research.distilled.train import train_policy
+    from finlab.research.distilled.trained_policy import CONFIGS
+
+    check_positive(steps=steps)
+    for name in CONFIGS:
+        if network not in ("both", name):
+            continue
+        losses = train_policy(output, name, preset, seed, steps, resume)
+        words = ", ".join(f"{key.replace('_', ' ')} {value:.4g}" for key, value in losses.items())
+        print(f"{output}: network {name}, preset {preset}, {words}")
 
 
 def _report(output: Path, made: TrainedWeights) -> None:

@@ -9,7 +9,7 @@ from typing import TypeVar
 
 from finlab.errors import FinlabError
 
-VERSION = 29
+VERSION = 30
 """What `fl_version()` of the C files returns; both rise together where a signature or a struct
 changes."""
 SIGNATURES = {
@@ -32,6 +32,7 @@ SIGNATURES = {
     "fl_conjugates": "ippppipp",
     "fl_power_bounds": "ipppppipp",
     "fl_power_bound_of_row": "rppppp",
+    "fl_dual_points": "ippppiipppppp",
     "fl_reach": "vpppppirppp",
     "fl_jets": "vppipppp",
     "fl_line_jets_length": "ip",

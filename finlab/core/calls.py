@@ -393,6 +393,11 @@ class QuestionRecord:
         self._has_multipliers = multipliers is not None
         self.write_conditions(conditions)
 
+    def begin_at(self, multipliers: Array | None) -> None:
+        """Writes where a batch begins, after `write`: lambda (N, 6) [W/N, W/(N m)], C-contiguous,
+        which has to live as long as it stands here; None for Newton's own."""
+        self._multipliers_pointer[0] = 0 if multipliers is None else multipliers.ctypes.data
+
     def write_conditions(self, conditions: Conditions) -> None:
         """Writes what holds of the robot."""
         if conditions is self._constant_conditions:
@@ -475,6 +480,23 @@ def prepared_work(block: Array) -> ctypes.Array[ctypes.c_char]:
 def widest_lanes() -> int:
     """Returns how many wrenches of a batch this machine answers at once, in lanes of vectors."""
     return int(library().fl_widest_lanes())
+
+
+class DualPoints(NamedTuple):
+    """The dual of N wrenches at N multipliers."""
+
+    multipliers: Array
+    """lambda (N, 6) [W/N, W/(N m)]."""
+    steps: NDArray[np.int32]
+    """How many steps of Newton's method were taken (N,)."""
+    residual: Array
+    """What the responses leave of the wrenches (N, 6) [N, N m] (Eq. 6)."""
+    dual_value: Array
+    """g (N,) [W] (Eq. 3)."""
+    force: Array
+    """Responses (N, n, 2) [N] (Eq. 5)."""
+    slope: Array
+    """Their derivatives by the prices (N, n, 3) [N^2/W]: xx, xy, yy."""
 
 
 class WorkArea:
@@ -606,7 +628,11 @@ class Core:
         return self.answer_row(wrench, policy, multipliers, conditions, -1.0).copied()
 
     def answer_many(
-        self, wrenches: Array, policy: Record | None, conditions: Conditions = NOMINAL
+        self,
+        wrenches: Array,
+        policy: Record | None,
+        conditions: Conditions = NOMINAL,
+        multipliers: Array | None = None,
     ) -> CoreAnswer:
         """Answers many wrenches in one call of C, which releases the interpreter's lock. Threads
         that ask at the same time are answered at the same time.
@@ -616,6 +642,8 @@ class Core:
             policy: of `policy_record`, what to give out of reach; None for nothing else
                 than the wrenches.
             conditions: what holds of the robot.
+            multipliers: lambda (N, 6) [W/N, W/(N m)] at which Newton's method begins; None for its
+                own.
 
         Returns:
             The same N answers as `answer_one` gives, to 1e-9.
@@ -625,6 +653,13 @@ class Core:
         """
         wrenches = np.ascontiguousarray(wrenches)
         count = len(wrenches)
+        if multipliers is not None:
+            multipliers = np.ascontiguousarray(multipliers, np.float64)
+            if multipliers.shape != (count, 6):
+                raise CommandError(
+                    f"multipliers: expected an array ({count}, 6), a row for each wrench, got one "
+                    f"of shape {multipliers.shape}"
+                )
         answer = CoreAnswer(
             force=np.empty((count, self.n, 2)),
             multipliers=np.empty((count, 6)),
@@ -645,6 +680,7 @@ class Core:
                     wrenches,
                     policy,
                     conditions,
+                    multipliers,
                     answer,
                     is_truncated,
                 )
@@ -656,7 +692,14 @@ class Core:
             area = self._spare_area()
             try:
                 self._answer_many(
-                    area.address, area.question, wrenches, policy, conditions, answer, is_truncated
+                    area.address,
+                    area.question,
+                    wrenches,
+                    policy,
+                    conditions,
+                    multipliers,
+                    answer,
+                    is_truncated,
                 )
             finally:
                 self._spare_areas.append(area)
@@ -676,12 +719,14 @@ class Core:
         wrenches: Array,
         policy: Record | None,
         conditions: Conditions,
+        multipliers: Array | None,
         answer: CoreAnswer,
         is_truncated: NDArray[np.bool_],
     ) -> None:
-        """Answers wrenches (N, 6) in a work area; the arrays of `answer`, and `is_truncated` (N,),
-        become the answers."""
+        """Answers wrenches (N, 6) in a work area, from multipliers (N, 6) where there are some; the
+        arrays of `answer`, and `is_truncated` (N,), become the answers."""
         question.write(policy, None, conditions)
+        question.begin_at(multipliers)
         code = self._unlocked_core.fl_answer_many(
             self._block_address,
             work_address,
@@ -698,7 +743,56 @@ class Core:
             answer.error.ctypes.data,
             is_truncated.ctypes.data,
         )
+        question.begin_at(None)
         raise_refusal(code)
+
+    def dual_points(
+        self,
+        wrenches: Array,
+        multipliers: Array | None,
+        most_steps: int,
+        conditions: Conditions = NOMINAL,
+    ) -> DualPoints:
+        """Takes some steps of Newton's method from multipliers, and evaluates the dual there.
+
+        Args:
+            wrenches: desired (N, 6) [N, N m].
+            multipliers: lambda (N, 6) [W/N, W/(N m)] to begin with; None for its own.
+            most_steps: most steps, those included that are undone; 0 for the dual as it is.
+            conditions: what holds of the robot.
+
+        Returns:
+            The dual at the multipliers that the steps come to.
+
+        Raises:
+            CommandError: the core cannot work with these numbers.
+        """
+        wrenches = np.ascontiguousarray(wrenches, np.float64)
+        count = len(wrenches)
+        begin = np.full((count, 6), np.nan)
+        if multipliers is not None:
+            begin[:] = multipliers
+        points = DualPoints(
+            multipliers=begin,
+            steps=np.empty(count, np.int32),
+            residual=np.empty((count, 6)),
+            dual_value=np.empty(count),
+            force=np.empty((count, self.n, 2)),
+            slope=np.empty((count, self.n, 3)),
+        )
+        with self._lock:
+            self._question.write(None, None, conditions)
+            code = self._core.fl_dual_points(
+                self._block_address,
+                self._work_address,
+                self._question.address,
+                wrenches.ctypes.data,
+                count,
+                most_steps,
+                *(array.ctypes.data for array in points),
+            )
+        raise_refusal(code)
+        return points
 
     def commands(self, force: Array, previous: Array | None = None) -> Array:
         """Finds the commands for forces, by the grids of the laws.

@@ -72,7 +72,9 @@ typedef double fl_wide; /* where differences of large numbers matter, in single 
               first multipliers, and of points of a lattice; beyond reach those that come nearest
    FL_FOILS   steps for these: of two searches, and twice for each share of a ray (begun at the last
               commands and anew); and a target for each start of a lattice
-   FL_BUDGETS targets within power budgets: the wrench itself, and each group of a policy
+   FL_BUDGETS targets within power budgets: the wrench itself, and each group of a policy at once
+              and at up to seven costs of what is missing; and in a tick forces at twelve costs of
+              turning
    FL_BOUND   forces are found twice in a tick in which drives pass their dead bands */
 #define FL_DIVE (FL_DIVE_ROUNDS * FL_STEPS_AT_KINK)
 #define FL_SEARCH (2 * FL_DIVE + (FL_PARTS + 1) * (FL_DIVE + 2 * FL_STEPS_AT_KINK))
@@ -80,10 +82,10 @@ typedef double fl_wide; /* where differences of large numbers matter, in single 
 #define FL_STARTS (FL_PARTS + 5 + FL_FOIL_VERTICES + 2 * FL_MOST + FL_LATTICE_FOLLOWED)
 #define FL_FOILS_CHEAPER (FL_FOIL_STEPS * FL_STEPS_AT_KINK * 2 * (FL_STARTS + FL_RAY_SHARES))
 #define FL_FOILS (FL_FOILS_CHEAPER + 2 * FL_LATTICE_STARTS * FL_STEPS_AT_KINK)
-#define FL_BUDGETS (13 * FL_STEPS)
+#define FL_BUDGETS ((1 + 6 * 8) * FL_STEPS + 12 * FL_FORCES)
 #define FL_BOUND (2 * (FL_FORCES + FL_FOILS) + FL_BUDGETS)
 
-#define FL_VERSION 29  /* of all structs and functions here */
+#define FL_VERSION 30  /* of all structs and functions here */
 #define FL_MAGIC 41721 /* first number of a block */
 
 /* The structs that cross the border of the library. */
@@ -127,6 +129,7 @@ enum {
   FL_POD,      /* an angle and a force */
   FL_FIN,      /* amplitude, frequency and direction of a beat */
   FL_FOIL,     /* an angle */
+  FL_STEERED,  /* deflection of a rudder, and the force of the propeller before it */
   FL_KINDS     /* how many kinds there are */
 };
 
@@ -254,8 +257,9 @@ const void *fl_python_method(void);
            it knows none. Asking the processor may take microseconds: ask once. */
 int fl_widest_lanes(void);
 
-/* Finds commands for many wrenches, all else as in a question. The outputs are those of fl_answer,
-   to rounding, and their bits depend neither on `lanes`, from 2 on, nor on the other wrenches.
+/* Finds commands for many wrenches, all else as in a question, whose multipliers are (count, 6)
+   here. The outputs are those of fl_answer, to rounding, and their bits depend neither on `lanes`,
+   from 2 on, nor on the other wrenches.
 
    @param lanes            how many wrenches are answered at once where that can be: 2, 4 or 8, no
                            more than fl_widest_lanes(); 1 for one after the other
@@ -361,6 +365,26 @@ fl_real fl_power_bound_of_row(const fl_prepared_call *call, const fl_formula *la
 void fl_reach(const fl_real *block, fl_work *work, const fl_real *sets, const fl_wide *from,
               const fl_wide *ray, int count, fl_wide close, fl_wide *size, fl_wide *normal,
               fl_real *force);
+
+/* Takes some steps of Newton's method on the dual from given multipliers, and evaluates it there.
+
+   @param question    losses, free axes and limits; the rest does not count
+   @param wrench      (count, 6) desired [N, N m]
+   @param most_steps  most steps, those included that are undone; 0 for the dual as it is
+   @param multipliers (count, 6) lambda of the wrenches to begin with [W/N, W/(N m)], rows of NaN
+                      for its own; becomes those that the steps come to
+   @param steps       becomes how many steps were taken (count,)
+   @param residual    becomes what the responses leave there of each wrench (count, 6) [N, N m],
+                      Eq. 6, of what the actuators span
+   @param dual_value  becomes the dual values (count,) [W], Eq. 3
+   @param force       becomes the responses (count, n, 2) [N], Eq. 5
+   @param slope       becomes their derivatives by the prices xx, xy, yy (count, n, 3) [N^2/W]
+   @return            FL_OK; FL_BAD_ARGUMENT where a number is not finite or out of range;
+                      FL_BAD_NUMBER as fl_answer_one */
+int fl_dual_points(const fl_real *block, fl_work *work, const fl_question *question,
+                   const fl_real *wrench, int count, int most_steps, fl_real *multipliers,
+                   int *steps, fl_real *residual, fl_real *dual_value, fl_real *force,
+                   fl_real *slope);
 
 /* Evaluates the dual at multipliers, in the state (losses, free axes, limits) of the last question.
 

@@ -57,7 +57,9 @@ FL_FIELD(fl_real, command_sign, , "1",
 FL_FIELD(fl_real, lean_angle, , "rad", "of a fin or foil: angle from command to force")
 FL_FIELD(fl_real, unevenness, , "1", "of a fin: 1 + unevenness cos(angle - unevenness_angle)")
 FL_FIELD(fl_real, unevenness_angle, , "rad", "see unevenness")
-FL_FIELD(fl_real, pressure_area, , "N", "of a foil: dynamic pressure times area")
+FL_FIELD(fl_real, pressure_area, , "N",
+         "of a foil: dynamic pressure times area; of a steered propeller: p, the thrust whose "
+         "slipstream is as fast as the flow")
 FL_FIELD(fl_real, zero_lift_angle, , "rad", "of a foil: angle without lift")
 FL_FIELD(fl_real, zero_lift_drag, , "1", "of a foil: coefficient of drag there")
 FL_FIELD(fl_real, uncertainty_cost, , "W/N^2",
@@ -84,7 +86,7 @@ FL_FIELD(fl_real, wrench, [6], "N, N m",
          "desired; behind it all is zeros where there is nothing to say")
 FL_FIELD(fl_policy_at, policy, , "address", "what to give beyond reach; 0: nothing else")
 FL_FIELD(fl_reals, multipliers, , "address",
-         "lambda (6,) of the wrench [W/N, W/(N m)] to begin with; 0 for none")
+         "lambda (6,) of the wrench [W/N, W/(N m)] to begin with, of many (count, 6); 0 for none")
 FL_FIELD(fl_reals, previous, , "address",
          "commands (n, 3) of the tick before, NaN for an unknown one; 0 for none")
 FL_FIELD(fl_bytes, lost, , "address", "(n,) which actuators do not work; 0 for none")

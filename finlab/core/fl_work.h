@@ -54,10 +54,11 @@ typedef struct {
   fl_real slope_max;           /* where turning costs: largest slope T' [N^2/W] */
   fl_real jump_angle;          /* where its response jumps: angle between the two [rad] */
   unsigned char is_flipped;    /* whether it pushes in reverse alone */
-  unsigned char is_forked;     /* whether both ends of its arc may be worth the same */
-  unsigned char has_jumped;    /* whether its response jumps where Newton's method stood still */
-  unsigned char arc_first;     /* first point of `arc` that it keeps */
-  unsigned char arc_last;      /* last one */
+  unsigned char reverses_straight; /* whether its reverse is against its first axis alone */
+  unsigned char is_forked;         /* whether both ends of its arc may be worth the same */
+  unsigned char has_jumped; /* whether its response jumps where Newton's method stood still */
+  unsigned char arc_first;  /* first point of `arc` that it keeps */
+  unsigned char arc_last;   /* last one */
   /* of a foil near to a command, whose limits are angles from there; else 0 */
   const fl_tangent *tangent;
   /* of a foil that may stall, while points beyond reach are looked for; else 0 */

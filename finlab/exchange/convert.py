@@ -128,6 +128,13 @@ def text_in(form: str, layout: Layout, exchange: Exchange, suffix: str) -> str:
     Raises:
         LayoutError: the format cannot hold the layout.
     """
+    for actuator in layout.actuators:
+        if not actuator.KIND.described:
+            raise LayoutError(
+                f"{form} has no place for a {actuator.type}; write a layout file, or finlab export "
+                "for a program",
+                actuator=f"{actuator.type} {actuator.name!r:.66}",
+            )
     if layout.interaction is not None:
         exchange.note(
             f"What the actuators do to each other is left out: {form} has no place for it."

@@ -43,6 +43,17 @@ MAX_ATTACHMENTS = 20
 """Most frames that are attached to one another in a row."""
 
 
+class Visual(NamedTuple):
+    """What a link looks like, or is taken for where it collides."""
+
+    link: str
+    """Name of the link."""
+    element: Element
+    """Its <visual> or <collision>."""
+    pose: Array
+    """Its pose (4, 4) in the frame of the description [m]."""
+
+
 @dataclass(frozen=True)
 class Description:
     """The content of a description, in its own frame."""
@@ -64,6 +75,8 @@ class Description:
     """Plugins, with the scope of the names in each."""
     included: list[str]
     """Names of what is included from other files, and not read."""
+    visuals: list[Visual]
+    """What all links look like."""
 
 
 class _Attachment(NamedTuple):
@@ -127,6 +140,7 @@ def parse_description(
         added_mass=masses.added_mass,
         plugins=plugins,
         included=included,
+        visuals=_visuals(elements, poses),
     )
 
 
@@ -331,6 +345,23 @@ def _link_name(scope: str, name: str, elements: Elements) -> str:
         scope, element = elements[key]
         name = element.get("attached_to", "")
     return name
+
+
+def _visuals(elements: Elements, poses: dict[str, Array]) -> list[Visual]:
+    """What all links look like, and where they collide."""
+    visuals = []
+    for key, (scope, element) in elements.items():
+        if key not in poses or element.tag != "link":
+            continue
+        for child in element:
+            if child.tag not in ("visual", "collision"):
+                continue
+            base = text_at(child, "pose@relative_to")
+            frame = _key(scope, base, elements) if base else key
+            if frame in poses:
+                pose = poses[frame] @ _pose(child)
+                visuals.append(Visual(key.removeprefix("link "), child, pose))
+    return visuals
 
 
 class _Masses(NamedTuple):

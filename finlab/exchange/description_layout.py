@@ -31,7 +31,8 @@ from finlab.exchange.thruster_plugins import (
     force_limits,
     is_gz_plugin,
 )
-from finlab.layout import MAX_ACTUATORS, Actuator, Layout
+from finlab.exchange.visuals import hull_in
+from finlab.layout import MAX_ACTUATORS, Actuator, Body, Layout
 
 
 def read_description(root: Element, name: str, exchange: Exchange) -> Layout:
@@ -70,6 +71,9 @@ def read_description(root: Element, name: str, exchange: Exchange) -> Layout:
         )
     exchange.note(f"Model {description.name} was read, x forward, y left, z up, in m, kg and N.")
     body = body_of(description, exchange) if at_gravity else None
+    hull = hull_in(description, origin, exchange)
+    if hull is not None:
+        body = replace(body or Body(), hull=hull)
     origin_name = "centre of gravity" if at_gravity else "base frame"
     return Layout(description.name, tuple(actuators), f"Origin at the {origin_name}.", body)
 

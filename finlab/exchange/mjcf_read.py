@@ -119,6 +119,7 @@ def read_mjcf(root: Element, name: str, exchange: Exchange) -> Layout:
         added_mass={},
         plugins=[],
         included=[],
+        visuals=[],
     )
     actuators, turned = _layout_actuators(robot, pushes, origin, others, exchange)
     left_out = {key: why for key, why in others.items() if key not in turned}

@@ -31,7 +31,7 @@ from finlab.actuators.response import Plane, Response
 from finlab.arrays import Array
 from finlab.axes import TURN
 from finlab.core.ray_reach import block_of_planes, ray_reach
-from finlab.layout import Layout
+from finlab.layout import Actuator, Layout
 from finlab.layout.effectiveness import own_effectiveness
 from finlab.physics.plant import plant_of
 
@@ -49,6 +49,8 @@ SIDES_OF_GAUGE = 193
 by at most 0.01 % of the width."""
 SIDES_OF_AZIMUTH = 48
 """Sides of the polygon of an azimuth: inside by at most 0.2 % of the width."""
+LEAST_RANGE = 1e-12
+"""Least range of a force by which is divided [N]."""
 SIDES_OF_FLOW = 24
 """Sides of the polygon of forces by the flow: inside by at most 1 % of the width."""
 MIN_ASPECT = 1e-3
@@ -319,15 +321,33 @@ def _flow_shapes(layout: Layout, flow: ArrayLike | None) -> dict[str, Shape]:
         if not law.feels_flow:
             continue
         inflow = plant_of(layout).inflow(body_flow)
+        share = _shares_of_limits(layout.actuators[indices[0]])
         lower = layout.lower[indices]
         upper = layout.upper[indices]
-        share = np.linspace(0.0, 1.0, N_SAMPLES)[:, None, None]
-        command = lower + share * (upper - lower)
+        command = lower + share[:, None] * (upper - lower)
         force = law.force(command, None if inflow is None else inflow[indices])[..., 1:]
         for k, i in enumerate(indices):
             plane = np.eye(3)[1:]
-            shapes[layout.names[i]] = _polygon(plane, force[:, k], 0.0, SIDES_OF_FLOW)
+            is_line = len(layout.actuators[i].KIND.push_rows) == 1
+            half_angle = 0.0 if is_line else np.pi
+            shapes[layout.names[i]] = _polygon(plane, force[:, k], half_angle, SIDES_OF_FLOW)
     return shapes
+
+
+def _shares_of_limits(actuator: Actuator) -> Array:
+    """Shares (S, 3) of the range of a command at which forces by the flow are asked: along an angle
+    `N_SAMPLES`, at each of them both ends of a force and rest between."""
+    angle = np.linspace(0.0, 1.0, N_SAMPLES)
+    number = actuator.KIND.force_number
+    if number is None:
+        return np.repeat(angle[:, None], 3, axis=1)
+    low = actuator.lower[number]
+    high = actuator.upper[number]
+    at_rest = np.clip(-low / max(high - low, LEAST_RANGE), 0.0, 1.0)
+    share = np.zeros((3, N_SAMPLES, 3))
+    share[..., 0] = angle
+    share[..., number] = np.array([0.0, at_rest, 1.0])[:, None]
+    return share.reshape(-1, 3)
 
 
 def _shape(response: Response, is_fin: bool) -> Shape:

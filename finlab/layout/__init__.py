@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from finlab.actuators.fin.fin import Servo as Servo
     from finlab.actuators.fin.fin_model import FinModelSpec as FinModelSpec
     from finlab.actuators.fin.fin_model import Limits as Limits
+    from finlab.actuators.propeller_rudder import PropellerRudder as PropellerRudder
     from finlab.actuators.rudder import Rudder as Rudder
     from finlab.actuators.thruster import Thruster as Thruster
     from finlab.layout.body import Body as Body
@@ -40,6 +41,7 @@ __all__ = [
     "Hull",
     "Layout",
     "Limits",
+    "PropellerRudder",
     "Rudder",
     "Servo",
     "Thruster",
@@ -62,6 +64,7 @@ _MODULE_OF_NAME = {
     "Servo": "finlab.actuators.fin.fin",
     "FinModelSpec": "finlab.actuators.fin.fin_model",
     "Limits": "finlab.actuators.fin.fin_model",
+    "PropellerRudder": "finlab.actuators.propeller_rudder",
     "Rudder": "finlab.actuators.rudder",
     "Thruster": "finlab.actuators.thruster",
     "Body": "finlab.layout.body",

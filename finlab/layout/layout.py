@@ -35,6 +35,8 @@ MAX_DESCRIPTION_LENGTH = 4000
 Power = Annotated[float, Meta(gt=0.0, le=1e12)]
 """The most power that actuators may take together [W]; beyond the largest something is wrong
 upstream."""
+MirrorPair = tuple[Name, Name]
+"""Names of two actuators that a designer keeps each other's mirror image."""
 
 
 @dataclass(frozen=True)
@@ -75,6 +77,9 @@ class Layout(Checked):
     """The most power that all actuators may take together [W]; None for no limit."""
     buses: tuple[Bus, ...] = ()
     """Power buses, each of which feeds some of the actuators; in place of `power_w`."""
+    mirror_pairs: Annotated[tuple[MirrorPair, ...], Meta(max_length=MAX_ACTUATORS // 2)] = ()
+    """Actuators that move together as mirror images in the plane y = 0 while the robot is designed;
+    each is in one pair at most. No answer depends on it."""
 
     def __post_init__(self) -> None:
         """Puts the axes in the order of a wrench. Raises LayoutError: a value does not fit, or a
@@ -96,6 +101,30 @@ class Layout(Checked):
             first_use[name] = i
         object.__setattr__(self, "buses", tuple(self.buses))
         self._check_buses()
+        pairs = tuple([(first, second) for first, second in self.mirror_pairs])
+        object.__setattr__(self, "mirror_pairs", pairs)
+        self._check_mirror_pairs()
+
+    def _check_mirror_pairs(self) -> None:
+        """Raises LayoutError: a pair has an actuator that there is not, or one that is in a pair
+        already."""
+        names = set(self.names)
+        paired: set[str] = set()
+        for i, pair in enumerate(self.mirror_pairs):
+            for j, name in enumerate(pair):
+                key = f"mirror_pairs[{i}][{j}]"
+                if name not in names:
+                    raise LayoutError(
+                        f"there is no actuator {name!r}, expected names of {', '.join(self.names)}",
+                        key,
+                    )
+                if name in paired:
+                    raise LayoutError(
+                        f"{name!r} is in a pair already, and an actuator has one mirror image; "
+                        "leave one of them out",
+                        key,
+                    )
+                paired.add(name)
 
     def _check_buses(self) -> None:
         """Raises LayoutError: a bus feeds an actuator that there is not, or that another one
@@ -138,6 +167,7 @@ class Layout(Checked):
                 self.interaction,
                 self.power_w,
                 self.buses,
+                self.mirror_pairs,
             )
         )
 
@@ -163,6 +193,11 @@ class Layout(Checked):
         from finlab.layout.layout_text import layout_blocks
 
         return html(layout_blocks(self), lambda: robot_picture(self))
+
+    @cached_property
+    def unpaired(self) -> "Layout":
+        """The layout without its mirror pairs: what answers and figures depend on."""
+        return replace(self, mirror_pairs=()) if self.mirror_pairs else self
 
     @cached_property
     def fins(self) -> tuple[Fin, ...]:
@@ -386,7 +421,8 @@ class Layout(Checked):
     def with_actuators(
         self, actuators: Sequence[Actuator], new_names: Mapping[str, str] | None = None
     ) -> "Layout":
-        """Returns the layout with other actuators; buses feed those that remain.
+        """Returns the layout with other actuators; buses feed those that remain, and mirror pairs
+        are those of which both remain.
 
         Args:
             actuators: the new ones.
@@ -403,7 +439,14 @@ class Layout(Checked):
             fed = tuple(name for name in called if name in names)
             if fed:
                 buses.append(replace(bus, actuators=fed))
-        return replace(self, actuators=tuple(actuators), buses=tuple(buses))
+        pairs = []
+        for first, second in self.mirror_pairs:
+            pair = new_names.get(first, first), new_names.get(second, second)
+            if names.issuperset(pair):
+                pairs.append(pair)
+        return replace(
+            self, actuators=tuple(actuators), buses=tuple(buses), mirror_pairs=tuple(pairs)
+        )
 
     def without(self, names: Iterable[str], argument: str = "") -> "Layout":
         """Returns the layout without some actuators.

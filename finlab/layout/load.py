@@ -379,7 +379,7 @@ def parse_layout(
                 values[name] = reader.value(getattr(file, name))
         return Layout(
             name=file.name,
-            actuators=values["actuators"],
+            actuators=_with_slipstreams(values["actuators"]),
             description=file.description or "",
             body=values["body"],
             axes=tuple(file.axes or AXES),
@@ -389,7 +389,18 @@ def parse_layout(
                 Bus(name, bus.power_w, tuple(bus.actuators))
                 for name, bus in (file.buses or {}).items()
             ),
+            mirror_pairs=tuple(file.mirror_pairs or ()),
         )
+
+
+def _with_slipstreams(actuators: tuple[Actuator, ...]) -> tuple[Actuator, ...]:
+    """The actuators of a file, each propeller and the rudder in its slipstream as one."""
+    types = {actuator.type for actuator in actuators}
+    if not types >= {"thruster", "rudder"}:
+        return actuators
+    from finlab.layout.slipstream import joined
+
+    return joined(actuators)
 
 
 @contextmanager

@@ -40,6 +40,8 @@ def layout_to_dict(layout: Layout) -> dict[str, Any]:
         for bus in layout.buses:
             buses[bus.name] = {"power_w": bus.power_w, "actuators": list(bus.actuators)}
         data["buses"] = buses
+    if layout.mirror_pairs:
+        data["mirror_pairs"] = [list(pair) for pair in layout.mirror_pairs]
     return data
 
 

@@ -24,6 +24,7 @@ PYTHON_FILES = [
     ROOT / "finlab/actuators/fin/law_box.py",
     ROOT / "finlab/actuators/kinds.py",
     ROOT / "finlab/actuators/response.py",
+    ROOT / "finlab/actuators/propeller_rudder.py",
     ROOT / "finlab/actuators/rudder.py",
     ROOT / "finlab/actuators/thrust_power.py",
     ROOT / "finlab/actuators/thruster.py",

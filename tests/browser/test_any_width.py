@@ -3,6 +3,7 @@
 import re
 from typing import Any
 
+from finlab.layout import load_layout
 from tests.browser.test_frame import SCHEME_SCRIPT, findings
 from webapp.session.lessons import LESSONS
 from webapp.start_page import ROBOTS
@@ -255,3 +256,39 @@ def test_the_list_of_methods_ends_in_the_window(resized: Any) -> None:
 def top(element: Any) -> float:
     """Where an element begins [px]."""
     return float(element.bounding_box()["y"])
+
+
+def test_nothing_in_the_bar_moves_by_itself(resized: Any) -> None:
+    page = resized
+    tab = page.page
+    session = page.session
+
+    def lefts() -> dict[str, float]:
+        """Where the parts of the bar begin [px]."""
+        found = {}
+        for word in ("Undo", "Redo"):
+            named = re.compile(f"^{word}(:|$)")
+            button = tab.get_by_role("button", name=named).locator("visible=true").first
+            found[word] = button.bounding_box()["x"]
+        found["tasks"] = tab.locator(".fl-tasks").bounding_box()["x"]
+        found["method"] = tab.locator("[data-fl~=method] + div").bounding_box()["x"]
+        return found
+
+    for width, height in SIZES[:3]:
+        tab.set_viewport_size({"width": width, "height": height})
+        page.rest(200)
+        before = lefts()
+        session.rename_robot("A robot with quite a long name")  # and so a step with one
+        page.view.do(lambda: None)
+        tab.get_by_role("button", name=re.compile("^Undo: Rename the robot")).first.wait_for()
+        assert lefts() == before, f"a step with a long name, at {width} px"
+        page.view.do(lambda: session.open_layout(load_layout("bluerov2")))
+        page.until(lambda: tab.locator("[data-fl~=method]").count() == 1 and not page.view.busy)
+        page.catch_up()
+        page.rest(200)
+        assert lefts() == before, f"a robot without fins, at {width} px"
+        for label in ("Least", "Method"):
+            shown = tab.locator("[data-fl~=region][data-fl~=top] label", has_text=label).first
+            assert shown.bounding_box()["width"] > 20.0, f"{label} is seen at {width} px"
+        page.start_over()
+    assert page.problems == []

@@ -155,7 +155,7 @@ def test_the_gizmo_moves_a_linked_pair(page: Any) -> None:
     page.until(lambda: session.selected == "front_right")
     page.tab("Design")
     page.press("Mirror")
-    page.until(lambda: session.state.links == (("front_right", "front_left"),))
+    page.until(lambda: session.state.layout.mirror_pairs == (("front_right", "front_left"),))
     page.until(lambda: session.selected == "front_left")
     page.look_from_above()
     before = session.state.layout

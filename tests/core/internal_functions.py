@@ -36,6 +36,8 @@ FIN = constant("FL_FIN")
 """Form of a fin's command, FL_FIN."""
 POD = constant("FL_POD")
 """Form of a pod's command, FL_POD."""
+STEERED = constant("FL_STEERED")
+"""Form of the command of a propeller with a rudder, FL_STEERED."""
 
 
 def _macro(name: str) -> int:

@@ -50,6 +50,9 @@ def forces_of(robot: Robot, i: int, limits: Set) -> tuple[Array, Array]:
             + limits.sector_half_angle * np.linspace(-1.0, 1.0, N_ANGLES)
         )
         radius = np.array([robot.radius(i, one) for one in angle])
+        if limits.reverses_straight and sign < 0.0:
+            angle = np.full(N_ANGLES, math.pi)
+            radius = np.ones(N_ANGLES)
         direction = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
         force.append((size[:, None, None] * direction).reshape(-1, 2))
         power.append(np.repeat(cost, N_ANGLES))

@@ -6,7 +6,7 @@ import ctypes
 import pytest
 
 from finlab.core.fields import struct
-from tests.core.internal_functions import FIN, ROBOTS, CommandForm, functions, robot_of
+from tests.core.internal_functions import FIN, ROBOTS, STEERED, CommandForm, functions, robot_of
 
 NO_NUMBER = -1
 """NO_NUMBER: no number of the command is one."""
@@ -42,4 +42,7 @@ def test_a_command_has_a_table_and_a_grid_where_its_form_says_so(name: str) -> N
         assert (form.command_table != 0) == (own["command_table"] > 0)
         assert bool(form.has_law_grid) == (own["law_grid"] > 0)
         is_fin = own["command_kind"] == FIN
-        assert bool(form.has_drag) == (bool(form.has_law_grid) and not is_fin)
+        is_steered = own["command_kind"] == STEERED
+        has_law_of_foil = bool(form.has_law_grid) and not is_fin and not is_steered
+        assert bool(form.has_drag) == has_law_of_foil
+        assert bool(form.reverses_straight) == is_steered

@@ -36,11 +36,10 @@ def commands_of(robot: Robot, i: int, rng: np.random.Generator, count: int) -> A
 
 
 def own_axes(robot: Robot, i: int, force: Array) -> Array:
-    """A force (3,) of the core in the actuator's own axes, with what a foil drags at rest."""
+    """A force (3,) of the core in the actuator's own axes, with what comes at no force of its row."""
     actuator = robot.actuators[i]
     told = force.copy()
-    if actuator["flow_speed"] > 0.0:
-        told[1] += actuator["pressure_area"] * actuator["zero_lift_drag"]
+    told[1] += actuator["pressure_area"] * actuator["zero_lift_drag"]
     return np.asarray(told @ robot.axes[i])
 
 

@@ -58,7 +58,7 @@ def check_span(robot: Robot, span: Span, lost: Array, free: Array) -> None:
     expected_offset = robot.head["wrench_offset"].copy()
     for i in np.flatnonzero(lost):
         actuator = robot.actuators[i]
-        if actuator["flow_speed"] > 0.0:
+        if actuator["zero_lift_drag"] != 0.0:  # a foil, or a steered propeller
             expected_offset -= (
                 actuator["pressure_area"]
                 * actuator["zero_lift_drag"]

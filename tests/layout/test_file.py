@@ -13,7 +13,16 @@ import yaml
 
 from finlab.actuators.fin.fin_model import FIN_MODELS
 from finlab.errors import LayoutError
-from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout, parse_layout, save_layout
+from finlab.layout import (
+    Fin,
+    FinModelSpec,
+    Layout,
+    Limits,
+    layout_to_dict,
+    load_layout,
+    parse_layout,
+    save_layout,
+)
 from finlab.layout.layout import Bus
 
 GOOD_LAYOUT = {
@@ -305,3 +314,31 @@ def test_power_buses_that_make_no_sense() -> None:
         replace(layout, buses=(bus,), power_w=100.0)
     with pytest.raises(LayoutError, match="power_w"):
         Bus("front", -1.0, layout.names[:2])
+
+
+def test_mirror_pairs_of_a_file_come_back_and_follow_their_actuators(tmp_path: Path) -> None:
+    layout = load_layout("ucat")
+    front, back = ("front_right", "front_left"), ("back_left", "back_right")
+    paired = replace(layout, mirror_pairs=(front, back))
+    for name in ("robot.yaml", "robot.json"):
+        save_layout(paired, tmp_path / name)
+        assert load_layout(tmp_path / name) == paired
+    assert paired != layout and paired.unpaired == layout
+    assert paired.without(["front_left"]).mirror_pairs == (back,)
+    renamed = paired.replace_actuator("front_left", name="bow")
+    assert renamed.mirror_pairs == (("front_right", "bow"), back)
+
+
+@pytest.mark.parametrize(
+    ("pairs", "says"),
+    [
+        ([["front_left", "nobody"]], r"mirror_pairs\[0\]\[1\]: there is no actuator 'nobody'"),
+        ([["front_left", "front_left"]], r"\[0\]\[1\]: 'front_left' is in a pair already"),
+        ([["front_left", "back_left"], ["front_left", "front_right"]], r"\[1\]\[0\]: 'front_left'"),
+        ([["front_left"]], r"mirror_pairs\[0\]: expected a list of 2 values"),
+    ],
+)
+def test_mirror_pairs_that_make_no_sense(pairs: list[list[str]], says: str) -> None:
+    data = {**layout_to_dict(load_layout("ucat")), "mirror_pairs": pairs}
+    with pytest.raises(LayoutError, match=says):
+        parse_layout(data)

@@ -136,7 +136,7 @@ def test_degrees_become_radians() -> None:
         ({**RUDDER_DATA, "aspect_ratio": None}, "aspect_ratio: expected a number, got None"),
         (
             {**RUDDER_DATA, "type": "jet"},
-            "type: expected one of fin, thruster, azimuth, tilt, rudder, got 'jet'",
+            "type: expected one of fin, thruster, azimuth, tilt, rudder, propeller_rudder, got 'jet'",
         ),
     ],
 )

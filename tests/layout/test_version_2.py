@@ -196,7 +196,7 @@ BAD_LAYOUTS = [
     (
         "actuators[0].type",
         edited(0, type="paddle"),
-        "expected one of fin, thruster, azimuth, tilt, rudder",
+        "expected one of fin, thruster, azimuth, tilt, rudder, propeller_rudder",
     ),
     ("actuators[0].type", edited(0, type=...), "required key is missing"),
     ("actuators[0].mounting_angle_deg", edited(0, mounting_angle_deg=...), "or shaft and zero"),

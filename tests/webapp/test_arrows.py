@@ -15,8 +15,9 @@ from finlab.layout import load_layout
 from finlab.swim.hull import hull_of
 from tests.webapp.stand_in import Recorded, SilentClient
 from webapp.markup.words import html
-from webapp.panels.status import in_unit, scale_words
+from webapp.panels.status import corner, in_unit, scale_words
 from webapp.scene.actuator_node import _moving, shape_of
+from webapp.scene.actuator_shapes import SHORTEST
 from webapp.scene.force_nodes import ForceNodes
 from webapp.scene.outline import HEAD_LENGTH, HEAD_RADIUS, Outline
 from webapp.scene.stage import arrow_size, part_size
@@ -29,6 +30,7 @@ from webapp.scene.wrench_nodes import (
     fitting_scale,
     fixed_scale,
 )
+from webapp.session.state import State
 from webapp.viser_internals import start_server, stop_server
 
 ONE = Scale(1.0, 1.0, 1.0)
@@ -154,6 +156,18 @@ def test_arrows_of_actuators_and_of_the_wrench_both_fit(
     assert ACTUATOR_ARROWS[0] <= longest <= ACTUATOR_ARROWS[1]
     assert ARROWS[0] <= LENGTH * wrench[0] / scale.newtons <= ARROWS[1]
     assert fitting_scale(wrench, answer, scale) == scale, "it rests"
+
+
+@pytest.mark.parametrize("name", ["ucat", "fish", "turtle_hybrid", "bluerov2"])
+def test_a_robot_at_rest_has_no_arrows_and_no_figures_of_noise(name: str) -> None:
+    rest = (0.0,) * 6
+    answer = answer_of(name, rest)
+    scale = fitting_scale(rest, answer, ONE)
+    assert scale == ONE, "what fins give that idle sets no scale"
+    longest = LENGTH * np.linalg.norm(answer.forces, axis=1).max() / scale.actuator
+    assert longest < SHORTEST
+    shown = corner(State(answer.layout, target=rest), "", answer, False, None)
+    assert "≤ 0.001" in shown and "e−" not in shown.partition("</b>")[2] and "Exact" in shown
 
 
 def test_a_fixed_scale_does_not_know_the_answer() -> None:

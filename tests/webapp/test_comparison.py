@@ -41,6 +41,25 @@ def test_all_methods_answer_one_after_the_other(worker: Pool) -> None:
     assert table.count("<tr") == 1 + len(COMPARED) and "compare again" in table
 
 
+def test_a_comparison_is_of_its_question_whatever_method_answers() -> None:
+    state = State(UCAT, target=PRESETS["Turn"])
+    run = Run(state)
+    assert not Run().answers_other_than(state)
+    paired = replace(UCAT, mirror_pairs=(("front_right", "front_left"),))
+    for same in (replace(state, method="mdn"), replace(state, layout=paired)):
+        assert not run.answers_other_than(same)
+    others = (
+        state.with_target(0, 2.0),
+        state.with_loss_toggled("front_left"),
+        replace(state, policy="direction"),
+        replace(state, speed=0.5),
+        replace(state, temperature=0.5),
+        state.with_layout(UCAT.replace_actuator("front_left", position=(0.2, 0.1, 0.0))),
+    )
+    for other in others:
+        assert run.answers_other_than(other)
+
+
 @pytest.mark.parametrize("robot", ["ucat", "bluerov2", "torpedo"])
 def test_a_comparison_that_is_cancelled_keeps_its_answers(robot: str, worker: Pool) -> None:
     state = State(load_layout(robot))

@@ -19,7 +19,7 @@ from finlab.files import yaml_text
 from finlab.layout import FinModelSpec, layout_to_dict, load_layout
 from finlab.layout.load import MAX_BYTES
 from finlab.physics import make_law
-from finlab.swim.design_files import stored_table
+from finlab.swim.design_files import Opened, stored_table
 from tests.webapp.stand_in import AtOnce
 from webapp.session import Session, files
 from webapp.session.looking import TWO_ROBOTS
@@ -157,28 +157,23 @@ def test_saving_sends_the_design_and_notes_it() -> None:
     assert browser.sent == ["My_turtle.yaml"] and session.saved == session.state.layout
 
 
-def test_pairs_that_do_not_travel_are_named_and_linked_again(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_mirror_pairs_travel_in_files_and_links() -> None:
     mine = Session(load_layout("hexa"))
-    browser = Browser()
-    scripts: list[str] = []
-    monkeypatch.setattr("webapp.tasks.designs.run_script", lambda _, script: scripts.append(script))
     mine.new_layout("thruster")
     mine.mirror()
-    designs_of(mine, browser).save()
-    designs_of(mine, browser).share()
-    said = "That Mirror has linked left and right is not in the file"
-    assert said in browser.saved[-1]
-    assert "is not in the link: press Mirror anew" in scripts[0]
-    mine.show_drawer(TWO_ROBOTS)
-    designs_of(mine, browser).share_pair()
-    assert "linked left and right is not in the link" in scripts[1]
-    theirs = Session(files.unpacked(files.packed(mine.state.layout)).layout)
-    theirs.select("left")
-    theirs.mirror()
-    assert theirs.state.links == mine.state.links, "nothing was added, both are linked"
-    assert theirs.state.layout == mine.state.layout
+    sent = mine.state.layout
+    assert sent.mirror_pairs == (("left", "right"),)
+    by_link = files.unpacked(files.packed(sent)).layout
+    by_file = files.read_layout(*files.layout_file(sent))
+    assert isinstance(by_file, Opened)
+    for layout in (by_link, by_file.layout):
+        assert layout == sent
+        theirs = Session(load_layout("ucat"))
+        theirs.open_layout(layout)
+        theirs.end_drag("left", (0.1, 0.2, 0.0))
+        assert theirs.state.layout.actuator("right").position == (0.1, -0.2, 0.0)
+        theirs.undo()
+        assert theirs.state.layout.mirror_pairs == sent.mirror_pairs
 
 
 def test_a_link_carries_the_wrench_and_says_that_it_is_a_copy(

@@ -24,6 +24,7 @@ from finlab.swim.hull.mesh_file import (
 )
 from tests.webapp.stand_in import turn_fin
 from webapp.markup.score_card import warnings
+from webapp.panels.pairs import broken_pairs_words
 from webapp.session import Session, layout_edits
 from webapp.session.files import reshaped_hull, stored_hull
 from webapp.session.targets import axis_reach
@@ -34,7 +35,7 @@ def test_linked_twins_move_together_until_unlinked(session: Session) -> None:
     session.mirror()
     assert session.state.layout.n_fins == 4, "its image stands there already"
     assert (
-        session.state.links == (("front_left", "front_right"),)
+        session.state.layout.mirror_pairs == (("front_left", "front_right"),)
         and session.selected == "front_right"
     )
     session.end_drag("front_left", (0.2, 0.18, 0.01))
@@ -43,7 +44,7 @@ def test_linked_twins_move_together_until_unlinked(session: Session) -> None:
     assert twin.position == (0.2, -0.18, 0.01) and twin.mounting_angle == pytest.approx(-0.5)
     session.undo()
     session.undo()
-    assert session.state.layout == load_layout(shipped_layouts()["ucat"])
+    assert session.state.layout.unpaired == load_layout(shipped_layouts()["ucat"])
     session.unlink()
     session.end_drag("front_left", (0.1, 0.2, 0.0))
     assert session.state.layout.fins[0].position[0] == pytest.approx(0.25753)
@@ -54,8 +55,42 @@ def test_linked_twins_move_together_until_unlinked(session: Session) -> None:
 def test_link_goes_with_its_fin(session: Session) -> None:
     session.select("front_left")
     session.mirror()
+    before = session.state.layout
     session.delete()
-    assert session.state.links == ()
+    assert session.state.layout.mirror_pairs == ()
+    sentence = broken_pairs_words(before, session.state.layout)
+    assert sentence == "front_left moves by itself: it is not linked to front_right any more"
+    session.undo()
+    assert session.state.layout.mirror_pairs == (("front_left", "front_right"),)
+
+
+def test_pairs_end_where_the_mirror_plane_moves(session: Session) -> None:
+    session.select("front_left")
+    session.mirror()
+    paired = session.state.layout
+    x, y, z = layout_edits.center_of_gravity(paired)
+    session.set_center_of_gravity((x + 0.05, y, z - 0.01))
+    assert session.state.layout.mirror_pairs == paired.mirror_pairs, "along the plane"
+    assert broken_pairs_words(paired, session.state.layout) == ""
+    session.set_center_of_gravity((x, y + 0.05, z))
+    moved = session.state.layout
+    assert moved.mirror_pairs == ()
+    assert "each moves by itself" in broken_pairs_words(paired, moved)
+    session.end_drag("front_left", (0.2, 0.18, 0.01))
+    assert session.state.layout.fins[0] == moved.fins[0], "the other one stays"
+
+
+def test_another_pair_ends_the_one_before(session: Session) -> None:
+    session.select("front_left")
+    session.mirror()
+    session.select("back_left")
+    session.mirror()
+    both = session.state.layout
+    assert broken_pairs_words(load_layout("ucat"), both) == ""
+    linked = layout_edits.linked(both, "front_left", "back_right")
+    assert linked.mirror_pairs == (("front_left", "back_right"),)
+    sentences = broken_pairs_words(both, linked).split("; ")
+    assert [sentence.partition(" ")[0] for sentence in sentences] == ["front_right", "back_left"]
 
 
 def test_ring_around_the_vertical_axis(session: Session) -> None:

@@ -148,7 +148,7 @@ def test_a_renamed_fin_keeps_its_damage_link_and_selection(session: Session) -> 
     session.toggle_loss("front_left")
     session.rename("front_left", " bow <b> ")
     state = session.state
-    assert state.lost == ("bow <b>",) and ("bow <b>", "front_right") in state.links
+    assert state.lost == ("bow <b>",) and ("bow <b>", "front_right") in state.layout.mirror_pairs
     assert session.selected == "bow <b>"
     assert (
         "<b>"

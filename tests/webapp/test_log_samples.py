@@ -15,9 +15,11 @@ from tests.webapp.stand_in import Direct, context_of
 from webapp.markup.words import three_digits
 from webapp.panels.log_tab import _summary, _whose_robot, moved_markup
 from webapp.session import Session
+from webapp.tasks.jobs import Jobs
 from webapp.tasks.log_reading import LogReading
 from webapp.tasks.log_samples import SAMPLES, Sample
 from webapp.tasks.swim_logs import read_any_log
+from webapp.tasks.swimming import Swimming
 
 LARGEST = 100_000
 """Most bytes of a sample."""
@@ -54,7 +56,8 @@ def test_a_judgement_is_told_part_by_part_and_can_be_stopped(tmp_path: Path) -> 
 
 def test_a_sample_puts_its_robot_and_worst_moment_on_the_page() -> None:
     session = Session(load_layout("ucat"))
-    reading = LogReading(context_of(Direct(), session))
+    context = context_of(Direct(), session)
+    reading = LogReading(context, Swimming(context))
     reading.open_sample(SAMPLES[3])
     reading.attend()
     judgement = reading.answer
@@ -78,8 +81,25 @@ def test_a_sample_puts_its_robot_and_worst_moment_on_the_page() -> None:
     kept = [a == improved.actuator(a.name) for a in judgement.robot.actuators]
     assert moved.count("<tr><td>") == kept.count(False)
     assert "not the robot of the log" in _whose_robot(judgement, load_layout("ucat"), False)
-    assert "log-swim" in _whose_robot(judgement, judgement.robot, True)
+    assert "swim waits" in _whose_robot(judgement, judgement.robot, True)
     assert "the improved robot" in _whose_robot(judgement, improved, False)
+
+
+def test_a_swim_waits_while_a_log_is_looked_at() -> None:
+    session = Session(load_layout("ucat"))
+    jobs = Jobs(context_of(Direct(), session))
+    swimming = jobs.swimming
+    swimming.start(session.swim.plan(session.state))
+    swimming.attend()
+    swimmer = swimming.swimmer
+    assert swimmer is not None and swimming.running and jobs.visible_swimmer is swimmer
+    jobs.log.open_sample(SAMPLES[3])
+    assert not swimming.running and jobs.visible_swimmer is swimmer, "there is no moment yet"
+    jobs.log.attend()
+    assert jobs.visible_swimmer is None and swimming.active, "the moment is on the robot"
+    session.show_task("Simulate")
+    assert jobs.visible_swimmer is swimmer
+    jobs.stop()
 
 
 def test_the_empty_page_offers_samples_and_says_how_far_it_is() -> None:

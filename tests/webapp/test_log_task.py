@@ -12,6 +12,7 @@ from tests.webapp.stand_in import Direct, context_of
 from webapp.panels.log_tab import _losses, _summary, log_plots, replays_table
 from webapp.session import Session
 from webapp.tasks.log_reading import LogReading
+from webapp.tasks.swimming import Swimming
 
 
 @pytest.fixture(scope="module")
@@ -19,7 +20,8 @@ def judged(tmp_path_factory: pytest.TempPathFactory) -> tuple[Session, LogReadin
     """A dive whose yaw was out of reach for a while."""
     path = px4_dive(tmp_path_factory.mktemp("log") / "dive.ulg", n=600).path
     session = Session(load_layout("ucat"))
-    reading = LogReading(context_of(Direct(), session))
+    context = context_of(Direct(), session)
+    reading = LogReading(context, Swimming(context))
     reading.open("../some where/dive.ulg", path.read_bytes())
     assert reading.attend()
     assert reading.error is None and session.desk.task == "Log"
@@ -59,7 +61,8 @@ def test_what_is_no_log_is_refused_in_a_sentence(
     judged: tuple[Session, LogReading], tmp_path: Path
 ) -> None:
     session = Session(load_layout("ucat"))
-    reading = LogReading(context_of(Direct(), session))
+    context = context_of(Direct(), session)
+    reading = LogReading(context, Swimming(context))
     reading.open("dive.ulg", b"no log")
     assert reading.attend() and reading.answer is None and reading.error is not None
     assert str(tmp_path.parent) not in reading.error and "/tmp" not in reading.error

@@ -79,7 +79,9 @@ def test_names_tell_modes_apart() -> None:
 
 
 def test_failed_fins_are_left_out() -> None:
-    assert modes_of([(np.nan,) * 3, PUSH_COMMAND, REST_COMMAND])[0].name == "fin 3 rests"
+    lost = (np.nan,) * 3
+    assert modes_of([lost, PUSH_COMMAND, REST_COMMAND])[0].name == "fin 3 rests"
+    assert modes_of([lost, PUSH_COMMAND, PUSH_COMMAND])[0].name == "all that work push"
 
 
 def test_no_more_are_shown_than_have_colours() -> None:

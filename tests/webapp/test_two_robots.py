@@ -348,5 +348,5 @@ def test_a_source_keeps_what_is_asked(session: Session) -> None:
     source = Source("mine", State(load_layout("octo")))
     session.set_speed(0.5)
     state = source.state_for(session.state)
-    assert state.speed == 0.5 and state.layout.name == "octo" and not state.links
+    assert state.speed == 0.5 and state.layout.name == "octo"
     assert math.isclose(state.target[0], session.state.target[0])

@@ -368,3 +368,18 @@ def test_a_law_that_the_app_has_no_words_for_is_known_by_its_class(
     monkeypatch.delitem(LAWS, "drag")
     assert law_words(fin).startswith("T = 2 rho Cd S rc^2 (2 pi f)^2 (1 - cos 2A) with half")
     assert "\n" not in law_words(fin)
+
+
+def test_a_table_of_reach_says_of_each_axis_which_way_it_went() -> None:
+    layout = replace(load_layout(shipped_layouts()["ucat"]), axes=AXES)
+    x, y, z = layout.actuators[0].position
+    wider = layout.replace_actuator("front_right", position=(x, 1.5 * y, z))
+    before, now = score_card(layout), score_card(wider)
+    table = score_table(wider, now, before)
+    signs = []
+    for old, new in zip(axis_rows(before), axis_rows(now), strict=True):
+        change = (new.largest + new.most_negative) / (old.largest + old.most_negative) - 1.0
+        signs.append("=" if abs(change) < 1e-3 else "▲" if change > 0.0 else "▼")
+    assert len(set(signs)) > 1, "it is no test where all go the same way"
+    axes_table = table.split("<table>")[2]
+    assert re.findall("[=▲▼](?=</span>)", axes_table) == signs

@@ -71,8 +71,8 @@ def opened_robot(layout: Layout) -> OpenedRobot:
     """What the script opens, which axes it frees, and its power budget: a robot that is shipped but
     for those is still opened by its name."""
     for name, known in shipped().items():
-        budget_apart = replace(layout, power_w=known.power_w, buses=known.buses)
-        if replace(budget_apart, axes=known.axes) != known:
+        budget_apart = replace(layout.unpaired, power_w=known.power_w, buses=known.buses)
+        if replace(budget_apart, axes=known.axes) != known.unpaired:
             continue
         power = _power_argument(layout, known)
         freed = known.commanded & ~layout.commanded

@@ -4,7 +4,7 @@ Sentences and columns are those of `finlab/analysis/card_text.py`, which the com
 `panels/limits_tab.py` shows the card, `panels/cards.py` the checks.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
 
@@ -18,11 +18,13 @@ from finlab.analysis.card_text import (
     CARD_COLUMNS,
     WEAKEST_LEFT,
     WITHOUT,
+    AxisRow,
     Remark,
     axis_rows,
     held_remarks,
 )
 from finlab.analysis.score_card import QuickCheck
+from finlab.axes import MotionAxis
 from finlab.display import Column
 from finlab.layout import Layout
 from finlab.swim.hull import hull_of
@@ -117,15 +119,29 @@ def _axes(card: ScoreCard, old_card: ScoreCard | None) -> str:
             axis_before = rows_of_card.get(axis_row.axis)
             ranges.append(DASH if axis_before is None else cell_text(largest, axis_before))
         # The panel has no room for a column of units: they stand beside the names.
+        if old_card is not None:
+            ranges.append(
+                _trend(*[_width(rows_of_card, axis_row.axis) for rows_of_card in rows_by_card])
+            )
         words = html("{} <span class='dim'>{}</span>", name.cell(axis_row), unit.cell(axis_row))
         figures = [cell_text(column, axis_row) for column in others]
         rows.append(row(words, *ranges, *figures))
     range_heads: list[Column] = [largest]
     if old_card is not None:
-        range_heads = [replace(largest, name="before"), replace(largest, name="now")]
+        range_heads = [
+            replace(largest, name="before"),
+            replace(largest, name="now"),
+            replace(largest, name="", hint="better ▲, the same =, or worse ▼"),
+        ]
     axis_head = Column("on its own", name.value, is_text=True)
     heads = head_row([axis_head, *range_heads, *others])
     return html("<table>{}{}</table>", heads, rows)
+
+
+def _width(rows: Mapping[MotionAxis, AxisRow], axis: MotionAxis) -> float | None:
+    """What can be given along an axis, both ways together [N or N m]; None where it is free."""
+    axis_row = rows.get(axis)
+    return None if axis_row is None else axis_row.largest + axis_row.most_negative
 
 
 def _losses(layout: Layout, card: ScoreCard) -> str:

@@ -13,6 +13,7 @@ from webapp.handles import add_html, placed, press
 from webapp.markup.answer import swatch
 from webapp.markup.words import html, marker
 from webapp.page import Page
+from webapp.panels.pairs import telling_pairs
 from webapp.session.layout_edits import partner
 from webapp.session.state import State
 
@@ -41,10 +42,10 @@ def add_actuator_list(page: Page) -> None:
     adds = {kind.capitalize(): partial(session.add, kind) for kind in KINDS}
     page.add_buttons("Add", adds, hint=f"On the hull; up to {MAX_ACTUATORS} actuators.")
     edits: dict[str, Callable[[], object]] = {
-        "Mirror": session.mirror,
+        "Mirror": telling_pairs(page, session.mirror),
         "Unlink": session.unlink,
         "Duplicate": session.duplicate,
-        "Delete": session.delete,
+        "Delete": telling_pairs(page, session.delete),
     }
     hint = "What Mirror (M) makes moves along until it is unlinked."
     add_html(page.gui, marker("fl-deletes"))
@@ -99,7 +100,7 @@ def _rows(state: State, index: int, is_selected: bool, is_mixed: bool) -> str:
     if is_mixed and (index == 0 or actuators[index - 1].type != actuator.type):
         head = html("<tr><th colspan='5'>{}</th></tr>", actuator.type)
     link = ""
-    twin = partner(state.links, name)
+    twin = partner(state.layout, name)
     if twin is not None:
         link = html("<span class='dim' title='moves with {}'>⇄</span>", twin)
     columns = [_minus(f"{value:.3f}") for value in actuator.position]

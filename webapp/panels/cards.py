@@ -218,12 +218,14 @@ def add_answering(page: Page) -> None:
     session = page.session
     gui = page.gui
     hint = (
-        "Watts, proved least by method dual; or the paper's effort, by the network of method mdn."
+        "Watts, proved least by method dual; or, of fins alone, the paper's effort, by the network "
+        "of method mdn."
     )
     least = page.bind(
         gui.add_dropdown("Least", tuple(LEAST), hint=hint), session.keep_least, least_of
     )
-    page.board.show(least, visible=lambda layout: layout.is_of_fins)
+    # It stays where it is, so that nothing in the bar moves when a robot is opened.
+    page.board.show(least, disabled=lambda layout: not layout.is_of_fins)
     add_html(gui, marker("fl-method"))
     hint = "It stays when another robot is opened, where it takes that one; else dual answers."
     methods = gui.add_dropdown("Method", tuple(METHODS), hint=hint)

@@ -5,6 +5,7 @@ from functools import partial
 from typing import Any, NamedTuple
 
 from webapp.page import Page
+from webapp.panels.pairs import telling_pairs
 from webapp.session.lessons import LESSONS, TOUR
 from webapp.session.looking import TASKS, TWO_ROBOTS
 from webapp.session.state import LEAST
@@ -75,8 +76,8 @@ def page_commands(page: Page) -> list[Command]:
         Command("Select the next fin", session.select_next, "N"),
         Command("Select nothing, or close tour and lesson", leave, "escape"),
         Command("Duplicate the selected fin", session.duplicate, "D", CTRL),
-        Command("Mirror the selected fin", session.mirror, "M"),
-        Command("Delete the selected fin", session.delete, "delete"),
+        Command("Mirror the selected fin", telling_pairs(page, session.mirror), "M"),
+        Command("Delete the selected fin", telling_pairs(page, session.delete), "delete"),
         Command("Add a fin", partial(session.add, "fin"), "I"),
         Command("New design", page.new),
         Command("Save the design", page.designs.save, "S", CTRL),

@@ -216,6 +216,7 @@ class Frame:
             "drawer": has_drawer,
             "open": drawer is not None,
             "guide": stop is not None,
+            "listed": stop is not None and not stop.inspects,
             "log": desk.task == LOG,
         }
         variables = Markup().join(f"--has-{name}: {int(flag)};" for name, flag in flags.items())

@@ -19,6 +19,7 @@ from finlab.swim.hull.surface import UNITS
 from finlab.swim.vehicle.fossen import GRAVITY
 from webapp.markup.words import html, three_digits
 from webapp.page import Page
+from webapp.panels.pairs import telling_pairs
 from webapp.session.files import reshaped_hull, stored_hull
 from webapp.session.layout_edits import center_of_gravity, with_hull
 
@@ -37,7 +38,8 @@ def add_hull(page: Page) -> None:
     _add_shape(page)
     hint = "Centre of gravity as seen from the hull's middle. Torques are about it."
     center = page.gui.add_vector3("Centre of gravity [m]", (0.0, 0.0, 0.0), step=0.005, hint=hint)
-    page.bind_number(center, page.session.set_center_of_gravity, center_of_gravity)
+    put = telling_pairs(page, page.session.set_center_of_gravity)
+    page.bind_number(center, put, center_of_gravity)
     _add_import(page)
     page.add_html(_report, visible=lambda layout: bool(_report(layout)))
     _add_turns(page)

@@ -151,6 +151,30 @@ POWER_LAW: tuple[Box, ...] = (
     ),
 )
 """Boxes of a propeller's power law."""
+FOIL_LAW: tuple[Box, ...] = (
+    NumberBox(label="Area [m²]", key="area", hint="Of the foil.", step=0.001),
+    NumberBox(label="Aspect ratio", key="aspect_ratio", hint="2 span²/area for a foil on a hull."),
+    NumberBox(
+        label="Lift slope [1/rad]",
+        key="lift_slope",
+        hint="Empty: by the aspect ratio.",
+        may_be_empty=True,
+    ),
+    NumberBox(
+        label="Drag",
+        key="drag",
+        hint="Drag coefficient without lift; 0.0065 is NACA 0015.",
+        step=0.001,
+    ),
+    NumberBox(
+        label="Stall [°]",
+        key="stall",
+        hint="Angle to the flow at which it separates.",
+        step=1.0,
+        degrees=True,
+    ),
+)
+"""Boxes of the law of a foil."""
 
 
 def _fin() -> Inspector:
@@ -250,32 +274,53 @@ def _rudder() -> Inspector:
             step=0.05,
         ),
     )
-    law = (
-        NumberBox(label="Area [m²]", key="area", hint="Of the foil.", step=0.001),
-        NumberBox(
-            label="Aspect ratio", key="aspect_ratio", hint="2 span²/area for a foil on a hull."
+    return Inspector(limits=limits, law=FOIL_LAW, other_axis="Leading edge")
+
+
+def _propeller_rudder() -> Inspector:
+    limits = (
+        RangeBox(
+            label="Thrust [N]",
+            key="force",
+            hint="Least and most; astern nothing meets the rudder.",
+            step=1.0,
         ),
-        NumberBox(
-            label="Lift slope [1/rad]",
-            key="lift_slope",
-            hint="Empty: by the aspect ratio.",
-            may_be_empty=True,
-        ),
-        NumberBox(
-            label="Drag",
-            key="drag",
-            hint="Drag coefficient without lift; 0.0065 is NACA 0015.",
-            step=0.001,
-        ),
-        NumberBox(
-            label="Stall [°]",
-            key="stall",
-            hint="Angle to the flow at which it separates.",
+        RangeBox(
+            label="Deflection [°]",
+            key="deflection",
+            hint="Least and greatest of the rudder.",
             step=1.0,
             degrees=True,
         ),
+        NumberBox(
+            label="Turn rate [°/s]",
+            key="turn_rate",
+            hint="How fast the rudder turns; empty: at once.",
+            step=STEP_DEGREES,
+            degrees=True,
+            may_be_empty=True,
+        ),
+        NumberBox(
+            label="Rate [N/s]",
+            key="rate",
+            hint="How fast the thrust changes; empty: at once.",
+            may_be_empty=True,
+        ),
+        NumberBox(
+            label="Lag [s]", key="time_constant", hint="Time to 63 % of a new command.", step=0.05
+        ),
     )
-    return Inspector(limits=limits, law=law, other_axis="Leading edge")
+    slipstream = (
+        NumberBox(label="Diameter [m]", key="diameter", hint="Of the propeller.", step=0.01),
+        NumberBox(
+            label="Slipstream",
+            key="slipstream",
+            hint="Share of its pressure on the rudder; 1: the rudder lies in it whole.",
+            step=0.05,
+        ),
+    )
+    law = (*slipstream, *FOIL_LAW, *POWER_LAW)
+    return Inspector(limits=limits, law=law, other_axis="Shaft")
 
 
 INSPECTORS: Mapping[str, Callable[[], Inspector]] = {
@@ -284,6 +329,7 @@ INSPECTORS: Mapping[str, Callable[[], Inspector]] = {
     "azimuth": _azimuth,
     "tilt": _azimuth,
     "rudder": _rudder,
+    "propeller_rudder": _propeller_rudder,
 }
 """Type of an actuator -> what makes its inspector."""
 

@@ -70,7 +70,6 @@ def add_log(page: Page) -> None:
     page.bind(by_page, log.choose_robot, lambda by_page: by_page)
     page.presses.on("sample", lambda key, _: log.open_sample(SAMPLES[placed(key, len(SAMPLES))]))
     page.presses.on("log-robot", lambda *_: log.jump(_moment_of(page)))
-    page.presses.on("log-swim", lambda *_: page.scenery.end_swim())
     page.presses.on("log-stop", lambda *_: log.stop())
     page.add_html(_summary)
     page.add_html(_whose_robot)
@@ -159,22 +158,18 @@ def _whose_robot(judgement: "Judgement | None", layout: Layout, swims: bool) -> 
     if judgement is None:
         return ""
     name = layout.name
-    if swims:
-        return html(
-            "<div class='fl said'>{} <div class='fl-samples'>{}</div></div>",
-            "The view shows a swim, not the moment of the log.",
-            button("End the swim", "log-swim"),
-        )
+    swim = "The swim waits in Simulate." if swims else ""
     if layout == judgement.robot:
         sentence = html("The view shows the robot of the log, {}; Undo brings back yours.", name)
-        return html("<div class='fl said dim'>{}</div>", sentence)
+        return html("<div class='fl said dim'>{} {}</div>", sentence, swim)
     if judgement.improved is not None and layout == judgement.improved:
         sentence = html("The view shows the improved robot, {}.", name)
     else:
         sentence = html("The view shows {}, not the robot of the log.", name)
     return html(
-        "<div class='fl said'>{} <div class='fl-samples'>{}</div></div>",
+        "<div class='fl said'>{} {} <div class='fl-samples'>{}</div></div>",
         sentence,
+        swim,
         button("Show the log's robot", "log-robot"),
     )
 

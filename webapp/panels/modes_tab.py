@@ -226,7 +226,7 @@ def add_comparison(page: Page) -> None:
     cancel = page.add_button("Cancel", page.jobs.comparison.cancel, icon=viser.Icon.X, hint=about)
     page.board.show(cancel, visible=lambda run: run.running)
     add_html(page.gui, marker("fl-column"))
-    page.add_html(lambda run, state: comparison_table(run, run.state not in (None, state)))
+    page.add_html(lambda run, state: comparison_table(run, run.answers_other_than(state)))
 
 
 LEFT_OUT = {

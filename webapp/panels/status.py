@@ -41,6 +41,13 @@ LONG = 24
 """Characters of a verdict above which it takes a line of its own in a small view."""
 ARROWS = ("asked", "delivered", "missing")
 """Arrows of the legend by name."""
+NOTHING_ASKED = (0.0,) * 6
+"""The wrench [N, N m] of a robot that rests."""
+AT_REST = 1e-3
+"""Error [1] and power [W] of a robot that rests up to which the status says no more than that they
+are as small: fins that idle give a little of both."""
+NEXT_TO_NOTHING = "≤ 0.001"
+"""`AT_REST` in words."""
 SLOWEST_WATER = 5e-4
 """Speed of the water from which it is in the legend of a swim [m/s]."""
 
@@ -232,7 +239,8 @@ def corner(
             html("<span class='pill' style='background:{}'>{}</span>", css(DEAD), WORKING)
         )
     else:
-        markup.append(_figures(allocation, least, in_reach, refined, badge))
+        rests = state.target == NOTHING_ASKED
+        markup.append(_figures(allocation, least, in_reach, refined, badge, rests))
     return _cards(legend, markup)
 
 
@@ -243,24 +251,40 @@ def _working_words(layout: Layout, lost: tuple[str, ...]) -> str:
     return html("<span class='aside'>{}</span>", words)
 
 
-def _figures(allocation: Allocation, least: bool, in_reach: bool, refined: str, badge: str) -> str:
-    """Error, power, effort, method and verdict of an answer; arguments as for `corner`."""
+def _figures(
+    allocation: Allocation, least: bool, in_reach: bool, refined: str, badge: str, rests: bool
+) -> str:
+    """Error, power, effort, method and verdict of an answer.
+
+    Args:
+        allocation: as for `corner`, and the next four likewise.
+        least: whether it is the answer itself.
+        in_reach: whether any command gives the target.
+        refined: the step of the refinement.
+        badge: where the mode comes from.
+        rests: whether no wrench is asked for.
+    """
     color = DEAD if refined else COLORS[verdict_of(allocation, in_reach)]
     sentence = refined or verdict_sentence(allocation, in_reach)
     pill = "pill long" if len(sentence) > LONG else "pill"
     unallocated = allocation.unallocated.tolist()
-    unallocated = [value if abs(value) >= ROUNDING else 0.0 for value in unallocated]
     missing = zip(AXES, unallocated, UNITS, strict=True)
-    rest = ", ".join([f"{axis} {signed(value)} {unit}" for axis, value, unit in missing])
+    rest = ", ".join(
+        [
+            f"{axis} {signed(value if abs(value) >= ROUNDING else 0.0)} {unit}"
+            for axis, value, unit in missing
+        ]
+    )
     method = allocation.method
+    err_norm = allocation.err_norm
+    power = allocation.power
+    err_digits = NEXT_TO_NOTHING if rests and err_norm <= AT_REST else error_digits(err_norm)
+    watts = f"{NEXT_TO_NOTHING} W" if rests and power <= AT_REST else with_unit(power, "W")
     figures = [
         f"<span title='missing, as a share of what the robot can push: {rest}'><span class='dim'>"
-        f"error</span> <b class='err'>{error_digits(allocation.err_norm)}</b></span>"
+        f"error</span> <b class='err'>{err_digits}</b></span>"
     ]
-    kinds = (
-        ("power", "watts", with_unit(allocation.power, "W")),
-        ("effort", "effort", three_digits(allocation.effort)),
-    )
+    kinds = (("power", "watts", watts), ("effort", "effort", three_digits(allocation.effort)))
     for word, kind, figure in kinds:
         if word == "effort" and allocation.effort is None:  # it is of fins
             continue

@@ -88,8 +88,9 @@ def add_run(page: Page) -> None:
     def hold() -> None:
         swimming.set_running(not swimming.running)
 
-    add_html(gui, marker("fl-primary"))
+    page.add_html(lambda swim_goes_on: marker("fl-usual" if swim_goes_on else "fl-primary"))
     page.add_button("Start", start, icon=viser.Icon.PLAYER_PLAY, hint="From the beginning.")
+    page.add_html(lambda swim_goes_on: marker("fl-verdict" if swim_goes_on else "fl-usual"))
     runs = {"Pause": hold, "Go on": hold, "Step": swimming.step, "End": page.scenery.end_swim}
     run = page.add_buttons("Run", runs, visible=False, hint=RUN_HINT)
     page.board.show(

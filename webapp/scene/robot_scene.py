@@ -152,7 +152,7 @@ class RobotScene:
         display: Display,
         dragged: int | None,
         task: str,
-        swims: bool,
+        shows_swim: bool,
         pair: Pair | None,
     ) -> None:
         if dragged is not None:  # a hull that breathes with the fin one drags is hard to aim at
@@ -170,7 +170,9 @@ class RobotScene:
         )
         if pair is not None:  # the camera sees both
             return
-        if not swims and not 0.75 < view_size(visible_layout) / self._size < 1.34:  # another robot
+        if (
+            not shows_swim and not 0.75 < view_size(visible_layout) / self._size < 1.34
+        ):  # another robot
             self.look_from("3D")
 
     def _place(
@@ -182,7 +184,7 @@ class RobotScene:
         lost: tuple[str, ...],
         damage: Damage,
         dragged: int | None,
-        swims: bool,
+        shows_swim: bool,
         follows: str,
     ) -> None:
         hull = hull_of(visible_layout)
@@ -195,15 +197,15 @@ class RobotScene:
             )
         for node in self._fins[visible_layout.n :]:
             node.hide()
-        edited = selected if task == "Design" and not (swims or follows) else None
-        stuck = () if swims else damage.stuck
+        edited = selected if task == "Design" and not (shows_swim or follows) else None
+        stuck = () if shows_swim else damage.stuck
         for i, actuator in enumerate(visible_layout.actuators):
             remark = (
                 ""
-                if swims or actuator.name in lost
+                if shows_swim or actuator.name in lost
                 else damage_words(damage, actuator.name, actuator.KIND.sticks_at_angle)
             )
-            named = actuator.name if swims else _named(actuator)  # one that swims is elsewhere
+            named = actuator.name if shows_swim else _named(actuator)  # one that swims is elsewhere
             words = (str(i + 1), named if actuator.name in selection else "", remark)
             label = " ".join([word for word in words if word])
             moved = actuator.name == edited
@@ -279,7 +281,7 @@ class RobotScene:
         target: tuple[float, ...],
         scale: Scale,
         task: str,
-        swims: bool,
+        shows_swim: bool,
         pulled: Grip | None,
         pair: Pair | None,
         follows: str,
@@ -299,7 +301,7 @@ class RobotScene:
         per_newton = size * display.arrow_length * LENGTH / scale.newtons
         Fx, Fy, Fz = target[:3]
         tip = per_newton * Fx, per_newton * Fy, per_newton * Fz
-        is_visible = display.handle and task == "Allocate" and not swims and pair is None
+        is_visible = display.handle and task == "Allocate" and not shows_swim and pair is None
         is_visible = is_visible and not display.presents
         is_visible = is_visible and not follows
         commanded = visible_layout.commanded.tolist()
@@ -396,13 +398,13 @@ class RobotScene:
         improvement: Improvement | None,
         progress: Progress | None,
         layout: Layout,
-        swims: bool,
+        shows_swim: bool,
     ) -> None:
         """The actuators that a search would put elsewhere, where it would put them so far."""
         is_improved = improvement is not None and improvement.improved
         offer = improvement if is_improved else progress
         moved: list[Actuator] = []
-        if offer is not None and not swims and offer.layout.name == layout.name:
+        if offer is not None and not shows_swim and offer.layout.name == layout.name:
             present = {
                 actuator.name: (actuator.position, actuator.frame) for actuator in layout.actuators
             }

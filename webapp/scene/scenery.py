@@ -55,6 +55,8 @@ class Scenery:
         self._scale = self._swam = self._of_pair = INITIAL_SCALE
         self._robot: tuple[str, tuple[str, ...]] | None = None
         """Name of the robot that the scale is of, and those of its actuators."""
+        self._swimmer: Swimmer | None = None
+        """The robot that is seen to swim."""
         self._is_answered = False
         """Whether the scale fits an answer of that robot."""
         self._is_fixed = False
@@ -110,11 +112,14 @@ class Scenery:
         self,
         target: Sequence[float],
         shown_allocation: Allocation | None,
+        swimmer: Swimmer | None = None,
         pair_allocations: Sequence[Allocation | None] = (),
     ) -> Scale:
-        """What arrows and rings stand for, given a target (6,) and what is shown of it, in a swim,
-        or of two robots beside each other, whose answers are given."""
-        swimmer = self._swimming.swimmer
+        """What arrows and rings stand for, given a target (6,) and what is shown of it, in a swim
+        that is seen, or of two robots beside each other, whose answers are given."""
+        if swimmer is None and self._swimmer is not None and self._swimming.active:
+            self.robot.look_from("3D")  # the robot of the page, where the swim was seen
+        self._swimmer = swimmer
         if swimmer is not None:
             self._swam = swim_scale(swimmer, self._swam)
             return self._swam
@@ -162,7 +167,7 @@ class Scenery:
     def _fail(self, error: Exception | None) -> None:
         if error is None:
             pair = None if self._swimming.active else self._session.two_robots.pair
-            self.robot.show(self._swimming.swimmer, pair)
+            self.robot.show(self._swimmer, pair)
         else:
             self.robot.hide()
             self.two_robots.hide()

@@ -51,6 +51,9 @@ NO_LENGTH = (0.0, 0.0, 0.0)
 """A vector of no length [m]."""
 LEAST_TURN = 1e-4
 """Change of a component of a direction up to which a mesh is not turned [1]."""
+NEGLIGIBLE = 1e-4
+"""Share of what a robot can push below which a force or torque sets no scale: fins that idle are
+not drawn as if they pushed."""
 LARGEST = 0.42
 """How far the drawn set may reach from the centre of gravity [m]."""
 
@@ -79,6 +82,13 @@ def fitting_scale(
         force = max(force, math.hypot(*wrench[:3]))
         torque = max(torque, math.hypot(*missing[3:]), math.hypot(*wrench[3:]))
         actuator_force = max([math.hypot(*f) for f in shown_allocation.forces.tolist()])
+        least_force = NEGLIGIBLE * shown_allocation.scale[0]
+        if force < least_force:
+            force = 0.0
+        if actuator_force < least_force:
+            actuator_force = 0.0
+        if torque < NEGLIGIBLE * shown_allocation.scale[3]:
+            torque = 0.0
     return _scale(force, torque, actuator_force, now)
 
 

@@ -19,7 +19,7 @@ from webapp.session import layout_edits
 from webapp.session.base import BaseSession
 from webapp.session.granted import Granted, SourceFile
 from webapp.session.key_words import key_words
-from webapp.session.layout_edits import partner, unlinked, with_twin
+from webapp.session.layout_edits import linked, partner, unlinked, with_twin
 from webapp.session.lessons import Guide
 from webapp.session.looking import Display
 from webapp.session.state import FIRST_POLICY, State, method_for
@@ -56,7 +56,7 @@ class Session(BaseSession):
         granted: tuple[Granted, ...] = (),
         source: SourceFile | None = None,
     ) -> None:
-        """Another layout; the target stays, damage and links are forgotten. The method stays where
+        """Another layout; the target stays, damage is forgotten. The method stays where
         it takes the robot, else `dual` answers; the policy is `closest` again.
 
         Args:
@@ -71,7 +71,6 @@ class Session(BaseSession):
             self.state,
             layout=layout,
             damage=Damage(lost),
-            links=(),
             method=method,
             policy=FIRST_POLICY,
             granted=granted,
@@ -233,17 +232,17 @@ class Session(BaseSession):
         together."""
         source = self._chosen()[-1]
         layout, name = layout_edits.mirrored(self.state.layout, source)
-        state = self.state.with_layout(layout)
-        links = (*unlinked(unlinked(state.links, source), name), (source, name))
-        self._commit(f"Mirror {source}", replace(state, links=links))
+        state = self.state.with_layout(linked(layout, source, name))
+        self._commit(f"Mirror {source}", state)
         self.selection_order = (name,)
 
     def unlink(self) -> None:
         """The selected actuator and its mirror image go their own ways."""
         name = self._chosen()[-1]
-        if partner(self.state.links, name) is None:
+        layout = self.state.layout
+        if partner(layout, name) is None:
             raise FinlabError(f"{name} is not linked to another one; Mirror links it to its image")
-        self._commit(f"Unlink {name}", replace(self.state, links=unlinked(self.state.links, name)))
+        self._commit(f"Unlink {name}", self.state.with_layout(unlinked(layout, name)))
 
     def ring(self, count: int, around: str = "z") -> None:
         """Copies of the selected actuator, so that `count` stand evenly around a body axis."""
@@ -358,7 +357,7 @@ class Session(BaseSession):
 
     def _follow(self, step: str, name: str, layout: Layout, merge_key: str, timed: bool) -> None:
         """A layout in which one actuator has moved; its twin moves along."""
-        layout = with_twin(self.state.layout, layout, self.state.links, name)
+        layout = with_twin(self.state.layout, layout, name)
         self._edit(step, layout, merge_key, timed)
 
     def _change(self, verb: str, change: Callable[[Actuator], Actuator]) -> None:
@@ -387,12 +386,11 @@ class Session(BaseSession):
             timed: whether such steps are apart after a while; without it, after `end_merge`.
         """
         old_layout = self.state.layout
-        links = self.state.links
         layout = old_layout
         done = set[str]()
         for name in reversed(names):
-            if partner(links, name) not in done:
-                layout = with_twin(old_layout, change(layout, name), links, name)
+            if partner(old_layout, name) not in done:
+                layout = with_twin(old_layout, change(layout, name), name)
                 done.add(name)
         self._edit(f"{verb} {_words(names)}", layout, merge_key, timed)
 

@@ -21,7 +21,7 @@ from finlab.layout import Actuator, Body, Fin, Layout
 from finlab.layout.body import HULL_SHAPES, Hull
 from finlab.layout.layout import MAX_ACTUATORS
 from finlab.swim.hull import hull_of
-from webapp.session.state import Links, number, numbers, one_of
+from webapp.session.state import number, numbers, one_of
 
 UNTOUCHED = 1e-6
 """Change [m], [rad] up to which a coordinate or an angle counts as left alone: a page's own
@@ -264,7 +264,8 @@ def center_of_gravity(layout: Layout) -> Vector3:
 
 def balanced(layout: Layout, center: Vector3) -> Layout:
     """The layout with the centre of gravity at a place in the hull [m]. The body frame has its
-    origin there, so hull, actuators and the centre of buoyancy move the other way."""
+    origin there, so hull, actuators and the centre of buoyancy move the other way; where they move
+    aside, no two are mirror images any more."""
     checked = numbers(center, "of the centre of gravity [m]", -2.0, 2.0)
     x, y, z = np.subtract(center_of_gravity(layout), checked).tolist()
 
@@ -280,7 +281,8 @@ def balanced(layout: Layout, center: Vector3) -> Layout:
     actuators = [
         replace(actuator, position=shifted(actuator.position)) for actuator in layout.actuators
     ]
-    return replace(layout, actuators=tuple(actuators), body=body)
+    pairs = layout.mirror_pairs if abs(y) <= UNTOUCHED else ()
+    return replace(layout, actuators=tuple(actuators), body=body, mirror_pairs=pairs)
 
 
 def with_power(layout: Layout, watts: float | None) -> Layout:
@@ -334,31 +336,37 @@ def modelled(actuator: Actuator, model: str) -> Actuator:
     return actuator.with_model(model) if model in actuator.KIND.models else actuator
 
 
-def partner(links: Links, name: str) -> str | None:
-    """The actuator that `name` is linked to, if any."""
-    for pair in links:
+def partner(layout: Layout, name: str) -> str | None:
+    """The actuator that moves along with another one as its mirror image; None where none does."""
+    for pair in layout.mirror_pairs:
         if name in pair:
             return pair[1 - pair.index(name)]
     return None
 
 
-def unlinked(links: Links, name: str) -> Links:
-    """The links without the pair of an actuator."""
-    return tuple([pair for pair in links if name not in pair])
+def unlinked(layout: Layout, *names: str) -> Layout:
+    """The layout without the mirror pairs of some actuators."""
+    pairs = [pair for pair in layout.mirror_pairs if not set(names) & set(pair)]
+    return replace(layout, mirror_pairs=tuple(pairs))
 
 
-def with_twin(old_layout: Layout, layout: Layout, links: Links, name: str) -> Layout:
+def linked(layout: Layout, name: str, image: str) -> Layout:
+    """The layout with two actuators as a mirror pair, in place of pairs that they were in."""
+    others = unlinked(layout, name, image)
+    return replace(others, mirror_pairs=(*others.mirror_pairs, (name, image)))
+
+
+def with_twin(old_layout: Layout, layout: Layout, name: str) -> Layout:
     """The layout after the twin of an actuator, if any, took its mirrored place.
 
     Args:
         old_layout: before the edit: axes of the twin that pointed the other way than those of the
             image do so again.
         layout: after the edit.
-        links: pairs of actuators that move together.
         name: of the actuator that was edited.
     """
-    twin_name = partner(links, name)
-    if twin_name is None or twin_name not in layout.names:
+    twin_name = partner(layout, name)
+    if twin_name is None:
         return layout
     image = layout.actuator(name).image()
     twin = layout.actuator(twin_name)

@@ -38,7 +38,8 @@ class Stop(Struct, frozen=True, forbid_unknown_fields=True):
     drawer: str = "Candidates"
     """What lies uppermost in the drawer; its task is open."""
     inspects: bool = False
-    """Whether a phone begins with the inspector below its card; else with the drawer."""
+    """Whether it speaks of the inspector: a phone begins with that below its card, else with the
+    drawer, and a low window has more room for the list where it does not."""
     exercise: str = ""
     praise: str = ""
 

@@ -13,7 +13,9 @@ from finlab.forces.attainable import WrenchHalf
 from finlab.layout import Layout
 from webapp.session.state import number, one_of
 
-TASKS = ("Design", "Allocate", "Simulate", "Export", "Log")
+LOG = "Log"
+"""Task in which a log is judged, and its moments are put on the robot."""
+TASKS = ("Design", "Allocate", "Simulate", "Export", LOG)
 CANDIDATES = "Candidates"
 """Tab of the drawer that shows the modes of a network's candidates, of robots of fins alone."""
 NULL_SPACE = "Null space"
@@ -25,7 +27,7 @@ DRAWERS: dict[str, tuple[str, ...]] = {
     "Allocate": (CANDIDATES, NULL_SPACE, "Comparison", TWO_ROBOTS),
     "Simulate": ("Swim over time",),
     "Export": (),
-    "Log": ("Log over time", "Replays"),
+    LOG: ("Log over time", "Replays"),
 }
 MODE_DRAWERS = (CANDIDATES, NULL_SPACE)
 """Tabs that show other commands for the wrench of an answer."""

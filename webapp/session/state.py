@@ -20,8 +20,6 @@ from finlab.research.mdn.method import MdnSettings
 from finlab.research.paper.pipeline import PaperSettings
 from webapp.session.granted import Granted, SourceFile
 
-Links = tuple[tuple[str, str], ...]
-"""Mirror pairs by name; an actuator is in at most one of them."""
 MAX_TARGET = 1e12
 """Largest target component that the page may ask for [N, N m]."""
 Flow = tuple[float, float, float, float, float, float]
@@ -56,7 +54,6 @@ class State:
     """Which of the networks that are there method `paper` answers with; empty for the one it began
     with."""
     policy: str = FIRST_POLICY
-    links: Links = ()
     speed: float = 0.0
     """Speed ahead through the water [m/s]."""
     granted: tuple[Granted, ...] = ()
@@ -122,19 +119,17 @@ class State:
     def with_layout(
         self, layout: Layout, renamed: Mapping[str, str] = MappingProxyType({})
     ) -> "State":
-        """Another layout; damage and links of actuators that still exist stay, also of those that
-        are `renamed` (old and new names). FinlabError: one of them cannot have its damage any
-        more."""
+        """Another layout; damage of actuators that still exist stays, also of those that are
+        `renamed` (old and new names). FinlabError: one of them cannot have its damage any more."""
         names = {old: renamed.get(old, old) for old in self.layout.names}
         now = {old: new for old, new in names.items() if new in layout.names}
         lost = {now.get(name) for name in self.lost}
         damage = replace(
             self.damage.renamed(now), lost=[name for name in layout.names if name in lost]
         )
-        links = tuple((now[a], now[b]) for a, b in self.links if a in now and b in now)
         method = method_for(layout, self.method)
         granted = tuple([row.renamed(now) for row in self.granted])
-        state = replace(self, layout=layout, links=links, method=method, granted=granted)
+        state = replace(self, layout=layout, method=method, granted=granted)
         return state._with_damage(damage)
 
     def with_setting(self, key: str, value: Any) -> "State":
@@ -180,8 +175,9 @@ def _angle(value: Any, name: str, low: float, high: float) -> float:
 
 
 def is_same_robot(one: State, other: State) -> bool:
-    """Whether two states have the same robot with the same damage."""
-    is_same_layout = one.layout is other.layout or one.layout == other.layout
+    """Whether two states have the same robot with the same damage; which actuators move together
+    while it is edited does not count."""
+    is_same_layout = one.layout is other.layout or one.layout.unpaired == other.layout.unpaired
     return is_same_layout and one.damage == other.damage
 
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.methods import method_class
-from webapp.session.state import FIRST_POLICY, State, compared
+from webapp.session.state import FIRST_POLICY, State, compared, is_same_robot
 from webapp.tasks.context import Context
 from webapp.tasks.slot import Slot
 from webapp.tasks.solver import Solver
@@ -39,6 +39,22 @@ class Run(NamedTuple):
     def running(self) -> bool:
         """True until all methods have answered."""
         return len(self.answers) < len(self.methods) and not self.cancelled
+
+    def answers_other_than(self, now: State) -> bool:
+        """Whether the methods were asked something else than a state asks; by which method it is
+        answered there does not count, for all have been asked."""
+        asked = self.state
+        if asked is None:
+            return False
+        is_as_asked = (
+            is_same_robot(asked, now)
+            and asked.target == now.target
+            and asked.policy == now.policy
+            and asked.speed == now.speed
+            and asked.temperature == now.temperature
+            and asked.network == now.network
+        )
+        return not is_as_asked
 
 
 class Comparison(Slot[State, Allocation]):

@@ -24,7 +24,7 @@ from webapp.session import Session, files
 from webapp.session.files import BESIDE, FRAGMENT, WRENCH, file_stem, packed, unpacked
 from webapp.session.granted import SourceFile
 from webapp.session.looking import TWO_ROBOTS
-from webapp.session.state import Links, State, one_of
+from webapp.session.state import State, one_of
 from webapp.tasks.importing import rows_of
 from webapp.tasks.modes_csv import modes_csv
 from webapp.tasks.slot import Deferred
@@ -210,12 +210,11 @@ class Designs:
 
     def save(self) -> None:
         """Send the design's file to the browser."""
-        state = self._session.state
-        layout = state.layout
+        layout = self._session.state.layout
 
         def send(file: tuple[str, bytes]) -> None:
             reminder = self._session.guide.reminder
-            self._download(*file, _with(pairs_words(state.links, "file"), reminder))
+            self._download(*file, reminder)
             self._session.saved = layout
 
         self._deferred.make(partial(files.layout_file, layout), send, "save")
@@ -225,14 +224,10 @@ class Designs:
         lets us."""
         state = self._session.state
         layout = state.layout
-        said = SHARED
-        pairs = pairs_words(state.links, "link")
-        if pairs:
-            said += f" {pairs}."
 
         def show(text: str) -> None:
             wrench = WRENCH + ",".join(f"{value:.6g}" for value in state.target)
-            card = json.dumps([f"Share {layout.name}", said, FRAGMENT + text + wrench])
+            card = json.dumps([f"Share {layout.name}", SHARED, FRAGMENT + text + wrench])
             run_script(self._client.gui, f"finlabCards.share(...{card});")
 
         self._deferred.make(partial(packed, layout), show, "share")
@@ -252,9 +247,6 @@ class Designs:
 
         def show(text: str) -> None:
             said = SHARED_PAIR + (" What is damaged does not travel." if is_damaged else "")
-            links = tuple(dict.fromkeys((*left.links, *right.links)))
-            if links:
-                said += f" {pairs_words(links, 'link')}."
             title = f"Share {' and '.join(pair.names)}"
             card = json.dumps([title, said, text])
             run_script(self._client.gui, f"finlabCards.share(...{card});")
@@ -321,21 +313,6 @@ class Designs:
         self._client.send_file_download(name, content, save_immediately=True)
         text = _with(f"{name}, among the downloads of this browser", reminder)
         self._notify("Saved", text, calm=True)
-
-
-def pairs_words(links: Links, carrier: str) -> str:
-    """What becomes of mirror pairs in a file or a link; nothing where there are none.
-
-    Args:
-        links: the pairs.
-        carrier: what the design travels in.
-    """
-    if not links:
-        return ""
-    pairs = "; ".join([" and ".join(pair) for pair in links])
-    return (
-        f"That Mirror has linked {pairs} is not in the {carrier}: press Mirror anew once it is open"
-    )
 
 
 def changed_words(before: State, now: State) -> str:

@@ -4,7 +4,7 @@ from typing import Any
 
 from finlab.analysis import AttainableSet
 from finlab.forces.reach import Ranges
-from webapp.session.looking import DRAWN
+from webapp.session.looking import DRAWN, LOG
 from webapp.session.state import State
 from webapp.tasks.analysing import (
     Analysis,
@@ -23,6 +23,7 @@ from webapp.tasks.improving import Improver
 from webapp.tasks.log_reading import LogReading
 from webapp.tasks.slot import Slot
 from webapp.tasks.solver import JetComparison
+from webapp.tasks.swimmer import Swimmer
 from webapp.tasks.swimming import Swimming
 from webapp.tasks.take_home import HomeQuestion, Offer, offers_of
 from webapp.tasks.two_robots import Pairing
@@ -60,12 +61,12 @@ class Jobs:
         )
         """What the best layout of a search attains so far."""
         self.fitting = Fitting(context)
-        self.log = LogReading(context)
+        self.swimming = Swimming(context)
+        self.log = LogReading(context, self.swimming)
         self.comparison = Comparison(context)
         self.pairing = Pairing(context)
         self.offers: Slot[HomeQuestion, tuple[Offer, ...]] = Slot(pools.brief, bell, offers_of)
         """In which formats the robot can be taken home."""
-        self.swimming = Swimming(context)
         self.first = frozenset[Slot[Any, Any]]([self.answering.slot, *self.pairing.slots])
         """What a change of the state waits for before the page is written."""
         self.beside = frozenset[Slot[Any, Any]](
@@ -117,6 +118,14 @@ class Jobs:
                 self.growing.ask(SetQuestion(best, kind, state.flow))
         if task in ("Design", "Allocate") and state.layout.interaction is not None:
             self.jet_comparison.ask(state)
+
+    @property
+    def visible_swimmer(self) -> Swimmer | None:
+        """The robot that swims; None where none does, or where a moment of a log is looked at, with
+        the robot of the page."""
+        if self.log.shown is not None and self._session.desk.task == LOG:
+            return None
+        return self.swimming.swimmer
 
     @property
     def busy(self) -> bool:

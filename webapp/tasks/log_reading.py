@@ -11,10 +11,12 @@ from finlab.errors import FinlabError
 from finlab.files.worker import in_worker
 from finlab.layout import Layout
 from webapp.session.files import shipped
+from webapp.session.looking import LOG
 from webapp.tasks.context import Context
 from webapp.tasks.fitting import as_file, short_name
 from webapp.tasks.log_samples import Sample
 from webapp.tasks.slot import Slot, Work
+from webapp.tasks.swimming import Swimming
 
 if TYPE_CHECKING:  # who opens no log needs none of it
     from finlab.log import Judgement
@@ -44,7 +46,8 @@ class LogFile:
 class LogReading(Slot[LogFile, "Judgement"]):
     """One log at a time for one page."""
 
-    def __init__(self, context: Context) -> None:
+    def __init__(self, context: Context, swimming: Swimming) -> None:
+        """No log yet; a robot that swims waits while one is opened."""
         super().__init__(
             context.pools.long,
             context.bell,
@@ -54,6 +57,7 @@ class LogReading(Slot[LogFile, "Judgement"]):
             title="Not judged",
         )
         self._session = context.session
+        self._swimming = swimming
         self.by_page = False
         """Whether the page's robot counts, not that of the log's parameters."""
         self.moment: float | None = None
@@ -88,7 +92,8 @@ class LogReading(Slot[LogFile, "Judgement"]):
         self.forget()
         self.moment = None
         self._is_on_page = False
-        self._session.show_task("Log")
+        self._swimming.set_running(False)
+        self._session.show_task(LOG)
         self.ask(LogFile(short_name(name), content, robot, self._session.state.layout))
 
     def attend(self) -> bool:

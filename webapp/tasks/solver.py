@@ -143,7 +143,10 @@ def _resting_words(mode: Mode) -> str:
         phrases.append(f"{fins_words(still)} {'rest' if len(still) > 1 else 'rests'}")
     if weak:
         phrases.append(f"{fins_words(weak)} hardly {'push' if len(weak) > 1 else 'pushes'}")
-    return ", ".join(phrases) or "all fins push"
+    if phrases:
+        return ", ".join(phrases)
+    has_lost = bool(np.isnan(mode.command).any())
+    return "all that work push" if has_lost else "all fins push"
 
 
 Load = Callable[..., MethodChoice]

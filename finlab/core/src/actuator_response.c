@@ -25,8 +25,9 @@ typedef struct {
   real other_end;  /* angle of the other end then [rad] */
 } push_direction;
 
-static const real *gauge_of(const real *block, const fl_actuator *a) {
-  if (a->gauge_table > 0) return block + (int)a->gauge_table;
+/* The gauge of a plane's forces ahead; 0 where it has none, and in reverse. */
+static const real *gauge_of(const real *block, const fl_actuator *a, const fl_set *set) {
+  if (a->gauge_table > 0 && !set->is_flipped) return block + (int)a->gauge_table;
   return 0;
 }
 
@@ -130,7 +131,7 @@ static response sector_response(const real *block, const fl_actuator *a, const f
 /* The response of a plane: of one that pushes either way a blend of both, the gauge ahead. */
 static response plane_response(const real *block, const fl_actuator *a, const fl_set *set,
                                const real *price) {
-  response own = sector_response(block, a, set, gauge_of(block, a), price);
+  response own = sector_response(block, a, set, gauge_of(block, a, set), price);
   if (set->force_max_reverse > 0) {
     const fl_set reversed = fl_reversed_set(set);
     const response other = sector_response(block, a, &reversed, 0, price);
@@ -306,7 +307,8 @@ real fl_support_of_set(const real *block, int i, const fl_set *set, const real *
     farthest_foil(block, i, set, price, force);
     return price[0];
   }
-  const push_direction g = farthest_direction(set, gauge_of(block, a), price);
+  const real *gauge = gauge_of(block, a, set);
+  const push_direction g = farthest_direction(set, gauge, price);
   real size = set->force_min;
   if (g.v > 0) size = set->force_max;
   force[0] = g.x;
@@ -314,7 +316,7 @@ real fl_support_of_set(const real *block, int i, const fl_set *set, const real *
   /* Without a gauge its length is 1 but for rounding, which would be that of the set: a step of
      Newton's method for the inverse root takes it off. */
   wide length_squared = 1;
-  if (!(a->gauge_table > 0)) length_squared = dot_wide(force, force, 2);
+  if (!gauge) length_squared = dot_wide(force, force, 2);
   const wide times = size / 2 * (3 - length_squared);
   force[0] *= times;
   force[1] *= times;
@@ -342,7 +344,7 @@ real fl_support_of_set(const real *block, int i, const fl_set *set, const real *
 int fl_undecided(const real *block, int i, const fl_set *set, const real *price, real *off) {
   const fl_actuator *a = ACTUATOR(block, i);
   const fl_set reversed = fl_reversed_set(set);
-  const response ahead = sector_response(block, a, set, 0, price);
+  const response ahead = sector_response(block, a, set, gauge_of(block, a, set), price);
   const response reverse = sector_response(block, a, &reversed, 0, price);
   const real delta = ahead.conjugate - reverse.conjugate;
   const real omega = blend_width(reversed.cost_at_max);

@@ -122,7 +122,7 @@ static void read_actuator(const real *block, const fl_work *work, int i, lanes_a
 /* Reads a robot in the state of a question; 0 where lanes cannot answer it. */
 static int read_robot(const real *block, const fl_work *work, const fl_question *q,
                       lanes_robot *robot) {
-  if (q->previous || q->multipliers || work->span.rank == 0) return 0;
+  if (q->previous || work->span.rank == 0) return 0;
   if (work->has_drag || work->has_turn_cost) return 0;
   robot->block = block;
   robot->work = work;
@@ -148,8 +148,9 @@ int fl_answer_many(const real *block, fl_work *work, const fl_question *question
   if (kernel && count > 1) {
     if (!fl_prepare_question(block, work, &q)) return FL_BAD_NUMBER;
     if (read_robot(block, work, &q, &robot)) {
-      const lanes_batch batch = {wrench,        count,   force, multipliers,
-                                 wrench_served, command, error, is_attainable};
+      const lanes_batch batch = {wrench,       question->multipliers, count,   force,
+                                 multipliers,  wrench_served,         command, error,
+                                 is_attainable};
       kernel(&robot, &batch);
     }
   }
@@ -158,6 +159,7 @@ int fl_answer_many(const real *block, fl_work *work, const fl_question *question
     is_truncated[k] = 0;
     if (is_attainable[k]) continue; /* answered in lanes */
     memcpy(q.wrench, wrench + 6 * k, sizeof q.wrench);
+    if (question->multipliers) q.multipliers = question->multipliers + 6 * k;
     const int code = fl_answer_one(block, work, &q, &out);
     if (code) return code;
     write_answer_of(block, &out, k, &answers);

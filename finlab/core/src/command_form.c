@@ -17,6 +17,12 @@ static const command_form FORMS[FL_KINDS] = {
                  .command_table = CURVE_TABLE,
                  .has_law_grid = 1,
                  .has_drag = 1},
+    /* nor does that of a rudder behind a propeller, which pulls along its own axis alone */
+    [FL_STEERED] = {.numbers = 2,
+                    .angle_number = NO_NUMBER,
+                    .force_number = 1,
+                    .has_law_grid = 1,
+                    .reverses_straight = 1},
 };
 
 const command_form *fl_form_of(const fl_actuator *a) { return FORMS + (int)a->command_kind; }
@@ -27,7 +33,8 @@ int fl_aims_force(const fl_actuator *a) {
   return form->angle_number != NO_NUMBER && form->force_number != NO_NUMBER;
 }
 
-/* Whether a command aims a force and has it in reverse. */
+/* Whether the command of a plane has its force in reverse. */
 int fl_is_in_reverse(const fl_actuator *a, const real *command) {
-  return fl_aims_force(a) && command[fl_form_of(a)->force_number] < 0;
+  const int number = fl_form_of(a)->force_number;
+  return is_plane(a) && number != NO_NUMBER && command[number] < 0;
 }

@@ -116,15 +116,15 @@ static void take_prepared(const real *block, fl_span *span) {
   span->rank = (int)h->rank;
 }
 
-/* The wrench beside the forces, less the drag at rest of foils that are lost. */
+/* The wrench beside the forces, less that of actuators that are lost: the drag at rest of foils, and
+   the -p of steered propellers. Of all others it is 0. */
 void fl_offset_wrench(const real *block, fl_span *span) {
   const fl_head *h = HEAD(block);
   for (int k = 0; k < 6; k++) {
     real sum = h->wrench_offset[k];
     for (int i = 0; i < COUNT(block); i++) {
       const fl_actuator *a = ACTUATOR(block, i);
-      const int has_no_drag = span->is_lost[i] && fl_form_of(a)->has_drag;
-      if (has_no_drag)
+      if (span->is_lost[i])
         sum -= a->pressure_area * a->zero_lift_drag * a->effectiveness_normalized[1][k] *
                h->wrench_scale[k];
     }

@@ -54,8 +54,9 @@ static real power_at(const real *block, int i, const real *command, real *price)
   fl_force_of_command(block, i, command, force, 0);
   real size = a->command_sign * force[0];
   if (is_plane(a)) size = size_of(force + 1);
-  if (fl_is_in_reverse(a, command)) size = -size;
-  if (a->gauge_table > 0) {
+  if (fl_is_in_reverse(a, command)) {
+    size = -size;
+  } else if (a->gauge_table > 0) {
     const real direction = ATAN2(force[2], force[1]);
     size /= fl_gauge_radius(block + (int)a->gauge_table, direction);
   }

@@ -24,6 +24,7 @@ static const constant CONSTANTS[] = {
     CONSTANT(FL_POD),
     CONSTANT(FL_FIN),
     CONSTANT(FL_FOIL),
+    CONSTANT(FL_STEERED),
     CONSTANT(FL_KINDS),
     CONSTANT(FL_DRAG),
     CONSTANT(FL_LIGHTHILL),
@@ -303,6 +304,44 @@ int fl_conjugates(const real *block, fl_work *work, const fl_question *question,
       actuator_price(work, i, lambda, s);
       conjugates[k * COUNT(block) + i] = conjugate_at(block, i, work->set + i, s, margins[i]);
     }
+  }
+  return FL_OK;
+}
+
+int fl_dual_points(const real *block, fl_work *work, const fl_question *question,
+                   const real *wrench, int count, int most_steps, real *multipliers, int *steps,
+                   real *residual, real *dual_value, real *force, real *slope) {
+  fl_question q = *question;
+  if (!fl_prepare_question(block, work, &q)) return FL_BAD_NUMBER;
+  const fl_span *span = &work->span;
+  const size_t n = (size_t)COUNT(block);
+  for (int k = 0; k < count; k++) {
+    real of_forces[6];
+    real target_reduced[6];
+    real lambda[6];
+    for (int j = 0; j < 6; j++) {
+      of_forces[j] = 0;
+      if (span->axis_counts[j]) of_forces[j] = wrench[6 * k + j] - span->wrench_offset[j];
+    }
+    fl_reduce_wrench(work, of_forces, target_reduced);
+    if (!fl_are_within(target_reduced, 6, LARGEST_NUMBER)) return FL_BAD_ARGUMENT;
+    work->newton_steps = 0;
+    if (isnan(multipliers[6 * k])) {
+      fl_dual_newton(block, work, target_reduced, 0, most_steps);
+    } else {
+      fl_reduce_lambda(work, multipliers + 6 * k, lambda);
+      if (!fl_are_within(lambda, 6, LARGEST_NUMBER)) return FL_BAD_ARGUMENT;
+      fl_dual_newton(block, work, target_reduced, lambda, most_steps);
+    }
+    steps[k] = work->newton_steps;
+    const fl_state *found = work->state_found;
+    for (int j = 0; j < 6; j++) {
+      multipliers[6 * k + j] = dot(span->basis[j], found->lambda_reduced, 6) / span->axis_scale[j];
+      residual[6 * k + j] = dot(span->basis[j], found->residual, 6) * span->axis_scale[j];
+    }
+    dual_value[k] = found->dual_value;
+    memcpy(force + 2 * n * (size_t)k, found->force, 2 * n * sizeof *force);
+    memcpy(slope + 3 * n * (size_t)k, found->dy_ds, 3 * n * sizeof *slope);
   }
   return FL_OK;
 }

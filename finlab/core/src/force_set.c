@@ -79,6 +79,14 @@ static void without_band(real band, real *low, real *high) {
   if (*high < band) *high = 0;
 }
 
+/* Makes the arc of a set that of its forces in reverse. */
+static void turn_arc_round(fl_set *set) {
+  set->sector_center += PI;
+  if (!set->reverses_straight) return;
+  set->sector_center = PI;
+  set->sector_half_angle = 0;
+}
+
 /* Makes a set of forces between two [N], of planes below 0 against their direction, in an arc
    of middle +- half [rad]. A plane keeps sizes, from 0 on: one that can push in reverse alone
    is flipped, its arc turned by pi; one that can push both ways has what it pushes ahead as its
@@ -120,8 +128,9 @@ void fl_limit_set(const real *block, int i, fl_set *set, real low, real high, re
   if (has_reverse && !set->is_flipped) set->force_max_reverse = -low;
 
   set->sector_center = middle;
-  if (set->is_flipped) set->sector_center = middle + PI;
   set->sector_half_angle = half;
+  set->reverses_straight = (unsigned char)fl_form_of(ACTUATOR(block, i))->reverses_straight;
+  if (set->is_flipped) turn_arc_round(set);
   fl_prepare_set(block, i, set);
 }
 
@@ -203,9 +212,15 @@ fl_set fl_reversed_set(const fl_set *set) {
   reversed.force_max_reverse = 0;
   reversed.is_flipped = 1;
   reversed.turn_origin = set->turn_origin + PI;
-  reversed.sector_center = set->sector_center + PI;
   reversed.cos_center = -set->cos_center;
   reversed.sin_center = -set->sin_center;
+  turn_arc_round(&reversed);
+  if (set->reverses_straight) {
+    reversed.cos_center = -1;
+    reversed.sin_center = 0;
+    reversed.cos_half_angle = 1;
+    reversed.sin_half_angle = 0;
+  }
   set_ends(1, &reversed);
   return reversed;
 }

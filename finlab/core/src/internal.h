@@ -222,12 +222,13 @@ int fl_span_of_question(const real *block, fl_work *work, const unsigned char *l
 enum { NO_NUMBER = -1 };
 enum { NO_TABLE, BEAT_TABLE, CURVE_TABLE }; /* kinds of command tables, see fl_work.h */
 typedef struct {
-  int numbers;       /* how many of the three a command uses, from the first one on */
-  int angle_number;  /* which one is an angle that wraps, or NO_NUMBER */
-  int force_number;  /* which one is a force, which may have a dead band, or NO_NUMBER */
-  int command_table; /* what fl_actuator.command_table is: BEAT_TABLE ... */
-  int has_law_grid;  /* whether the law is a grid */
-  int has_drag;      /* whether the second axis of the law is drag */
+  int numbers;           /* how many of the three a command uses, from the first one on */
+  int angle_number;      /* which one is an angle that wraps, or NO_NUMBER */
+  int force_number;      /* which one is a force, which may have a dead band, or NO_NUMBER */
+  int command_table;     /* what fl_actuator.command_table is: BEAT_TABLE ... */
+  int has_law_grid;      /* whether the law is a grid */
+  int has_drag;          /* whether the second axis of the law is drag */
+  int reverses_straight; /* whether in reverse it pushes against its first axis, at any angle */
 } command_form;
 const command_form *fl_form_of(const fl_actuator *a);
 int fl_aims_force(const fl_actuator *a);

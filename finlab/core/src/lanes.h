@@ -65,6 +65,7 @@ typedef struct {
 /* Targets of a batch, and their answers; see fl_answer_many. */
 typedef struct {
   const real *wrench;
+  const real *multipliers_first; /* (count, 6) to begin with; 0 for none */
   int count;
   real *force;
   real *multipliers;

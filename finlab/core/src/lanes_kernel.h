@@ -6,10 +6,11 @@
    A lane whose target is met, or is left to fl_answer_one, takes up the next one: so targets that
    take few steps wait for none that takes many. No number goes from one lane to another. */
 
-#define CHUNK 64                /* targets that are on the stack at once */
-#define PRICE_STEPS 5           /* of Newton's method to a price of first multipliers */
-#define LANES_STEPS 100         /* steps of Newton's method in a lane; what takes more is left */
-#define LARGEST_IN_LANES R(1e9) /* wrench [N, N m]; larger ones are left */
+#define CHUNK 64        /* targets that are on the stack at once */
+#define PRICE_STEPS 5   /* of Newton's method to a price of first multipliers */
+#define LANES_STEPS 100 /* steps of Newton's method in a lane; what takes more is left */
+/* Wrench [N, N m], and multiplier to begin with [W/N, W/(N m)]; larger ones are left. */
+#define LARGEST_IN_LANES R(1e9)
 #define SLIGHT R(1e-3) /* turn [rad] up to which its sine and cosine are those of their series */
 
 /* A target on its way through the lanes. */
@@ -539,10 +540,27 @@ static inline void first_lambda_lanes(const lanes_robot *robot, const vector *ta
   *mu = select_lanes(is_near_limit, lanes_of(MU_NEAR_LIMIT), lanes_of(NEARLY));
 }
 
-/* Sets up to LANES candidates of a chunk: their targets and where they begin. Returns a bit for
-   each that lies in the range of the effectiveness, and is a wrench that can be answered. */
-static int begin_lanes(const lanes_robot *robot, const real *wrench, int count,
-                       candidate *candidates) {
+/* Multipliers in the basis [W] of those of the wrench (count, 6): fl_reduce_lambda. Returns where
+   they can be begun with: not where they are NaN. */
+static inline mask reduce_lambda_lanes(const fl_span *span, const real *multipliers, int count,
+                                       vector *lambda) {
+  mask is_small = ~no_lanes();
+  for (int j = 0; j < 6; j++) lambda[j] = lanes_of(0);
+  for (int k = 0; k < 6; k++) {
+    vector own = {0};
+    for (int l = 0; l < LANES; l++) own[l] = multipliers[6 * (l < count ? l : count - 1) + k];
+    is_small &= size_of_lanes(own) <= LARGEST_IN_LANES;
+    own *= span->axis_scale[k];
+    for (int j = 0; j < 6; j++) lambda[j] += span->basis[k][j] * own;
+  }
+  return is_small;
+}
+
+/* Sets up to LANES candidates of a chunk: their targets and where they begin, at multipliers
+   (count, 6), or at their own where there are none. Returns a bit for each that lies in the range
+   of the effectiveness, and is a wrench that can be answered. */
+static int begin_lanes(const lanes_robot *robot, const real *wrench, const real *multipliers,
+                       int count, candidate *candidates) {
   const fl_span *span = &robot->work->span;
   vector scaled[6];
   vector target[6];
@@ -570,7 +588,12 @@ static int begin_lanes(const lanes_robot *robot, const real *wrench, int count,
   const real rounding = larger(NEARLY, 10 * ROUNDING);
   const mask is_in_range = root_of(outside_squared) <=
                            rounding * (WRENCH_MIN + root_of(size_squared));
-  first_lambda_lanes(robot, target, lambda, &mu);
+  if (multipliers) {
+    is_small &= reduce_lambda_lanes(span, multipliers, count, lambda);
+    mu = lanes_of(NEARLY);
+  } else {
+    first_lambda_lanes(robot, target, lambda, &mu);
+  }
   for (int l = 0; l < count; l++) {
     for (int j = 0; j < 6; j++) {
       candidates[l].target[j] = target[j][l];
@@ -1039,8 +1062,10 @@ static void answer_in_lanes(const lanes_robot *robot, const lanes_batch *batch) 
     for (int k = 0; k < chunk; k += LANES) {
       int some = chunk - k;
       if (some > LANES) some = LANES;
+      const real *multipliers = 0;
+      if (batch->multipliers_first) multipliers = batch->multipliers_first + 6 * (first + k);
       const int may_be_met =
-          begin_lanes(robot, batch->wrench + 6 * (first + k), some, candidates + k);
+          begin_lanes(robot, batch->wrench + 6 * (first + k), multipliers, some, candidates + k);
       for (int l = 0; l < some; l++) {
         batch->is_answered[first + k + l] = 0;
         if (may_be_met >> l & 1) order[count++] = k + l;

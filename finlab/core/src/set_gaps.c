@@ -23,13 +23,17 @@ static int is_in_sector(const fl_set *set, real angle, real size, real largest, 
 }
 
 /* How far a plane's force is from all that it can give forward and in reverse. */
-static real gap_between_ways(const fl_actuator *a, const fl_set *set, const real *force,
-                             real size) {
-  const real angle = angle_from_middle(set, force);
+static real gap_between_ways(const real *block, const fl_actuator *a, const fl_set *set,
+                             const real *force, real size) {
+  const fl_set reversed = fl_reversed_set(set);
   const real rounding = NEARLY * a->row_force_max[0];
   if (size <= rounding) return 0;
-  if (is_in_sector(set, angle, size, set->force_max, rounding)) return 0;
-  if (is_in_sector(set, angle + PI, size, set->force_max_reverse, rounding)) return 0;
+  real largest = set->force_max;
+  if (a->gauge_table > 0)
+    largest *= fl_gauge_radius(block + (int)a->gauge_table, ATAN2(force[1], force[0]));
+  if (is_in_sector(set, angle_from_middle(set, force), size, largest, rounding)) return 0;
+  const real from_back = angle_from_middle(&reversed, force);
+  if (is_in_sector(&reversed, from_back, size, reversed.force_max, rounding)) return 0;
   return PI;
 }
 
@@ -74,7 +78,7 @@ real fl_gap_of(const real *block, const fl_work *work, int i, const real *force,
   const real size = size_of(force);
   real amount = gap_in_band(a, set, force);
   if (set->force_max_reverse > 0 && !lambda)
-    return larger(gap_between_ways(a, set, force, size), amount);
+    return larger(gap_between_ways(block, a, set, force, size), amount);
   const int is_hollow = set->force_min > HOLLOW * largest;
   if (!lambda && set->sector_half_angle > FLAT && is_hollow && size < set->force_min * (1 - NEARLY))
     amount += 1 - size / set->force_min;
@@ -153,12 +157,8 @@ int fl_nearer_side(const real *block, int i, const fl_set *set, const real *forc
 
 /* Turns a set round: what it pushed in reverse is what it pushes now. */
 static void turn_round(fl_set *set) {
-  set->force_max = set->force_max_reverse;
-  set->cost_at_max = set->cost_at_max_reverse;
-  set->force_max_reverse = 0;
-  set->sector_center += PI;
-  set->turn_origin += PI;
-  set->is_flipped = 1;
+  const fl_set reversed = fl_reversed_set(set);
+  *set = reversed;
 }
 
 /* Keeps of a plane with a dead band what is beyond the band on the side of a force (1), or

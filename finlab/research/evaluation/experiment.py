@@ -35,6 +35,7 @@ EXPERIMENTS = (
     "velocity",
     "swims",
     "interaction",
+    "distilled",
 )
 """Names, those of their modules in `finlab.research.evaluation.experiments`, in the order of the
 report."""
