@@ -215,13 +215,13 @@ class Moves:
         actuators = np.arange(self.layout.n)
         leader_row = np.array(self._leader_rows)[leader]
         twin_row = self._twin_rows[leader]
-        return (leader_row[:, None] == actuators) | (twin_row[:, None] == actuators)
+        return np.asarray((leader_row[:, None] == actuators) | (twin_row[:, None] == actuators))
 
     @property
     def is_whole_turn(self) -> NDArray[np.bool_]:
         """Which free numbers are angles whose bounds are a whole turn apart (D,)."""
         is_angle = np.flatnonzero(self._free) % 5 >= 3
-        return is_angle & (self.upper - self.lower >= TURN - ROUNDING)
+        return np.asarray(is_angle & (self.upper - self.lower >= TURN - ROUNDING))
 
     @property
     def whole_tilts(self) -> NDArray[np.intp]:

@@ -21,7 +21,7 @@ from finlab.analysis.layout_bound import LayoutBound, check_bounded, layout_boun
 from finlab.analysis.moves import Bounds, Moves, mirror_pairs
 from finlab.analysis.score_card import ScoreCard, score_card
 from finlab.analysis.slopes import GoalPoint, MissionPower, SlopedGoal, WeakestDirection
-from finlab.analysis.soft_ascent import SoftAscent
+from finlab.analysis.soft_ascent import SoftAscent, has_few_facets
 from finlab.arrays import Array
 from finlab.axes import MotionAxis
 from finlab.forces.force_sets import force_sets
@@ -40,7 +40,9 @@ MAX_DRAWS = 20
 RANKED_PER_START = 6
 """Most vectors that are ranked for each start."""
 ASCENTS = 16
-"""Random vectors, and as many mirrored ones, from which the smooth goal of thrusters is raised."""
+"""Random vectors from which the smooth goal of thrusters is raised."""
+RAISED_STARTS = 3
+"""The best of these, from which climbs begin."""
 MIN_ASCENT = 20
 """Fewest free numbers from which on it is raised: with fewer, the climbs are many."""
 STARTS_SCALE = 2800
@@ -345,14 +347,25 @@ class _Search:
                 return
 
     def climb(self, goal: SlopedGoal, seed: int, with_present: bool) -> None:
-        """Climbs a few steps from several starts, among them the present vector where it is to be,
-        then on from the best of them, and rounds the results to the grid."""
+        """Climbs from several starts, among them the present vector where it is to be, and of many
+        free thrusters from those of an ascent of a smooth goal, too."""
+        self._climb_from(goal, self._starts(goal, seed, with_present))
+        moves = self._moves
+        is_over = self.stopped or self._done >= self._rounds
+        if is_over or len(moves.start) < MIN_ASCENT:
+            return
+        if isinstance(goal, WeakestDirection) and has_few_facets(goal, moves.layout):
+            self._climb_from(goal, self._raised_starts(goal, seed))
+
+    def _climb_from(self, goal: SlopedGoal, starts: Iterator[GoalPoint]) -> None:
+        """Climbs a few steps from each start, then on from the best of them, and rounds the results
+        to the grid."""
         best = self.best
         vector = self.vector
         had_gained = self.gained
         self.stopped = self._cancelled()
         climbs = list[Climb]()
-        for start in self._starts(goal, seed, with_present) if not self.stopped else ():
+        for start in starts if not self.stopped else ():
             climbs.append(Climb(goal, self._rules, start))
             if self._climbed(climbs[-1], FIRST_STEPS):
                 break
@@ -386,16 +399,19 @@ class _Search:
                 continue
             for k in np.argsort(-goal.guess(valid), kind="stable")[:n_best]:
                 yield goal.evaluate(valid[k])
-            if len(moves.start) >= MIN_ASCENT and SoftAscent.applies(goal, moves.layout):
-                valid = self._valid(vectors, mirrored, ASCENTS, random)
-                yield from self._raised_starts(goal, valid, n_best)
 
-    def _raised_starts(self, goal: SlopedGoal, vectors: Array, count: int) -> Iterator[GoalPoint]:
-        """Yields the best of some vectors (P, D) after an ascent of a smooth goal."""
+    def _raised_starts(self, goal: WeakestDirection, seed: int) -> Iterator[GoalPoint]:
+        """Yields the best of some random vectors after an ascent of a smooth goal."""
+        moves = self._moves
+        random = np.random.default_rng(seed)
+        vectors = random.uniform(moves.lower, moves.upper, (RANDOM_VECTORS, len(moves.start)))
+        valid = self._valid(vectors, False, ASCENTS, random)
+        if not len(valid):
+            return
         ascent = SoftAscent(goal, self._rules)
-        raised = ascent.raised(vectors, self._cancelled)
+        raised = ascent.raised(valid, self._cancelled)
         raised = raised[self._rules.violation(raised) <= 0.0]
-        for k in np.argsort(-ascent.least_distances(raised), kind="stable")[:count]:
+        for k in np.argsort(-ascent.least_distances(raised), kind="stable")[:RAISED_STARTS]:
             yield goal.evaluate(raised[k])
 
     def _valid(

@@ -24,15 +24,15 @@ from numpy.typing import NDArray
 
 from finlab.actuators.thruster import Thruster
 from finlab.analysis.climb import Rules
-from finlab.analysis.slopes import NUDGE, SlopedGoal, WeakestDirection, difference
+from finlab.analysis.slopes import NUDGE, WeakestDirection, difference
 from finlab.arrays import Array
 from finlab.layout import Layout
 
 MAX_FACETS = 600
 """Most facets that are looked at, after all losses: those of eleven thrusters and six axes."""
-STEPS = 200
+STEPS = 400
 """Steps of the ascent."""
-EVEN_STEPS = 100
+EVEN_STEPS = 200
 """Steps with even limits, where thrusters may be reversed."""
 FACING_ROUNDS = 2
 """How often the reversal of each thruster is tried."""
@@ -141,11 +141,20 @@ def facets_of(columns: Array, least: Array, most: Array, table: FacetTable) -> F
     return Facets(np.minimum(ahead, astern), normal, force + spanning_force)
 
 
+def has_few_facets(goal: WeakestDirection, layout: Layout) -> bool:
+    """Whether all facets can be looked at: of thrusters alone, as many as axes or a few more."""
+    if not all(isinstance(actuator, Thruster) for actuator in layout.actuators):
+        return False
+    n_losses = layout.n - goal.n_axes + 1 if goal.after_loss else 1
+    spans_axes = layout.n - goal.after_loss >= goal.n_axes
+    return spans_axes and comb(layout.n, goal.n_axes - 1) * n_losses <= MAX_FACETS
+
+
 class SoftAscent:
     """Raises the soft minimum over all facets, for many vectors of `Moves` at once."""
 
     def __init__(self, goal: WeakestDirection, rules: Rules) -> None:
-        """Takes a goal to which `applies` holds, and the rules of the search."""
+        """Takes a goal to which `has_few_facets` applies, and the rules of the search."""
         self._goal = goal
         self._rules = rules
         moves = rules.moves
@@ -153,17 +162,6 @@ class SoftAscent:
         self._least = moves.layout.lower[:, 0]
         self._most = moves.layout.upper[:, 0]
         self._table = FacetTable(moves.layout.n, goal.n_axes, goal.after_loss)
-
-    @staticmethod
-    def applies(goal: SlopedGoal, layout: Layout) -> bool:
-        """Whether a goal is one of directions, of thrusters alone, with few enough facets."""
-        if not isinstance(goal, WeakestDirection):
-            return False
-        if not all(isinstance(actuator, Thruster) for actuator in layout.actuators):
-            return False
-        losses = layout.n - goal.n_axes + 1 if goal.after_loss else 1
-        is_spanned = layout.n - goal.after_loss >= goal.n_axes
-        return is_spanned and comb(layout.n, goal.n_axes - 1) * losses <= MAX_FACETS
 
     def least_distances(self, vectors: Array) -> Array:
         """Returns the exact goals (P,) [N, scaled] of vectors (P, D)."""

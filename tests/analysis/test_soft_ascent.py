@@ -11,7 +11,7 @@ from finlab.analysis import Bounds
 from finlab.analysis.climb import CLEARANCE, ROUNDING, Rules
 from finlab.analysis.moves import Moves
 from finlab.analysis.slopes import WeakestDirection
-from finlab.analysis.soft_ascent import FacetTable, SoftAscent, facets_of
+from finlab.analysis.soft_ascent import FacetTable, SoftAscent, facets_of, has_few_facets
 from finlab.arrays import Array
 from finlab.axes import AXES
 from finlab.layout import Layout
@@ -150,11 +150,11 @@ def test_where_it_applies(shipped: Layouts) -> None:
     heavy = shipped("bluerov2_heavy")
     _, moves, _ = ascent_of(heavy)
     goal = WeakestDirection(moves, MOTIONS, after_loss=True)
-    assert SoftAscent.applies(goal, heavy)
+    assert has_few_facets(goal, heavy)
     fins = shipped("A")
     bounds = {fins.names[0]: Bounds.around(fins.actuators[0])}
     fin_goal = WeakestDirection(Moves(fins, fins.names[:1], bounds), MOTIONS, after_loss=False)
-    assert not SoftAscent.applies(fin_goal, fins)
+    assert not has_few_facets(fin_goal, fins)
     few = heavy.without(heavy.names[:2])
     few_moves = ascent_of(few)[1]
-    assert not SoftAscent.applies(WeakestDirection(few_moves, MOTIONS, after_loss=True), few)
+    assert not has_few_facets(WeakestDirection(few_moves, MOTIONS, after_loss=True), few)
