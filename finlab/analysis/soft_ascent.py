@@ -35,7 +35,7 @@ STEPS = 400
 EVEN_STEPS = 200
 """Steps with even limits, where thrusters may be reversed."""
 FACING_ROUNDS = 2
-"""How often the reversal of each thruster is tried."""
+"""How often the reversal of each thruster, and of each two, is tried."""
 SHARPNESS = (30.0, 2000.0)
 """beta times the mean distance, at the first step and after the last."""
 STEP_SIZE = (0.02, 0.0002)
@@ -211,12 +211,13 @@ class SoftAscent:
 
     def _faced(self, share: Array, tilts: NDArray[np.intp]) -> Array:
         """Shares of the bounds (P, D) with those thrusters reversed, by tilts of a whole turn, that
-        raise the goal, one after the other."""
+        raise the goal, one or two at a time."""
         moves = self._rules.moves
         value = self.least_distances(moves.lower + share * self._width)
-        for tilt in np.tile(tilts, FACING_ROUNDS):
+        pairs = [list(pair) for pair in combinations(tilts, 2)]
+        for reversed_tilts in FACING_ROUNDS * ([[tilt] for tilt in tilts] + pairs):
             reversed_share = share.copy()
-            reversed_share[:, tilt] = (share[:, tilt] + 0.5) % 1.0
+            reversed_share[:, reversed_tilts] = (share[:, reversed_tilts] + 0.5) % 1.0
             trial = self.least_distances(moves.lower + reversed_share * self._width)
             share = np.where((trial > value)[:, None], reversed_share, share)
             value = np.maximum(value, trial)
