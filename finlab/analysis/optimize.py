@@ -39,7 +39,7 @@ MAX_DRAWS = 20
 """Most times that random vectors are drawn until enough of them keep all rules."""
 RANKED_PER_START = 6
 """Most vectors that are ranked for each start."""
-ASCENTS = 16
+ASCENTS = 24
 """Random vectors from which the smooth goal of thrusters is raised."""
 RAISED_STARTS = 3
 """The best of these, from which climbs begin."""
@@ -312,6 +312,7 @@ class _Search:
         self._progress = progress
         self._cancelled = cancelled or (lambda: False)
         self._mapped = mapped
+        self._ascent: SoftAscent | None = None
         self.vector = moves.start
         self.best = before
         self.gained = False
@@ -323,6 +324,9 @@ class _Search:
 
     def _note(self, value: float, vector: Array) -> None:
         """Keeps a vector that keeps all rules, where it is the best so far."""
+        if value > self.best and self._ascent is not None:
+            # A climb may miss the nearest facet.
+            value = min(value, float(self._ascent.least_distances(vector[None])[0]))
         if value > self.best:
             self.best = value
             self.vector = vector
@@ -349,13 +353,13 @@ class _Search:
     def climb(self, goal: SlopedGoal, seed: int, with_present: bool) -> None:
         """Climbs from several starts, among them the present vector where it is to be, and of many
         free thrusters from those of an ascent of a smooth goal, too."""
-        self._climb_from(goal, self._starts(goal, seed, with_present))
         moves = self._moves
-        is_over = self.stopped or self._done >= self._rounds
-        if is_over or len(moves.start) < MIN_ASCENT:
-            return
         if isinstance(goal, WeakestDirection) and has_few_facets(goal, moves.layout):
-            self._climb_from(goal, self._raised_starts(goal, seed))
+            self._ascent = SoftAscent(goal, self._rules)
+        self._climb_from(goal, self._starts(goal, seed, with_present))
+        is_over = self.stopped or self._done >= self._rounds
+        if self._ascent is not None and not is_over and len(moves.start) >= MIN_ASCENT:
+            self._climb_from(goal, self._raised_starts(goal, self._ascent, seed))
 
     def _climb_from(self, goal: SlopedGoal, starts: Iterator[GoalPoint]) -> None:
         """Climbs a few steps from each start, then on from the best of them, and rounds the results
@@ -400,7 +404,9 @@ class _Search:
             for k in np.argsort(-goal.guess(valid), kind="stable")[:n_best]:
                 yield goal.evaluate(valid[k])
 
-    def _raised_starts(self, goal: WeakestDirection, seed: int) -> Iterator[GoalPoint]:
+    def _raised_starts(
+        self, goal: SlopedGoal, ascent: SoftAscent, seed: int
+    ) -> Iterator[GoalPoint]:
         """Yields the best of some random vectors after an ascent of a smooth goal."""
         moves = self._moves
         random = np.random.default_rng(seed)
@@ -408,7 +414,6 @@ class _Search:
         valid = self._valid(vectors, False, ASCENTS, random)
         if not len(valid):
             return
-        ascent = SoftAscent(goal, self._rules)
         raised = ascent.raised(valid, self._cancelled)
         raised = raised[self._rules.violation(raised) <= 0.0]
         for k in np.argsort(-ascent.least_distances(raised), kind="stable")[:RAISED_STARTS]:

@@ -30,15 +30,15 @@ from finlab.layout import Layout
 
 MAX_FACETS = 600
 """Most facets that are looked at, after all losses: those of eleven thrusters and six axes."""
-STEPS = 400
+STEPS = 800
 """Steps of the ascent."""
-EVEN_STEPS = 200
+EVEN_STEPS = 600
 """Steps with even limits, where thrusters may be reversed."""
 FACING_ROUNDS = 2
 """How often the reversal of each thruster, and of each two, is tried."""
 SHARPNESS = (30.0, 2000.0)
 """beta times the mean distance, at the first step and after the last."""
-STEP_SIZE = (0.02, 0.0002)
+STEP_SIZE = (0.03, 0.0002)
 """Change of a number by a steady slope, at the first step and after the last, as a share of its
 bounds."""
 FIRST_MEMORY = 0.9
@@ -171,7 +171,7 @@ class SoftAscent:
         """Returns vectors at which the soft minimum is large; nearly all keep the rules.
 
         Where thrusters may be reversed, the ascent begins with even limits, halves of their ranges,
-        which do not tell a thruster from a reversed one. Halfway all are turned as their own limits
+        which do not tell a thruster from a reversed one. Then all are turned as their own limits
         want it: unlike places, which way they face is no matter of small steps.
 
         Args:
