@@ -196,9 +196,7 @@ def read_robot(text: str, file: str, exchange: Exchange) -> Layout:
     return read_plain(data, name, exchange, comments)
 
 
-def _note_parts(
-    layout: Layout, listed: Sequence[Mapping[str, Any]], exchange: Exchange
-) -> None:
+def _note_parts(layout: Layout, listed: Sequence[Mapping[str, Any]], exchange: Exchange) -> None:
     """Says what a layout file lists as an actuator and was read as a part of another one.
 
     Args:
