@@ -14,6 +14,7 @@ import math
 import time
 from collections import defaultdict
 from collections.abc import Sequence
+from functools import lru_cache
 from multiprocessing import Pool
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -26,7 +27,8 @@ from finlab.axes import mask_of
 from finlab.layout import Layout, load_layout
 from finlab.layout.damage import NO_DAMAGE, Damage
 from finlab.swim.control import Completion, Diagnosis, FaultMonitor
-from finlab.swim.control.contract import LEVER_M, asked_of_weak, axes_of
+from finlab.swim.control.completion import axes_of
+from finlab.swim.control.contract import LEVER_M, asked_of_weak
 from finlab.swim.vehicle.fossen import complete_body
 from tests.plant_mujoco import MujocoRobot, TrueFault, random_frame
 from tests.plant_mujoco import Path as SwumPath
@@ -91,10 +93,10 @@ class Run(NamedTuple):
         if self.kind is None:
             return None
         rng = np.random.default_rng([self.seed, KINDS.index(self.kind), 7])
-        possible = range(layout.n)
+        possible = list(range(layout.n))
         if self.kind == "reversed":  # a fin that turns about is stuck, or wired wrongly
             possible = [k for k in possible if not layout.is_fin[k]]
-        index = int(rng.choice(list(possible)))
+        index = int(rng.choice(possible))
         moment = round(float(rng.uniform(12.0, 20.0)), 1)
         return TrueFault(index, self.kind, moment, float(rng.uniform(0.2, 0.5)))
 
@@ -140,13 +142,10 @@ def judged(run: Run) -> dict[str, Any]:
     seed = run.seed
     allocator = Allocator(layout)
     axes = axes_of(layout)
-    completion = {(): Completion(layout, (), axes)}
+    completion_of = lru_cache(maxsize=8)(lambda damage: Completion(layout, damage, axes))
 
     def command_for(wanted: Array, damage: Damage) -> tuple[Array, Array]:
-        lost = tuple(damage.lost)
-        if lost not in completion:
-            completion[lost] = Completion(layout, lost, axes)
-        wrench = completion[lost](wanted)
+        wrench = completion_of(damage)(wanted)
         answer = allocator.allocate(wrench, damage=damage, policy="closest")
         return wrench, answer.command
 

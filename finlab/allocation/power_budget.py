@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from numbers import Real
@@ -95,6 +95,42 @@ def check_power(power: object, layout: Layout) -> PowerBudget | None:
         return None
     left = tuple(name for name, watts in watts_of.items() if math.isfinite(watts))
     return PowerBudget(left, own.members[is_limited], limits[is_limited])
+
+
+def power_from(texts: Sequence[str]) -> float | dict[str, float] | None:
+    """Returns the power that a question names by texts, for `check_power`.
+
+    Args:
+        texts: watts of all actuators together, or `BUS=W` for each of some buses.
+
+    Returns:
+        Watts; or watts by the names of buses; None without texts.
+
+    Raises:
+        AllocationError: a text is neither, both kinds are mixed, or one is there twice.
+    """
+    if not texts:
+        return None
+    watts_of: dict[str, float] = {}
+    for text in texts:
+        name, _, number = text.rpartition("=")
+        try:
+            watts = float(number)
+        except ValueError:
+            raise AllocationError(
+                f"power: expected watts such as 216, or those of a bus such as aft=60, got "
+                f"{text!r:.60}"
+            ) from None
+        if name in watts_of:
+            raise AllocationError(
+                f"power: {name or 'all actuators'!r:.60} has two numbers; give one"
+            )
+        watts_of[name] = watts
+    if "" not in watts_of:
+        return watts_of
+    if len(watts_of) > 1:
+        raise AllocationError("power: give watts for all actuators, or for buses by name, not both")
+    return watts_of[""]
 
 
 def _budget_of_all(watts: float, layout: Layout) -> PowerBudget:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from finlab.analysis.sizes_within_budget import sizes_within_budget
 from finlab.arrays import Array
 from finlab.axes import AXES as WRENCH
 from finlab.axes import MOTIONS, Axis, MotionAxis
@@ -58,12 +59,13 @@ class Authority(HeldAxes):
     """Of the matrix whose columns are the actuators' scaled wrenches at full thrust [N], falling;
     as many as axes count."""
     largest: tuple[float, ...]
-    """Largest wrench along each axis with the other five at zero (6,) [N, N m]."""
+    """Largest wrench along each axis with the other five at zero (6,) [N, N m], within the power
+    budget that the layout may have."""
     most_negative: tuple[float, ...]
     """The same along the negative axes, as a size (6,) [N, N m]."""
     weakest: float
-    """Scaled wrench [N] that is within reach in every direction of the axes that count; 0 below
-    that rank."""
+    """Scaled wrench [N] that is within reach in every direction of the axes that count, whatever
+    power it takes; 0 below that rank."""
     weakest_direction: tuple[float, ...]
     """Unit scaled wrench (6,) along which no more than `weakest` can be had."""
 
@@ -140,6 +142,7 @@ def _authorities(
     values, vectors = singular_values(counting)
     held_of = [_held(commanded_axes(layout), *pair) for pair in zip(values, vectors, strict=True)]
     size = _largest_sizes(sets, held_of, layout, flow)
+    size = sizes_within_budget(layout, failures, size, SCALE, flow)
     least = weakest(counting)
     direction = np.zeros((len(failures), 6))
     direction[:, counted_rows] = least.direction

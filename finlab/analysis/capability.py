@@ -226,9 +226,11 @@ def capability(
             computation.
 
     Raises:
-        LayoutError: there is no actuator of a name, or the loads do not fit.
+        LayoutError: there is no actuator of a name, the loads do not fit, or the layout has a power
+            budget.
     """
     angles = _checked_headings(headings)
+    _refuse_budget(layout)
     if loads is None:
         # What comes from a heading pushes the other way.
         turn = np.deg2rad(angles)
@@ -288,9 +290,11 @@ def dp_capability(
         progress: as in `capability`.
 
     Raises:
-        LayoutError: there is no actuator of a name, or the standard has no rule for one.
+        LayoutError: there is no actuator of a name, the standard has no rule for one, or the layout
+            has a power budget.
     """
     angles = _checked_headings(headings)
+    _refuse_budget(layout)
     unknown = [name for name in losses if name not in LOSSES]
     if unknown:
         raise LayoutError(f"losses: expected some of {', '.join(LOSSES)}, got {', '.join(unknown)}")
@@ -352,6 +356,15 @@ def _failures(
         layout.indices(members, f"ship.groups.{name}")
         failures.append((name, members))
     return failures
+
+
+def _refuse_budget(layout: Layout) -> None:
+    """Raises LayoutError: a layout has a power budget, which no plot counts."""
+    if layout.power_w is not None or layout.buses:
+        raise LayoutError(
+            f"layout {layout.name}: has a power budget, which a capability plot does not count; "
+            "leave out power_w and buses, or see `finlab layout show`, which counts them"
+        )
 
 
 def _checked_headings(headings: Sequence[float]) -> tuple[float, ...]:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finlab.allocation import Allocator
+from finlab.allocation.power_budget import budget_of
 from finlab.allocation.question import check_flow
 from finlab.analysis.authority import AXES, Authority, HeldAxes, Loss, authority, held_axes, losses
 from finlab.analysis.card_text import card_blocks
@@ -157,6 +158,11 @@ def _notes(layout: Layout, lost: Collection[str], flow: Array | None) -> tuple[s
         if any(getattr(each, "barred", ()) for each in layout.actuators):
             reason = "some actuators have several arcs"
         notes.append(f"{subject} of the convex hull: {reason}.")
+    if budget_of(layout) is not None:
+        notes.append(
+            "Largest wrenches and powers are within the layout's power budget; the weakest "
+            "direction is that of the forces alone."
+        )
     pushed_by_flow = [name for name in layout.flow_driven if name not in lost]
     if flow is not None and pushed_by_flow:
         notes.append("Forces of the flow count with the convex hull of their lift and drag.")

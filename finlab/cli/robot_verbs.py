@@ -32,7 +32,7 @@ def allocate(
     stuck: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=DEG|N")] = (),
     running: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=A,F,DEG|DEG,N|N")] = (),
     flow: shared_options.Flow = None,
-    power: Annotated[float | None, arg(metavar="W")] = None,
+    power: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="W|BUS=W")] = (),
     bound: bool = False,
     seed: shared_options.Count = 0,
     json: shared_options.JsonFile = None,
@@ -60,7 +60,8 @@ def allocate(
             force at which a thruster hangs [N].
         running: the command that one keeps whatever is asked: of a fin A,F,DEG [rad, Hz, deg], of
             an azimuth DEG,N [deg, N], of a thruster N [N].
-        power: for method dual: the most that all actuators may take together [W].
+        power: for method dual: the most that all actuators may take together [W], or those of a
+            power bus of the layout, such as aft=60; inf for no limit.
         bound: tell as well the power [W] that no answer can undercut.
         seed: same target, layout and seed, same answer.
     """
@@ -78,9 +79,14 @@ def allocate(
     axes = cast("tuple[Axis, ...]", free)
     allocator = Allocator(robot, name, checkpoint=checkpoint, **options)
     answer = policy_from(policy, axis_weights, priority, falling)
+    watts = None
+    if power:
+        from finlab.allocation.power_budget import power_from
+
+        watts = power_from(power)
     damage = Damage.parse(robot, gone, weak, torn, stuck, running)
     result = allocator.allocate(
-        wrench, damage=damage, free=axes, policy=answer, flow=flow, seed=seed, power=power
+        wrench, damage=damage, free=axes, policy=answer, flow=flow, seed=seed, power=watts
     )
     lines = [str(result)]
     if bound and result.bound is None:

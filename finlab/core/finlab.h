@@ -72,7 +72,9 @@ typedef double fl_wide; /* where differences of large numbers matter, in single 
               first multipliers, and of points of a lattice; beyond reach those that come nearest
    FL_FOILS   steps for these: of two searches, and twice for each share of a ray (begun at the last
               commands and anew); and a target for each start of a lattice
-   FL_BUDGETS targets within power budgets: the wrench itself, and each group of a policy
+   FL_BUDGETS targets within power budgets: the wrench itself, and each group of a policy at once
+              and at up to seven costs of what is missing; and in a tick forces at twelve costs of
+              turning
    FL_BOUND   forces are found twice in a tick in which drives pass their dead bands */
 #define FL_DIVE (FL_DIVE_ROUNDS * FL_STEPS_AT_KINK)
 #define FL_SEARCH (2 * FL_DIVE + (FL_PARTS + 1) * (FL_DIVE + 2 * FL_STEPS_AT_KINK))
@@ -80,7 +82,7 @@ typedef double fl_wide; /* where differences of large numbers matter, in single 
 #define FL_STARTS (FL_PARTS + 5 + FL_FOIL_VERTICES + 2 * FL_MOST + FL_LATTICE_FOLLOWED)
 #define FL_FOILS_CHEAPER (FL_FOIL_STEPS * FL_STEPS_AT_KINK * 2 * (FL_STARTS + FL_RAY_SHARES))
 #define FL_FOILS (FL_FOILS_CHEAPER + 2 * FL_LATTICE_STARTS * FL_STEPS_AT_KINK)
-#define FL_BUDGETS (13 * FL_STEPS)
+#define FL_BUDGETS ((1 + 6 * 8) * FL_STEPS + 12 * FL_FORCES)
 #define FL_BOUND (2 * (FL_FORCES + FL_FOILS) + FL_BUDGETS)
 
 #define FL_VERSION 30  /* of all structs and functions here */

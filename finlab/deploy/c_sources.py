@@ -17,11 +17,12 @@ from finlab import core
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.dual.compiled import core_policy
 from finlab.allocation.dual.method import Dual, DualSettings
-from finlab.allocation.policy import Policy, PolicyName
-from finlab.allocation.power_budget import budget_of
+from finlab.allocation.policy import CLOSEST, Policy, PolicyName
+from finlab.allocation.power_budget import PowerBudget, budget_of
 from finlab.allocation.question import check_flow
-from finlab.arrays import Array
+from finlab.arrays import NOTHING, Array
 from finlab.axes import AXES
+from finlab.core.calls import Conditions, budget_record
 from finlab.core.fields import actuators_of, constant
 from finlab.deploy.c_interaction import (
     DECLARATIONS,
@@ -32,13 +33,16 @@ from finlab.deploy.c_interaction import (
     coupled_source,
 )
 from finlab.deploy.thin_block import tables_of, thinned
-from finlab.errors import AllocationError
 from finlab.layout import Layout
 from finlab.physics.objective import wrench_scale_of
 from finlab.whole_file import write_folder
 
 SAMPLES = 24
 """Questions of a self-test."""
+MARGIN_SAMPLES = 64
+"""Questions that show how far powers by the core's tables are from those by the laws."""
+MOST_MARGIN = 1.1
+"""Power over a budget from which on the core has not kept it, rather than that tables are off."""
 MAX_CORE_ERROR = 3e-7
 """Largest normalized error of the core's commands for a question of the self-test: beyond it the
 library would refine them, and its answer were not the core's."""
@@ -61,10 +65,11 @@ FILES_LEFT_OUT = (
     "kalman_filter.c",
     "motion_model.c",
     "path_wrench.c",
-    "power_budget.c",
 )
 """Files of the core that an export does not need: judgement by formulas, messages of networks,
-attainable sets, batches, what Python alone calls, what swims in a simulation, and power budgets."""
+attainable sets, batches, what Python alone calls, and what swims in a simulation."""
+FILE_OF_BUDGETS = "power_budget.c"
+"""The file of the core that only robots with a power budget need."""
 QUESTIONS: tuple[tuple[PolicyName, float], ...] = (
     ("closest", 0.9),
     ("closest", 3.0),
@@ -107,20 +112,21 @@ def c_sources(
 
     Raises:
         AllocationError: the actuators act on each other by no formula of the core, or the layout
-            has a power budget.
+            has a power budget that is not kept for such a robot.
         CommandError: `flow` is not six finite numbers.
         DataError: a force table cannot be read.
     """
-    if budget_of(layout) is not None:
-        raise AllocationError(
-            f"layout {layout.name!r}: has a power budget, which the C files do not keep; leave out "
-            "`power_w` and `buses`, or let `finlab-runtime serve` answer on the robot"
-        )
     water = check_flow(flow)
     method = Dual(layout, DualSettings(), wrench_scale_of(layout), None).at(water)
     is_coupled = layout.interaction is not None
     if is_coupled:
         check_interaction(method)
+    budget = budget_of(layout)
+    margin = 0.0
+    if budget is not None:
+        method.check_budget(budget, CLOSEST)
+        margin = _budget_margin(method, budget)
+        budget = PowerBudget(budget.names, budget.members, budget.watts / (1.0 + margin))
     block = method.compiled.block
     thin = thinned(block)
     folder = Path(core.__path__[0])
@@ -133,6 +139,8 @@ def c_sources(
         for file in FILES_OF_FOILS:
             del sources[file]
         sources |= {path.name: path.read_text("utf-8") for path in STUBS.glob("*.c")}
+    if budget is None:
+        del sources[FILE_OF_BUDGETS]
     headers = ["finlab.h", "internal.h"]
     if is_coupled:
         headers += HEADERS
@@ -144,7 +152,11 @@ def c_sources(
     sources["fl_names.h"] = _prefixed_names(declared, name)
     zones = int(actuators_of(block)["barred_count"].max(initial=0.0))
     sources["finlab.h"] = _with_size(sources["finlab.h"], layout.n, foils, zones, is_coupled)
+    if budget is None:
+        sources["finlab.h"] = _without_budgets(sources["finlab.h"])
     sources["robot.c"] = _robot(block, thin)
+    if budget is not None:
+        sources["robot.c"] += "\n" + _budget_source(budget)
     if is_coupled:
         sources["robot.c"] += "\n" + coupled_source(method, _block)
     sources["robot.h"] = _header(layout, name)
@@ -163,6 +175,7 @@ def c_sources(
         double=8 * len(block),
         single=4 * len(thin),
         law=4 * law,
+        budget=_budget_words(budget, margin),
         axes=", ".join(np.array(AXES)[layout.commanded]),
         flow="at rest"
         if water is None
@@ -193,7 +206,6 @@ def _with_size(header: str, count: int, foils: int, zones: int, is_coupled: bool
     arcs = min(foils, constant("FL_ARCS"))
     header = re.sub(r"(#define FL_ARCS) \d+", rf"\1 {arcs}", header, count=1)
     header = re.sub(r"(#define FL_ZONES) \d+", rf"\1 {zones}", header, count=1)
-    header = header.replace("#define FL_KEEPS_BUDGETS 1", "#define FL_KEEPS_BUDGETS 0", 1)
     if is_coupled:
         return header.replace("#ifdef FL_SINGLE\n", "#define FL_NO_LANES\n#ifdef FL_SINGLE\n", 1)
     single = (
@@ -201,6 +213,64 @@ def _with_size(header: str, count: int, foils: int, zones: int, is_coupled: bool
         "FL_SINGLE\n#endif\n\n"
     )
     return header.replace("#ifdef FL_SINGLE\n", f"{single}#ifdef FL_SINGLE\n", 1)
+
+
+def _budget_margin(method: Dual, budget: PowerBudget) -> float:
+    """The share by which powers by the laws may be above those of the core's tables, by which the
+    export keeps its budgets: twice what random questions show; 0 where tables are exact."""
+    if method.has_exact_power:
+        return 0.0
+    rng = np.random.default_rng(1)
+    most = 0.0
+    for wrench in method.plant.wrench(method.plant.sample(rng, (MARGIN_SAMPLES,))):
+        target = (wrench * method.layout.commanded)[None]
+        free = method.compiled.forces(target, CLOSEST).command
+        taken = budget.power_of_buses(method.plant.power(free))[0]
+        watts = np.maximum(taken * rng.uniform(0.3, 0.9), NOTHING)
+        conditions = Conditions(budget=budget_record(budget.members, watts))
+        command = method.compiled.forces(target, CLOSEST, None, conditions).command
+        kept = budget.power_of_buses(method.plant.power(command))[0] / watts
+        if (
+            kept.max() < MOST_MARGIN
+        ):  # else the core has found nothing within the budget, and says so
+            most = max(most, float(kept.max()) - 1.0)
+    return 2.0 * most
+
+
+def _without_budgets(header: str) -> str:
+    """finlab.h of a robot without a power budget, which needs no code for one."""
+    return header.replace("#define FL_KEEPS_BUDGETS 1", "#define FL_KEEPS_BUDGETS 0", 1)
+
+
+def _budget_words(budget: PowerBudget | None, margin: float) -> str:
+    """What the README says of the power budget."""
+    if budget is None:
+        return "The layout has no power budget, and `question.budget` is refused."
+    buses = ", ".join(
+        f"{name} {watts:.6g} W" for name, watts in zip(budget.names, budget.watts, strict=True)
+    )
+    words = (
+        f"`question.budget = ROBOT_BUDGET;` keeps the power within the layout's budget ({buses}), "
+        "as the function `allocate` of the plain header does. `answer.exceeds_budget` says where "
+        "that was not found, or rates forbid it."
+    )
+    if margin > 0.0:
+        words += (
+            f" That is {100.0 * margin:.2g} % less than the layout has: by so much powers by the "
+            "laws may be above those of the tables here."
+        )
+    return words
+
+
+def _budget_source(budget: PowerBudget) -> str:
+    """The budget of robot.c: the most that each bus may take, and which bus feeds an actuator."""
+    bus_of = budget.record["bus_of"][0][: budget.members.shape[1]]
+    names = ", ".join(budget.names)
+    return (
+        f"/* Buses: {names}. */\n"
+        f"const fl_budget robot_budget = {{{len(budget.watts)}, {_row(budget.watts)}, "
+        f"{{{', '.join(map(str, bus_of.tolist()))}}}}};\n"
+    )
 
 
 def _row(values: Array) -> str:
@@ -280,7 +350,7 @@ extern "C" {{
 extern const fl_real robot[];    /* its block of numbers */
 extern const int robot_length;   /* how many */
 int robot_selftest(void);        /* how many answers differ from the library's */
-{coupled}#define ROBOT_HEAD ((const fl_head *)(const void *)robot)
+{coupled}{budget}#define ROBOT_HEAD ((const fl_head *)(const void *)robot)
 #define ROBOT_ACTUATOR(i) ((const fl_actuator *)(const void *)(ROBOT_HEAD + 1) + (i))
 
 {rows}
@@ -290,6 +360,16 @@ int robot_selftest(void);        /* how many answers differ from the library's *
 #endif
 """
 
+_BUDGET = """
+/* What its buses may take, for fl_question.budget. */
+#define robot_budget fl_{name}_budget
+extern const fl_budget robot_budget;
+#define ROBOT_BUDGET (&robot_budget)
+"""
+_WITHOUT_BUDGET = """
+/* For fl_question.budget: this robot has no power budget. */
+#define ROBOT_BUDGET 0
+"""
 _PLAIN_HEADER = """/* The robot {title} in three functions, for C and C++.
    A program may have several robots. */
 #ifndef FL_{upper}_H
@@ -340,6 +420,7 @@ int fl_{name}_allocate(const double *wrench, const double (*previous)[3], double
     is_prepared = 1;
   }}
   question.policy = &policy;
+  question.budget = ROBOT_BUDGET;
   for (int k = 0; k < 6; k++) question.wrench[k] = (fl_real)wrench[k];
   if (previous) {{
     for (int i = 0; i < ROBOT_COUNT; i++)
@@ -360,7 +441,8 @@ def _header(layout: Layout, name: str) -> str:
     if layout.interaction is not None:
         coupled = DECLARATIONS.format(name=name)
     rows = _rows_of_commands(layout, "ROBOT")
-    return _HEADER.format(title=layout.name, name=name, rows=rows, coupled=coupled)
+    budget = _WITHOUT_BUDGET if budget_of(layout) is None else _BUDGET.format(name=name)
+    return _HEADER.format(title=layout.name, name=name, rows=rows, coupled=coupled, budget=budget)
 
 
 def _plain_header(layout: Layout, name: str) -> str:
@@ -375,7 +457,9 @@ def _plain_source(layout: Layout, name: str) -> str:
 def _core_command(method: Dual, wrench: Array, policy: Policy) -> Array:
     """Commands (1, n, 3) for a wrench (6,) as the core gives them."""
     if method.plant.interaction is None:
-        return method.compiled.forces(wrench[None], policy).command
+        budget = budget_of(method.layout)
+        conditions = Conditions(budget=None if budget is None else budget.record)
+        return method.compiled.forces(wrench[None], policy, None, conditions).command
     return method.coupled.answer_many(wrench[None], core_policy(policy)).command
 
 
@@ -391,10 +475,11 @@ def _self_test(layout: Layout, method: Dual, count: int) -> str:
     rng = np.random.default_rng(0)
     previous_rows: list[str] = []
     rows: list[str] = []
+    questions = [each for each in QUESTIONS if budget_of(layout) is None or each[0] != "falling"]
     for k in range(8 * count):
         if len(rows) == count:
             break
-        policy, reach = QUESTIONS[k % len(QUESTIONS)]
+        policy, reach = questions[k % len(questions)]
         wrench = method.plant.wrench(method.plant.sample(rng, (1,)))[0] * layout.commanded
         tick = allocator.allocate(0.5 * wrench, flow=flow).command if reach < 0.9 else None
         answer = allocator.allocate(reach * wrench, policy=policy, previous=tick, flow=flow)

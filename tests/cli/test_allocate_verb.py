@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ import pytest
 
 from finlab.cli import main
 from finlab.layout import Uncertainty, load_layout, save_layout
+from finlab.layout.layout import Bus
 from tests.layout.test_file import HOSTILE_FILES
 from tests.terminal import refused
 
@@ -87,6 +89,27 @@ def test_a_budget_binds(allocate: Callable[..., tuple[int, str, str]]) -> None:
     assert result["power"] == pytest.approx(0.5 * full["power"], rel=1e-6)
     assert result["binding"] == ["power"] and not result["reachable"]
     assert 0.5 < result["share"] < 1.0
+
+
+def test_a_bus_of_the_layout_has_a_budget_by_name(
+    allocate: Callable[..., tuple[int, str, str]], tmp_path: Path
+) -> None:
+    layout = load_layout("bluerov2_heavy")
+    names = tuple(name for name in layout.names if "rear" in name)
+    path = tmp_path / "bus.yaml"
+    save_layout(replace(layout, buses=(Bus("rear", 500.0, names),)), path)
+    words = (str(path), "--wrench", "60", "20", "10", "0", "0", "4")
+    result = answer(allocate(*words, "--power", "rear=20", "--json"))
+    assert "bus rear" in result["binding"] and not result["reachable"]
+    assert answer(allocate(*words, "--power", "inf", "--json"))["reachable"]
+    for flags, said in (
+        (("--power", "front=20"), "has rear, got bus 'front'"),
+        (("--power", "much"), "expected watts such as 216"),
+        (("--power", "20", "--power", "rear=20"), "not both"),
+        (("--power", "rear=20", "--power", "rear=30"), "has two numbers"),
+    ):
+        code, _, error = allocate(*words, *flags)
+        assert code != 0 and said in error
 
 
 def test_failed_fins_have_no_command(allocate: Callable[..., tuple[int, str, str]]) -> None:

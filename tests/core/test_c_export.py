@@ -1,6 +1,7 @@
 """`finlab export ROBOT --c DIR`: the self-test here, under sanitizers, on aarch64 and on a
 Cortex-M7."""
 
+import ctypes
 import os
 import re
 import shlex
@@ -11,6 +12,7 @@ from functools import cache
 from itertools import starmap
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,6 +24,8 @@ from finlab.deploy.c_sources import c_sources, write_c
 from finlab.deploy.thin_block import tables_of, thinned
 from finlab.errors import AllocationError
 from finlab.layout import load_layout
+from finlab.layout.layout import Bus, Layout
+from finlab.physics import plant_of
 from tests.allocator_cache import AllocatorCache
 from tests.core.test_foil_arcs import beyond, tail
 from tests.random_robots import KINDS, load, random_robot, with_rates
@@ -286,7 +290,64 @@ def test_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert "no C sources" in refused(["export", "A", "--method", "mdn", "--c", str(tmp_path / "d")])
 
 
-def test_a_power_budget_is_refused() -> None:
-    layout = replace(load_layout("bluerov2_heavy"), power_w=216.0)
-    with pytest.raises(AllocationError, match="power budget"):
-        c_sources(layout)
+def _heavy_with(budget: dict[str, Any]) -> Layout:
+    """BlueROV2 Heavy with a power budget."""
+    return replace(load_layout("bluerov2_heavy"), **budget)
+
+
+BUDGETS: tuple[dict[str, Any], ...] = (
+    {"power_w": 80.0},
+    {
+        "buses": (
+            Bus("front", 30.0, ("front_left", "front_right")),
+            Bus("rear", 25.0, ("rear_left", "rear_right")),
+        )
+    },
+)
+"""Fields of a layout with one bus for all, and with two that leave thrusters without a limit."""
+
+
+@pytest.mark.parametrize("budget", BUDGETS)
+def test_a_power_budget_is_kept_as_by_the_library(budget: dict[str, Any], tmp_path: Path) -> None:
+    layout = _heavy_with(budget)
+    write_c(c_sources(layout), tmp_path)
+    ran("gcc -std=c99 -O1 -Wall -Wextra -Werror *.c -lm -o it && ./it", tmp_path)
+    ran("gcc -std=c99 -O1 -shared -fPIC *.c -lm -o it.so", tmp_path)
+    library = ctypes.CDLL(str(tmp_path / "it.so"))
+    allocator = Allocator(layout)
+    command = np.zeros((layout.n, 3))
+    rng = np.random.default_rng(6)
+    binding = 0
+    for _ in range(100):
+        wrench = allocator.scale * rng.normal(size=6)
+        code = library.fl_bluerov2_heavy_allocate(
+            wrench.ctypes.data_as(ctypes.c_void_p), None, command.ctypes.data_as(ctypes.c_void_p)
+        )
+        answer = allocator.allocate(wrench, policy="direction")
+        assert code == 0
+        np.testing.assert_allclose(command[:, 0], answer.command[:, 0], rtol=0.0, atol=1e-9)
+        binding += any("power" in word or "bus" in word for word in answer.binding)
+    assert binding > 50
+
+
+def test_a_power_budget_of_fins_is_kept_by_less_than_the_tables_are_off(tmp_path: Path) -> None:
+    layout = replace(load_layout("A"), power_w=0.5)
+    write_c(c_sources(layout), tmp_path)
+    ran("gcc -std=c99 -O1 -shared -fPIC *.c -lm -o it.so", tmp_path)
+    library = ctypes.CDLL(str(tmp_path / "it.so"))
+    allocator = Allocator(layout)
+    plant = plant_of(layout)
+    command = np.zeros((layout.n, 3))
+    rng = np.random.default_rng(7)
+    for _ in range(100):
+        wrench = allocator.scale * rng.normal(size=6)
+        code = library.fl_a_allocate(
+            wrench.ctypes.data_as(ctypes.c_void_p), None, command.ctypes.data_as(ctypes.c_void_p)
+        )
+        assert code == 0
+        assert plant.power(command).sum() <= 0.5 * (1.0 + 1e-6)
+
+
+def test_a_power_budget_of_a_robot_with_rudders_is_refused() -> None:
+    with pytest.raises(AllocationError, match="no budget is kept yet for robots with rudders"):
+        c_sources(replace(load_layout("torpedo"), power_w=216.0))

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import IO, Any
 
@@ -16,12 +17,13 @@ import pytest
 
 from finlab.allocation import Allocator
 from finlab.deploy import serve as serve_module
-from finlab.deploy.bundle import Bundle
+from finlab.deploy.bundle import Bundle, make_bundle
 from finlab.deploy.deployed_robot import DeployedRobot, parse_robot
 from finlab.deploy.serve import RECENT_S, Server
 from finlab.deploy.transport import MAX_LINE, SIGNALS, Line, StandardStreams, Unsent
 from finlab.errors import DataError, FinlabError
 from finlab.layout import load_layout
+from finlab.layout.layout import Bus
 
 GOOD_REQUEST: dict[str, Any] = {"wrench": [1, 0, 0.5, 0, 0, 0.1]}
 """A request that is answered."""
@@ -285,6 +287,19 @@ def test_axes_that_are_not_commanded_are_null(robot: DeployedRobot) -> None:
     assert reply["err_norm"] < 1e-6 and reply["unallocated"][1] == 0.0
     refused = served(robot, {"wrench": [0.5, None, 0.5, 0, 0, 0]})[0]
     assert refused["status"] == "error" and 'free=("Fy",)' in refused["error"]
+
+
+def test_a_request_may_limit_the_power_of_a_bus() -> None:
+    layout = load_layout("bluerov2_heavy")
+    buses = (Bus("front", 500.0, layout.names[:2]), Bus("rear", 500.0, layout.names[2:4]))
+    robot = parse_robot(make_bundle(Allocator(replace(layout, buses=buses))).files)
+    request = {"wrench": [60, 20, 10, 0, 0, 4], "policy": "direction", "power": {"rear": 20}}
+    reply = served(robot, request)[0]
+    known = robot.allocate(request["wrench"], policy="direction", power={"rear": 20.0})
+    assert "bus rear" in known.binding
+    assert reply["power"] == pytest.approx(known.power, rel=1e-9)
+    refused = served(robot, {**request, "power": {"aft": 20}})[0]
+    assert "has front, rear, got bus 'aft'" in json.dumps(refused)
 
 
 def test_a_request_may_limit_the_power(robot: DeployedRobot) -> None:

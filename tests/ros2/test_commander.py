@@ -337,9 +337,19 @@ def test_period_and_calm_change_under_way() -> None:
     assert vars(own.commander.robot.allocator.settings)["calm"] == 0.0
 
 
-def test_a_budget_of_power_is_said_to_be_without_effect() -> None:
+def test_a_budget_of_power_is_kept_and_changed() -> None:
     heavy = Robot("bluerov2_heavy", power_w=100.0)
-    assert heavy.status.level == WARN and "power_w has no effect" in heavy.status.message
+    for power_w in (100.0, 40.0):
+        heavy.commander.change({"power_w": power_w})
+        answer = heavy.ask([80.0, 40.0, 0.0, 0.0, 0.0, 10.0]).answer
+        assert answer is not None and answer.power == pytest.approx(power_w, rel=1e-6)
+        assert "power" in heavy.status.message
+        assert dict(heavy.status.values)["power_w"] == f"{power_w:g}"
+    heavy.commander.change({"power_w": None})
+    answer = heavy.ask([80.0, 40.0, 0.0, 0.0, 0.0, 10.0]).answer
+    assert answer is not None and answer.power > 100.0
+    with pytest.raises(FinlabError, match="power: expected watts above 0"):
+        heavy.commander.change({"power_w": 0.0})
 
 
 def test_the_status_has_what_an_answer_says() -> None:

@@ -11,6 +11,8 @@ Method `dual` asks only where an answer takes more power than a bus has.
 
 from __future__ import annotations
 
+from collections.abc import Set
+from dataclasses import replace
 from threading import Lock
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
@@ -63,6 +65,13 @@ MOST_LOGARITHM = 46.0
 """Largest logarithm of 1 + zeta: what is dearer is not used."""
 MOST_LOGARITHM_MET = 16.0
 """The same where a wrench is to be met: beyond it the budget is the least that meets it."""
+
+
+_EXCEEDS = (
+    "takes more power than its budget: no command within it was found, as where rates or actuators "
+    "that cannot rest leave none"
+)
+"""Note of an answer beyond its budget."""
 
 
 class BudgetAnswer(NamedTuple):
@@ -281,6 +290,7 @@ class BudgetMethod(Protocol):
         command: Array,
         multipliers: Array,
         is_unreached: NDArray[np.bool_] | None,
+        sentences: Set[str] = frozenset(),
     ) -> Solution:
         """Returns the solution that commands (N, n, 3) for targets (N, 6) are."""
 
@@ -349,10 +359,34 @@ def _solve_one(
     power = _power_of_buses(method, solved, budget)
     if not (power > (1.0 + SLACK) * budget.watts).any():
         return solved
-    answer = method.budgeted.answer(targets[0], policy, conditions, budget)
+    answer, most_over = _answer_kept(method, conditions, targets[0], policy, budget)
+    sentences = {_EXCEEDS} if most_over > 1.0 + EXACT else set()
     return method.solution_of(
-        conditions, targets, answer.command[None], answer.multipliers[None], None
+        conditions, targets, answer.command[None], answer.multipliers[None], None, sentences
     )
+
+
+def _answer_kept(
+    method: BudgetMethod, conditions: Conditions, target: Array, policy: Policy, budget: PowerBudget
+) -> tuple[BudgetAnswer, float]:
+    """The answer by `BudgetedCore` to a target (6,), and the largest power of a bus over what it
+    has. Where its multipliers end a little above a budget, it is asked for as much less."""
+    answer = method.budgeted.answer(target, policy, conditions, budget)
+    power = budget.power_of_buses(method.plant.power(answer.command))
+    most = float((power / budget.watts).max())
+    watts = budget.watts
+    for _ in range(CORRECTIONS):
+        if not 1.0 + SLACK < most < 1.0 + NEAR:
+            break
+        watts = np.minimum(watts, watts * budget.watts / np.maximum(power, LEAST_SQUARE))
+        lower = replace(budget, watts=watts * (1.0 - SLACK))
+        again = method.budgeted.answer(target, policy, conditions, lower)
+        power = budget.power_of_buses(method.plant.power(again.command))
+        if not float((power / budget.watts).max()) < most:
+            break
+        answer = again
+        most = float((power / budget.watts).max())
+    return answer, most
 
 
 def _power_of_buses(method: BudgetMethod, solved: Solved, budget: PowerBudget) -> Array:

@@ -6,7 +6,7 @@ its tables leave undone, by the actuators' own laws, is removed by Levenberg-Mar
 commands, within the same limits.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Set
 from dataclasses import dataclass
 from functools import cache, cached_property, partial
 from typing import TYPE_CHECKING
@@ -526,6 +526,7 @@ class Dual(Method):
         command: Array,
         multipliers: Array,
         is_unreached: NDArray[np.bool_] | None,
+        sentences: Set[str] = frozenset(),
     ) -> Solution:
         """Returns the solution that commands are which were found within power budgets.
 
@@ -535,6 +536,7 @@ class Dual(Method):
             command: (N, n, 3).
             multipliers: lambda (N, 6) [W/N, W/(N m)].
             is_unreached: which targets (N,) are out of reach; None for all.
+            sentences: about the commands.
         """
         problem = self.problem_under(conditions)
         _, finite_command = self._without_nan(command, conditions)
@@ -544,7 +546,7 @@ class Dual(Method):
             problem.wrench(finite_command) * problem.error_scale,
             multipliers,
             np.zeros(len(targets)),
-            partial(self.notes_of, set(), unreached, conditions),
+            partial(self.notes_of, set(sentences), unreached, conditions),
             conditions,
         )
 

@@ -7,6 +7,7 @@
 
 #define LARGEST R(1e12) /* wrench, price or command of a question */
 #define MOST_CALM 1000
+#define CALM_STEPS 10    /* halves of the range of what turning costs, to keep a budget */
 #define STEPS_BY_LAWS 12 /* on commands, to a wrench a little beyond the tables */
 /* Error over the wrench scale, beyond reach, up to which the laws may yet meet the target. */
 #define BEYOND_TABLES (10 * CLOSE)
@@ -102,10 +103,41 @@ static void find_multipliers(const fl_span *span, fl_answer *out) {
 }
 
 #if FL_KEEPS_BUDGETS
+/* Finds forces where turning costs so much; returns whether they take more power than their buses
+   have. */
+static int exceeds_at_calm(const real *block, fl_work *work, const fl_question *q, real calm,
+                           const real *wrench_desired, fl_answer *out) {
+  fl_question calmer = *q;
+  calmer.calm = calm;
+  fl_limits_of_tick(block, work, &calmer);
+  find_forces(block, work, wrench_desired, q->policy, 0, out);
+  return fl_exceeds_budget(block, work, q->budget, out->force);
+}
+
+/* Turns more freely where that brings buses within their budgets: as calmly as they allow. Returns
+   whether it does; else turning costs nothing. */
+static int turn_within_budget(const real *block, fl_work *work, const fl_question *q,
+                              const real *wrench_desired, fl_answer *out) {
+  real low = 0;
+  real high = 1; /* shares of what turning costs */
+  if (exceeds_at_calm(block, work, q, 0, wrench_desired, out)) return 0;
+  for (int k = 0; k < CALM_STEPS; k++) {
+    const real share = (low + high) / 2;
+    if (exceeds_at_calm(block, work, q, share * q->calm, wrench_desired, out)) {
+      high = share;
+    } else {
+      low = share;
+    }
+  }
+  exceeds_at_calm(block, work, q, low * q->calm, wrench_desired, out);
+  return 1;
+}
+
 /* Finds other forces where these take more power than their buses have; returns whether they do. */
 static int keep_budget(const real *block, fl_work *work, const fl_question *q,
                        const real *wrench_desired, fl_answer *out) {
   if (!q->budget || !fl_exceeds_budget(block, work, q->budget, out->force)) return 0;
+  if (work->has_turn_cost && turn_within_budget(block, work, q, wrench_desired, out)) return 1;
   real wrench[6];
   take_off_offset(&work->span, wrench_desired, wrench);
   out->exceeds_budget = !fl_keep_budget(block, work, wrench, q->policy, q->budget, out);

@@ -22,10 +22,14 @@
 #define HELD_AXIS R(1e4)      /* weight of axes that are served over those that follow */
 #define BUDGET_KEPT TOLERANCE /* share of a budget by which a power may be off */
 #define BUDGET_STEPS FL_STEPS /* of Newton's method for one target */
+#define DEAR 100              /* multiple of a usual price that only what is missing explains */
 #define SHORT_SHARE R(0.1)    /* of a step, from which on mu falls */
 #define BUDGET_IDLE 12        /* steps without progress after which it ends */
 /* There, of TOLERANCE, what may be left: rounding where multipliers lie far apart. */
 #define STANDSTILL 100
+/* The cost of a miss with which the way along costs begins, over MISS_COST, and its steps. */
+#define COST_BEGIN R(1e-6)
+#define COST_TIMES 10
 #define EXPONENT_GUESS (R(2.0) / 3) /* of forces over powers, to begin with: costs ~ T^1.5 */
 
 enum { NOTHING_MISSES, AXES_MISS, RAY_MISSES };
@@ -45,6 +49,11 @@ typedef struct {
   real miss_cost;        /* K of a miss of the wrench scale [W] */
   real ray_cost;         /* that of a ray [W] */
   real most_power;       /* no answer within the budgets takes more [W] */
+  /* Actuators whose forces groups of axes before have left no choice of, and these. */
+  int is_settled[FL_MOST];
+  real settled_force[FL_MOST][2]; /* [N] */
+  real settled_power[FL_MOST];    /* [W] */
+  int is_open[FL_BUSES];          /* whether a bus feeds any that are not settled */
 } budget_problem;
 
 /* Multipliers, and what they give. `state` has forces and their derivatives. */
@@ -112,10 +121,18 @@ static real find_missing(const budget_problem *p, const real *lambda, real *miss
 
 /* By how much a bus takes more than it has, over that, or less where that costs it something. */
 static real excess_of(const budget_problem *p, const budget_point *at, int bus) {
-  if (!p->keeps_budgets) return 0;
+  if (!p->keeps_budgets || !p->is_open[bus]) return 0;
   const real excess = at->power[bus] / p->budget->watts[bus] - 1;
   if (at->factor[bus] > 1) return excess;
   return larger(excess, 0);
+}
+
+/* The response of an actuator at a price: of one that is settled its force, at any price. */
+static response response_to(const budget_problem *p, int i, const real *v) {
+  if (!p->is_settled[i]) return fl_response(p->block, i, p->work->set + i, v);
+  response y = {{p->settled_force[i][0], p->settled_force[i][1]}, 0, 0, 0, 0, 0};
+  y.conjugate = dot(v, y.force, 2) - p->settled_power[i];
+  return y;
 }
 
 /* Evaluates the dual at the multipliers of a point. */
@@ -135,7 +152,7 @@ static void evaluate(const budget_problem *p, budget_point *at) {
     actuator_price(work, i, state->lambda_reduced, v);
     v[0] *= over;
     v[1] *= over;
-    const response y = fl_response(p->block, i, work->set + i, v);
+    const response y = response_to(p, i, v);
     state->force[i][0] = y.force[0];
     state->force[i][1] = y.force[1];
     state->dy_ds[i][0] = y.xx;
@@ -143,6 +160,7 @@ static void evaluate(const budget_problem *p, budget_point *at) {
     state->dy_ds[i][2] = y.yy;
     const real price_quadratic = a->row_force_max[0] / a->secant[0];
     state->secant[i] = size_of(y.force) / larger(size_of(v), price_quadratic);
+    if (p->is_settled[i]) state->secant[i] = 0;
     conjugate += factor * y.conjugate;
     at->power[p->bus[i]] += dot(v, y.force, 2) - y.conjugate;
     const real(*B)[6] = work->span.effectiveness_reduced[i];
@@ -449,6 +467,49 @@ static int find_optimum(const budget_problem *p, budget_point *at) {
   return status;
 }
 
+/* Makes what is missing so many times as dear. */
+static void make_dearer(budget_problem *p, real times) {
+  for (int k = 0; k < 6; k++) p->looseness[k] /= times;
+  p->ray_cost *= times;
+}
+
+/* Goes to where what is missing has become so many times as dear: all multipliers grow with that
+   where the budgets bind, else they stay. */
+static void follow_cost(const budget_problem *p, real times, budget_point *at) {
+  budget_point grown = *at;
+  at->state = p->work->state;
+  evaluate(p, at);
+  grown.state = p->work->state + 1;
+  for (int j = 0; j < 6; j++) grown.lambda[j] *= times;
+  for (int b = 0; b < p->budget->buses; b++) {
+    if (grown.factor[b] > 1) grown.factor[b] *= times;
+  }
+  evaluate(p, &grown);
+  if (grown.value > at->value) *at = grown;
+}
+
+/* Newton's method where something may miss, from a point. Where it makes no progress, it begins
+   anew at a cost of what is missing that saturates no actuator, and follows that cost up. */
+static int find_best(budget_problem *p, budget_point *at) {
+  const budget_point begin = *at;
+  int status = find_optimum(p, at);
+  if (status != FL_NO_PROGRESS) return status;
+  real dearness = COST_BEGIN;
+  *at = begin;
+  make_dearer(p, dearness);
+  real largest = 1;
+  for (int b = 0; b < p->budget->buses; b++) largest = larger(largest, at->factor[b]);
+  for (int j = 0; j < 6; j++) at->lambda[j] /= largest;
+  for (int b = 0; b < p->budget->buses; b++) at->factor[b] = 1;
+  for (;;) {
+    status = find_optimum(p, at);
+    if (dearness >= 1) return status;
+    make_dearer(p, COST_TIMES);
+    dearness *= COST_TIMES;
+    follow_cost(p, COST_TIMES, at);
+  }
+}
+
 /* Power [W] of a force (2,) of an actuator, by its tables. */
 static real power_of(const real *block, const fl_work *work, int i, const real *force) {
   const fl_actuator *a = ACTUATOR(block, i);
@@ -541,7 +602,7 @@ static void begin_at(const budget_problem *p, const budget_begin *begin, budget_
   }
   factor = larger(factor, 1);
   for (int j = 0; j < 6; j++) at->lambda[j] = factor * begin->nu[j];
-  for (int b = 0; b < p->budget->buses; b++) at->factor[b] = factor;
+  for (int b = 0; b < p->budget->buses; b++) at->factor[b] = p->is_open[b] ? factor : 1;
 }
 
 /* Asks for a wrench (6,) [N, N m] in axes of a weight above 0, of which nothing misses. */
@@ -625,7 +686,7 @@ static int serve_closest(budget_problem *p, const fl_policy *policy, const real 
   let_axes_miss(p, weight, wrench);
   begin_with_share(p, before, &begin);
   begin_at(p, &begin, at);
-  return find_optimum(p, at);
+  return find_best(p, at);
 }
 
 static int serve_direction(budget_problem *p, const real *wrench, const budget_free_answer *before,
@@ -634,7 +695,7 @@ static int serve_direction(budget_problem *p, const real *wrench, const budget_f
   let_ray_miss(p, wrench);
   begin_with_share(p, before, &begin);
   begin_at(p, &begin, at);
-  return find_optimum(p, at);
+  return find_best(p, at);
 }
 
 /* Weights of axes when a group is served: those of groups before it are held. Returns whether it
@@ -694,6 +755,47 @@ static void begin_with_held(const budget_problem *p, const real *weight,
   }
 }
 
+/* Whether what is missing leaves no choice of an actuator's force: that of a bus whose power is dear
+   because of it, or one at a limit that a price holds there which is large because of it. */
+static int has_no_choice(const budget_problem *p, const budget_point *at, int i) {
+  const real factor = at->factor[p->bus[i]];
+  const real usual = p->work->power_max[i] / ACTUATOR(p->block, i)->row_force_max[0]; /* [W/N] */
+  real price[2];
+  actuator_price(p->work, i, at->state->lambda_reduced, price);
+  return factor >= DEAR || size_of(price) >= DEAR * factor * usual;
+}
+
+/* Settles the forces of actuators of which what is missing leaves no choice. Returns whether that
+   are all. */
+static int settle(budget_problem *p, budget_point *at) {
+  const fl_state *state = at->state;
+  int has_choice = 0;
+  int is_open[FL_BUSES + 1] = {0};
+  for (int i = 0; i < COUNT(p->block); i++) {
+    if (p->is_settled[i] || p->work->span.is_lost[i]) continue;
+    if (!has_no_choice(p, at, i)) {
+      has_choice = 1;
+      is_open[p->bus[i]] = 1;
+      continue;
+    }
+    const real factor = at->factor[p->bus[i]];
+    real v[2];
+    actuator_price(p->work, i, state->lambda_reduced, v);
+    v[0] /= factor;
+    v[1] /= factor;
+    const response y = fl_response(p->block, i, p->work->set + i, v);
+    p->is_settled[i] = 1;
+    p->settled_force[i][0] = y.force[0];
+    p->settled_force[i][1] = y.force[1];
+    p->settled_power[i] = dot(v, y.force, 2) - y.conjugate;
+  }
+  for (int b = 0; b < p->budget->buses; b++) {
+    p->is_open[b] = is_open[b];
+    if (!is_open[b] && has_choice) at->factor[b] = 1;
+  }
+  return !has_choice;
+}
+
 /* Policy FL_PRIORITY: groups of axes in order, each as near as those before it allow. */
 static int serve_groups(budget_problem *p, const fl_policy *policy, const real *wrench,
                         int is_bus_of_all, const budget_free_answer *before, budget_point *at) {
@@ -719,7 +821,7 @@ static int serve_groups(budget_problem *p, const fl_policy *policy, const real *
       if (first > 0) begin_with_held(p, weight, before, &held, power_held, &begin);
       begin_at(p, &begin, at);
     }
-    status = find_optimum(p, at);
+    status = find_best(p, at);
     if (status != FL_MET) return status;
     real missed = 0;
     int binds = 0;
@@ -732,7 +834,7 @@ static int serve_groups(budget_problem *p, const fl_policy *policy, const real *
     for (int k = 0; k < 6; k++) {
       if (group[k] && p->axis[k]) wanted[k] -= at->missing[k] * span->axis_scale[k];
     }
-    if (binds && is_bus_of_all && missed > NEARLY) break; /* no power is left */
+    if (missed > NEARLY && settle(p, at)) break; /* all that follows has no choice left */
   }
   return status;
 }
@@ -766,8 +868,10 @@ int fl_keep_budget(const real *block, fl_work *work, const real *wrench, const f
   p.budget = budget;
   p.keeps_budgets = 1;
   p.miss_cost = 0;
+  for (int b = 0; b < FL_BUSES; b++) p.is_open[b] = 1;
   for (int i = 0; i < COUNT(block); i++) {
     p.bus[i] = bus_of(budget, i);
+    p.is_settled[i] = 0;
     p.miss_cost += MISS_COST * work->power_max[i];
   }
   const int is_bus_of_all = feeds_all(block, work, budget);

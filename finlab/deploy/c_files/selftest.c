@@ -124,7 +124,7 @@ static fl_real error_of(const fl_real *wrench, fl_real command[][3]) {
    more steps, may be a little farther. */
 static int differs(const sample *s) {
   fl_policy policy = {s->policy, GROUPS, {1, 1, 1, 1, 1, 1}, {{0}}};
-  fl_question question = {.policy = &policy, .calm = CALM};
+  fl_question question = {.policy = &policy, .calm = CALM, .budget = ROBOT_BUDGET};
   if (s->previous) question.previous = s->previous[0];
   memcpy(policy.group, group, sizeof group);
   if (s->policy == FL_FALLING) {
@@ -143,6 +143,8 @@ static int differs(const sample *s) {
   fl_coupled_wrench(&robot_coupled, robot_linear, &work, out.command, out.wrench_served);
   if (!out.is_attainable) out.error = 0;
 #endif
+  /* In a tick rates go before budgets. */
+  if (out.exceeds_budget && !s->previous) return 1;
   if (out.newton_steps > most_steps) most_steps = out.newton_steps;
 
   static const fl_real rest[6];

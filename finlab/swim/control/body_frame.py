@@ -17,7 +17,9 @@ from finlab.arrays import Array
 from finlab.axes import wrapped_angle
 from finlab.errors import FinlabError
 from finlab.layout import Layout
-from finlab.swim.control.contract import Completion, Controller, Measurement, Setpoint, axes_of
+from finlab.layout.damage import NO_DAMAGE
+from finlab.swim.control.completion import Completion, axes_of
+from finlab.swim.control.contract import Controller, Measurement, Setpoint
 from finlab.swim.control.observer import MotionObserver
 from finlab.swim.control.tracking_controller import TrackingController, inverse_delay, max_wrench_of
 
@@ -249,7 +251,7 @@ def _axes(layout: Layout, name: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """
     able = axes_of(layout)
     axes = tuple(axis for axis in ("Fx", "Fz", "Tz") if axis in able)
-    if "Ty" in able or not Completion(layout, (), axes).controllable:
+    if "Ty" in able or not Completion(layout, NO_DAMAGE, axes).controllable:
         raise FinlabError(
             f"controller: {name} commands Fx, Fz and Tz, which {layout.name!r:.60} cannot give "
             "independently; take tracking"

@@ -1,27 +1,24 @@
-"""Contract of controllers: measurements, setpoints, protocols, and the axes that are commanded or
-left open.
+"""Contract of controllers: measurements, setpoints, protocols, and what weak actuators are told.
 
-A controller commands some axes of the wrench, holds others at zero, and may leave some free. Few
-fins, or few that are left, may not be able to hold zeros: two fins have four forces to choose for
-six axes. A target that asks for the impossible spoils what the controller wants, so the open axes
-are set to what the fins give with it; and free axes to what they give with the least force.
+A controller commands some axes of the wrench, holds others at zero, and may leave some free
+(`completion.py`).
 """
 
 import math
 from collections.abc import Sequence
-from itertools import combinations
 from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
 from finlab.arrays import Array
-from finlab.axes import mask_of
 from finlab.layout import Layout
 from finlab.layout.damage import Damage
-from finlab.layout.effectiveness import layout_effectiveness
 
 NO_WRENCH = np.zeros(6)
 """Wrench of actuators that have given nothing [N, N m]."""
+LEVER_M = 0.25
+"""Torques count as forces at this lever when open axes are traded against each other [m]; about
+U-CAT's."""
 NOT_MEASURED = np.full(3, math.nan)
 """Of a sensor that is not there."""
 
@@ -161,103 +158,3 @@ def asked_of_weak(layout: Layout, damage: Damage, command: Array) -> Array:
         index = layout.index(name)
         result[index, layout.actuators[index].KIND.force_number or 0] /= share
     return result
-
-
-LEVER_M = 0.25
-"""Torques count as forces at this lever when open axes are traded against each other [m]; about
-U-CAT's."""
-RANK_TOLERANCE = 1e-6
-"""Singular values below this share of the largest count as zero."""
-
-
-class Completion:
-    """Wanted axes to whole wrenches, for one layout with some fins lost. Linear in the wanted
-    axes."""
-
-    def __init__(
-        self, layout: Layout, lost: Sequence[str], axes: Sequence[str], free: Sequence[str] = ()
-    ) -> None:
-        """Prepares for the actuators that work.
-
-        Args:
-            layout: the robot.
-            lost: names of actuators that do not work.
-            axes: names of the axes that are commanded, c below.
-            free: names of those that may be anything; the others are held at 0, h below.
-
-        Raises:
-            LayoutError: an unknown name, or no actuator is left.
-        """
-        # Forces y with B_c y = w_c exactly, of which B_h y = 0 comes nearest: with the
-        # pseudoinverse B_c^+ and a basis N of the null space of B_c,
-        #     y = (B_c^+ - N (B_h N)^+ B_h B_c^+) w_c.
-        scale = np.array([1.0, 1.0, 1.0, 1 / LEVER_M, 1 / LEVER_M, 1 / LEVER_M])
-        B = layout_effectiveness(layout.without(lost) if lost else layout) * scale[:, None]
-        chosen = mask_of(axes)
-        B_c = B[chosen]
-        B_h = B[~mask_of((*axes, *free))]
-        U, singular_values, V_T = np.linalg.svd(B_c)
-        largest = max(float(singular_values[0]), 1e-9)
-        rank = int((singular_values > RANK_TOLERANCE * largest).sum())
-        self.controllable = rank == len(B_c)
-        """Whether the working actuators can give any small combination of the wanted axes."""
-        B_c_inverse = V_T[:rank].T @ np.diag(1.0 / singular_values[:rank]) @ U[:, :rank].T
-        N = V_T[rank:].T
-        correction = N @ np.linalg.pinv(B_h @ N, rcond=RANK_TOLERANCE) @ B_h @ B_c_inverse
-        scaled = B @ (B_c_inverse - correction) * scale[chosen] / scale[:, None]
-        self.matrix = np.zeros((6, 6))
-        """Wrench with the wanted axes filled in, to the whole wrench (6, 6)."""
-        self.matrix[:, chosen] = np.where(np.abs(scaled) < 1e-9, 0.0, scaled)
-        self._transposed = np.ascontiguousarray(self.matrix.T)
-
-    def __call__(self, wrench: Array) -> Array:
-        """Wrenches (..., 6) whose wanted axes are asked for, whole."""
-        whole: Array = wrench @ self._transposed
-        return whole
-
-
-def axes_of(layout: Layout) -> tuple[str, ...]:
-    """The axes that are commanded: surge, heave and yaw, and sway where that costs nothing. Fins
-    that push sideways hardly push ahead: with them sway is headed against. A robot that lifts by
-    rudders alone dives by its pitch, and one that does not lift at all is steered in the plane."""
-    surge_heave_yaw = ("Fx", "Fz", "Tz")
-    rudders = layout.flow_driven
-    without_rudders = layout.without(rudders) if len(rudders) < layout.n else layout
-    candidates: list[tuple[Layout, tuple[str, ...]]] = []
-    if not layout.n_fins:
-        candidates.append((without_rudders, ("Fx", "Fy", "Fz", "Tz")))
-    candidates.append((without_rudders, surge_heave_yaw))
-    if rudders:
-        candidates.append((layout, ("Fx", "Ty", "Tz")))
-    if not layout.n_fins:
-        candidates.append((layout, ("Fx", "Fy", "Tz")))
-    for robot, axes in candidates:
-        if Completion(robot, (), axes).controllable:
-            return axes
-    return surge_heave_yaw
-
-
-def steers(layout: Layout, lost: Sequence[str] = ()) -> bool:
-    """Whether what works of a robot can give the axes that are commanded independently, in
-    small."""
-    return Completion(layout, lost, axes_of(layout)).controllable
-
-
-def steerable_loss(layout: Layout, count: int, lost: Sequence[str] = ()) -> tuple[str, ...] | None:
-    """Returns the names of the first actuators without which a robot can still be steered.
-
-    Args:
-        layout: the robot.
-        count: how many besides the lost ones.
-        lost: names of actuators that do not work anyway.
-
-    Returns:
-        Their names; None where there are no such.
-    """
-    working = [name for name in layout.names if name not in lost]
-    if count >= len(working):
-        return None
-    for more_lost in combinations(working, count):
-        if count == 0 or steers(layout, (*lost, *more_lost)):
-            return more_lost
-    return None

@@ -176,11 +176,12 @@ class FaultMonitor:
         """What each actuator is taken for, index in `KINDS`."""
         self._since = np.zeros(n)
         self._certainty = np.zeros(n)
-        self._is_announced = np.zeros(n, dtype=bool)  # lost by what was said, and left alone
+        self._is_announced = np.zeros(n, dtype=bool)  # lost or stuck by what was said, left alone
         self._is_returning = np.zeros(n, dtype=bool)  # from a probe to what is commanded
         self._rates = Rates(plant_of(layout), layout.rates * self.period_s)
         self._sent = np.full((n, 3), np.nan)
         self._no_direction = np.zeros(n)  # of actuators that are not tried
+        self._never_stuck = np.full(n, np.nan)
         self._suspect = (-1, -1)
         """Actuator and kind that are likeliest to be a new fault."""
         self._last_named_s = -math.inf
@@ -318,7 +319,8 @@ class FaultMonitor:
     def tell(self, name: str, strength: float = 1.0, stuck: float = math.nan) -> Diagnosis:
         """The state of an actuator is known: its strength, and where it is stuck [rad, N] if it is.
 
-        One that is said to be lost is left alone until another state is said: no probe moves it.
+        One that is said to be lost or stuck is left alone until another state is said: nothing
+        tries it.
         Raises LayoutError: there is no actuator of that name."""
         k = self.layout.index(name)
         model = self._model
@@ -338,7 +340,7 @@ class FaultMonitor:
             elif strength < WEAK_BELOW:
                 kind = WEAK
         self._mark(k, kind, self._clock_s, 1.0)
-        self._is_announced[k] = kind in (LOST, REVERSED)
+        self._is_announced[k] = kind in (LOST, REVERSED, STUCK)
         return self.verdict()
 
     def adopt(self, layout: Layout) -> None:
@@ -390,13 +392,21 @@ class FaultMonitor:
 
         Now and then one that the monitor has called lost is tried for two seconds: if it gives
         nothing by it, it is lost, and of one that has been repaired the robot feels it, and takes
-        it back. Fins that all but rest push a little, see `MonitorSettings.least_push`. Both change
-        no faster than the rates of the drives allow from what was returned last, as does the way
-        back to what is commanded.
+        it back. A thruster that it has called stuck is tried by another force than the one at which
+        it is stuck, as the allocator asks it for that one. Fins that all but rest push a little,
+        see `MonitorSettings.least_push`. Both change no faster than the rates of the drives allow
+        from what was returned last, as does the way back to what is commanded.
         """
-        lost = self._is_lost & ~self._is_announced
-        direction = self._model.motion.direction if lost.any() else self._no_direction
-        probed = self._probe.added(command, lost, direction)
+        gives_stuck_force = (self._kind == STUCK) & ~self._model.sticks_at_angle
+        tried = (self._is_lost | gives_stuck_force) & ~self._is_announced
+        direction = self._no_direction
+        stuck_at = self._never_stuck
+        if tried.any():
+            direction = self._model.motion.direction
+            stuck_at = stuck_at.copy()
+            for k in np.flatnonzero(gives_stuck_force).tolist():
+                stuck_at[k] = self._stuck_value(k)
+        probed = self._probe.added(command, tried, direction, stuck_at)
         if probed is command and not self._is_returning.any():
             self._sent = command
             return command
@@ -484,7 +494,7 @@ class FaultMonitor:
         return shares
 
     def _within(self, k: int, value: float) -> float:
-        """A stuck force within what the thruster can give; angles as they are."""
+        """A force within what the thruster can give; angles as they are."""
         part = self.layout.actuators[k]
         if part.KIND.sticks_at_angle:
             return value
@@ -552,8 +562,11 @@ class FaultMonitor:
         k = odds.actuator
         waited = min(self._doubtful_s / KIND_WAIT_S, 1.0)
         odds_needed = KIND_ODDS + (1.0 - KIND_ODDS) * waited
-        # What the likeliest explanation has of all those of this actuator.
-        of_best = max(odds.of_kind * odds.of_single, 1.0 - odds.of_single)
+        # What the likeliest explanation has of all those of this actuator; one that is lost with
+        # another is no less lost.
+        of_alone = odds.of_kind * odds.of_single
+        in_pairs = 1.0 - odds.of_single
+        of_best = of_alone + in_pairs if odds.kind == LOST else max(of_alone, in_pairs)
         is_clear = of_best > (1.0 - of_best) * odds_needed or waited == 1.0
         confirm_s = CONFIRM_S
         if self._clock_s - self._last_named_s < CAUTION_S and self._kind[k] == WHOLE:

@@ -1,4 +1,5 @@
-"""Pushes that keep resting fins known: small steady ones, and short beats of those called lost."""
+"""Pushes that keep actuators known: small steady ones of fins that rest, and short ones of those
+that are called lost or stuck."""
 
 import math
 
@@ -15,6 +16,11 @@ PROBE_FORCE_N = 0.6
 """Force of a whole fin that is probed [N], or what it can give if that is less."""
 THRUSTER_SHARE = 0.1
 """Force of a thruster that is probed, as a share of its largest."""
+STUCK_FACTOR = -0.5
+"""Force of a thruster that is called stuck and probed, over the force at which it is stuck. So one
+that is stuck, whole, lost or reversed each gives something else."""
+STUCK_SHARE = 0.03
+"""Least size of that, as a share of its largest force."""
 PROBE_S = 2.0
 """How long a probe lasts [s]; a fin takes half a second to swing up, and a whole one to turn."""
 BUSY_FACTOR = 1.5
@@ -55,29 +61,42 @@ class Probe:
         self._has_fins = bool(layout.is_fin.any())
         self._count = 0
 
-    def added(self, command: Array, lost: NDArray[np.bool_], direction: Array) -> Array:
+    def added(
+        self, command: Array, tried: NDArray[np.bool_], direction: Array, stuck_at: Array
+    ) -> Array:
         """The command (n, 3) with what is added to it.
 
         Args:
             command: of the allocator; NaN rows are left alone but for probes.
-            lost: fins (n,) that are probed, one at a time.
+            tried: actuators (n,) that are probed, one at a time.
             direction: where the fins point (n,) [rad].
+            stuck_at: forces (n,) at which thrusters are taken to be stuck [N]; NaN of all others.
         """
         result = command
         if self._min_force > 0.0 and self._has_fins:
             result = self._with_min_force(command)
-        if self._probe_every_ticks == 0 or not lost.any():
+        if self._probe_every_ticks == 0 or not tried.any():
             self._count = 0
             return result
         self._count += 1
         turn, tick = divmod(self._count, self._probe_every_ticks)
         if turn == 0 or tick >= self._probe_ticks:
             return result
-        fins = np.flatnonzero(lost)
-        fin = int(fins[turn % len(fins)])
+        indices = np.flatnonzero(tried)
+        k = int(indices[turn % len(indices)])
         result = result.copy()
-        result[fin] = self._probe_command(fin, float(direction[fin]))
+        if math.isnan(stuck_at[k]):
+            result[k] = self._probe_command(k, float(direction[k]))
+        else:
+            result[k] = (self._force_against(k, float(stuck_at[k])), 0.0, 0.0)
         return result
+
+    def _force_against(self, index: int, stuck_at: float) -> float:
+        """The force [N] by which a thruster is tried that is taken to be stuck at another one."""
+        part = self._parts[index]
+        low, high = part.lower[0], part.upper[0]
+        size = max(abs(STUCK_FACTOR * stuck_at), STUCK_SHARE * max(high, -low))
+        return min(max(math.copysign(size, STUCK_FACTOR * stuck_at), low), high)
 
     def _probe_command(self, index: int, direction: float) -> tuple[float, float, float]:
         """The command of one that is tried, which is or points at a direction [rad]."""

@@ -16,7 +16,8 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.axes import wrapped_angle
 from finlab.layout import Layout
-from finlab.swim.control.contract import Measurement, Setpoint, axes_of
+from finlab.swim.control.completion import axes_of
+from finlab.swim.control.contract import Measurement, Setpoint
 from finlab.swim.control.observer import (
     AXES,
     CRUISE,

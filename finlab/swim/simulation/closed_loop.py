@@ -158,7 +158,8 @@ class ClosedLoop:
         self._no_beliefs = _constant(np.full(n, np.nan))
         self.verdict: Diagnosis | None = None
         """What the monitor believed at the last step; None without one."""
-        self._completion: dict[tuple[str, ...], Completion] = {}
+        self._completion: Completion | None = None
+        self._completed_damage: Damage | None = None
         self._ticks: list[Tick] = []
         self._setpoints: deque[Setpoint] = deque()
         """Of this tick and the next ones."""
@@ -325,7 +326,7 @@ class ClosedLoop:
         self._note_faults()
         if self.monitor is not None:
             self.monitor.adopt(layout)
-        self._completion.clear()
+        self._completion = None
 
     def run(self) -> RunLog:
         """Swims to the end of the task."""
@@ -359,7 +360,7 @@ class ClosedLoop:
         if self._command is None:
             return NO_WRENCH
         believed = self._believed_motion
-        believed.step(self._command, self.period_s)
+        believed.step(self._as_believed(self._command), self.period_s)
         force = self._plant.force(believed.command, flow=self._flow) * believed.pushes[:, None]
         if lost := self.damage.lost:
             force[list(self.layout.indices(lost))] = 0.0
@@ -368,14 +369,24 @@ class ClosedLoop:
         return 0.5 * (before + self._wrench_before)
 
     def _current_completion(self) -> Completion:
-        """What completes the controller's wrench for the actuators that work now."""
-        lost = tuple(self.damage.lost)
-        if lost not in self._completion:
+        """What completes the controller's wrench for what the actuators can do now."""
+        damage = self.damage
+        if self._completion is None or damage != self._completed_damage:
             controller = self.controller
-            self._completion[lost] = Completion(
-                self.allocator.layout, lost, controller.axes, controller.free
+            self._completion = Completion(
+                self.allocator.layout, damage, controller.axes, controller.free
             )
-        return self._completion[lost]
+            self._completed_damage = damage
+        return self._completion
+
+    def _as_believed(self, command: Array) -> Array:
+        """What a command (n, 3) is taken to have the actuators do: stuck ones do not heed it."""
+        stuck = self.damage.stuck
+        if not stuck:
+            return command
+        stuck_at = np.full(self.layout.n, np.nan)
+        stuck_at[list(self.layout.indices(list(stuck)))] = list(stuck.values())
+        return self.motion.turned_to(command, stuck_at)
 
     def _for_drives(self, command: Array) -> Array:
         """What drives make of a command (n, 3): a lost actuator is not moved, a stuck one does not
@@ -419,7 +430,7 @@ class ClosedLoop:
             reference=setpoint.position,
             reference_surge=setpoint.surge,
             asked=wrench,
-            allocated=self._allocated(command),
+            allocated=self._allocated(self._as_believed(command)),
             delivered=mean.wrench,
             command=sent,
             fin_motion=self.motion.command,

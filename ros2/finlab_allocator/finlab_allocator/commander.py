@@ -356,6 +356,7 @@ class Commander:
             lost=self.parameters.lost,
             free=target.free,
             policy=self.parameters.policy,
+            power=self.parameters.power_w,
             damage=self.damage,
             flow=self._flow_of(now_s),
         )
@@ -455,6 +456,7 @@ class Commander:
             lost=parameters.lost,
             free=parameters.free,
             policy=parameters.policy,
+            power=parameters.power_w,
             previous=robot.neutral(parameters.lost),
         )
 

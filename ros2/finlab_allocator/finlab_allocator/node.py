@@ -34,7 +34,7 @@ from finlab_allocator import messages
 from finlab_allocator.commander import Commander, Sent
 from finlab_allocator.frames import StaticFrames
 from finlab_allocator.parameters import Parameters, descriptions
-from finlab_allocator.status_report import NO_POWER_BUDGET, AuthorityLeft, status_report
+from finlab_allocator.status_report import AuthorityLeft, status_report
 from finlab_allocator.topics import NumberTopic, number_topics, values_to_send
 
 try:
@@ -361,8 +361,6 @@ class AllocatorNode(LifecycleNode):
             self._start_watchdog()
         if {"robot", "monitor", "period_s", "pressure", "drives"} & set(values):
             self._start_watch()
-        if commander.parameters.power_w is not None and "power_w" in values:
-            self.get_logger().warning(NO_POWER_BUDGET)
 
     # What goes out.
 

@@ -46,7 +46,9 @@ class Parameters:
         None, "what turning costs; the method's own where not set, or NaN"
     )
     power_w: float | None = _parameter(
-        None, "budget of power [W]; no limit where not set, or infinite"
+        None,
+        "the most power that all actuators take together [W]; the layout's own budget where not "
+        "set, or infinite",
     )
     monitor: bool = _parameter(
         False, "whether actuators that the monitor takes for broken are done without"

@@ -15,8 +15,6 @@ WARN = 1
 """Level of one to look at."""
 ERROR = 2
 """Level of one that is wrong."""
-NO_POWER_BUDGET = "power_w has no effect: this finlab has no budget of power yet"
-"""What is said where parameter `power_w` is set."""
 MOVES_UNEXPLAINED = (
     "unknown: the robot moves as no fault of an actuator explains; a tether may pull, or the body "
     "is not as the layout says"
@@ -59,6 +57,7 @@ def status_report(commander: Commander, warnings: Sequence[str] = ()) -> Report:
         ("policy", parameters.policy),
         ("lost", ", ".join(commander.lost)),
         ("free", ", ".join(parameters.free)),
+        ("power_w", "" if parameters.power_w is None else f"{parameters.power_w:g}"),
     ]
     if answer is not None:
         values += _answer_values(answer)
@@ -86,8 +85,6 @@ def status_report(commander: Commander, warnings: Sequence[str] = ()) -> Report:
             warnings = (*warnings, f"found: {'; '.join(phrases)}")
         if commander.watch.is_unknown:
             warnings = (*warnings, MOVES_UNEXPLAINED)
-    if parameters.power_w is not None:
-        warnings = (*warnings, NO_POWER_BUDGET)
     if warnings:
         level = max(level, WARN)
         message = "; ".join([message, *warnings])

@@ -12,7 +12,8 @@ from scipy.optimize import brentq
 from finlab.actuators.thrust_model import PowerTable
 from finlab.actuators.thruster import Thruster
 from finlab.allocation import Allocation, Allocator, Policy
-from finlab.arrays import Array
+from finlab.allocation.policy import PolicyName
+from finlab.arrays import EXACT, Array
 from finlab.errors import AllocationError
 from finlab.layout import load_layout
 from finlab.layout.layout import Bus, Layout
@@ -101,9 +102,9 @@ def check_beside_clarabel(question: Question) -> None:
     allocator, wrench = question.allocator, question.wrench
     answer = allocator.allocate(wrench)
     question.check_power(answer)
-    if answer.reachable:
+    if miss_of(answer) <= EXACT:  # `reachable` is one that misses a thousandth, too
         least = question.cones().least_power(wrench)
-        assert answer.power == pytest.approx(least, rel=MISS)
+        assert answer.power == pytest.approx(least, rel=WATTS)
     assert miss_of(answer) == pytest.approx(question.cones().least_miss(wrench), abs=MISS)
 
     answer = allocator.allocate(wrench, policy="direction")
@@ -299,11 +300,31 @@ def test_a_budget_of_a_layout_is_that_of_a_question() -> None:
     np.testing.assert_allclose(batch.command[0], own.command, rtol=0.0, atol=1e-9)
 
 
-def test_the_core_needs_no_help_with_thrusters(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(*_: object) -> None:
-        raise AssertionError("the slow way was taken")
+@pytest.mark.parametrize(
+    ("kind", "number", "policy"),
+    [
+        ("thrusters", 138, "priority"),  # its second group leaves the third no choice
+        ("thrusters", 213, "priority"),
+        ("thrusters", 246, "priority"),  # one bus bears a hundredth of what another does
+        ("thrusters", 385, "direction"),  # one bus binds from far, two never do
+        ("azimuths", 103, "priority"),
+        ("azimuths", 372, "closest"),
+    ],
+)
+def test_the_core_needs_no_help_with_several_buses(
+    monkeypatch: pytest.MonkeyPatch, kind: str, number: int, policy: PolicyName
+) -> None:
+    question = asked(kind, number, 3)
+    monkeypatch.setattr("finlab.allocation.dual.budget.BudgetedCore.answer", _refuse)
+    question.check_power(question.allocator.allocate(question.wrench, policy=policy))
 
-    monkeypatch.setattr("finlab.allocation.dual.budget.BudgetedCore.answer", refuse)
+
+def _refuse(*_: object) -> None:
+    raise AssertionError("the slow way was taken")
+
+
+def test_the_core_needs_no_help_with_thrusters(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("finlab.allocation.dual.budget.BudgetedCore.answer", _refuse)
     allocator = Allocator(load_layout("bluerov2_heavy"))
     rng = np.random.default_rng(4)
     for _ in range(30):

@@ -9,7 +9,7 @@ from finlab.allocation.allocator import Allocator
 from finlab.arrays import Array
 from finlab.layout import load_layout
 from finlab.swim.control import DriveTelemetry, FaultMonitor, Finding, Measurement
-from finlab.swim.control.contract import axes_of
+from finlab.swim.control.completion import axes_of
 from finlab.swim.control.drive_telemetry import (
     LEARNED_SAMPLES,
     LOG_RATIO_MAX,

@@ -11,8 +11,8 @@ import pytest
 
 from finlab.allocation.allocator import Allocator
 from finlab.layout import load_layout
-from finlab.swim.control import FaultMonitor
-from finlab.swim.control.contract import axes_of
+from finlab.swim.control import Completion, FaultMonitor
+from finlab.swim.control.completion import axes_of
 from tests.plant_mujoco import NO_NOISE, NO_SPREAD, MujocoRobot, Path, TrueFault, random_frame
 from tools.judge_monitor import Run, is_right, judged
 
@@ -79,6 +79,37 @@ def test_what_breaks_is_named_and_made_up_for(offset: int, kind: str, sensors: s
     assert is_right(result, (result["shown_s"] or result["time_s"]) + 3.0)
     assert {name for _, name, _ in result["events"]} == {result["actuator"]}
     assert result["error"] < 0.1 < result["error_of_unaware"]
+
+
+def test_a_stuck_thruster_that_obeys_again_is_taken_back() -> None:
+    """The allocator asks it for the force at which it was stuck: by that alone nothing would ever
+    show. One that stays stuck is called so throughout."""
+    layout = random_frame(20_017)
+    axes = axes_of(layout)
+    named = {}
+    for is_repaired in (False, True):
+        robot = MujocoRobot(layout, 17)
+        path = Path(layout, axes, 17, gentle=False)
+        allocator = Allocator(layout)
+        monitor = FaultMonitor(layout)
+        command = None
+        for tick in range(400):
+            if tick == 120:
+                robot.fail(TrueFault(2, "stuck", 12.0))
+            measurement = robot.measure()
+            verdict = monitor.step(measurement, command)
+            kinds = [finding.kind for finding in verdict.findings]
+            if tick == 180:
+                assert kinds == ["stuck"]
+                if is_repaired:
+                    robot.actuators.stuck_at[2] = np.nan
+            wanted = path.wrench(0.1 * tick, measurement, is_closed=True)
+            wrench = Completion(layout, verdict.damage, axes)(wanted)
+            answer = allocator.allocate(wrench, damage=verdict.damage, policy="closest")
+            command = monitor.sent(answer.command)
+            robot.step(command, 0.1)
+        named[is_repaired] = kinds
+    assert named == {False: ["stuck"], True: []}
 
 
 @pytest.mark.parametrize(("offset", "sensors"), [(1, "dvl"), (7, "imu")])

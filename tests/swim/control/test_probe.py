@@ -1,11 +1,12 @@
-"""Pushes that keep fins known: of those that all but rest, and of those that are taken for lost."""
+"""Pushes that keep actuators known: of fins that all but rest, and of those that are taken for lost
+or stuck."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from finlab.layout import Layout
+from finlab.layout import Layout, load_layout
 from finlab.physics import plant_of
 from finlab.swim.control import FaultMonitor, MonitorSettings
 from finlab.swim.control.jump_evidence import LOST
@@ -15,6 +16,8 @@ LEAST_PUSH = MonitorSettings().least_push
 """Force below which the monitor learns nothing of a fin [N]."""
 NO_FIN_LOST = np.zeros(4, dtype=bool)
 """Which of four fins are lost."""
+NEVER_STUCK = np.full(4, np.nan)
+"""Forces at which they are stuck: they are not."""
 
 
 def planar_forces(layout: Layout, command: np.ndarray) -> np.ndarray:
@@ -26,7 +29,7 @@ def test_fins_that_all_but_rest_push_up_and_down(layout_a: Layout) -> None:
     probe = Probe(layout_a, MonitorSettings(), 0.1)
     command = np.array([[0.5, 1.5, 0.2], [0.5, 0.3, 0.0], [np.nan] * 3, [0.5, 0.2, 1.0]])
     before = planar_forces(layout_a, command)
-    after = planar_forces(layout_a, probe.added(command, NO_FIN_LOST, np.zeros(4)))
+    after = planar_forces(layout_a, probe.added(command, NO_FIN_LOST, np.zeros(4), NEVER_STUCK))
     np.testing.assert_array_equal(after[[0, 2]], before[[0, 2]])
     for fin in (1, 3):
         assert np.linalg.norm(before[fin]) < LEAST_PUSH
@@ -36,7 +39,7 @@ def test_fins_that_all_but_rest_push_up_and_down(layout_a: Layout) -> None:
         )
     assert after[1, 1] * after[3, 1] < 0.0, "together they lift little"
     command[1, 2] = np.pi  # now it is told to push astern: the side stays
-    again = planar_forces(layout_a, probe.added(command, NO_FIN_LOST, np.zeros(4)))
+    again = planar_forces(layout_a, probe.added(command, NO_FIN_LOST, np.zeros(4), NEVER_STUCK))
     np.testing.assert_allclose(again[1], after[1] * [-1.0, 1.0], atol=1e-6)
 
 
@@ -84,3 +87,20 @@ def test_pushes_and_the_way_back_are_held_to_the_rates(layout_a: Layout) -> None
         before = sent
         command[2] = [0.3, 0.2, 0.0]
     assert pushed > 100
+
+
+@pytest.mark.parametrize("stuck_at", [-30.0, -0.01, 0.2, 12.0, 51.0])
+def test_a_stuck_thruster_is_probed_by_a_force_that_tells_what_it_is(stuck_at: float) -> None:
+    """One that is whole gives something else than one that is stuck, lost or reversed."""
+    layout = load_layout("bluerov2")
+    probe = Probe(layout, MonitorSettings(), 0.1)
+    stuck = np.full(layout.n, np.nan)
+    stuck[3] = stuck_at
+    command = np.zeros((layout.n, 3))
+    command[3, 0] = stuck_at
+    told = [probe.added(command, ~np.isnan(stuck), np.zeros(layout.n), stuck) for _ in range(210)]
+    last = told[-1]
+    np.testing.assert_array_equal(np.delete(last, 3, axis=0), np.delete(command, 3, axis=0))
+    force = float(last[3, 0])
+    assert layout.lower[3, 0] <= force <= layout.upper[3, 0]
+    assert min(abs(force - stuck_at), abs(force), abs(2.0 * force)) > 1.5
