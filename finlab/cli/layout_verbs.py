@@ -44,6 +44,8 @@ def check(layouts: Annotated[Positional[tuple[str, ...]], arg(metavar="LAYOUT...
             n_bad += 1
         else:
             print(f"{text}: ok, layout {layout.name} with {layout.counts_in_words}")
+            for note in layout.parts_notes:
+                print(f"{text}: {note}")
             for remark in REMARKS:
                 if (words := resolve_name(remark)(layout)) is not None:
                     print(f"{text}: {words}")

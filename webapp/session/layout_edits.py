@@ -224,7 +224,7 @@ def _added(layout: Layout, actuator: Actuator, stem: str) -> tuple[Layout, str]:
     while name in layout.names:
         name = f"{short}_{number}"
         number += 1
-    return replace(layout, actuators=(*layout.actuators, replace(actuator, name=name))), name
+    return replace(layout, actuators=(*layout.actuators, actuator.copied(name))), name
 
 
 def _mirror_name(name: str) -> str:
