@@ -16,7 +16,8 @@
 /* Least thrust that is asked of an actuator whose box leaves low to high: no thrust astern of a
    propeller with a rudder in a flow from ahead, of which too little is known there. */
 static real least_thrust(const fl_actuator *a, real low, real high) {
-  const int is_in_flow = (int)a->command_kind == FL_STEERED && a->pressure_area > 0;
+  const int is_steered = FL_SLIPSTREAMS && (int)a->command_kind == FL_STEERED;
+  const int is_in_flow = is_steered && a->pressure_area > 0;
   if (is_in_flow && low < 0 && high >= 0) return 0;
   return low;
 }
