@@ -68,9 +68,10 @@ def test_shipped_robots_are_settled(name: str) -> None:
     assert len(found) == 1 or found[1] == "proved"
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "slipstreams"])
 def test_random_robots_are_settled(kind: str) -> None:
-    """So is that of random robots, with rudders at rest, wide arcs and fins that cannot rest."""
+    """So is that of random robots, with rudders at rest, wide arcs and fins that cannot rest;
+    rudders in slipstreams are refused, see `test_propeller_rudder.py`."""
     for number in range(ROBOTS_PER_KIND or (kind not in SLOW)):
         assert verdicts(load(random_robot(kind, number, 63)))
 

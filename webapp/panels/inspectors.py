@@ -293,7 +293,7 @@ def _propeller_rudder() -> Inspector:
             degrees=True,
         ),
         NumberBox(
-            label="Turn rate [°/s]",
+            label="Rudder rate [°/s]",
             key="turn_rate",
             hint="How fast the rudder turns; empty: at once.",
             step=STEP_DEGREES,

@@ -1,6 +1,7 @@
 """Target wrenches to start from, and how much of each axis a layout can give."""
 
 import math
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -61,6 +62,8 @@ def _extents(layout: Layout, flow: Flow | None) -> tuple[Array, Array]:
 def lone_reach(layout: Layout, lost: tuple[str, ...] = (), flow: Flow | None = None) -> Array:
     """How far a robot goes along each axis (6,) [N, N m] with the other five at zero, the farther
     of both ways; where it pushes an axis only along with others, as far as `axis_reach` has it.
+    A power budget is left out: sliders go as far as actuators push, and their marks as far as the
+    budget lets them.
 
     Args:
         layout: the robot, with the limits that damage has left.
@@ -70,7 +73,8 @@ def lone_reach(layout: Layout, lost: tuple[str, ...] = (), flow: Flow | None = N
     with_others = axis_reach(layout, lost, flow)
     if len(lost) == layout.n:
         return with_others
-    sizes = authority(layout, lost, flow)
+    without_budget = replace(layout, power_w=None, buses=())
+    sizes = authority(without_budget, lost, flow)
     alone = np.maximum(sizes.largest, sizes.most_negative)
     reach: Array = np.where(alone > 0.0, alone, with_others)
     reach.setflags(write=False)
