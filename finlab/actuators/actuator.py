@@ -343,6 +343,27 @@ class Actuator(Checked, ABC):
         return self.frame[self.KIND.pointed_row]
 
     @property
+    def parts(self) -> tuple[str, ...]:
+        """Names of what a layout file lists as actuators of their own, and this one holds; none of
+        most kinds."""
+        return ()
+
+    @property
+    def parts_words(self) -> str:
+        """What its `parts` are to it, as a sentence without a full stop; empty where it has
+        none."""
+        return ""
+
+    @property
+    def parts_damage_words(self) -> str:
+        """How damage of its `parts` is told, as a sentence like `parts_words`."""
+        return ""
+
+    def copied(self, name: str) -> "Self":
+        """Returns a copy under another name, whose `parts` have no names."""
+        return replace(self, name=name)
+
+    @property
     def reads(self) -> str | None:
         """Path of the file that its law reads, None where it reads none."""
         return None

@@ -93,7 +93,7 @@ LAW_ANGLES = 2049
 """Deflections from -90 to 90 deg of the grid from which the core evaluates the law."""
 OFFSET = -1.0
 """Drag coefficient by which the core takes the offset (-p, 0) of a lost one off."""
-BEYOND = 3
+BEYOND = 12
 """Points of the gauge beyond each end of the arc that go on along its tangent."""
 SEARCHED = 65
 """Deflections in each of the searches for the one that is worth most at a price."""
@@ -431,6 +431,8 @@ class PropellerRudder(Propeller):
         time_constant: time in which the thrust comes to 63 % of a new command [s].
         rate: largest change of the commanded thrust [N/s]; None: nothing limits it.
         uncertainty: standard deviation of its force [N]; None: nothing is known of it.
+        rudder_name: name of the rudder where a layout file lists it as an actuator of its own;
+            None: it has none.
         hangs: whether damage has left it a single thrust, that of both limits (a truth value, which
             no file has).
 
@@ -495,6 +497,7 @@ class PropellerRudder(Propeller):
     time_constant: Seconds = 0.1
     rate: ForceRate | None = None
     uncertainty: Uncertainty | None = None
+    rudder_name: Name | None = None
     hangs: bool = False
 
     def check_together(self) -> None:
@@ -545,6 +548,31 @@ class PropellerRudder(Propeller):
             stall=self.stall,
             density=self.density,
         )
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """See `Actuator`: its rudder, where that has a name."""
+        return () if self.rudder_name is None else (self.rudder_name,)
+
+    @property
+    def parts_words(self) -> str:
+        """See `Actuator`."""
+        return (
+            f"{self.rudder_name} stands in the slipstream of {self.name}: both are one actuator, "
+            f"{self.name}"
+        )
+
+    @property
+    def parts_damage_words(self) -> str:
+        """See `Actuator`: a rudder that turns no more is the actuator stuck at its angle."""
+        return (
+            f"where {self.rudder_name} no longer turns and the propeller still pushes, "
+            f"{self.name} is stuck at the angle of the rudder (stuck {self.name}=0 amidships); "
+            f"where both are lost, {self.name} is lost"
+        )
+
+    def copied(self, name: str) -> Self:
+        return replace(self, name=name, rudder_name=None)
 
     @property
     def disc(self) -> float:

@@ -454,6 +454,8 @@ class Rudder(Actuator):
         time_constant: time in which the deflection comes to 63 % of a new command [s].
         rate: largest change of the deflection [rad/s]; None: nothing limits it.
         uncertainty: standard deviation of its force [N]; None: nothing is known of it.
+        alone: whether a reader of layout files leaves it an actuator of its own where it stands in
+            the slipstream of a thruster, which it then does not feel (a truth value).
 
     Raises:
         LayoutError: a value is out of its bounds; the message names the argument.
@@ -501,6 +503,7 @@ class Rudder(Actuator):
     time_constant: Seconds = 0.1
     rate: TurnRate | None = None
     uncertainty: Uncertainty | None = None
+    alone: bool = False
 
     def check_together(self) -> None:
         """See `Actuator`."""

@@ -454,6 +454,7 @@ def _notes_at_rest(layout: Layout, stamps: tuple[tuple[int, int] | None, ...]) -
     stamps) are read again."""
     first_line = layout.description.partition("\n")[0]
     notes = [f"layout {layout.name} is {first_line}"] if first_line.startswith(DOUBT) else []
+    notes += layout.parts_notes
     for fin in layout.fins:
         notes_of_fin = _notes_of_model(fin.model, fin.limits, fin.stamp)
         notes += [note.replace("{name}", fin.name) for note in notes_of_fin]

@@ -13,6 +13,7 @@ from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finlab.actuators.actuator import Actuator
 from finlab.actuators.kinds import laws_of
@@ -27,6 +28,10 @@ from finlab.layout.effectiveness import moved_effectiveness
 MIRROR_TOLERANCE = 1e-3
 """How far [m, rad] two actuators may be from each other's mirror image and still count as a
 pair."""
+TURN = 2.0 * math.pi
+"""A whole turn [rad]."""
+ROUNDING = 1e-9
+"""Angle by which a range may fall short of a whole turn [rad]."""
 PROBE_SHARE = 0.1
 """Share of its bounds by which a number is changed to see whether it costs an axis."""
 
@@ -62,7 +67,7 @@ class Bounds:
     ) -> Bounds:
         """Returns bounds about the present position and angles of an actuator.
 
-        Horizontal shafts stay horizontal, others also tilt, by up to a quarter turn.
+        Horizontal shafts stay horizontal, others also tilt by as much as they turn.
 
         Args:
             actuator: the actuator.
@@ -73,9 +78,7 @@ class Bounds:
         x, y, z = (
             (p - float(r), p + float(r)) for p, r in zip(actuator.position, reaches, strict=True)
         )
-        tilt = (
-            min(turn, 0.5 * math.pi) if getattr(actuator, "mounting_angle", None) is None else 0.0
-        )
+        tilt = turn if getattr(actuator, "mounting_angle", None) is None else 0.0
         angle = azimuth(actuator)
         return Bounds(x, y, z, (angle - turn, angle + turn), (-tilt, tilt))
 
@@ -196,6 +199,35 @@ class Moves:
         """Steps (D,) of the grid, 0 for any number."""
         self.start = self._values[self._free]
         """Where the actuators are now, brought within bounds (D,)."""
+
+    @property
+    def numbers_by_kind(self) -> list[NDArray[np.intp]]:
+        """Indices of the free numbers of each kind: x, y, z, turn and tilt; kinds that are held are
+        left out."""
+        kind = np.flatnonzero(self._free) % 5
+        indices = [np.flatnonzero(kind == k) for k in range(5)]
+        return [numbers for numbers in indices if len(numbers)]
+
+    @property
+    def moves_actuator(self) -> NDArray[np.bool_]:
+        """Which actuators a free number moves (D, n)."""
+        leader = np.flatnonzero(self._free) // 5
+        actuators = np.arange(self.layout.n)
+        leader_row = np.array(self._leader_rows)[leader]
+        twin_row = self._twin_rows[leader]
+        return np.asarray((leader_row[:, None] == actuators) | (twin_row[:, None] == actuators))
+
+    @property
+    def is_whole_turn(self) -> NDArray[np.bool_]:
+        """Which free numbers are angles whose bounds are a whole turn apart (D,)."""
+        is_angle = np.flatnonzero(self._free) % 5 >= 3
+        return np.asarray(is_angle & (self.upper - self.lower >= TURN - ROUNDING))
+
+    @property
+    def whole_tilts(self) -> NDArray[np.intp]:
+        """Indices of tilts over a whole turn: half a turn of one reverses its main axis."""
+        is_tilt = np.flatnonzero(self._free) % 5 == 4
+        return np.flatnonzero(is_tilt & self.is_whole_turn)
 
     @property
     def smooth(self) -> Moves:

@@ -1,7 +1,8 @@
 """Improves a layout: moves chosen actuators within bounds to raise a goal.
 
-`climb` follows the goal's slopes from several starts; where it finds nothing better, or the goal
-has no slopes, SciPy's differential evolution searches.
+`climb` follows the goal's slopes from several starts, of many free thrusters also from those of
+`soft_ascent`; where it finds nothing better, or the goal has no slopes, SciPy's differential
+evolution searches.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -20,6 +21,7 @@ from finlab.analysis.layout_bound import LayoutBound, check_bounded, layout_boun
 from finlab.analysis.moves import Bounds, Moves, mirror_pairs
 from finlab.analysis.score_card import ScoreCard, score_card
 from finlab.analysis.slopes import GoalPoint, MissionPower, SlopedGoal, WeakestDirection
+from finlab.analysis.soft_ascent import SoftAscent, has_few_facets
 from finlab.arrays import Array
 from finlab.axes import MotionAxis
 from finlab.forces.force_sets import force_sets
@@ -37,6 +39,12 @@ MAX_DRAWS = 20
 """Most times that random vectors are drawn until enough of them keep all rules."""
 RANKED_PER_START = 6
 """Most vectors that are ranked for each start."""
+ASCENTS = 24
+"""Random vectors from which the smooth goal of thrusters is raised."""
+RAISED_STARTS = 3
+"""The best of these, from which climbs begin."""
+MIN_ASCENT = 20
+"""Fewest free numbers from which on it is raised: with fewer, the climbs are many."""
 STARTS_SCALE = 2800
 """Number of climbs times the square of the free numbers: a step's time grows with that square."""
 MIN_STARTS = 3
@@ -304,6 +312,7 @@ class _Search:
         self._progress = progress
         self._cancelled = cancelled or (lambda: False)
         self._mapped = mapped
+        self._ascent: SoftAscent | None = None
         self.vector = moves.start
         self.best = before
         self.gained = False
@@ -315,6 +324,9 @@ class _Search:
 
     def _note(self, value: float, vector: Array) -> None:
         """Keeps a vector that keeps all rules, where it is the best so far."""
+        if value > self.best and self._ascent is not None:
+            # A climb may miss the nearest facet.
+            value = min(value, float(self._ascent.least_distances(vector[None])[0]))
         if value > self.best:
             self.best = value
             self.vector = vector
@@ -339,14 +351,25 @@ class _Search:
                 return
 
     def climb(self, goal: SlopedGoal, seed: int, with_present: bool) -> None:
-        """Climbs a few steps from several starts, among them the present vector where it is to be,
-        then on from the best of them, and rounds the results to the grid."""
+        """Climbs from several starts, among them the present vector where it is to be, and of many
+        free thrusters from those of an ascent of a smooth goal, too."""
+        moves = self._moves
+        if isinstance(goal, WeakestDirection) and has_few_facets(goal, moves.layout):
+            self._ascent = SoftAscent(goal, self._rules)
+        self._climb_from(goal, self._starts(goal, seed, with_present))
+        is_over = self.stopped or self._done >= self._rounds
+        if self._ascent is not None and not is_over and len(moves.start) >= MIN_ASCENT:
+            self._climb_from(goal, self._raised_starts(goal, self._ascent, seed))
+
+    def _climb_from(self, goal: SlopedGoal, starts: Iterator[GoalPoint]) -> None:
+        """Climbs a few steps from each start, then on from the best of them, and rounds the results
+        to the grid."""
         best = self.best
         vector = self.vector
         had_gained = self.gained
         self.stopped = self._cancelled()
         climbs = list[Climb]()
-        for start in self._starts(goal, seed, with_present) if not self.stopped else ():
+        for start in starts if not self.stopped else ():
             climbs.append(Climb(goal, self._rules, start))
             if self._climbed(climbs[-1], FIRST_STEPS):
                 break
@@ -380,6 +403,21 @@ class _Search:
                 continue
             for k in np.argsort(-goal.guess(valid), kind="stable")[:n_best]:
                 yield goal.evaluate(valid[k])
+
+    def _raised_starts(
+        self, goal: SlopedGoal, ascent: SoftAscent, seed: int
+    ) -> Iterator[GoalPoint]:
+        """Yields the best of some random vectors after an ascent of a smooth goal."""
+        moves = self._moves
+        random = np.random.default_rng(seed)
+        vectors = random.uniform(moves.lower, moves.upper, (RANDOM_VECTORS, len(moves.start)))
+        valid = self._valid(vectors, False, ASCENTS, random)
+        if not len(valid):
+            return
+        raised = ascent.raised(valid, self._cancelled)
+        raised = raised[self._rules.violation(raised) <= 0.0]
+        for k in np.argsort(-ascent.least_distances(raised), kind="stable")[:RAISED_STARTS]:
+            yield goal.evaluate(raised[k])
 
     def _valid(
         self, vectors: Array, mirrored: bool, count: int, random: np.random.Generator

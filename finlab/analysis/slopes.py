@@ -107,11 +107,18 @@ class WeakestDirection:
         self._moves = moves
         self._axes = [WRENCH.index(axis) for axis in named_axes(axes)]
         self._losses = np.arange(moves.layout.n) if after_loss else None
+        self.n_axes = len(self._axes)
+        self.after_loss = after_loss
         self._random = np.random.default_rng(0)
 
     def _sets(self, vectors: Array) -> ForceSets:
         """Force sets of the actuators moved by vectors (P, D), in the axes that count."""
         return self._moves.sets(vectors).along(self._axes)
+
+    def columns(self, vectors: Array) -> Array:
+        """Returns the scaled wrenches (P, n, m) of 1 N of each actuator along the first direction
+        of its plane, the only one of a thruster."""
+        return np.asarray(self._sets(vectors).effectiveness[:, :, 0])
 
     def guess(self, vectors: Array) -> Array:
         """Returns a quick measure (P,) to rank vectors (P, D) by: smallest singular values."""

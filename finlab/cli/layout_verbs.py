@@ -44,6 +44,8 @@ def check(layouts: Annotated[Positional[tuple[str, ...]], arg(metavar="LAYOUT...
             n_bad += 1
         else:
             print(f"{text}: ok, layout {layout.name} with {layout.counts_in_words}")
+            for note in layout.parts_notes:
+                print(f"{text}: {note}")
             for remark in REMARKS:
                 if (words := resolve_name(remark)(layout)) is not None:
                     print(f"{text}: {words}")
@@ -231,7 +233,7 @@ def optimize(
         goal: weakest_direction, mission_power or worst_single_failure.
         reach: how far each may go from where it is, either way along x, y and z [m].
         turn: how far each may turn about the vertical, either way [deg]; all but fins with a
-            mounting angle also tilt.
+            mounting angle also tilt, by as much.
         mirror: keep actuators that are each other's mirror image so.
         axes: surge, sway, heave, roll, pitch, yaw: those whose directions count; all that there are
             actuators enough for by default.

@@ -40,8 +40,11 @@ typedef double fl_wide; /* where differences of large numbers matter, in single 
 #ifndef FL_ZONES
 #define FL_ZONES 4 /* most barred zones of a pod; exports of robots without any have 0 */
 #endif
+#ifndef FL_SLIPSTREAMS
+#define FL_SLIPSTREAMS 1 /* whether rudders in slipstreams are known; exports without any have 0 */
+#endif
 #ifndef FL_KEEPS_BUDGETS
-#define FL_KEEPS_BUDGETS 1 /* whether power budgets are kept; exports have 0 */
+#define FL_KEEPS_BUDGETS 1 /* whether power budgets are kept; exports without any have 0 */
 #endif
 #define FL_BUSES 8 /* most buses whose power is limited */
 #ifndef FL_PARTS

@@ -7,7 +7,7 @@ tables where FL_SINGLE is defined. The same layout gives the same bytes.
 import os
 import re
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -151,7 +151,9 @@ def c_sources(
     declared = "".join(sources[header] for header in headers)
     sources["fl_names.h"] = _prefixed_names(declared, name)
     zones = int(actuators_of(block)["barred_count"].max(initial=0.0))
-    sources["finlab.h"] = _with_size(sources["finlab.h"], layout.n, foils, zones, is_coupled)
+    is_steered = actuators_of(block)["command_kind"] == constant("FL_STEERED")
+    size = ExportSize(layout.n, foils, zones, bool(is_steered.any()))
+    sources["finlab.h"] = _with_size(sources["finlab.h"], size, is_coupled)
     if budget is None:
         sources["finlab.h"] = _without_budgets(sources["finlab.h"])
     sources["robot.c"] = _robot(block, thin)
@@ -198,14 +200,30 @@ def write_c(files: dict[str, bytes], folder: str | os.PathLike[str]) -> None:
     write_folder(folder, files, foreign, "an export")
 
 
-def _with_size(header: str, count: int, foils: int, zones: int, is_coupled: bool) -> str:
-    """finlab.h for so many actuators, of which so many are foils, and so many barred zones of a
-    pod. In single precision where a processor has no unit for double, but for robots whose
-    actuators act on each other, which have no lanes of vectors."""
-    header = re.sub(r"(#define FL_MOST) \d+", rf"\1 {count}", header, count=1)
-    arcs = min(foils, constant("FL_ARCS"))
-    header = re.sub(r"(#define FL_ARCS) \d+", rf"\1 {arcs}", header, count=1)
-    header = re.sub(r"(#define FL_ZONES) \d+", rf"\1 {zones}", header, count=1)
+class ExportSize(NamedTuple):
+    """What of the core the code of a robot needs."""
+
+    count: int
+    """Of actuators."""
+    foils: int
+    """Of those, how many may stall."""
+    zones: int
+    """Most barred zones of a pod."""
+    has_slipstreams: bool
+    """Whether a rudder stands in the slipstream of a propeller."""
+
+
+def _with_size(header: str, size: ExportSize, is_coupled: bool) -> str:
+    """finlab.h for a robot of this size. In single precision where a processor has no unit for
+    double, but for robots whose actuators act on each other, which have no lanes of vectors."""
+    values = {
+        "FL_MOST": size.count,
+        "FL_ARCS": min(size.foils, constant("FL_ARCS")),
+        "FL_ZONES": size.zones,
+        "FL_SLIPSTREAMS": int(size.has_slipstreams),
+    }
+    for name, value in values.items():
+        header = re.sub(rf"(#define {name}) \d+", rf"\1 {value}", header, count=1)
     if is_coupled:
         return header.replace("#ifdef FL_SINGLE\n", "#define FL_NO_LANES\n#ifdef FL_SINGLE\n", 1)
     single = (

@@ -21,6 +21,8 @@ CELLS = 128
 """Most cells of a table; of a foil's angles and lifts twice as many knots."""
 POINTS = 64
 """Most directions of a gauge."""
+STEERED_POINTS = 128
+"""The same of a propeller with a rudder, whose narrow arc has few of them."""
 ANGLES = 1024
 """Angles over its period from which those of a grid of foils are chosen; more say nothing in single
 precision."""
@@ -86,7 +88,7 @@ def thinned(block: Array) -> Array:
     new_offset = {0: 0}
     offset_new = begin
     for offset, table in tables.items():
-        thin = _thinned_table(table, actuators[actuators["law_grid"] == offset])
+        thin = _thinned_table(table, actuators[actuators[table.field] == offset])
         thin_tables.append(thin)
         new_offset[offset] = offset_new
         offset_new += len(thin)
@@ -111,11 +113,12 @@ def _rounded(limits: Array, up: bool) -> NDArray[np.float32]:
 
 
 def _thinned_table(table: Table, users: Record) -> Array:
-    """Returns a table with fewer knots; `users` are the actuators (m,) whose law it is."""
+    """Returns a table with fewer knots; `users` are the actuators (m,) that have it."""
     if table.field in ("force_table", "force_table_reverse"):
         return _radial(table.numbers)
     if table.field == "gauge_table":
-        return _gauge(table.numbers)
+        is_steered = (users["command_kind"] == constant("FL_STEERED")).any()
+        return _gauge(table.numbers, STEERED_POINTS if is_steered else POINTS)
     if table.field == "law_grid":
         return _grid(table.numbers, users)
     return _curve(table.numbers)
@@ -132,10 +135,10 @@ def _radial(table: Array) -> Array:
     return table_numbers(float(table[0]), force, np.minimum(slope, slope_max), float(table[2]))
 
 
-def _gauge(table: Array) -> Array:
-    """A gauge with every so many of its directions."""
+def _gauge(table: Array, points: int) -> Array:
+    """A gauge with every so many of its directions, as many as `points` at most."""
     rows = table[1:].reshape(-1, 4)
-    rows = rows[:: max(len(rows) // POINTS, 1)]
+    rows = rows[:: max(len(rows) // points, 1)]
     return np.concatenate([[len(rows)], rows.ravel()])
 
 

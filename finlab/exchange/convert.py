@@ -6,7 +6,7 @@ that format; `WRITERS` has the writers. The app reads dropped files by `read_rob
 
 import os
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -187,11 +187,32 @@ def read_robot(text: str, file: str, exchange: Exchange) -> Layout:
     data = _plain_values(text, suffix)
     if isinstance(data, dict) and _is_layout_file(data):
         folder = exchange.path.parent if exchange.path else None
-        return parse_layout(data, "", folder, may_open=folder is not None)
+        layout = parse_layout(data, "", folder, may_open=folder is not None)
+        _note_parts(layout, data["actuators"], exchange)
+        return layout
     if not isinstance(data, dict | list):
         raise LayoutError(UNKNOWN_FORMAT)
     comments = [line for line in text.splitlines() if line.lstrip().startswith(("#", "//"))]
     return read_plain(data, name, exchange, comments)
+
+
+def _note_parts(layout: Layout, listed: Sequence[Mapping[str, Any]], exchange: Exchange) -> None:
+    """Says what a layout file lists as an actuator and was read as a part of another one.
+
+    Args:
+        layout: the robot.
+        listed: the actuators as the file has them.
+        exchange: gets the notes.
+    """
+    names = {actuator["name"] for actuator in listed}
+    for actuator in layout.actuators:
+        if names.intersection(actuator.parts):
+            exchange.note(
+                actuator.parts_words,
+                "alone: true of the rudder keeps two actuators",
+                field="slipstream",
+                actuators=[actuator.name],
+            )
 
 
 def _plain_values(text: str, suffix: str) -> Any:

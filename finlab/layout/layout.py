@@ -371,11 +371,26 @@ class Layout(Checked):
         """
         if name not in self.names:
             what = "fin" if self.is_of_fins else "actuator"
-            raise LayoutError(
-                f"layout {self.name} has no {what} {name!r:.60}, it has {', '.join(self.names)}",
-                argument,
-            )
+            problem = f"layout {self.name} has no {what} {name!r:.60}, it has "
+            problem += ", ".join(self.names)
+            holder = self.holder_of(name)
+            if holder is not None:
+                problem += f"; {holder.parts_words}; {holder.parts_damage_words}"
+            raise LayoutError(problem, argument)
         return self.names.index(name)
+
+    def holder_of(self, name: str) -> Actuator | None:
+        """Returns the actuator of which something of a name is part, such as the propeller of a
+        rudder in its slipstream; None where there is none."""
+        for actuator in self.actuators:
+            if name in actuator.parts:
+                return actuator
+        return None
+
+    @property
+    def parts_notes(self) -> tuple[str, ...]:
+        """What a file lists apart and is part of an actuator, as sentences without a full stop."""
+        return tuple(actuator.parts_words for actuator in self.actuators if actuator.parts)
 
     def indices(self, names: Sequence[str], argument: str = "") -> tuple[int, ...]:
         """Returns the indices of several actuators.

@@ -33,4 +33,7 @@ def layout_blocks(layout: Layout) -> list[Block]:
     inspector.
     """
     title = f"{layout.name}: {layout.description}" if layout.description else layout.name
-    return [title, table_of(COLUMNS, layout.actuators)]
+    blocks: list[Block] = [title, table_of(COLUMNS, layout.actuators)]
+    if layout.parts_notes:
+        blocks.append("\n".join(layout.parts_notes))
+    return blocks

@@ -17,7 +17,7 @@ made of the same declarations.
 import math
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from functools import cache, reduce
@@ -37,7 +37,7 @@ from finlab.errors import LayoutError, layout_errors_at
 from finlab.files import parse_json, parse_yaml
 from finlab.files.guarded import read_text
 from finlab.files.schema import Checked, Name, Part, checked, form, is_class, shown
-from finlab.layout.layout import MAX_ACTUATORS, Bus, Layout
+from finlab.layout.layout import MAX_ACTUATORS, Bus, Layout, MirrorPair
 
 FORMAT = "finlab-layout"
 """Value of the key `format` in a layout file."""
@@ -377,19 +377,17 @@ def parse_layout(
         for name in ("actuators", "body", "interaction"):
             with layout_errors_at(name):
                 values[name] = reader.value(getattr(file, name))
+        actuators = _with_slipstreams(values["actuators"])
         return Layout(
             name=file.name,
-            actuators=_with_slipstreams(values["actuators"]),
+            actuators=actuators,
             description=file.description or "",
             body=values["body"],
             axes=tuple(file.axes or AXES),
             interaction=values["interaction"],
             power_w=file.power_w,
-            buses=tuple(
-                Bus(name, bus.power_w, tuple(bus.actuators))
-                for name, bus in (file.buses or {}).items()
-            ),
-            mirror_pairs=tuple(file.mirror_pairs or ()),
+            buses=_buses(file.buses or {}, actuators),
+            mirror_pairs=_mirror_pairs(file.mirror_pairs or (), actuators),
         )
 
 
@@ -401,6 +399,34 @@ def _with_slipstreams(actuators: tuple[Actuator, ...]) -> tuple[Actuator, ...]:
     from finlab.layout.slipstream import joined
 
     return joined(actuators)
+
+
+def _buses(buses: Mapping[str, Any], actuators: Sequence[Actuator]) -> tuple[Bus, ...]:
+    """The buses of a file, without parts of actuators: a rudder in a slipstream takes no power."""
+    parts = {part for actuator in actuators for part in actuator.parts}
+    result = []
+    for name, bus in buses.items():
+        fed = tuple(actuator for actuator in bus.actuators if actuator not in parts)
+        if fed or not bus.actuators:
+            result.append(Bus(name, bus.power_w, fed))
+    return tuple(result)
+
+
+def _mirror_pairs(
+    pairs: Sequence[MirrorPair], actuators: Sequence[Actuator]
+) -> tuple[MirrorPair, ...]:
+    """The mirror pairs of a file, with an actuator in the place of its parts; each pair once."""
+    holders = {}
+    for actuator in actuators:
+        for part in actuator.parts:
+            holders[part] = actuator.name
+    if not holders:
+        return tuple(pairs)
+    result: dict[frozenset[str], MirrorPair] = {}
+    for first, second in pairs:
+        pair = holders.get(first, first), holders.get(second, second)
+        result.setdefault(frozenset(pair), pair)
+    return tuple(result.values())
 
 
 @contextmanager

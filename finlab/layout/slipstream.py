@@ -9,6 +9,9 @@ thruster. What the file does not say is taken so:
 - of the foil's area, chord times D lies in the slipstream, and at most so much that the foil does
   not push aside with more than the thrust: more momentum there is not; the rest meets the flow;
 - as a rudder alone it stays where the propeller has a dead band or a reaction torque.
+
+The joined actuator keeps the rudder's name in `rudder_name`, so that a question about the rudder is
+answered by a sentence. A rudder with `alone: true` stays an actuator of its own.
 """
 
 import math
@@ -67,6 +70,8 @@ def _pairs(actuators: Sequence[Actuator]) -> list[tuple[int, int]]:
                 and _is_behind(thruster, rudder)
             ):
                 found.append((i, k))
+    names = [actuator.name for actuator in actuators]
+    found = [(i, k) for i, k in found if names.count(names[k]) == 1]  # others are refused later
     thrusters = [i for i, _ in found]
     rudders = [k for _, k in found]
     return [(i, k) for i, k in found if thrusters.count(i) == 1 and rudders.count(k) == 1]
@@ -74,6 +79,8 @@ def _pairs(actuators: Sequence[Actuator]) -> list[tuple[int, int]]:
 
 def _is_behind(thruster: Thruster, rudder: Rudder) -> bool:
     """Whether a rudder lies in the slipstream of a thruster, and both can be one actuator."""
+    if rudder.alone:
+        return False
     is_simple = thruster.dead_band == 0.0 and thruster.torque_per_newton == 0.0
     pushes_ahead = thruster.force[1] > 0.0
     if not (is_simple and pushes_ahead):
@@ -116,4 +123,5 @@ def _joined_pair(thruster: Thruster, rudder: Rudder) -> PropellerRudder:
         time_constant=thruster.time_constant,
         rate=thruster.rate,
         uncertainty=thruster.uncertainty,
+        rudder_name=rudder.name,
     )

@@ -7,6 +7,7 @@ The judge of forces and power is `tests/oracle_plant.py`.
 
 import json
 import math
+import subprocess
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -19,9 +20,11 @@ from finlab.actuators.propeller_rudder import PropellerRudder
 from finlab.analysis.prove import prove
 from finlab.arrays import Array
 from finlab.cli import main
-from finlab.deploy.deployed_robot import load_robot
+from finlab.deploy.c_sources import c_sources, write_c
+from finlab.deploy.deployed_robot import DeployedRobot, load_robot
+from finlab.deploy.serve import Server
 from finlab.errors import LayoutError
-from finlab.layout import Damage, Layout, load_layout, save_layout
+from finlab.layout import Damage, Layout, layout_to_dict, load_layout, save_layout
 from finlab.layout.load import parse_layout
 from finlab.physics.plant import plant_of
 from tests.oracle_plant import OraclePlant
@@ -62,6 +65,8 @@ RUDDER: Mapping[str, Any] = {
     "aspect_ratio": 1.5,
 }
 """A rudder 10 cm behind a screw."""
+JOINED = "rudder stands in the slipstream of screw: both are one actuator, screw"
+"""What is said of the two."""
 
 
 def boat_of(*actuators: Mapping[str, Any]) -> dict[str, Any]:
@@ -224,6 +229,7 @@ def test_a_rudder_behind_a_screw_is_read_as_one_actuator() -> None:
     answer = finlab.Allocator(layout).allocate([0, 0, 0, 0, 0, 0.4], free=("Fx",))
     assert answer.wrench[5] == pytest.approx(0.4, abs=1e-6)
     assert answer.commands["screw"].deflection < -0.1
+    assert JOINED in answer.notes and JOINED in str(layout)
 
     # At speed the whole rudder is met by the flow: as the rudder alone, the screw at no thrust.
     flow = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
@@ -272,6 +278,128 @@ def test_files_bundles_and_other_formats(
     result = prove(layout, [1.0, 0.0, 0.0, 0.0, 0.0, 0.1])
     assert result.verdict not in ("proved", "refuted")
     assert "nothing certain is known of a propeller_rudder" in result.reason
+
+
+def test_a_rudder_that_is_to_stay_alone_does() -> None:
+    data = boat_of(THRUSTER, {**RUDDER, "alone": True})
+    layout = parse_layout(data)
+    assert layout.names == ("screw", "rudder") and layout.parts_notes == ()
+    assert parse_layout(layout_to_dict(layout)) == layout
+
+
+def test_a_question_about_the_rudder_is_told_what_to_ask(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What the sentence says to write is answered: the rudder held, the screw still pushing."""
+    file = tmp_path / "boat.json"
+    file.write_text(json.dumps(boat_of(THRUSTER, RUDDER)), "utf-8")
+    assert main(["layout", "check", str(file)]) == 0
+    assert JOINED in capsys.readouterr().out
+    wrench = ["--wrench", "2", "0", "0", "0", "0", "0"]
+    for option in (["--lost", "rudder"], ["--stuck", "rudder=5"]):
+        assert main(["allocate", str(file), *wrench, *option]) == 2
+        error = capsys.readouterr().err
+        assert JOINED in error and "stuck screw=0 amidships" in error
+    assert main(["allocate", str(file), *wrench, "--stuck", "screw=0"]) == 0
+    assert JOINED in capsys.readouterr().out
+    with pytest.raises(LayoutError, match="both are one actuator, screw"):
+        finlab.Allocator(load_layout(file)).allocate([0] * 6, lost=("rudder",))
+
+
+def test_buses_and_mirror_pairs_may_name_the_rudder() -> None:
+    """A rudder takes no power, and its image is that of its screw."""
+    units = []
+    for side, y in (("left", 0.2), ("right", -0.2)):
+        for part in (THRUSTER, RUDDER):
+            x = part["position_m"][0]
+            units.append({**part, "name": f"{part['name']}_{side}", "position_m": [x, y, 0.0]})
+    data = boat_of(*units)
+    data["buses"] = {
+        "main": {"power_w": 30.0, "actuators": ["screw_left", "rudder_left", "screw_right"]},
+        "steering": {"power_w": 5.0, "actuators": ["rudder_right"]},
+    }
+    data["mirror_pairs"] = [["screw_left", "screw_right"], ["rudder_left", "rudder_right"]]
+    layout = parse_layout(data)
+    assert [bus.actuators for bus in layout.buses] == [("screw_left", "screw_right")]
+    assert layout.mirror_pairs == (("screw_left", "screw_right"),)
+    assert parse_layout(layout_to_dict(layout)) == layout
+
+
+def test_a_flow_that_steers_alone_costs_nothing() -> None:
+    """A torque that the flow on the rudder gives takes no thrust, ahead or astern."""
+    layout = parse_layout(boat_of(THRUSTER, RUDDER))
+    flow = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+    allocator = finlab.Allocator(layout)
+    for Tz in (0.4, -0.2, 0.05):
+        answer = allocator.allocate([0, 0, 0, 0, 0, Tz], free=("Fx",), flow=flow)
+        assert answer.wrench[5] == pytest.approx(Tz, abs=1e-6)
+        assert answer.command[0, 1] >= 0.0
+        assert answer.power < 1e-6
+        tick = allocator.allocate(
+            [0, 0, 0, 0, 0, Tz], free=("Fx",), flow=flow, previous=answer.command
+        )
+        assert tick.err_norm < 1e-6 and tick.power < 1e-6
+
+
+def test_the_loop_on_board_names_its_numbers() -> None:
+    layout = parse_layout(boat_of(THRUSTER, RUDDER))
+    server = Server(DeployedRobot(finlab.Allocator(layout)))
+    request = {"wrench": [3, 0, 0, 0, 0, 0.3]}
+    (reply,) = server.answers(json.dumps(request).encode())
+    answer = finlab.Allocator(layout).allocate([3, 0, 0, 0, 0, 0.3])
+    assert reply["status"] == "ok"
+    (unit,) = reply["actuators"]
+    assert (unit["name"], unit["type"]) == ("screw", "propeller_rudder")
+    assert unit["command"] == {
+        "deflection_rad": pytest.approx(answer.command[0, 0], abs=1e-9),
+        "force_n": pytest.approx(answer.command[0, 1], abs=1e-9),
+    }
+    (refusal,) = server.answers(json.dumps({**request, "lost": ["rudder"]}).encode())
+    assert refusal["status"] == "error" and "both are one actuator, screw" in refusal["error"]
+
+
+def test_the_exported_allocator_gives_the_same(tmp_path: Path) -> None:
+    """The self-test of the C sources, of two sides in a flow, in both precisions."""
+    twin = {**UNIT, "name": "other", "position_m": [-0.45, 0.3, 0.0]}
+    layout = parse_layout(boat_of({**UNIT, "position_m": [-0.45, -0.3, 0.0]}, twin))
+    write_c(c_sources(layout, 40, (0.8, 0.0, 0.0, 0.0, 0.0, 0.0)), str(tmp_path))
+    for single in ("", "-DFL_SINGLE"):
+        words = f"gcc -std=c99 -O0 {single} *.c -lm -o it && ./it"
+        done = subprocess.run(words, shell=True, cwd=tmp_path, capture_output=True, text=True)
+        assert done.returncode == 0, done.stdout + done.stderr
+        assert done.stdout.startswith("0 of 40 ")
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.7, -2.5])
+def test_two_coupled_pods_are_one_in_the_middle(angle: float) -> None:
+    """The wrench of a linkage's two equal pods is that of one of twice the force between them, at
+    the watts of both: in yaw, too, as their couples cancel."""
+    c = 1.3
+    e = 1.5
+    pods = []
+    for name, y, force, factor in (
+        ("left", 0.3, 20.0, c),
+        ("right", -0.3, 20.0, c),
+        ("both", 0.0, 40.0, 2.0 ** (1.0 - e) * c),
+    ):
+        pods.append(
+            {
+                "name": name,
+                "type": "azimuth",
+                "position_m": [-0.5, y, -0.1],
+                "turn_axis": [0.0, 0.0, 1.0],
+                "zero": [1.0, 0.0, 0.0],
+                "force_n": [0.0, force],
+                "model": {"type": "power_law", "forward": factor, "exponent": e},
+            }
+        )
+    two = OraclePlant(boat_of(*pods[:2]))
+    middle = parse_layout(boat_of(pods[2]))
+    target = two.wrench(np.array([[angle, 8.0, 0.0], [angle, 8.0, 0.0]]))
+    answer = finlab.Allocator(middle).allocate(target)
+    assert answer.command[0, :2] == pytest.approx([angle, 16.0], abs=1e-5)
+    np.testing.assert_allclose(answer.wrench, target, atol=1e-5)
+    assert answer.power == pytest.approx(2.0 * c * 8.0**e, rel=1e-6)
 
 
 def test_more_than_the_momentum_of_the_slipstream_is_refused() -> None:

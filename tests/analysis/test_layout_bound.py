@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from finlab.analysis import Bounds, KeepOut, layout_bound, optimize_layout
+from finlab.analysis.climb import CLEARANCE
 from finlab.analysis.keep_out import extreme_places, keep_out_rule
 from finlab.analysis.layout_bound import inradius_factor
 from finlab.analysis.pose_set import TOLERANCE, PoseSet
@@ -27,6 +28,8 @@ CUBE = Bounds((-0.2, 0.2), (-0.2, 0.2), (-0.2, 0.2), QUARTER, QUARTER)
 """A cube, all directions."""
 FLAT = Bounds((-0.15, 0.15), (-0.22, 0.22), (-0.06, 0.06), QUARTER, QUARTER)
 """A box like that of a small vehicle, all directions."""
+FLAT_BOTH_WAYS = replace(FLAT, mounting_angle=(-np.pi, np.pi), tilt=(-np.pi, np.pi))
+"""The same box, where a thruster may also be reversed."""
 MIDDLE = KeepOut((-0.1, 0.1), (-0.2, 0.2), (-0.05, 0.05))
 """What is in the middle of it."""
 HULL = KeepOut((-0.1, 0.1), (-0.15, 0.15), (-0.04, 0.04))
@@ -262,18 +265,26 @@ def test_its_certificate_proves_it(shipped: Layouts) -> None:
     assert bound.axes == AXES
 
 
-@pytest.mark.parametrize(("n", "mirror", "most"), [(6, (), 0.08), (8, None, 0.15)])
+@pytest.mark.parametrize(
+    ("n", "bounds", "mirror", "most"),
+    [(6, FLAT, (), 0.08), (8, FLAT, None, 0.15), (8, FLAT_BOTH_WAYS, (), 0.15)],
+    ids=["six", "pairs", "eight"],
+)
 def test_a_search_comes_near_it(
-    shipped: Layouts, n: int, mirror: tuple[()] | None, most: float
+    shipped: Layouts, n: int, bounds: Bounds, mirror: tuple[()] | None, most: float
 ) -> None:
     layout = thrusters(shipped, n)
-    everywhere = dict.fromkeys(layout.names, FLAT)
+    everywhere = dict.fromkeys(layout.names, bounds)
     improvement = optimize_layout(
         layout, layout.names, everywhere, mirror=mirror, searches=2, keep_outs=[HULL], bound=True
     )
     assert improvement.improved
     assert improvement.gap is not None and 0.0 <= improvement.gap <= most
     assert (HULL.depth(improvement.layout.position) == 0.0).all()
+    first, second = np.triu_indices(n, k=1)
+    position = improvement.layout.position
+    distance = np.linalg.norm(position[first] - position[second], axis=1)
+    assert distance.min() >= CLEARANCE - 1e-8
     assert improvement.to_dict()["bound"]["value"] > improvement.value_after
 
 

@@ -65,6 +65,7 @@ _KINDS: dict[str, Any] = {
     "fl_wide": REAL,
     "int": ctypes.c_int,
     "unsigned char": ctypes.c_ubyte,
+    "signed char": ctypes.c_byte,
 }
 """Types of fields in the headers; structs join them below, each once it is read."""
 _MEMBER = re.compile(r"\s*(\*?)(\w+)((?:\[\w+\])*)\s*")
@@ -76,7 +77,9 @@ def _fields(declarations: str) -> list[tuple[str, Any]]:
     fields = list[tuple[str, Any]]()
     for declaration in re.sub(r"/\*.*?\*/", "", declarations, flags=re.S).split(";")[:-1]:
         words = declaration.split()
-        kind = words[0] if words[0] != "unsigned" else "unsigned char"
+        kind = words[0]
+        if kind in ("signed", "unsigned"):
+            kind = f"{kind} char"
         if words[0] == "const":
             kind = words[1]
         names = declaration.partition(kind)[2]

@@ -56,6 +56,16 @@ def test_a_command_holds_each_number_by_its_name(robot: str) -> None:
             assert entry[f"{name}/frequency"] == (command.frequency, 0.0)
 
 
+def test_a_propeller_with_a_rudder_has_its_angle_and_its_thrust_in_one_entry() -> None:
+    layout = finlab.Layout("boat", (finlab.PropellerRudder.sample(),), axes=("Fx",))
+    states = messages.JointStates(layout)
+    assert not states.needs_forces
+    message = states.message(np.array([[0.2, 7.0, 0.0]]), None, STAMP)
+    assert entries(message) == {"propeller_rudder": (0.2, 7.0)}
+    lost = states.message(np.full((1, 3), math.nan), None, STAMP)
+    assert math.isnan(entries(lost)["propeller_rudder"][1])
+
+
 def test_numbers_go_in_and_out_in_order() -> None:
     out = messages.wrench_stamped(range(1, 7), "base_link", STAMP)
     back = messages.wrench_of(out)

@@ -10,8 +10,9 @@ import pytest
 from finlab.errors import FinlabError, LayoutError
 from finlab.exchange import Question
 from finlab.exchange.exchange import T200_FORCE, WHICH_FORCE
-from finlab.layout import load_layout
+from finlab.layout import layout_to_dict, load_layout
 from finlab.swim.design_files import Opened
+from tests.actuators.test_propeller_rudder import JOINED, RUDDER, THRUSTER, boat_of
 from tests.exchange.test_questions import MATRIX, PLAIN_URDF, TWO_ROBOTS
 from webapp.box_labels import box_label, in_boxes
 from webapp.inquiry import checked_answer
@@ -179,6 +180,22 @@ def test_a_design_of_finlab_and_another_robot_have_no_such_list(page: Page) -> N
     assert session.state.granted == () and session.state.source is None
     session.undo()
     assert len(session.state.granted) == 4
+
+
+def test_a_rudder_that_is_read_into_its_screw_is_listed_with_its_box(page: Page) -> None:
+    session, _, importing = page
+    importing.open("boat.json", json.dumps(boat_of(THRUSTER, RUDDER)).encode())
+    row = row_of(session, "slipstream")
+    assert row.sentence == JOINED and row.left(session.state.layout) == ("screw",)
+    markup = granted_markup(session.state.granted, session.state.source, session.state.layout)
+    assert "Slipstream" in markup and "alone" not in markup
+    session.select("screw")
+    session.duplicate()
+    copy = session.state.layout.actuator("screw_2")
+    assert copy.parts == ()
+    saved = json.dumps(layout_to_dict(session.state.layout))
+    importing.open("boat.json", saved.encode())
+    assert session.state.granted == (), "what is written as one is not taken for granted"
 
 
 @pytest.mark.parametrize(

@@ -97,6 +97,22 @@ def test_usual_values_are_not_written_and_shared_ones_stay(session: Session) -> 
         modelled(fin(session, "front_right"), "table")
 
 
+@pytest.mark.parametrize("name", ["supply", "drillship"])
+def test_actuators_of_ships_move_as_far_as_the_ship_is_long(name: str) -> None:
+    session = Session(load_layout(name))
+    layout = session.state.layout
+    k = int(np.abs(layout.position[:, 0]).argmax())
+    x, y, z = layout.actuators[k].position
+    session.select(layout.names[k])
+    session.place_selected((1.2 * x, y, z))
+    session.nudge((0.5, 0.0, 0.0))
+    assert session.state.layout.position[k] == pytest.approx([1.2 * x + 0.5, y, z])
+    with pytest.raises(FinlabError, match=f"x of {layout.names[k]}"):
+        session.place_selected((3.0 * x, y, z))
+    with pytest.raises(FinlabError, match=f"x of {layout.names[k]}"):
+        session.place_selected((1001.0, y, z))
+
+
 @pytest.mark.parametrize(
     ("act", "says"),
     [

@@ -18,10 +18,13 @@ from webapp.markup.words import html
 from webapp.page import Page
 from webapp.panels.actuator_model import add_fit, add_model, of_selected
 from webapp.panels.inspectors import Box, NumberBox, RangeBox, all_inspectors, inspector_of
+from webapp.scene.stage import arrow_size
 from webapp.session.state import number
 
 LARGEST = 1e9
 """Largest size of a number that a box takes, in its unit; its field has narrower bounds."""
+PLACE_STEP_M = 0.005
+"""Step of a coordinate, on a robot of the size of a U-CAT [m]."""
 SNAPS: dict[str, Vector3] = {
     "+x": (1.0, 0.0, 0.0),
     "−x": (-1.0, 0.0, 0.0),
@@ -75,7 +78,8 @@ def _add_place(page: Page) -> None:
         session.point_selected((x, y, math.sin(elevation)))
 
     hint = "x forward, y left, z up, from the centre of gravity."
-    position = gui.add_vector3("Position [m]", (0.0, 0.0, 0.0), step=0.005, hint=hint)
+    position = gui.add_vector3("Position [m]", (0.0, 0.0, 0.0), step=PLACE_STEP_M, hint=hint)
+    board.show(position, step=lambda layout: PLACE_STEP_M * arrow_size(layout))
     page.bind_number(
         position, session.place_selected, of_selected(lambda actuator: actuator.position)
     )

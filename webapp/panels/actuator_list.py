@@ -39,7 +39,7 @@ def add_actuator_list(page: Page) -> None:
 
     page.presses.on("fin", select)
     page.presses.on("robot", lambda _key, _modifier: session.select(None))
-    adds = {kind.capitalize(): partial(session.add, kind) for kind in KINDS}
+    adds = {kind.replace("_", " ").capitalize(): partial(session.add, kind) for kind in KINDS}
     page.add_buttons("Add", adds, hint=f"On the hull; up to {MAX_ACTUATORS} actuators.")
     edits: dict[str, Callable[[], object]] = {
         "Mirror": telling_pairs(page, session.mirror),

@@ -26,8 +26,12 @@ from webapp.session.state import number, numbers, one_of
 UNTOUCHED = 1e-6
 """Change [m], [rad] up to which a coordinate or an angle counts as left alone: a page's own
 rounding."""
-MAX_COORDINATE = 10.0
-"""How far out an actuator may be placed in the browser [m]."""
+MIN_RANGE = 10.0
+"""How far out an actuator of any robot may be placed in the browser [m]."""
+RANGE_SHARE = 2.0
+"""How far out it may be placed on a large robot, over the largest coordinate of an actuator."""
+MAX_RANGE = 1000.0
+"""How far out an actuator of a layout file may be [m]."""
 CLOSE = 0.005
 """How far [m, rad] an actuator may be from another one's mirror image to count as it."""
 CLEARANCE = 0.12
@@ -47,8 +51,16 @@ DYNAMICS = tuple(field.name for field in fields(Body) if field.name != "hull")
 
 def moved(layout: Layout, name: str, position: Vector3) -> Layout:
     """The layout with an actuator at another position [m] in the body frame."""
-    checked = numbers(position, f"of {name} [m]", -MAX_COORDINATE, MAX_COORDINATE)
+    most = place_range(layout)
+    checked = numbers(position, f"of {name} [m]", -most, most)
     return layout.replace_actuator(name, position=checked)
+
+
+def place_range(layout: Layout) -> float:
+    """Largest coordinate [m] to which an actuator of a robot may be moved in the browser: it
+    follows the size of the robot, since 30 m are a slip of the hand on a small one."""
+    farthest = float(np.abs(layout.position).max(initial=0.0))
+    return min(max(MIN_RANGE, RANGE_SHARE * farthest), MAX_RANGE)
 
 
 def with_mounting_angle(layout: Layout, name: str, angle: float) -> Layout:
@@ -212,7 +224,7 @@ def _added(layout: Layout, actuator: Actuator, stem: str) -> tuple[Layout, str]:
     while name in layout.names:
         name = f"{short}_{number}"
         number += 1
-    return replace(layout, actuators=(*layout.actuators, replace(actuator, name=name))), name
+    return replace(layout, actuators=(*layout.actuators, actuator.copied(name))), name
 
 
 def _mirror_name(name: str) -> str:

@@ -25,9 +25,11 @@ typedef struct {
   real other_end;  /* angle of the other end then [rad] */
 } push_direction;
 
-/* The gauge of a plane's forces ahead; 0 where it has none, and in reverse. */
+/* The gauge of a plane's forces ahead; 0 where it has none, and in reverse, which only rudders in
+   slipstreams have beside a gauge. */
 static const real *gauge_of(const real *block, const fl_actuator *a, const fl_set *set) {
-  if (a->gauge_table > 0 && !set->is_flipped) return block + (int)a->gauge_table;
+  if (FL_SLIPSTREAMS && set->is_flipped) return 0;
+  if (a->gauge_table > 0) return block + (int)a->gauge_table;
   return 0;
 }
 
@@ -344,7 +346,9 @@ real fl_support_of_set(const real *block, int i, const fl_set *set, const real *
 int fl_undecided(const real *block, int i, const fl_set *set, const real *price, real *off) {
   const fl_actuator *a = ACTUATOR(block, i);
   const fl_set reversed = fl_reversed_set(set);
-  const response ahead = sector_response(block, a, set, gauge_of(block, a, set), price);
+  const real *gauge = 0;
+  if (FL_SLIPSTREAMS) gauge = gauge_of(block, a, set);
+  const response ahead = sector_response(block, a, set, gauge, price);
   const response reverse = sector_response(block, a, &reversed, 0, price);
   const real delta = ahead.conjugate - reverse.conjugate;
   const real omega = blend_width(reversed.cost_at_max);

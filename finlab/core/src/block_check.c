@@ -134,7 +134,8 @@ static int check_actuator(const real *block, const fl_actuator *a) {
   const int drags = fl_form_of(a)->has_drag && a->rows == 2;
   if (is_foil(a) && !drags) return FL_BAD_BLOCK;
   const int is_steered = (int)a->command_kind == FL_STEERED;
-  if (is_steered && (a->rows != 2 || !(a->gauge_table > 0))) return FL_BAD_BLOCK;
+  const int is_known = FL_SLIPSTREAMS && a->rows == 2 && a->gauge_table > 0;
+  if (is_steered && !is_known) return FL_BAD_BLOCK;
   return FL_OK;
 }
 

@@ -286,30 +286,6 @@ static void fin_force(const real *block, const fl_actuator *a, const real *comma
   grid_at(grid, command, force, slope_or_none);
 }
 
-/* Force of a propeller with a rudder in its slipstream, by deflection and thrust T, beyond that
-   at T = -p: (T + p) g, where g = (1 - sigma CD, sigma CL) is the law's grid and p the thrust
-   whose slipstream is as fast as the flow. In reverse nothing meets the rudder. */
-static void steered_force(const real *block, const fl_actuator *a, const real *command, real *force,
-                          real (*slope)[3], int has_slope) {
-  const real slipstream = command[1] + a->pressure_area;
-  if (slipstream < 0) {
-    force[1] = slipstream;
-    slope[1][1] = 1;
-    return;
-  }
-  const real along[3] = {0, 0, command[0]};
-  real g[2];
-  real by[3][3] = {{0}};
-  real(*by_or_none)[3] = 0;
-  if (has_slope) by_or_none = by;
-  grid_at(block + (int)a->law_grid, along, g, by_or_none);
-  for (int k = 0; k < 2; k++) {
-    force[1 + k] = slipstream * g[k];
-    slope[0][1 + k] = slipstream * by[2][k];
-    slope[1][1 + k] = g[k];
-  }
-}
-
 /* Where an ascending column of a curve (count, 2) has a value: linear between its points. */
 static real on_curve(const real *curve, real value) {
   const int count = (int)curve[0];
@@ -327,29 +303,6 @@ static real on_curve(const real *curve, real value) {
   real t = 0;
   if (width > 0) t = clipped((value - row[2 * low]) / width, 0, 1);
   return row[2 * low + 1] + t * (row[2 * high + 1] - row[2 * low + 1]);
-}
-
-/* Deflection and thrust for a force in the plane of a propeller with a rudder; with no force, the
-   deflection before. */
-static void steered_command(const real *block, int i, const fl_box *box, const real *force,
-                            const real *before, real *command) {
-  const fl_actuator *a = ACTUATOR(block, i);
-  const real *gauge = block + (int)a->gauge_table;
-  const real size = size_of(force);
-  const real direction = ATAN2(force[1], force[0]);
-  const int is_reverse = COS(direction) < 0;
-  real deflection = 0;
-  if (before) deflection = before[0];
-  real slipstream = size;
-  if (is_reverse) {
-    slipstream = -size;
-  } else if (size > 0) {
-    slipstream = size / fl_gauge_radius(gauge, direction);
-    deflection = direction - fl_gauge_lean(gauge, direction);
-  }
-  command[0] = fl_clip_number(box, i, 0, NO_NUMBER, deflection);
-  command[1] = fl_clip_number(box, i, 1, NO_NUMBER, slipstream - a->pressure_area);
-  command[2] = 0;
 }
 
 /* Amplitude and frequency of a fin for a share of its largest force, from a table at shares
@@ -528,29 +481,6 @@ static force_range pod_range(const real *block, int i, const fl_box *box) {
   return range;
 }
 
-/* Direction of the force of a propeller with a rudder at a deflection [rad]. */
-static real steered_direction(const real *block, int i, real deflection) {
-  const real command[3] = {deflection, 1, 0};
-  real force[3];
-  fl_force_of_command(block, i, command, force, 0);
-  return ATAN2(force[2], force[1]);
-}
-
-static force_range steered_range(const real *block, int i, const fl_box *box) {
-  const fl_actuator *a = ACTUATOR(block, i);
-  const real p = a->pressure_area;
-  const real first = steered_direction(block, i, box->command_min[i][0]);
-  const real last = steered_direction(block, i, box->command_max[i][0]);
-  const real end_low = a->sector_center - a->sector_half_angle;
-  const real end_high = a->sector_center + a->sector_half_angle;
-  const real low = clipped(first, end_low, end_high);
-  const real high = clipped(last, end_low, end_high);
-  force_range range = {0, 0, (low + high) / 2, (high - low) / 2};
-  range.low = box->command_min[i][1] + p;
-  range.high = box->command_max[i][1] + p;
-  return range;
-}
-
 static force_range fin_range(const real *block, int i, const fl_box *box) {
   const fl_actuator *a = ACTUATOR(block, i);
   force_range range = arc_of(block, i, box);
@@ -580,12 +510,86 @@ typedef struct {
   force_range (*range)(const real *block, int i, const fl_box *box);
 } command_law;
 
+#if FL_SLIPSTREAMS
+/* Force of a propeller with a rudder in its slipstream, by deflection and thrust T, beyond that
+   at T = -p: (T + p) g, where g = (1 - sigma CD, sigma CL) is the law's grid and p the thrust
+   whose slipstream is as fast as the flow. In reverse nothing meets the rudder. */
+static void steered_force(const real *block, const fl_actuator *a, const real *command, real *force,
+                          real (*slope)[3], int has_slope) {
+  const real slipstream = command[1] + a->pressure_area;
+  if (slipstream < 0) {
+    force[1] = slipstream;
+    slope[1][1] = 1;
+    return;
+  }
+  const real along[3] = {0, 0, command[0]};
+  real g[2];
+  real by[3][3] = {{0}};
+  real(*by_or_none)[3] = 0;
+  if (has_slope) by_or_none = by;
+  grid_at(block + (int)a->law_grid, along, g, by_or_none);
+  for (int k = 0; k < 2; k++) {
+    force[1 + k] = slipstream * g[k];
+    slope[0][1 + k] = slipstream * by[2][k];
+    slope[1][1 + k] = g[k];
+  }
+}
+
+/* Deflection and thrust for a force in the plane of a propeller with a rudder; with no force, the
+   deflection before. */
+static void steered_command(const real *block, int i, const fl_box *box, const real *force,
+                            const real *before, real *command) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  const real *gauge = block + (int)a->gauge_table;
+  const real size = size_of(force);
+  const real direction = ATAN2(force[1], force[0]);
+  const int is_reverse = COS(direction) < 0;
+  real deflection = 0;
+  if (before) deflection = before[0];
+  real slipstream = size;
+  if (is_reverse) {
+    slipstream = -size;
+  } else if (size > 0) {
+    slipstream = size / fl_gauge_radius(gauge, direction);
+    deflection = direction - fl_gauge_lean(gauge, direction);
+  }
+  command[0] = fl_clip_number(box, i, 0, NO_NUMBER, deflection);
+  command[1] = fl_clip_number(box, i, 1, NO_NUMBER, slipstream - a->pressure_area);
+  command[2] = 0;
+}
+
+/* Direction of the force of a propeller with a rudder at a deflection [rad]. */
+static real steered_direction(const real *block, int i, real deflection) {
+  const real command[3] = {deflection, 1, 0};
+  real force[3];
+  fl_force_of_command(block, i, command, force, 0);
+  return ATAN2(force[2], force[1]);
+}
+
+static force_range steered_range(const real *block, int i, const fl_box *box) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  const real p = a->pressure_area;
+  const real first = steered_direction(block, i, box->command_min[i][0]);
+  const real last = steered_direction(block, i, box->command_max[i][0]);
+  const real end_low = a->sector_center - a->sector_half_angle;
+  const real end_high = a->sector_center + a->sector_half_angle;
+  const real low = clipped(first, end_low, end_high);
+  const real high = clipped(last, end_low, end_high);
+  force_range range = {0, 0, (low + high) / 2, (high - low) / 2};
+  range.low = box->command_min[i][1] + p;
+  range.high = box->command_max[i][1] + p;
+  return range;
+}
+#endif
+
 static const command_law LAWS[FL_KINDS] = {
     [FL_THRUSTER] = {thruster_force, thruster_command, thruster_range},
     [FL_POD] = {pod_force, pod_command, pod_range},
     [FL_FIN] = {fin_force, fin_command, fin_range},
     [FL_FOIL] = {foil_force, foil_command, foil_range},
+#if FL_SLIPSTREAMS
     [FL_STEERED] = {steered_force, steered_command, steered_range},
+#endif
 };
 
 static const command_law *law_of(const fl_actuator *a) { return LAWS + (int)a->command_kind; }

@@ -116,8 +116,8 @@ static void take_prepared(const real *block, fl_span *span) {
   span->rank = (int)h->rank;
 }
 
-/* The wrench beside the forces, less that of actuators that are lost: the drag at rest of foils, and
-   the -p of steered propellers. Of all others it is 0. */
+/* The wrench beside the forces, less that of actuators that are lost: the drag at rest of foils,
+   and the -p of steered propellers. Of all others it is 0. */
 void fl_offset_wrench(const real *block, fl_span *span) {
   const fl_head *h = HEAD(block);
   for (int k = 0; k < 6; k++) {

@@ -13,11 +13,21 @@
 #define ACROSS R(0.01)
 #define QUICK R(1e6) /* change of an angle in a tick [rad] from which turning has no rate */
 
+/* Least thrust that is asked of an actuator whose box leaves low to high: no thrust astern of a
+   propeller with a rudder in a flow from ahead, of which too little is known there. */
+static real least_thrust(const fl_actuator *a, real low, real high) {
+  const int is_steered = FL_SLIPSTREAMS && (int)a->command_kind == FL_STEERED;
+  const int is_in_flow = is_steered && a->pressure_area > 0;
+  if (is_in_flow && low < 0 && high >= 0) return 0;
+  return low;
+}
+
 /* Makes a box of the limits of all commands of an actuator. */
 static void whole_box(const real *block, fl_box *box, int i) {
   const fl_actuator *a = ACTUATOR(block, i);
   memcpy(box->command_min[i], a->command_min, sizeof a->command_min);
   memcpy(box->command_max[i], a->command_max, sizeof a->command_max);
+  box->command_min[i][1] = least_thrust(a, a->command_min[1], a->command_max[1]);
   box->is_free_angle[i] = a->is_free_angle != 0;
 }
 
@@ -43,6 +53,7 @@ static void box_after(const real *block, fl_box *box, int i, const real *before,
     box->command_min[i][k] = larger(center - step, a->command_min[k]);
     box->command_max[i][k] = smaller(center + step, a->command_max[k]);
   }
+  box->command_min[i][1] = least_thrust(a, box->command_min[i][1], box->command_max[i][1]);
   if (FL_ZONES > 0 && a->barred_count > 0) fl_trim_arc(a, box->command_min[i], box->command_max[i]);
 }
 
@@ -124,7 +135,9 @@ static void begin_as_before(const real *block, fl_work *work, const real *previo
 /* Whether rates leave number k of a command all of its range; unused numbers always have it. */
 static int has_full_range(const real *block, const fl_box *box, int i, int k) {
   const fl_actuator *a = ACTUATOR(block, i);
-  return box->command_min[i][k] <= a->command_min[k] && box->command_max[i][k] >= a->command_max[k];
+  real least = a->command_min[k];
+  if (k == 1) least = least_thrust(a, least, a->command_max[k]);
+  return box->command_min[i][k] <= least && box->command_max[i][k] >= a->command_max[k];
 }
 
 /* The forces that an actuator's box gives, within its limits. Where rates leave it all of its

@@ -82,7 +82,7 @@ static void without_band(real band, real *low, real *high) {
 /* Makes the arc of a set that of its forces in reverse. */
 static void turn_arc_round(fl_set *set) {
   set->sector_center += PI;
-  if (!set->reverses_straight) return;
+  if (!reverses_straight(set)) return;
   set->sector_center = PI;
   set->sector_half_angle = 0;
 }
@@ -129,7 +129,8 @@ void fl_limit_set(const real *block, int i, fl_set *set, real low, real high, re
 
   set->sector_center = middle;
   set->sector_half_angle = half;
-  set->reverses_straight = (unsigned char)fl_form_of(ACTUATOR(block, i))->reverses_straight;
+  if (FL_SLIPSTREAMS)
+    set->reverses_straight = (unsigned char)fl_form_of(ACTUATOR(block, i))->reverses_straight;
   if (set->is_flipped) turn_arc_round(set);
   fl_prepare_set(block, i, set);
 }
@@ -215,7 +216,7 @@ fl_set fl_reversed_set(const fl_set *set) {
   reversed.cos_center = -set->cos_center;
   reversed.sin_center = -set->sin_center;
   turn_arc_round(&reversed);
-  if (set->reverses_straight) {
+  if (reverses_straight(set)) {
     reversed.cos_center = -1;
     reversed.sin_center = 0;
     reversed.cos_half_angle = 1;

@@ -222,13 +222,13 @@ int fl_span_of_question(const real *block, fl_work *work, const unsigned char *l
 enum { NO_NUMBER = -1 };
 enum { NO_TABLE, BEAT_TABLE, CURVE_TABLE }; /* kinds of command tables, see fl_work.h */
 typedef struct {
-  int numbers;           /* how many of the three a command uses, from the first one on */
-  int angle_number;      /* which one is an angle that wraps, or NO_NUMBER */
-  int force_number;      /* which one is a force, which may have a dead band, or NO_NUMBER */
-  int command_table;     /* what fl_actuator.command_table is: BEAT_TABLE ... */
-  int has_law_grid;      /* whether the law is a grid */
-  int has_drag;          /* whether the second axis of the law is drag */
-  int reverses_straight; /* whether in reverse it pushes against its first axis, at any angle */
+  signed char numbers;       /* how many of the three a command uses, from the first one on */
+  signed char angle_number;  /* which one is an angle that wraps, or NO_NUMBER */
+  signed char force_number;  /* which one is a force, which may have a dead band, or NO_NUMBER */
+  signed char command_table; /* what fl_actuator.command_table is: BEAT_TABLE ... */
+  signed char has_law_grid;  /* whether the law is a grid */
+  signed char has_drag;      /* whether the second axis of the law is drag */
+  signed char reverses_straight; /* whether in reverse it pushes against its first axis */
 } command_form;
 const command_form *fl_form_of(const fl_actuator *a);
 int fl_aims_force(const fl_actuator *a);
@@ -446,6 +446,11 @@ void fl_commands_of_point(const real *block, const fl_work *work, const foil_lat
 
 /* foil_arcs.c: foils that may stall, beyond reach */
 static inline int has_arc(const fl_set *set) { return FL_ARCS > 0 && set->arc; }
+
+/* Whether a set in reverse is straight against its first axis, at any deflection. */
+static inline int reverses_straight(const fl_set *set) {
+  return FL_SLIPSTREAMS && set->reverses_straight;
+}
 void fl_lay_arcs(const real *block, fl_work *work);
 #if FL_ARCS > 0
 void fl_farthest_on_arc(const fl_set *set, const real *price, wide *force);

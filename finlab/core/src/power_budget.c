@@ -755,8 +755,8 @@ static void begin_with_held(const budget_problem *p, const real *weight,
   }
 }
 
-/* Whether what is missing leaves no choice of an actuator's force: that of a bus whose power is dear
-   because of it, or one at a limit that a price holds there which is large because of it. */
+/* Whether what is missing leaves no choice of an actuator's force: that of a bus whose power is
+   dear because of it, or one at a limit that a price holds there which is large because of it. */
 static int has_no_choice(const budget_problem *p, const budget_point *at, int i) {
   const real factor = at->factor[p->bus[i]];
   const real usual = p->work->power_max[i] / ACTUATOR(p->block, i)->row_force_max[0]; /* [W/N] */

@@ -29,7 +29,7 @@ static real gap_between_ways(const real *block, const fl_actuator *a, const fl_s
   const real rounding = NEARLY * a->row_force_max[0];
   if (size <= rounding) return 0;
   real largest = set->force_max;
-  if (a->gauge_table > 0)
+  if (FL_SLIPSTREAMS && a->gauge_table > 0)
     largest *= fl_gauge_radius(block + (int)a->gauge_table, ATAN2(force[1], force[0]));
   if (is_in_sector(set, angle_from_middle(set, force), size, largest, rounding)) return 0;
   const real from_back = angle_from_middle(&reversed, force);

@@ -121,8 +121,8 @@ class JointStates:
         for index, actuator in enumerate(layout.actuators):
             kind = actuator.KIND
             angle = kind.aiming_number
-            if angle is None and kind.force_number is None:
-                angle = 0  # a foil's deflection
+            if angle is None and kind.sticks_at_angle:
+                angle = kind.stuck_number  # a rudder's deflection, with a propeller or without
             self._forces.append(kind.force_number)
             self._angles.append(angle)
             for number, name in enumerate(number_names(actuator)):
