@@ -97,6 +97,8 @@ def test_garbage_from_the_page_changes_nothing_but_raises_no_fault(
     )
     assert "Traceback" not in capsys.readouterr().err
     assert not any("fault" in note for note in view.client.notes)
+    # A budget that was set is refused where actuators act on each other, and that is said.
+    on_loop(server, lambda: view.do(lambda: view.session.set_power(None)))
     on_loop(server, lambda: view.do(lambda: view.session.set_target(0, 0.7)))
     until(lambda: not view.busy)
     assert view.shown_allocation is not None and view.shown_allocation.target[0] == 0.7
