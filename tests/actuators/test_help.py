@@ -16,7 +16,7 @@ LONGEST_SIGNATURE = 300
 """Most characters of a signature: three lines of a terminal."""
 MOST_LINES = 45
 """Most lines of a docstring: a screen."""
-NO_UNIT = {"name", "hangs", "common"}
+NO_UNIT = {"name", "alone", "hangs", "common"}
 """Arguments that are no quantities: texts and truth values."""
 
 

@@ -151,6 +151,7 @@ def test_asks_for_the_core_and_offers_extras(wheel: Path) -> None:
         "cluster",
         "logs",
         "docs",
+        "mujoco",
         "all",
         "test",
         "dev",
