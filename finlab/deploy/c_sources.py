@@ -203,8 +203,8 @@ def write_c(files: dict[str, bytes], folder: str | os.PathLike[str]) -> None:
 class ExportSize(NamedTuple):
     """What of the core the code of a robot needs."""
 
-    count: int
-    """Of actuators."""
+    actuators: int
+    """How many."""
     foils: int
     """Of those, how many may stall."""
     zones: int
@@ -217,7 +217,7 @@ def _with_size(header: str, size: ExportSize, is_coupled: bool) -> str:
     """finlab.h for a robot of this size. In single precision where a processor has no unit for
     double, but for robots whose actuators act on each other, which have no lanes of vectors."""
     values = {
-        "FL_MOST": size.count,
+        "FL_MOST": size.actuators,
         "FL_ARCS": min(size.foils, constant("FL_ARCS")),
         "FL_ZONES": size.zones,
         "FL_SLIPSTREAMS": int(size.has_slipstreams),
