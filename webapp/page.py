@@ -17,6 +17,7 @@ from webapp.board import Board
 from webapp.handles import Asking, Presses, on_user_change
 from webapp.inquiry import Inquiry
 from webapp.intents import Intents
+from webapp.markup.words import kind_words
 from webapp.number_boxes import NumberBoxes
 from webapp.scene.scenery import Scenery
 from webapp.tasks.context import Context
@@ -71,7 +72,7 @@ class Page:
             self.ask,
             "New design",
             BEGIN,
-            {k.capitalize(): partial(self.designs.new, k) for k in KINDS},
+            {kind_words(kind): partial(self.designs.new, kind) for kind in KINDS},
         )
         """Asks what a new design begins with."""
         hold_uploads(client.gui, MAX_BUNDLE_BYTES, partial(intents.notify, "Not possible"))

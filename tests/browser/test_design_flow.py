@@ -242,7 +242,7 @@ def test_what_would_be_lost_is_asked_about_and_typed_values_are_steps(page: Any)
     page.press("End")
     page.page.wait_for_function(drops.format("false"))
     page.press("New")
-    page.page.locator(".fl-ask button", has_text="Rudder").click()
+    page.page.locator(".fl-ask").get_by_role("button", name="Rudder", exact=True).click()
     page.until(
         lambda: session.desk.task == "Design" and session.state.layout.flow_driven == ("left",)
     )

@@ -75,6 +75,8 @@ def check(page: Any, name: str, text: str, end: str) -> str:
     before = box.input_value()
     heard = page.view.page.number_boxes
     count = heard.taken
+    if page.page.locator('[role="listbox"]:visible').count():
+        page.page.keyboard.press("Escape")  # options that Tab opened may lie over the box
     box.click()
     page.page.keyboard.press("Control+a")
     page.page.keyboard.press("Delete")

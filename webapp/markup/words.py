@@ -382,3 +382,8 @@ def damage_words(damage: Damage, name: str, sticks_at_angle: bool = True) -> str
         elif kind == "stuck":
             faults.append(f"hangs at {value:.3g} N")
     return ", ".join(faults).replace("-", "−")
+
+
+def kind_words(kind: str) -> str:
+    """A kind of actuator as a button says it, such as `Propeller rudder`."""
+    return kind.replace("_", " ").capitalize()

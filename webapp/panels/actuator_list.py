@@ -11,7 +11,7 @@ from finlab.layout import Actuator
 from finlab.layout.layout import MAX_ACTUATORS
 from webapp.handles import add_html, placed, press
 from webapp.markup.answer import swatch
-from webapp.markup.words import html, marker
+from webapp.markup.words import html, kind_words, marker
 from webapp.page import Page
 from webapp.panels.pairs import telling_pairs
 from webapp.session.layout_edits import partner
@@ -39,7 +39,7 @@ def add_actuator_list(page: Page) -> None:
 
     page.presses.on("fin", select)
     page.presses.on("robot", lambda _key, _modifier: session.select(None))
-    adds = {kind.replace("_", " ").capitalize(): partial(session.add, kind) for kind in KINDS}
+    adds = {kind_words(kind): partial(session.add, kind) for kind in KINDS}
     page.add_buttons("Add", adds, hint=f"On the hull; up to {MAX_ACTUATORS} actuators.")
     edits: dict[str, Callable[[], object]] = {
         "Mirror": telling_pairs(page, session.mirror),

@@ -33,7 +33,7 @@ KEPT_COMMANDS = {
     "running": ("Runs on", "It no longer listens: it keeps the command that it has."),
 }
 """Faults that keep a command of an actuator -> label and hint of their switch."""
-LOST_COLORS = (css(DEAD), "#fff")
+LOST_COLORS = (css(DEAD), ink(DEAD))
 """Background and text of the button of a lost actuator."""
 HELD_COLORS = ("transparent", "inherit")
 """Background and text of the button of an actuator that is held."""
