@@ -102,6 +102,11 @@ Share = Annotated[float, Meta(ge=1e-3, le=1.0)]
 """A share of the slipstream's dynamic pressure [1]."""
 
 
+def _direction_of(foil: Coefficients, sigma: Array | float) -> Array:
+    """g = (1 - sigma CD, sigma CL) (..., n, 2) by the coefficients (..., n) of the rudders."""
+    return np.stack([1.0 - sigma * foil.drag, sigma * foil.lift], axis=-1)
+
+
 class SteeredLaw(ActuatorLaw):
     """Law of n propellers with a rudder in the slipstream; see the module."""
 
@@ -128,7 +133,7 @@ class SteeredLaw(ActuatorLaw):
         by the deflection [1/rad], both (..., n, 2)."""
         foil: Coefficients = self._foil.coefficients(deflection)
         sigma = self.race_area
-        g = np.stack([1.0 - sigma * foil.drag, sigma * foil.lift], axis=-1)
+        g = _direction_of(foil, sigma)
         slope = np.stack([-sigma * foil.drag_slope, sigma * foil.lift_slope], axis=-1)
         return g, slope
 
@@ -337,8 +342,7 @@ def _arc_of(rudder: Rudder, race_area: float) -> Arc:
 
     def direction(deflection: Array) -> Array:
         """g (K, 2) of deflections (K,) [rad]."""
-        foil = law.coefficients(deflection[:, None])
-        return np.stack([1.0 - race_area * foil.drag[:, 0], race_area * foil.lift[:, 0]], axis=-1)
+        return _direction_of(law.coefficients(deflection[:, None]), race_area)[:, 0]
 
     # The core uses a rudder up to the peak of its lift; beyond it the same force takes more drag.
     peak = _angle_of_peak(law)

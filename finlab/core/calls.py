@@ -671,19 +671,11 @@ class Core:
             is_truncated=False,
         )
         is_truncated = np.empty(count, np.bool_)
+        batch = (wrenches, policy, conditions, multipliers, answer, is_truncated)
         if self._lock.acquire(blocking=False):
             try:
                 self._is_busy[0] = 1
-                self._answer_many(
-                    self._work_address,
-                    self._question,
-                    wrenches,
-                    policy,
-                    conditions,
-                    multipliers,
-                    answer,
-                    is_truncated,
-                )
+                self._answer_many(self._work_address, self._question, *batch)
             finally:
                 self._is_busy[0] = 0
                 self._lock.release()
@@ -691,16 +683,7 @@ class Core:
             # Another thread is answered at this moment.
             area = self._spare_area()
             try:
-                self._answer_many(
-                    area.address,
-                    area.question,
-                    wrenches,
-                    policy,
-                    conditions,
-                    multipliers,
-                    answer,
-                    is_truncated,
-                )
+                self._answer_many(area.address, area.question, *batch)
             finally:
                 self._spare_areas.append(area)
         return answer._replace(is_truncated=bool(is_truncated.any()))
