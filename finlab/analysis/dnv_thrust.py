@@ -16,8 +16,9 @@ import numpy as np
 from finlab.actuators.azimuth import Azimuth
 from finlab.actuators.thruster import Thruster
 from finlab.analysis.dnv_loads import Weather, folded
+from finlab.analysis.force_pieces import Piece
 from finlab.analysis.ship_file import ActuatorType, Ship, ShipActuator
-from finlab.analysis.split_sets import Piece, SplitSet
+from finlab.analysis.split_sets import SplitSet
 from finlab.arrays import Array
 from finlab.axes import TURN, is_full_turn
 from finlab.errors import LayoutError
@@ -92,6 +93,8 @@ class ShipThruster:
     arc: tuple[float, float] | None
     """Directions in which it may push [rad]; None all round. Of one that does not turn, that of its
     forward thrust, twice."""
+    barred: tuple[tuple[float, float], ...] = ()
+    """Sectors within the arc in which it may not [rad]: those between several arcs."""
 
     @property
     def turns(self) -> bool:
@@ -115,8 +118,10 @@ def ship_thrusters(layout: Layout, ship: Ship) -> tuple[ShipThruster, ...]:
     found = []
     for actuator in layout.actuators:
         data = ship.actuators.get(actuator.name, ShipActuator())
+        barred: tuple[tuple[float, float], ...] = ()
         if isinstance(actuator, Azimuth):
-            arc, known_type = _azimuth_arc(actuator)
+            arc, barred = _azimuth_arc(actuator)
+            known_type: ActuatorType = "azimuth"
         elif isinstance(actuator, Thruster):
             arc, known_type = _line(actuator)
         else:
@@ -149,28 +154,31 @@ def ship_thrusters(layout: Layout, ship: Ship) -> tuple[ShipThruster, ...]:
                 reverse=reverse,
                 data=data,
                 arc=arc,
+                barred=barred,
             )
         )
     return tuple(found)
 
 
-def _azimuth_arc(azimuth: Azimuth) -> tuple[tuple[float, float] | None, ActuatorType]:
-    """Directions [rad] in which a turning thruster may push, None all round, and its type."""
+def _azimuth_arc(
+    azimuth: Azimuth,
+) -> tuple[tuple[float, float] | None, tuple[tuple[float, float], ...]]:
+    """Directions [rad] in which a turning thruster may push, None all round, and the sectors among
+    them in which it may not."""
     up = azimuth.turn_axis[2]
     if abs(abs(up) - 1.0) > VERTICAL:
         raise LayoutError(
             f"{azimuth.name}.turn_axis: DNV-ST-0111 level 1 has azimuths that turn about the "
             f"vertical, got {list(azimuth.turn_axis)}"
         )
-    if azimuth.barred:
-        raise LayoutError(
-            f"{azimuth.name}.arc_deg: expected one arc for the formulas of DNV-ST-0111, got several"
-        )
     low, high = azimuth.turn_range
     if is_full_turn(high - low):
-        return None, "azimuth"
+        return None, ()
     zero = math.atan2(azimuth.zero[1], azimuth.zero[0])
-    return ((zero + low, zero + high) if up > 0.0 else (zero - high, zero - low)), "azimuth"
+    sectors = []
+    for begin, end in (azimuth.turn_range, *azimuth.barred):
+        sectors.append((zero + begin, zero + end) if up > 0.0 else (zero - end, zero - begin))
+    return sectors[0], tuple(sectors[1:])
 
 
 def _line(thruster: Thruster) -> tuple[tuple[float, float], ActuatorType]:
@@ -388,10 +396,10 @@ def ship_sets(
     dead = [each for each in thrusters if each.name in lost]
     sets = []
     for thruster in working:
-        zones: list[tuple[float, float]] = []
+        zones = [*thruster.barred]
         notches: list[Notch | None] = []
         if "flushing" in losses:
-            zones = flushing_zones(thruster, working)
+            zones += flushing_zones(thruster, working)
             notches += [dead_notch(thruster, each) for each in dead]
         if "skeg" in losses:
             notches += [skeg_notch(thruster, skeg) for skeg in ship.skegs_m]

@@ -17,65 +17,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.analysis.force_pieces import Piece, PieceTable
 from finlab.arrays import Array
-from finlab.core.ray_reach import block_of_planes
-from finlab.forces.force_sets import ForceSets, Shape, is_wide
+from finlab.forces.force_sets import Shape, is_wide
 from finlab.forces.reach import FINE
 
-INSIDE = 1e-7
-"""Distance by which a force may be outside of a part and still count as within, over the largest
-force of its actuator [1]."""
 SAME_SHARE = 1e-9
 """Share by which a leaf has to promise more than what is held already to be searched on [1]."""
-
-
-class Piece(NamedTuple):
-    """A convex set of forces of one actuator in its plane: a sector of a disc, or its hull, or a
-    polygon."""
-
-    radius: float
-    """Largest force [N]."""
-    center: float = 0.0
-    """Middle of the arc of a sector [rad]."""
-    half_angle: float = np.pi
-    """Half of that arc [rad]; pi for a disc."""
-    corners: Array | None = None
-    """Corners (K, 2) [N] of a polygon, in place of the arc."""
-
-    @property
-    def middle(self) -> Array:
-        """A force (2,) [N] of the set: the middle of a polygon, and none of a sector."""
-        return np.zeros(2) if self.corners is None else self.corners.mean(axis=0)
-
-    def contains(self, force: Array) -> NDArray[np.bool_]:
-        """Returns whether forces (R, 2) [N] are within the set, but for `INSIDE`."""
-        margin = INSIDE * self.radius
-        if self.corners is not None:
-            edge = np.roll(self.corners, -1, axis=0) - self.corners
-            length = np.linalg.norm(edge, axis=-1)
-            offset = force[:, None, :] - self.corners
-            # Counterclockwise corners: the inside is to the left of each edge.
-            left = edge[:, 0] * offset[..., 1] - edge[:, 1] * offset[..., 0]
-            within: NDArray[np.bool_] = (left >= -margin * length).all(axis=-1)
-            return within
-        size = np.linalg.norm(force, axis=-1)
-        angle = np.arctan2(force[:, 1], force[:, 0])
-        turn = (angle - self.center + np.pi) % (2.0 * np.pi) - np.pi
-        # Beyond the ends of the arc, the distance to the nearer radius counts.
-        beyond = np.maximum(np.abs(turn) - self.half_angle, 0.0)
-        distance = size * np.sin(np.minimum(beyond, 0.5 * np.pi))
-        is_within: NDArray[np.bool_] = (size <= self.radius + margin) & (distance <= margin)
-        return is_within
-
-    def to_dict(self) -> dict[str, Any]:
-        """Returns what a file holds of it."""
-        if self.corners is not None:
-            return {"corners_n": self.corners.tolist()}
-        return {
-            "radius_n": self.radius,
-            "center_rad": self.center,
-            "half_angle_rad": self.half_angle,
-        }
 
 
 class SplitSet(NamedTuple):
@@ -214,30 +162,14 @@ class _Search:
         nonzero = np.where(self.length > 0.0, self.length, 1.0)
         self._ray = scaled / nonzero[:, None]
         self._pieces = [(each.cover, *each.parts) for each in sets]
-        self._begin = np.cumsum([0, *(len(pieces) for pieces in self._pieces)])[:-1]
-        self._offset, self._block = _polygon_block(self._pieces)
-        flat = [piece for pieces in self._pieces for piece in pieces]
-        self._radius = np.array([piece.radius for piece in flat])
-        self._center = np.array([piece.center for piece in flat])
-        self._middle = np.array([piece.middle for piece in flat])
-        self._half_angle = np.array(
-            [piece.half_angle if piece.corners is None else 0.0 for piece in flat]
-        )
+        self._table = PieceTable(self._pieces)
 
     def solve(self, rows: Sequence[_Row]) -> tuple[Array, Array, Array]:
         """Returns shares (R,), prices (R, 6) and planar forces (R, n, 2) [N] of rows."""
         question = np.array([row.question for row in rows])
-        piece = self._begin + np.array([row.choice for row in rows])
+        choice = np.array([row.choice for row in rows])
         factor = self._factor[question][..., None, None]
-        sets = ForceSets(
-            effectiveness=factor * self._effectiveness / self._scale,
-            radius=self._radius[piece],
-            sector_center=self._center[piece],
-            sector_half_angle=self._half_angle[piece],
-            n_parts=np.ones_like(piece),
-            polygon_offset=self._offset[piece],
-            block=self._block,
-        )
+        sets = self._table.sets(choice, factor * self._effectiveness / self._scale)
         ray = self._ray[question]
         size, normal, force = sets.reach(np.zeros_like(ray), ray, FINE)
         missed = np.flatnonzero(np.isneginf(size))
@@ -245,7 +177,7 @@ class _Search:
             # Actuators that cannot stop: the ray misses all wrenches. One from among these to the
             # target ends before it, and the plane there parts them.
             of_missed = sets.take(missed)
-            inside = of_missed.wrench(self._middle[piece[missed]])
+            inside = of_missed.wrench(self._table.middles(choice[missed]))
             target = ray[missed] * self.length[question[missed], None]
             normal[missed] = of_missed.reach(inside, target - inside, FINE)[1]
         share = np.maximum(size, 0.0) / self.length[question]
@@ -285,21 +217,3 @@ class _Search:
         """Returns which parts a row has, by the actuators' names."""
         chosen = zip(self._sets, row.choice, strict=True)
         return {each.name: part - 1 for each, part in chosen if part > 0}
-
-
-def _polygon_block(pieces_of: Sequence[Sequence[Piece]]) -> tuple[Array, Array]:
-    """Offsets of the polygons of all pieces, 0 for sectors, and the block that holds them."""
-    tables = [block_of_planes(len(pieces_of))]
-    end_of_block = len(tables[0])
-    offsets = []
-    for pieces in pieces_of:
-        for piece in pieces:
-            if piece.corners is None:
-                offsets.append(0.0)
-                continue
-            offsets.append(float(end_of_block))
-            # A polygon in the block: the number of its corners, then their coordinates.
-            tables.append(np.array([float(len(piece.corners))]))
-            tables.append(piece.corners.ravel())
-            end_of_block += 1 + piece.corners.size
-    return np.array(offsets), np.concatenate(tables)

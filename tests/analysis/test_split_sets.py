@@ -5,8 +5,9 @@ from itertools import product
 import numpy as np
 import pytest
 
+from finlab.analysis.force_pieces import Piece
 from finlab.analysis.refusal_check import covers, proven_share
-from finlab.analysis.split_sets import Piece, SplitSet, largest_shares
+from finlab.analysis.split_sets import SplitSet, largest_shares
 
 
 def random_set(rng: np.random.Generator, name: str) -> SplitSet:
