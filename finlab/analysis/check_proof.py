@@ -10,9 +10,10 @@ A wrench of the box is a weighted mean of corners, so the same mean of their for
 a set is not convex, a convex part is named, the same for all corners; a box may be split in two,
 each with parts of its own.
 
-Refuted: in one case, of one corner w, for a price y per newton and l per watt, no force of any
-actuator has a profit y.Bf - l.P(f) above a bound, and all bounds together are below y.w - l.budget.
-Where arcs are cut in two, there is such a price for each choice of halves.
+Refuted: in one case, of one wrench w of the box, for a price y per newton and l per watt, no force
+of any actuator has a profit y.Bf - l.P(f) above a bound, and all bounds together are below
+y.w - l.budget. Where forces are not convex, arcs are taken one by one, or cut in pieces, and there
+is such a price for each choice of them.
 """
 
 import json
@@ -88,13 +89,32 @@ def turns_left(arc: Any) -> Any:
     return cross(a, b) >= 0
 
 
+def is_line(arc: Any) -> Any:
+    """Whether both directions of an arc are one."""
+    return cross(*arc) == 0 < dot(*arc)
+
+
 def in_arc(arc: Any, p: Any) -> Any:
-    if arc is None:
-        return True
     a, b = arc
     if not turns_left(arc):
         return cross(a, p) >= 0 or cross(p, b) >= 0
-    return cross(a, p) >= 0 and cross(p, b) >= 0 and dot(a, p) + dot(b, p) >= 0
+    return cross(a, p) >= 0 and cross(p, b) >= 0 and (not is_line(arc) or dot(a, p) >= 0)
+
+
+def is_within(arc: Any, whole: Any) -> Any:
+    """Whether an arc of at most half a turn lies within another one."""
+    a, b = arc
+    return in_arc(whole, a) and in_arc((a, whole[1]), b)
+
+
+def is_wide(arcs: Any) -> Any:
+    """Whether some arc has half a turn or more; no arcs are all directions."""
+    return arcs is None or any(cross(*arc) <= 0 and not is_line(arc) for arc in arcs)
+
+
+def check_edges(arcs: Any) -> None:
+    for edge in sum(arcs, []):
+        need(1 <= dot(edge, edge) < 2, "a direction of an arc is too short, or too long")
 
 
 def check_actuator(actuator: Any) -> None:
@@ -106,9 +126,11 @@ def check_actuator(actuator: Any) -> None:
     need(len(axes) == 1 or abs(dot(*axes)) < Fraction(1, 10**9), f"{name}: its axes are skew")
     least, most = actuator["force_n"]
     need(least <= most and most >= 0, f"{name}: limits of the force are in no order")
-    for edge in actuator["arc"] or ():
-        need(1 <= dot(edge, edge) < 2, f"{name}: a direction of the arc is too short")
-    need(actuator["outer_force_n"] >= max(most, -least), f"{name}: the outer force is too small")
+    check_edges(actuator["arcs"] or ())
+    low, high = actuator["outer_force_n"]
+    need(low <= least and high >= most, f"{name}: the outer forces are too few")
+    held = actuator["mean"] and is_wide(actuator["arcs"])  # small forces, as means over time
+    need(low <= 0 or not held, f"{name}: the outer forces are too few")
     power = actuator["power"]
     if power is None:
         return
@@ -121,45 +143,44 @@ def check_actuator(actuator: Any) -> None:
         need(slopes == sorted(slopes), f"{name}: its power is not convex")
         rises = len(axes) == 1 or (slopes[0] >= 0 and points[0][0] == 0)
         need(rises and min(p for _, p in points) >= 0, f"{name}: its power falls with the force")
-        need(points[0][0] <= min(least, 0) or len(axes) == 2, f"{name}: its power is not known")
-        need(points[-1][0] >= actuator["outer_force_n"] or len(axes) == 1, f"{name}: no power")
-        need(points[-1][0] >= most and power["error_w"] >= 0, f"{name}: its power is not known")
+        need(points[0][0] <= min(low, 0) or len(axes) == 2, f"{name}: its power is not known")
+        largest = high if len(axes) == 1 else max(high, -low)
+        need(points[-1][0] >= largest and power["error_w"] >= 0, f"{name}: its power is not known")
     else:
         need(power["forward"] >= 0 and power["reverse"] >= 0, f"{name}: its power is negative")
         need(1 <= power["exponent"] <= 4, f"{name}: its power is not convex")
 
 
 def convex_part(actuator: Any, part: Any) -> Any:
-    """The arc, largest force and least force ahead of the convex part of an actuator's forces."""
+    """The arc, the largest force, and n, c with n.p >= c, of a convex part of an actuator's forces
+    p."""
     name = actuator["name"]
     least, most = actuator["force_n"]
-    whole = actuator["arc"]
-    arc = part.get("arc", whole)
+    whole = actuator["arcs"]
+    arc = part.get("arc", whole[0] if whole and len(whole) == 1 else None)
+    need(arc is not None or whole is None, f"{name}: has several arcs, and no part")
     if arc is not None:
         need(turns_left(arc), f"{name}: its arc is not convex")
-        ends_inside = in_arc(whole, arc[0]) and in_arc(whole, arc[1])
-        goes_outside = False
-        if whole is not None and not turns_left(whole):
-            middle_outside = (whole[0][0] + whole[1][0], whole[0][1] + whole[1][1])
-            goes_outside = in_arc(arc, middle_outside)
-        need(ends_inside and not goes_outside, f"{name}: the part is not within its arc")
-    if least <= 0:
-        return arc, most, None
-    is_half = arc is not None and cross(*arc) == 0 and dot(*arc) < 0
-    if actuator["mean"] and (arc is None or is_half):
-        return arc, most, None  # less than the least force is a mean of opposite directions
+        check_edges([arc])
+        is_part = whole is None or any(is_within(arc, each) for each in whole)
+        need(is_part, f"{name}: the part is not within its arcs")
+    if least <= 0 or (actuator["mean"] and arc is None):
+        return arc, most, (0, 0), 0  # a small force is a mean of opposite ones
+    if actuator["mean"] and not is_line(arc):  # beyond the chord of least forces at both ends
+        a, b = arc
+        return arc, most, (b[1] - a[1], a[0] - b[0]), least * cross(a, b)
     need("ahead" in part, f"{name}: cannot push less than {float(least):g} N, and has no part")
     need(dot(part["ahead"], part["ahead"]) <= 1, f"{name}: ahead is longer than 1")
-    return arc, most, (part["ahead"], least)  # |p| >= ahead.p >= least
+    return arc, most, part["ahead"], least  # |p| >= ahead.p >= least
 
 
 def in_part(actuator: Any, part: Any, force: Any) -> Any:
     if len(actuator["axes"]) == 1:
         least, most = actuator["force_n"]
         return least <= force[0] <= most
-    arc, most, ahead = part
-    is_ahead = ahead is None or dot(ahead[0], force) >= ahead[1]
-    return in_arc(arc, force) and dot(force, force) <= most**2 and is_ahead
+    arc, most, normal, bound = part
+    is_ahead = (arc is None or in_arc(arc, force)) and dot(normal, force) >= bound
+    return is_ahead and dot(force, force) <= most**2
 
 
 def most_watts(actuator: Any, force: Any) -> Any:
@@ -167,6 +188,7 @@ def most_watts(actuator: Any, force: Any) -> Any:
     power = actuator["power"]
     is_plane = len(force) == 2
     size = root_above(dot(force, force)) if is_plane else abs(force[0])
+    size = max(size, actuator["force_n"][0]) if is_plane else size  # means are of forces so large
     if "points" not in power:
         factor = power["reverse" if force[0] < 0 and not is_plane else "forward"]
         return factor * raised(size, power["exponent"], root_above, max)
@@ -177,26 +199,35 @@ def most_watts(actuator: Any, force: Any) -> Any:
     return p0 + (p1 - p0) / (x1 - x0) * (x - x0)
 
 
-def most_gain(actuator: Any, price: Any) -> Any:
-    """An upper bound of price.d over the directions d in which an actuator can push."""
-    arc = actuator["arc"]
-    if in_arc(arc, price):
-        return root_above(dot(price, price))
-    return max(Fraction(0), dot(price, arc[0]), dot(price, arc[1]))
+def most_gain(arcs: Any, price: Any, low: Any, high: Any) -> Any:
+    """An upper bound of price.p over forces p from low to high along the directions of arcs."""
+    if arcs is None or any(in_arc(arc, price) for arc in arcs):
+        return high * root_above(dot(price, price))
+    gains = []
+    for edge in sum(arcs, []):
+        along = dot(price, edge)  # an edge is no shorter than 1
+        is_loss = along < 0 < low
+        gains.append(low * along / root_above(dot(edge, edge)) if is_loss else high * along)
+    return max(gains) if low > 0 else max(0, *gains)
 
 
 def most_profit(actuator: Any, price: Any, watt_price: Any, touch: Any) -> Any:
     """An upper bound of price.f - watt_price P(f) over all forces f of an actuator."""
-    least, most = actuator["force_n"]
+    low, high = actuator["outer_force_n"]
+    arcs = actuator["arcs"]
     power = actuator["power"]
+    back = [-c for c in price]
     if len(actuator["axes"]) == 1:
-        sides = [(price[0], most, "forward"), (-price[0], -least, "reverse")]
+        if watt_price == 0:
+            return max(price[0] * low, price[0] * high)
+        sides = [(price[0], high, "forward"), (-price[0], -low, "reverse")]
     else:
-        sides = [(most_gain(actuator, price), actuator["outer_force_n"], "forward")]
-        if least < 0:
-            sides.append((most_gain(actuator, [-c for c in price]), -least, "reverse"))
-    if watt_price == 0:
-        return max(gain * largest for gain, largest, _ in sides)
+        if watt_price == 0:
+            gain = most_gain(arcs, price, low, high)
+            return gain if low >= 0 else max(gain, most_gain(arcs, back, 0, -low))
+        sides = [(most_gain(arcs, price, 0, 1), high, "forward")]
+        if low < 0:
+            sides.append((most_gain(arcs, back, 0, 1), -low, "reverse"))
     if "points" in power:
         along = price[0] if len(actuator["axes"]) == 1 else max(gain for gain, *_ in sides)
         return max(along * x - watt_price * (p - power["error_w"]) for x, p in power["points"])
@@ -213,14 +244,13 @@ def most_profit(actuator: Any, price: Any, watt_price: Any, touch: Any) -> Any:
 
 
 def corner_wrench(low: Any, high: Any, signs: Any) -> list[Fraction]:
-    need(set(signs) <= set("+-0") and len(signs) == len(low), f"corner {signs}: no such corner")
-    ends = [{"-": a, "0": (a + b) / 2, "+": b} for a, b in zip(low, high, strict=True)]
+    ends = [{"-": a, "0": a, "+": b} for a, b in zip(low, high, strict=True)]
     return [end[sign] for end, sign in zip(ends, signs, strict=True)]
 
 
 def checked_premises(proof: Any) -> Any:
     """The actuators with their columns, and the statement with the half widths of its box."""
-    need(proof["format"] == "finlab-proof" and proof["version"] == 1, "no proof of version 1")
+    need(proof["format"] == "finlab-proof" and proof["version"] == 2, "no proof of version 2")
     statement = proof["statement"]
     rows = [i for i, axis in enumerate(AXES) if axis in statement["box"]]
     free = [axis for axis in AXES if axis not in statement["box"]]
@@ -236,7 +266,7 @@ def checked_premises(proof: Any) -> Any:
         known = statement["power_w"] is None or actuator["power"] is not None
         need(known, f"{actuator['name']}: its power is not known")
         actuator["columns"] = [[c[i] for i in rows] for c in columns(actuator)]
-    return actuators, {**statement, "half_widths": half_widths}
+    return actuators, {**statement, "rows": rows, "half_widths": half_widths}
 
 
 def check(text: Any) -> str:
@@ -305,21 +335,45 @@ def check_counterexample(example: Any, premises: Any) -> None:
     lost = example["lost"]
     few = len(set(lost)) <= statement["lost"] and set(lost) <= set(actuators)
     need(few, "others are lost than the statement says")
-    high = statement["half_widths"]
-    wrench = corner_wrench([-half for half in high], high, example["corner"])
-    cuts = example["cuts"]
-    halves = []
-    for name, middle in cuts.items():
-        first, last = actuators[name]["arc"]
-        need(actuators[name]["force_n"][0] >= 0, f"{name}: pushes astern")
-        halves.append(((first, middle), (middle, last)))
-        inside = in_arc((first, last), middle) and dot(middle, middle) >= 1
-        need(inside and all(map(turns_left, halves[-1])), f"{name}: is not cut in two halves")
-    need(len(example["prices"]) == 2 ** len(cuts), "a price for each choice of halves is missing")
-    for chosen, price in zip(product(*halves), example["prices"], strict=True):
-        arcs = dict(zip(cuts, chosen, strict=True))
-        in_halves = [{**a, "arc": arcs.get(name, a["arc"])} for name, a in actuators.items()]
-        check_price(price, wrench, [a for a in in_halves if a["name"] not in lost], statement)
+    box = statement["box"]
+    need(example["wrench"].keys() == box.keys(), "the wrench has other axes")
+    wrench = [example["wrench"][AXES[i]] for i in statement["rows"]]
+    in_box = all(abs(w) <= half for w, half in zip(wrench, statement["half_widths"], strict=True))
+    need(in_box, "the wrench is not in the box")
+    working = {name: each for name, each in actuators.items() if name not in lost}
+    check_tree(example["tree"], wrench, working, statement)
+
+
+def check_tree(tree: Any, wrench: Any, actuators: Any, statement: Any) -> None:
+    """A price, or the name of an actuator, pieces of its arcs, and a tree for each of them."""
+    if "price" in tree:
+        check_price(tree, wrench, actuators.values(), statement)
+        return
+    actuator = actuators[tree["cut"]]
+    pieces = tree["arcs"]
+    need(covers(pieces, actuator["arcs"]), f"{tree['cut']}: pieces leave out directions")
+    has_means = actuator["mean"] and actuator["outer_force_n"][0] > 0  # of forces in one arc
+    need(not has_means or pieces == actuator["arcs"], f"{tree['cut']}: its arcs cannot be cut")
+    for piece, branch in zip(pieces, tree["each"], strict=True):
+        one = {**actuators, tree["cut"]: {**actuator, "arcs": [piece]}}
+        check_tree(branch, wrench, one, statement)
+
+
+def covers(pieces: Any, arcs: Any) -> Any:
+    """Whether each arc is a chain of pieces of at most half a turn, one after the other."""
+    check_edges(pieces)
+    if arcs is None and any(map(is_line, pieces)):
+        return False
+    left = list(pieces)
+    for first, last in arcs or [(pieces[0][0], pieces[0][0])]:  # all round, back to the beginning
+        is_end = False
+        at = first
+        while not is_end:
+            if not left or left[0][0] != at or not turns_left(left[0]):
+                return False
+            at = left.pop(0)[1]
+            is_end = at == last
+    return not left
 
 
 def check_price(price: Any, wrench: Any, actuators: Any, statement: Any) -> None:
@@ -334,7 +388,7 @@ def check_price(price: Any, wrench: Any, actuators: Any, statement: Any) -> None
     need(profit < value, "the price does not separate the corner")
 
 
-NAMES = ("format", "name", "type", "free", "verdict", "layout", "corner", "axis", "remarks", "mean")
+NAMES = ("format", "name", "type", "free", "verdict", "layout", "axis", "cut", "remarks", "mean")
 
 
 def numbers_in(value: Any, key: Any = "") -> Any:

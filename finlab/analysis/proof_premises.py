@@ -10,8 +10,8 @@ the safe side by `FIN_MARGIN`: in mean over a stroke, as everywhere in finlab.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,6 +24,7 @@ from finlab.actuators.rudder import Rudder
 from finlab.actuators.thrust_model import PowerLaw
 from finlab.actuators.thrust_power import ThrustPower
 from finlab.actuators.thruster import Thruster
+from finlab.analysis.force_pieces import Piece
 from finlab.arrays import Array
 from finlab.axes import is_full_turn
 from finlab.errors import FinlabError
@@ -45,8 +46,17 @@ INNER_SHARE = 0.3
 """Where a sector's inner point lies between its tip and its rim [1]."""
 NO_ROOM = 0.99
 """Least force of a fin over its largest one from which on there is no room between them [1]."""
-MAX_CUT = 3
-"""Most actuators whose wide arcs have several parts to choose from, three each."""
+RIM_POINTS = 97
+"""Points on the rim of a sector that the search takes for a polygon."""
+SMALL_LEAST = 0.01
+"""Least force over the largest one up to which the search takes a sector whole [1]: its forces are
+means with an inner point, which lies further ahead."""
+RING_PARTS = 8
+"""Convex parts of the forces of one that turns all round and cannot stop."""
+RING_PIECE = math.pi / 8.0
+"""Widest arc of a piece of forces that cannot be small [rad]."""
+SHIFTS = (0.0, 1.0, -1.0, 0.5, -0.5)
+"""Where convex parts of an arc lie, from its middle to its ends [1]."""
 
 
 class NotSettledError(FinlabError):
@@ -58,14 +68,19 @@ class Part(NamedTuple):
 
     values: dict[str, Any]
     """Its keys in the file; none where the whole set is convex."""
-    sector_center: float
-    """Middle of its arc [rad]."""
-    sector_half_angle: float
-    """Half of its arc [rad]; pi of a circle, 0 of a line."""
-    least_ahead: float
-    """Least force along the middle of its arc [N]; 0 where any smaller force is in the set."""
+    piece: Piece
+    """The part as the search takes it."""
     inner_point: Array
-    """A point well inside (1,) or (2,) [N]."""
+    """A force (2,) [N] well inside."""
+
+
+class Cut(NamedTuple):
+    """A piece of the arcs of an actuator, by which a refutation takes them one by one."""
+
+    arc: list[list[float]]
+    """Its ends as a file has them."""
+    piece: Piece
+    """Convex set that contains all forces in it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,14 +91,15 @@ class ProofActuator:
     """Its premises, as the file has them."""
     radius: float
     """Largest force that is certain [N]; of a line the farther one of its ends."""
-    outer_radius: float
-    """Force that it does not exceed [N]."""
     parts: tuple[Part, ...]
     """Convex parts to choose from, at least one."""
-    hull: Part
-    """The whole set, convex or not."""
-    halves: tuple[Part, ...] = ()
-    """Both halves of a wide arc, which together are the whole set; none of others."""
+    cover: Piece
+    """A convex set that contains these."""
+    outer_cover: Piece
+    """A convex set that contains all forces that it may have."""
+    cuts: tuple[Cut, ...] = ()
+    """Pieces of its arcs, which together have all forces that it may have; none where
+    `outer_cover` is the set itself."""
 
     @property
     def name(self) -> str:
@@ -135,28 +151,17 @@ def proof_actuators(layout: Layout, with_power: bool) -> tuple[ProofActuator, ..
     return tuple(actuators)
 
 
-def part_choices(actuators: tuple[ProofActuator, ...]) -> list[tuple[Part, ...]]:
-    """Returns the combinations of convex parts to try in a case, first those in the middle of each
-    arc."""
-    choices = []
-    cut = 0
-    for actuator in actuators:
-        parts = actuator.parts
-        if len(parts) > 1:
-            cut += 1
-            if cut > MAX_CUT:
-                parts = parts[:1]
-        choices.append(parts)
-    return list(product(*choices))
-
-
 def decimals(values: Any) -> Any:
     """Returns numbers rounded to `PLACES` decimals, as plain values."""
     return (np.round(np.asarray(values, np.float64), PLACES) + 0.0).tolist()  # + 0.0: no "-0.0"
 
 
 def _premises(
-    actuator: Any, axes: Array, force: tuple[float, float], outer_force: float, power: Any
+    actuator: Any,
+    axes: Array,
+    force: tuple[float, float],
+    outer_force: tuple[float, float],
+    power: Any,
 ) -> dict[str, Any]:
     """What a file says of an actuator with these axes (1, 3) or (2, 3)."""
     return {
@@ -166,8 +171,8 @@ def _premises(
         "axes": decimals(axes),
         "torque_per_newton_m": decimals(getattr(actuator, "torque_per_newton", 0.0)),
         "force_n": list(map(float, force)),
-        "outer_force_n": float(outer_force),
-        "arc": None,
+        "outer_force_n": list(map(float, outer_force)),
+        "arcs": None,
         "mean": False,
         "power": power,
     }
@@ -181,28 +186,29 @@ def _thruster(thruster: Thruster, axes: Array, with_power: bool) -> ProofActuato
         raise NotSettledError(f"hangs at {most:g} N")
     power = _propeller_power(thruster, least, most, is_plane=False)
     radius = max(-least, most)
-    values = _premises(thruster, axes, (least, most), radius, power)
+    values = _premises(thruster, axes, (least, most), (least, most), power)
     values["mean"] = thruster.dead_band > 0.0
-    inner_point = np.array([0.25 * (least + most)])
-    part = Part({}, 0.0, 0.0, 0.0, inner_point)
-    return ProofActuator(values, radius, radius, (part,), part)
+    piece = Piece(radius, corners=np.array([[least, 0.0], [most, 0.0]]))
+    part = Part({}, piece, np.array([0.25 * (least + most), 0.0]))
+    return ProofActuator(values, radius, (part,), piece, piece)
 
 
 def _azimuth(azimuth: Azimuth, axes: Array, with_power: bool) -> ProofActuator:
     least, most = usable_force(azimuth)
+    if 0.0 < least < azimuth.dead_band:
+        least = 0.0  # a command within the dead band gives no force
     if with_power and (azimuth.dead_band or (least < 0.0 and not _has_law(azimuth))):
         raise NotSettledError("has a dead band or a table of power astern, and so no convex power")
     if most <= 0.0:
         raise NotSettledError("pushes astern alone; turn its zero direction round")
-    if azimuth.barred:
-        raise NotSettledError("has several arcs, and premises are those of one")
     power = _propeller_power(azimuth, least, most, is_plane=True)
-    outer = max(-least, most)
-    values = _premises(azimuth, axes, (least, most), outer, power)
-    values["mean"] = azimuth.dead_band > 0.0
-    low, high = azimuth.turn_range
-    half_angle = math.pi if is_full_turn(high - low) else 0.5 * (high - low)
-    return _plane(values, most, outer, 0.5 * (low + high), half_angle)
+    values = _premises(azimuth, axes, (least, most), (least, most), power)
+    values["mean"] = azimuth.dead_band > 0.0 and least <= 0.0
+    arcs = []
+    for low, high in azimuth.arcs:
+        half_angle = math.pi if is_full_turn(high - low) else 0.5 * (high - low)
+        arcs.append(_Arc(0.5 * (low + high), half_angle))
+    return _plane(values, arcs)
 
 
 def _fin(fin: Fin, axes: Array) -> ProofActuator:
@@ -220,6 +226,7 @@ def _fin(fin: Fin, axes: Array) -> ProofActuator:
     force = np.array([table.table.force[0], table.table.largest])
     least = float(force[0] * strongest_share) * (1.0 + FIN_MARGIN)
     most = float(force[1] * weakest_share) * (1.0 - FIN_MARGIN)
+    outer_least = float(force[0] * weakest_share) * (1.0 - FIN_MARGIN)
     outer = float(force[1] * strongest_share) * (1.0 + FIN_MARGIN)
     if least >= NO_ROOM * most:
         raise NotSettledError("can push hardly less than it can at most")
@@ -239,11 +246,12 @@ def _fin(fin: Fin, axes: Array) -> ProofActuator:
         "points": _points(size * weakest_share, watts + margin),
         "error_w": float(1.01 * np.max(chord - true)) + 3.0 * margin,
     }
-    values = _premises(fin, axes, (least, most), outer, power)
+    arc = _Arc(table.directions.sector_center, table.directions.sector_half_angle)
+    if not arc.is_narrow:
+        outer_least = 0.0  # small forces are means over time
+    values = _premises(fin, axes, (least, most), (outer_least, outer), power)
     values["mean"] = True
-    directions = table.directions
-    half_angle = directions.sector_half_angle
-    return _plane(values, most, outer, directions.sector_center, half_angle)
+    return _plane(values, [arc])
 
 
 def _gauge_step(gauge: Array) -> float:
@@ -295,55 +303,176 @@ def _points(x: Array, y: Array) -> list[list[float]]:
     return points
 
 
-def _plane(
-    values: dict[str, Any], radius: float, outer: float, center: float, half_angle: float
-) -> ProofActuator:
+class _Arc(NamedTuple):
+    """Directions of forces."""
+
+    center: float
+    """Its middle [rad]."""
+    half_angle: float
+    """Half of it [rad]; pi of all directions."""
+
+    @property
+    def is_round(self) -> bool:
+        """Whether it has all directions."""
+        return self.half_angle >= math.pi
+
+    @property
+    def is_half_turn(self) -> bool:
+        """Whether it is half a turn."""
+        return abs(self.half_angle - 0.5 * math.pi) <= HALF_TURN_TOLERANCE
+
+    @property
+    def is_narrow(self) -> bool:
+        """Whether it is less than half a turn."""
+        return self.half_angle < 0.5 * math.pi - HALF_TURN_TOLERANCE
+
+    @property
+    def edges(self) -> list[list[float]]:
+        """Its ends as a file has them."""
+        return _edges(self.center, self.half_angle)
+
+    def pieces(self, width: float) -> list[_Arc]:
+        """The arc in equal pieces that are no wider [rad]."""
+        count = max(1, math.ceil(2.0 * self.half_angle / width - HALF_TURN_TOLERANCE))
+        half_angle = self.half_angle / count
+        first = self.center - self.half_angle + half_angle
+        return [_Arc(first + 2.0 * half_angle * k, half_angle) for k in range(count)]
+
+
+def _plane(values: dict[str, Any], arcs: Sequence[_Arc]) -> ProofActuator:
     """An actuator whose force lies in a plane, with its parts."""
-    hull = _part(values, radius, center, half_angle)
-    if half_angle >= math.pi:
-        if values["force_n"][0] > 0.0 and not values["mean"]:
-            raise NotSettledError("cannot stop, and turns by more than half a turn")
-        return ProofActuator(values, radius, outer, (hull,), hull)
-    values["arc"] = _edges(center, half_angle)
-    quarter = 0.5 * math.pi
-    if half_angle <= quarter + HALF_TURN_TOLERANCE:
-        return ProofActuator(values, radius, outer, (hull,), hull)
-    room = half_angle - quarter
+    least, most = values["force_n"]
+    outer_least, outer_most = values["outer_force_n"]
+    is_round = arcs[0].is_round
+    values["arcs"] = None if is_round else [arc.edges for arc in arcs]
     parts = []
-    for share in (0.0, 1.0, -1.0):
-        part_center = center + share * (room - 1e-9)
-        part = _part(values, radius, part_center, quarter)
-        part.values["arc"] = _edges(part_center, quarter)
-        parts.append(part)
-    halves = []
-    for share in (-0.5, 0.5):
-        half = Part({}, center + share * half_angle, 0.5 * half_angle, 0.0, np.zeros(2))
-        halves.append(half)
-    can_cut = values["force_n"][0] >= 0.0
-    return ProofActuator(
-        values, radius, outer, tuple(parts), hull, tuple(halves) if can_cut else ()
-    )
+    for arc in arcs:
+        parts += _parts(arc, max(least, 0.0), most, values["mean"])
+    if len(arcs) == 1 and len(parts) == 1:
+        parts[0].values.pop("arc", None)
+    cover = _cover([part.piece for part in parts])
+
+    # What cannot stop, or has no convex arc, is cut into pieces for a refutation.
+    cuts = []
+    is_ring = outer_least > 0.0 and not values["mean"]
+    for arc in arcs:
+        width = RING_PIECE if is_ring else math.pi
+        chain = [arc] if arc.is_narrow and not is_ring else arc.pieces(width)
+        edges = [arc.edges[0], *(piece.edges[0] for piece in chain[1:])]
+        edges.append(edges[0] if is_round else arc.edges[1])
+        for piece, *ends in zip(chain, edges, edges[1:], strict=False):
+            cuts.append(Cut(ends, _outer_piece(piece, outer_least, outer_most)))
+    outer_cover = _cover([cut.piece for cut in cuts])
+    if len(cuts) == 1 or (is_round and not is_ring):
+        cuts = []
+        outer_cover = _outer_piece(arcs[0], outer_least, outer_most)
+    return ProofActuator(values, most, tuple(parts), cover, outer_cover, tuple(cuts))
 
 
-def middle_of(part: Part) -> list[float]:
-    """Returns the direction in the middle of an arc, as a file has it."""
-    return _direction(part.sector_center)
+def _parts(arc: _Arc, least: float, most: float, has_means: bool) -> list[Part]:
+    """Convex parts of the forces within an arc; of one that cannot stop beyond a line ahead, or
+    all means of these."""
+    quarter = 0.5 * math.pi
+    room = max(arc.half_angle - quarter, 0.0)
+    if least == 0.0 or has_means:
+        if arc.is_round:
+            return [Part({}, Piece(most), np.zeros(2))]
+        if room <= HALF_TURN_TOLERANCE:
+            return [_sector(arc, least, most)]
+        shifted = [_Arc(arc.center + shift * (room - 1e-9), quarter) for shift in SHIFTS]
+        return [_sector(each, 0.0, most) for each in shifted]
+    parts = []
+    if arc.is_round:
+        for k in range(RING_PARTS):
+            ahead = 2.0 * math.pi * k / RING_PARTS
+            parts.append(_beyond(_Arc(ahead, quarter), ahead, least, most))
+        return parts
+    for shift in SHIFTS if arc.half_angle > 0.0 else (0.0,):
+        if room <= HALF_TURN_TOLERANCE:
+            parts.append(_beyond(arc, arc.center + shift * arc.half_angle, least, most))
+        else:
+            center = arc.center + shift * (room - 1e-9)
+            parts.append(_beyond(_Arc(center, quarter), center, least, most))
+    return parts
 
 
-def _part(values: dict[str, Any], radius: float, center: float, half_angle: float) -> Part:
-    """A sector, without its small forces where these cannot be held."""
-    if half_angle >= math.pi:
-        return Part({}, center, half_angle, 0.0, np.zeros(2))
-    direction = np.array([math.cos(center), math.sin(center)])
-    is_half_turn = abs(half_angle - 0.5 * math.pi) <= HALF_TURN_TOLERANCE
-    least = max(values["force_n"][0], 0.0)
-    if least == 0.0 or (values["mean"] and is_half_turn):
-        return Part({}, center, half_angle, 0.0, INNER_SHARE * radius * direction)
-    if values["type"] != "fin" and half_angle > 0.5 * math.pi + HALF_TURN_TOLERANCE:
-        raise NotSettledError("cannot stop, and turns by more than half a turn")
-    inner_point = 0.5 * (least + radius) * direction
-    own = {"ahead": decimals(AHEAD_LENGTH * direction)}
-    return Part(own, center, half_angle, least, inner_point)
+def _sector(arc: _Arc, least: float, most: float) -> Part:
+    """All means of forces from the least to the most within an arc of at most half a turn."""
+    direction = np.array([math.cos(arc.center), math.sin(arc.center)])
+    chord = least * math.cos(arc.half_angle)
+    if arc.half_angle == 0.0:
+        return _beyond(arc, arc.center, least, most)
+    inner_point = INNER_SHARE * most * direction
+    piece = Piece(most, arc.center, arc.half_angle)
+    if chord > SMALL_LEAST * most:
+        inner_point = 0.5 * (chord + most) * direction
+        angle = arc.center + arc.half_angle * np.linspace(-1.0, 1.0, RIM_POINTS)
+        rim = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+        # An edge is a little longer than 1, so that the chord between edges is farther out.
+        inner = least * EDGE_LENGTH * rim[[-1, 0]]
+        piece = Piece(most, corners=np.concatenate([most * rim, inner]))
+    return Part({"arc": arc.edges}, piece, inner_point)
+
+
+def _beyond(arc: _Arc, ahead: float, least: float, most: float) -> Part:
+    """Forces within an arc of at most half a turn that push with at least the least force along a
+    direction [rad]."""
+    values: dict[str, Any] = {"arc": arc.edges}
+    direction = np.array([math.cos(ahead), math.sin(ahead)])
+    if least > 0.0:
+        values["ahead"] = decimals(AHEAD_LENGTH * direction)
+    # Up to the ends of the arc, or up to the rim where that is nearer.
+    to_rim = math.acos(min(least / most, 1.0)) if most > 0.0 else 0.0
+    low = max(arc.center - arc.half_angle, ahead - to_rim)
+    high = min(arc.center + arc.half_angle, ahead + to_rim)
+    angle = np.linspace(low, high, RIM_POINTS)
+    rim = most * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    along_line = least / np.maximum(np.cos(angle[[-1, 0]] - ahead), 1e-12)
+    inner = np.minimum(along_line / most, 1.0)[:, None] * rim[[-1, 0]] if most > 0.0 else rim[:2]
+    corners = np.concatenate([rim, inner])
+    if arc.half_angle == 0.0:
+        corners = corners[[0, -1]]
+    return Part(values, Piece(most, corners=corners), corners.mean(axis=0))
+
+
+def _outer_piece(arc: _Arc, least: float, most: float) -> Piece:
+    """A convex set of all forces within an arc, of one that is wider than half a turn its hull."""
+    reverse = max(-least, 0.0)
+    radius = max(most, reverse)
+    if arc.is_round or (reverse == 0.0 and least <= SMALL_LEAST * most and arc.half_angle > 0.0):
+        return Piece(radius, arc.center, arc.half_angle)
+    angle = arc.center + arc.half_angle * np.linspace(-1.0, 1.0, RIM_POINTS)
+    rim = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    return Piece(radius, corners=convex_hull(np.concatenate([most * rim, least * rim])))
+
+
+def _cover(pieces: Sequence[Piece]) -> Piece:
+    """A convex set that contains pieces."""
+    if len(pieces) == 1:
+        return pieces[0]
+    radius = max(piece.radius for piece in pieces)
+    points = []
+    for piece in pieces:
+        if piece.corners is not None:
+            points.append(piece.corners)
+            continue
+        angle = piece.center + piece.half_angle * np.linspace(-1.0, 1.0, RIM_POINTS)
+        points.append(piece.radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1))
+        points.append(np.zeros((1, 2)))
+    return Piece(radius, corners=convex_hull(np.concatenate(points)))
+
+
+def convex_hull(points: Array) -> Array:
+    """Returns the corners of the convex hull of points (P, 2), counter-clockwise; both ends of
+    points along a line."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        return np.asarray(points[ConvexHull(points).vertices])
+    except QhullError:
+        direction = points[np.linalg.norm(points, axis=1).argmax()]
+        along = points @ direction
+        return np.asarray(points[[along.argmin(), along.argmax()]])
 
 
 def _edges(center: float, half_angle: float) -> list[list[float]]:

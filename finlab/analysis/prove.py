@@ -3,10 +3,12 @@
 The attainable wrenches of convex sets of forces are convex, so a box is attainable where its
 corners are. `prove` finds, for each case (who is lost) and corner, forces well inside their sets by
 the core's search along rays, and corrects them in rationals until their wrench is the corner
-exactly. Where a corner is out of reach, the normal of the plane that bounds the attainable wrenches
-is a price that separates it: the counterexample. With a power budget, the dual's answers of least
-power and its multipliers take their place. `check_proof` decides whether what was found counts: no
-result says more than that it accepted the file.
+exactly. Where a wrench is out of reach, the normal of the plane that bounds the attainable wrenches
+is a price that separates it: the counterexample. Sets of forces that are not convex have parts, of
+which a box takes one of each actuator, or is split; a counterexample has a price for each choice of
+pieces of these sets (`proof_search.py`). With a power budget, the dual's answers of least power and
+its multipliers take their place. `check_proof` decides whether what was found counts: no result
+says more than that it accepted the file.
 """
 
 from __future__ import annotations
@@ -20,23 +22,21 @@ from itertools import combinations, product
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from finlab.analysis import check_proof
 from finlab.analysis.proof_premises import (
     NotSettledError,
     Part,
-    ProofActuator,
     decimals,
-    middle_of,
-    part_choices,
     proof_actuators,
 )
+from finlab.analysis.proof_search import PartSearch, Tree, Tried
 from finlab.arrays import Array
 from finlab.axes import AXES
 from finlab.errors import CommandError
-from finlab.forces.force_sets import SCALE, ForceSets, Shape, assembled, force_sets
-from finlab.forces.reach import FINE, axis_ranges
+from finlab.forces.force_sets import SCALE, force_sets
+from finlab.forces.reach import axis_ranges
 from finlab.layout import Layout
 
 Verdict = Literal["proved", "refuted", "not settled"]
@@ -54,14 +54,11 @@ that rounded axes leave no exact answer [N, N m]."""
 NO_REACH = 1e-6
 """Share of the strongest actuator's wrench below which an axis counts as out of reach [1]."""
 MAX_SPLITS = 6
-"""Most times that a box is split where arcs are wide, one split in the other."""
-MAX_CUT_ARCS = 5
-"""Most wide arcs that are cut in halves for a counterexample: each doubles the number of prices."""
-RIM_POINTS = 97
-"""Points on the rim of a sector that the search takes for a polygon."""
-SMALL_LEAST = 0.01
-"""Least force over the largest one up to which the search takes a sector whole [1]: its forces are
-means with an inner point, which lies further ahead."""
+"""Most times that a box is split where forces are not convex, one split in the other."""
+MAX_BOXES = 400
+"""Most boxes that are looked at for one statement."""
+GAP_LENGTHS = (1.0, 0.5, 0.1)
+"""Lengths of wrenches of the box that may need forces between arcs, over the largest one [1]."""
 BLENDS = (0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 1e-4, 1e-5, 1e-6, 0.0)
 """Shares of the forces well inside that are mixed into those of least power [1]."""
 
@@ -81,8 +78,8 @@ class ProofResult:
     n_corners: int = 0
     """Corners of the box in each case."""
     largest_share: float | None = None
-    """About the share of the box that holds in all cases, above 1 where there is room [1]; None
-    with a power budget, or where something is not settled before."""
+    """About the share of the box that holds in all cases at most, above 1 where there is room [1];
+    None with a power budget, or where forces that are not convex refute what it promises."""
     proof: dict[str, Any] | None = field(default=None, repr=False)
     """The file, for JSON; None where nothing is settled."""
 
@@ -93,7 +90,7 @@ class ProofResult:
         if self.verdict == "proved":
             lines.append(f"{self.n_cases} cases of {self.n_corners} corners, each in fractions.")
         if self.largest_share is not None:
-            lines.append(f"About {self.largest_share:.3g} of this box holds, by floats.")
+            lines.append(f"At most about {self.largest_share:.3g} of this box holds, by floats.")
         return "\n".join(lines)
 
     def to_dict(self) -> dict[str, Any]:
@@ -244,8 +241,41 @@ class _Search:
         for i, columns in enumerate(self._columns):
             for k, column in enumerate(columns):
                 self._effectiveness[i, k, self._rows] = np.array(column, np.float64)
+        self._inner = self._inner_search()
+        self._outer = self._outer_search()
+        self._parts = self._inner.covers
+        """The last parts that gave a box."""
+        self._boxes_left = MAX_BOXES
         self._tolerance = 0.0
         self._allocator: Any = None
+
+    def _inner_search(self) -> PartSearch:
+        """The parts of forces that are certain."""
+        pieces_of = []
+        inner_points = []
+        for actuator in self._actuators:
+            pieces = [part.piece for part in actuator.parts]
+            points = [part.inner_point for part in actuator.parts]
+            if len(pieces) > 1:
+                pieces.insert(0, actuator.cover)
+                points.insert(0, points[0])
+            pieces_of.append(pieces)
+            inner_points.append(points)
+        return PartSearch(self._effectiveness, pieces_of, inner_points)
+
+    def _outer_search(self) -> PartSearch:
+        """The pieces of all forces that are possible."""
+        pieces_of = []
+        inner_points = []
+        for actuator in self._actuators:
+            pieces = [actuator.outer_cover, *(cut.piece for cut in actuator.cuts)]
+            pieces_of.append(pieces)
+            inner_points.append([piece.middle for piece in pieces])
+        return PartSearch(self._effectiveness, pieces_of, inner_points)
+
+    def _gone(self, lost: Sequence[str]) -> list[int]:
+        """Indices of the lost."""
+        return [self._names.index(name) for name in lost]
 
     def _corners_of(self, low: list[Fraction], high: list[Fraction]) -> _Corners:
         """The corners of a box."""
@@ -272,15 +302,20 @@ class _Search:
         cases = list(self._cases())
         share, worst_case, worst_corner = self._largest_share(cases)
         if share < 1.0:
-            found = self._separated(worst_case, worst_corner)
+            found = self._refutation(worst_case, [self._whole.exact[worst_corner]])
             if found is not None:
                 return self._refuted(statement, found, share)
         written = []
+        unsettled: NotSettledError | None = None
         for lost in cases:
             try:
                 written.append({"lost": list(lost), **self._box_of(lost, self._whole, MAX_SPLITS)})
             except _CounterexampleError as error:
                 return self._refuted(statement, error.example, share)
+            except NotSettledError as error:
+                unsettled = unsettled or error
+        if unsettled is not None:
+            raise unsettled
         proof = self._file("proved", cases=written)
         return ProofResult(
             verdict="proved",
@@ -294,20 +329,20 @@ class _Search:
     def _refuted(self, statement: str, example: dict[str, Any], share: float) -> ProofResult:
         """The result with a counterexample."""
         lost = ", ".join(example["lost"])
-        signs = dict(zip(self._box, example["corner"], strict=True))
-        corner = []
-        for axis, sign in signs.items():
-            corner.append(f"{axis} {self._box[axis] * ('-0+'.index(sign) - 1):g}")
+        wrench = []
+        for axis, value in example["wrench"].items():
+            wrench.append(f"{axis} {float(Fraction(value)):g}")
         without = f"without {lost}" if lost else "with everything working"
-        limit = "" if example["prices"][0]["watt_price"] == "0" else f" within {self._power:g} W"
-        reason = f"{without} there is no wrench {', '.join(corner)}{limit}."
+        is_too_dear = example["tree"].get("watt_price", "0") != "0"
+        limit = f" within {self._power:g} W" if is_too_dear else ""
+        reason = f"{without} there is no wrench {', '.join(wrench)}{limit}."
         return ProofResult(
             verdict="refuted",
             statement=statement,
             reason=reason[0].upper() + reason[1:],
             n_cases=1,
             n_corners=len(self._whole.names),
-            largest_share=self._shown(share),
+            largest_share=self._shown(share) if share < 1.0 else None,
             proof=self._file("refuted", counterexample=example),
         )
 
@@ -324,7 +359,7 @@ class _Search:
         """The values of a file."""
         return {
             "format": "finlab-proof",
-            "version": 1,
+            "version": 2,
             "layout": self._layout.name,
             "verdict": verdict,
             "statement": {
@@ -334,95 +369,102 @@ class _Search:
                 "power_w": self._power,
                 "wrench_tolerance": self._tolerance,
             },
-            "actuators": [actuator.values for actuator in self._actuators],
+            "actuators": [{**actuator.values} for actuator in self._actuators],
             **settled,
         }
-
-    def _sets(self, lost: Sequence[str], parts: Sequence[Part], *, is_outer: bool) -> ForceSets:
-        """The sets of forces of a case, of certain parts, or of the least that holds all that is
-        possible in these parts (`is_outer`)."""
-        shapes = []
-        for actuator, part in zip(self._actuators, parts, strict=True):
-            radius = actuator.outer_radius if is_outer else actuator.radius
-            shapes.append(_shape(actuator, part, radius, is_hull=is_outer))
-        effectiveness = np.zeros((1, len(shapes), 3, 6))
-        effectiveness[0, :, :2] = self._effectiveness
-        sets = assembled([shapes], effectiveness)
-        gone = [self._names.index(name) for name in lost]
-        sets.lose(0, gone)
-        return sets
-
-    @property
-    def _hulls(self) -> list[Part]:
-        """The whole set of each actuator."""
-        return [actuator.hull for actuator in self._actuators]
 
     def _largest_share(self, cases: list[tuple[str, ...]]) -> tuple[float, tuple[str, ...], int]:
         """About the share of the box that holds in all cases, and the case and corner that bound
         it."""
         best = (math.inf, cases[0], 0)
+        wrench = self._whole.wrench
+        choices = [self._outer.covers] * len(wrench)
         for lost in cases:
-            ray = self._whole.wrench / SCALE
-            sets = self._sets(lost, self._hulls, is_outer=True).repeat(len(ray))
-            share = sets.reach(np.zeros_like(ray), ray, FINE)[0]
+            share = self._outer.solve(self._gone(lost), choices, wrench, from_rest=True).share
             corner = int(share.argmin())
             if share[corner] < best[0]:
                 best = (float(share[corner]), lost, corner)
         return best
 
-    def _inside(
-        self, lost: Sequence[str], parts: Sequence[Part], corners: _Corners
-    ) -> tuple[Array, Array]:
-        """The forces of each corner of a case that lie well inside chosen parts.
-
-        Returns:
-            Lengths (C,) of rays from an inner wrench to the end of what is attainable, over the
-            distance of the corner [1]: at least 1 within reach; and forces (C, n, 2) [N].
-        """
-        count = len(corners.names)
-        sets = self._sets(lost, parts, is_outer=False).repeat(count)
-        inner = np.zeros((len(parts), 2))
-        for i, part in enumerate(parts):
-            if self._names[i] not in lost:
-                inner[i, : len(part.inner_point)] = part.inner_point
-        inner_forces = np.broadcast_to(inner, (count, *inner.shape))
-        origin = sets.wrench(inner_forces)
-        share, _, forces = sets.reach(origin, corners.wrench / SCALE - origin, FINE)
-        # From the end of the ray back to the corner: a mean with the inner forces.
-        weight = np.where(share >= 1.0, 1.0 / np.maximum(share, 1.0), 1.0)[:, None, None]
-        return share, inner_forces + weight * (forces - inner_forces)
-
     def _box_of(self, lost: tuple[str, ...], corners: _Corners, splits: int) -> dict[str, Any]:
         """A box of a case as the file has it, split at most so often. Raises _CounterexampleError:
-        a corner is out of reach; NotSettledError: neither is known."""
+        a wrench is out of reach; NotSettledError: neither is known."""
+        self._boxes_left -= 1
         reason = ""
-        shares = []
-        for parts in part_choices(self._actuators):
-            share, forces = self._inside(lost, parts, corners)
-            shares.append(share)
-            if share.min() < 1.0:
+        failed = []
+        gone = self._gone(lost)
+        for tried in self._inner.common_parts(gone, corners.wrench, self._parts):
+            failed.append(tried)
+            if not tried.is_reached.all():
                 continue
+            parts = []
+            for actuator, number in zip(self._actuators, tried.choice, strict=True):
+                parts.append(actuator.parts[max(number - 1, 0)])
             try:
-                return self._written_box(lost, parts, corners, forces)
+                box = self._written_box(lost, parts, corners, tried.force)
             except check_proof.WrongProof as error:
                 reason = str(error)
-        is_reached = np.array(shares) >= 1.0
-        for index in np.flatnonzero(~is_reached.any(axis=0)).tolist():
-            reason = f"{self._where(lost, corners, index)}: out of reach of the convex parts tried"
-            if corners is self._whole:
-                found = self._separated(lost, index)
-                if found is not None:
-                    raise _CounterexampleError(found)
-            raise NotSettledError(reason)
-        if len(shares) == 1 or not splits:
-            where = self._where(lost, corners, int(np.array(shares).max(axis=0).argmin()))
-            raise NotSettledError(reason or f"{where}: no parts reach all corners together")
-        return self._split(lost, corners, is_reached, splits)
+                continue
+            self._parts = tried.choice
+            return box
+        wrenches = [*corners.exact, self._middle(corners)]
+        if corners is self._whole:
+            wrenches += self._wrenches_between_arcs(lost)
+        example = self._refutation(lost, wrenches)
+        if example is not None:
+            raise _CounterexampleError(example)
+        is_convex = all(len(actuator.parts) == 1 for actuator in self._actuators)
+        if is_convex or not splits or self._boxes_left <= 0:
+            last = failed[-1].is_reached
+            where = self._where(lost, corners, int(last.argmin()))
+            raise NotSettledError(reason or f"{where}: out of reach of the convex parts tried")
+        return self._split(lost, corners, failed, splits)
+
+    def _middle(self, corners: _Corners) -> list[Fraction]:
+        """The wrench in the middle of a box."""
+        return [(low + high) / 2 for low, high in zip(corners.low, corners.high, strict=True)]
+
+    def _wrenches_between_arcs(self, lost: Sequence[str]) -> list[list[Fraction]]:
+        """Wrenches of the box that may need forces in directions that no arc has."""
+        half_widths = np.array(list(self._box.values()))
+        gone = self._gone(lost)
+        working = [i for i in range(len(self._actuators)) if i not in gone]
+        # Forces of least size over the largest, f = R R B^T (B R R B^T)^-1 w, of w within the box.
+        radius = np.array([actuator.radius for actuator in self._actuators])
+        own = self._effectiveness[working][..., self._rows] * radius[working, None, None]
+        matrix = own.reshape(2 * len(working), -1).T / SCALE[self._rows, None]
+        scaled_box = np.diag(half_widths / SCALE[self._rows])
+        answers = np.linalg.pinv(matrix, rcond=RANK_TOLERANCE) @ scaled_box
+        found = []
+        for row, i in enumerate(working):
+            for direction in _directions_between(self._actuators[i].values["arcs"]):
+                force = answers[2 * row : 2 * row + 2]
+                alone = own[row].T @ direction
+                shares = [np.linalg.pinv(force) @ direction]
+                shares.append(
+                    np.where(half_widths > 0.0, alone / np.maximum(half_widths, 1e-300), 0.0)
+                )
+                for share in shares:
+                    largest = np.abs(share).max(initial=0.0)
+                    if not 0.0 < largest < math.inf:
+                        continue
+                    for length in GAP_LENGTHS:
+                        found.append(self._in_box(length / largest * share * half_widths))
+        return found
+
+    def _in_box(self, wrench: Array) -> list[Fraction]:
+        """A wrench of the axes that count, with few digits and within the box."""
+        exact = []
+        for value, half in zip(wrench.tolist(), self._whole.high, strict=True):
+            rounded = _rounded(value, float(half))
+            exact.append(min(max(rounded, -half), half))
+        return exact
 
     def _split(
-        self, lost: tuple[str, ...], corners: _Corners, is_reached: NDArray[np.bool_], splits: int
+        self, lost: tuple[str, ...], corners: _Corners, failed: Sequence[Tried], splits: int
     ) -> dict[str, Any]:
         """A box in two halves, along the axis whose corners on either side want other parts."""
+        is_reached = np.array([tried.is_reached for tried in failed])
         best = (-1, 0.0, 0)
         for k, (low, high) in enumerate(zip(corners.low, corners.high, strict=True)):
             above = np.array([name[k] == "+" for name in corners.names])
@@ -433,7 +475,7 @@ class _Search:
             width = float((high - low) / self._whole.high[k])
             best = max(best, (most_above + most_below, width, k))
         axis = best[2]
-        middle = (corners.low[axis] + corners.high[axis]) / 2
+        middle = self._middle(corners)[axis]
         high_below = [*corners.high]
         high_below[axis] = middle
         low_above = [*corners.low]
@@ -539,8 +581,9 @@ class _Search:
             row = self._layout.names.index(actuator.name)
             for k, axis in enumerate(actuator.values["axes"]):
                 cheapest[i, k] = body[row] @ axis
-        if corners is self._whole and self._watts(lost, cheapest) > self._power:
-            example = self._too_dear(lost, index, result.multipliers, cheapest)
+        if self._watts(lost, cheapest) > self._power:
+            wrench = corners.exact[index]
+            example = self._too_dear(lost, wrench, result.multipliers, cheapest)
             if example is not None:
                 raise _CounterexampleError(example)
         for blend in BLENDS:
@@ -566,12 +609,12 @@ class _Search:
         for actuator, own in zip(self._actuators, forces.tolist(), strict=True):
             if actuator.name not in lost:
                 exact = [_rounded(size, actuator.radius) for size in own[: actuator.n_axes]]
-                values = check_proof.numbers_in(_as_text({"power": actuator.values["power"]}))
+                values = check_proof.numbers_in(_as_text(actuator.values))
                 total += check_proof.most_watts(values, exact)
         return float(total)
 
     def _too_dear(
-        self, lost: Sequence[str], index: int, multipliers: Array | None, forces: Array
+        self, lost: Sequence[str], wrench: list[Fraction], multipliers: Array | None, forces: Array
     ) -> dict[str, Any] | None:
         """A counterexample by the multipliers of the least power, None where they prove nothing."""
         if multipliers is None:
@@ -580,86 +623,99 @@ class _Search:
         for actuator, own in zip(self._actuators, forces, strict=True):
             touch[actuator.name] = decimals(np.hypot(*own))
         price = decimals(np.asarray(multipliers)[self._rows])
-        prices = [{"price": price, "watt_price": "1", "touch": touch}]
-        return self._accepted(lost, index, {}, prices)
+        tree = {"price": price, "watt_price": "1", "touch": touch}
+        return self._accepted(lost, wrench, tree)
 
-    def _separated(self, lost: Sequence[str], index: int) -> dict[str, Any] | None:
-        """A counterexample by planes that bound all wrenches of a case; None: none is known that
-        separates the corner. Where hulls are not enough, wide arcs are cut in halves."""
-        found = self._separated_by(lost, index, [])
-        cut = []
-        for i, actuator in enumerate(self._actuators):
-            if actuator.halves and actuator.name not in lost:
-                cut.append(i)
-        if found is None and 0 < len(cut) <= MAX_CUT_ARCS:
-            found = self._separated_by(lost, index, cut)
-        return found
-
-    def _separated_by(
-        self, lost: Sequence[str], index: int, cut: list[int]
+    def _refutation(
+        self, lost: Sequence[str], wrenches: list[list[Fraction]]
     ) -> dict[str, Any] | None:
-        """A counterexample with the arcs of some actuators cut in halves, None where there is
-        none."""
-        cuts = {}
-        for i in cut:
-            actuator = self._actuators[i]
-            cuts[actuator.name] = middle_of(actuator.hull)
-        prices: list[dict[str, Any]] = []
-        for chosen in product(*(self._actuators[i].halves for i in cut)):
-            parts = self._hulls
-            for i, half in zip(cut, chosen, strict=True):
-                parts[i] = half
-            candidates = self._prices(lost, index, parts)
-            if not cut:
-                for price in candidates:
-                    found = self._accepted(lost, index, {}, [price])
-                    if found is not None:
-                        return found
-                return None
-            if not candidates:
-                return None
-            prices.append(candidates[-1])
-        return self._accepted(lost, index, cuts, prices)
+        """A counterexample among wrenches by planes that bound all wrenches of a case; None: none
+        is known that parts one of them."""
+        floats = np.zeros((len(wrenches), 6))
+        floats[:, self._rows] = np.array(wrenches, np.float64)
+        for tree, wrench in zip(self._outer.trees(self._gone(lost), floats), wrenches, strict=True):
+            if tree is None:
+                continue
+            written = self._written_tree(lost, wrench, tree)
+            if written is not None:
+                found = self._accepted(lost, wrench, written)
+                if found is not None:
+                    return found
+        return None
 
-    def _prices(
-        self, lost: Sequence[str], index: int, parts: Sequence[Part]
-    ) -> list[dict[str, Any]]:
-        """Prices that may separate a corner from all wrenches of chosen parts."""
-        sets = self._sets(lost, parts, is_outer=True)
-        wrench = self._whole.wrench[index] / SCALE
-        normals = []
-        # What no actuator pushes at all comes first, then the plane at the end of a ray.
-        columns = sets.full_effectiveness()[0]
-        solution = np.linalg.lstsq(columns.T, wrench, rcond=RANK_TOLERANCE)[0]
-        left = wrench - columns.T @ solution
-        if np.linalg.norm(left) > RANK_TOLERANCE * np.linalg.norm(wrench):
-            normals.append(left)
-        inner = np.zeros((1, len(self._actuators), 2))
-        for i, part in enumerate(parts):
-            if self._names[i] not in lost:
-                inner[0, i, : len(part.inner_point)] = part.inner_point
-        for origin in (sets.wrench(inner)[0], np.zeros(6)):
-            share, normal, _ = sets.reach(origin[None], (wrench - origin)[None], FINE)
-            if share[0] < 1.0:
-                normals.append(normal[0])
-        prices = []
-        for normal in normals:
+    def _written_tree(
+        self, lost: Sequence[str], wrench: list[Fraction], tree: Tree
+    ) -> dict[str, Any] | None:
+        """A tree as a file has it; None: some of its planes does not part the wrench."""
+        if tree.normal is not None:
+            return self._separating_price(lost, wrench, tree)
+        branches = []
+        for branch in tree.branches:
+            written = self._written_tree(lost, wrench, branch)
+            if written is None:
+                return None
+            branches.append(written)
+        actuator = self._actuators[tree.actuator]
+        return {"cut": actuator.name, "arcs": [cut.arc for cut in actuator.cuts], "each": branches}
+
+    def _separating_price(
+        self, lost: Sequence[str], wrench: list[Fraction], tree: Tree
+    ) -> dict[str, Any] | None:
+        """A price that parts a wrench from all forces of a choice of pieces; None: none is
+        known."""
+        premises = self._file("refuted")
+        for actuator, number in zip(premises["actuators"], tree.choice, strict=True):
+            if number:
+                index = self._names.index(actuator["name"])
+                actuator["arcs"] = [self._actuators[index].cuts[number - 1].arc]
+        actuators, statement = check_proof.checked_premises(
+            check_proof.numbers_in(_as_text(premises))
+        )
+        working = [each for name, each in actuators.items() if name not in lost]
+        for normal in self._normals(lost, wrench, tree):
             price = (normal / SCALE)[self._rows]
             largest = np.abs(price).max()
-            if largest > 0.0 and np.isfinite(largest):
-                scaled = decimals(price / largest)
-                prices.append({"price": scaled, "watt_price": "0", "touch": {}})
-        return prices
+            if not 0.0 < largest < math.inf:
+                continue
+            leaf = {"price": decimals(price / largest), "watt_price": "0", "touch": {}}
+            try:
+                check_proof.check_price(
+                    check_proof.numbers_in(_as_text(leaf)), wrench, working, statement
+                )
+            except check_proof.WrongProof:
+                continue
+            return leaf
+        return None
+
+    def _normals(self, lost: Sequence[str], wrench: list[Fraction], tree: Tree) -> Iterator[Array]:
+        """Normals (6,) of planes that may part a wrench from all of a choice of pieces, scaled."""
+        assert tree.normal is not None
+        row = np.zeros(6)
+        row[self._rows] = np.array(wrench, np.float64)
+        scaled = row / SCALE
+        # What no actuator pushes at all comes first, then the plane at the end of a ray.
+        gone = self._gone(lost)
+        columns = []
+        for i, actuator in enumerate(self._actuators):
+            if i not in gone:
+                columns += list(self._effectiveness[i] * actuator.radius / SCALE)
+        matrix = np.array(columns).reshape(-1, 6)
+        solution = np.linalg.lstsq(matrix.T, scaled, rcond=RANK_TOLERANCE)[0]
+        left = scaled - matrix.T @ solution
+        if np.linalg.norm(left) > RANK_TOLERANCE * np.linalg.norm(scaled):
+            yield left
+        yield tree.normal
+        if row.any():
+            yield self._outer.solve(gone, [tree.choice], row[None], from_rest=True).normal[0]
 
     def _accepted(
-        self, lost: Sequence[str], index: int, cuts: dict[str, Any], prices: list[dict[str, Any]]
+        self, lost: Sequence[str], wrench: list[Fraction], tree: dict[str, Any]
     ) -> dict[str, Any] | None:
         """A counterexample that the checker accepts, None where it does not."""
         example = {
             "lost": list(lost),
-            "corner": self._whole.names[index],
-            "cuts": cuts,
-            "prices": prices,
+            "wrench": dict(zip(self._box, map(_text, wrench), strict=True)),
+            "tree": tree,
         }
         try:
             _verify(self._file("refuted", counterexample=example))
@@ -669,7 +725,7 @@ class _Search:
 
 
 class _CounterexampleError(Exception):
-    """A corner that takes more power than the budget."""
+    """A wrench that is out of reach, or takes more power than the budget."""
 
     def __init__(self, example: dict[str, Any]) -> None:
         super().__init__()
@@ -687,42 +743,19 @@ class _Basis(NamedTuple):
     """Forces per missing wrench."""
 
 
-def _shape(actuator: ProofActuator, part: Part, radius: float, *, is_hull: bool) -> Shape:
-    """The forces of an actuator for the search along rays."""
-    directions = np.eye(2, 3)
-    least, most = actuator.values["force_n"]
-    if actuator.n_axes == 1:
-        ends = np.array([[least, 0.0], [most, 0.0]])
-        return Shape(directions, radius, 0.0, 0.0, (ends,))
-    center = part.sector_center
-    half_angle = part.sector_half_angle
-    angle = center + half_angle * np.linspace(-1.0, 1.0, RIM_POINTS)
-    rim = radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-    if is_hull and least < 0.0 and half_angle < math.pi:
-        corners = np.concatenate([rim, least / radius * rim])
-        return Shape(directions, radius, center, half_angle, (_convex_hull(corners),))
-    if not is_hull and part.least_ahead > SMALL_LEAST * radius:
-        # Beyond the chord along which the force ahead is the least one: up to the ends of the arc,
-        # or up to the rim where that is nearer.
-        to_rim = math.acos(min(part.least_ahead / radius, 1.0))
-        used_angle = min(half_angle, to_rim)
-        angle = center + used_angle * np.linspace(-1.0, 1.0, RIM_POINTS)
-        rim = radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-        width = part.least_ahead * math.tan(used_angle)
-        cos = math.cos(center)
-        sin = math.sin(center)
-        turn = np.array([[cos, sin], [-sin, cos]])
-        chord = np.array([[part.least_ahead, width], [part.least_ahead, -width]]) @ turn
-        corners = np.concatenate([rim, chord])
-        return Shape(directions, radius, center, half_angle, (corners,))
-    return Shape(directions, radius, center, half_angle)
-
-
-def _convex_hull(points: Array) -> Array:
-    """The corners of the convex hull of points (P, 2), counter-clockwise."""
-    from scipy.spatial import ConvexHull
-
-    return np.asarray(points[ConvexHull(points).vertices])
+def _directions_between(arcs: list[list[list[float]]] | None) -> list[Array]:
+    """Directions (2,) in the middle of what several arcs, or one that is wider than half a turn,
+    leave out, and beside its ends."""
+    if arcs is None or (len(arcs) == 1 and check_proof.turns_left(arcs[0])):
+        return []
+    found = []
+    for arc, following in zip(arcs, [*arcs[1:], arcs[0]], strict=True):
+        low = math.atan2(*arc[1][::-1])
+        width = (math.atan2(*following[0][::-1]) - low) % (2.0 * math.pi)
+        for share in (0.5, 0.1, 0.9):
+            angle = low + share * width
+            found.append(np.array([math.cos(angle), math.sin(angle)]))
+    return found
 
 
 def _pivots(matrix: Array) -> tuple[list[int], int]:

@@ -42,13 +42,13 @@ def _holds(proof: dict[str, Any]) -> bool:
     axes = [axis for axis in AXES if axis in statement["box"]]
     box = dict(zip(axes, (_decimal(statement["box"][axis]) for axis in axes), strict=True))
     complete = sorted([*statement["box"], *statement["free"]]) == sorted(AXES)
-    if proof["format"] != "finlab-proof" or proof["version"] != "1" or not complete:
+    if proof["format"] != "finlab-proof" or proof["version"] != "2" or not complete:
         return False
     if min(box.values()) < 0:
         return False
     robot = {}
     for actuator in proof["actuators"]:
-        if actuator["arc"] is not None:
+        if actuator["arcs"] is not None:
             return False
         robot[actuator["name"]] = _Oracle(actuator, axes)
     if len(robot) != len(proof["actuators"]) or not all(part.sane for part in robot.values()):
@@ -105,11 +105,12 @@ def _separates(
     tolerance: Decimal,
 ) -> bool:
     lost = set(example["lost"])
-    if len(lost) > count or not lost <= set(robot) or example["cuts"]:
+    if len(lost) > count or not lost <= set(robot) or set(example["wrench"]) != set(box):
         return False
-    corner = [("-0+".index(sign) - 1) for sign in example["corner"]]
-    target = np.array([s * half for s, half in zip(corner, box.values(), strict=True)])
-    (found,) = example["prices"]
+    target = np.array([_decimal(example["wrench"][axis]) for axis in box])
+    if any(abs(w) > half for w, half in zip(target, box.values(), strict=True)):
+        return False
+    found = example["tree"]
     price = _array(found["price"])
     per_watt = _decimal(found["watt_price"])
     if per_watt < 0 or (budget is None and per_watt):
@@ -131,12 +132,13 @@ class _Oracle:
         whole = np.concatenate([directions, torque], axis=1)
         self.columns = whole[:, [AXES.index(axis) for axis in axes]]
         self.least, self.most = map(_decimal, actuator["force_n"])
-        self.outer = _decimal(actuator["outer_force_n"])
+        self.outer = [_decimal(end) for end in actuator["outer_force_n"]]
         self.power = actuator["power"]
         norms = (directions * directions).sum(axis=1)
         square = len(directions) == 1 or abs(directions[0] @ directions[1]) < Decimal("1e-9")
         unit = max(abs(norms - 1)) < Decimal("1e-9")
-        covered = self.outer >= max(self.most, -self.least)
+        low, high = self.outer
+        covered = low <= self.least and high >= self.most
         ordered = self.most >= self.least and self.most >= 0
         self.stops = bool(self.least <= 0 or actuator["mean"] or len(directions) == 1)
         self.sane = bool(unit and square and covered and ordered and len(directions) < 3)
@@ -165,13 +167,14 @@ class _Oracle:
         best = Decimal(0) if per_watt else Decimal("-Infinity")
         error = _decimal(self.power["error_w"]) if self.power and "error_w" in self.power else 0
         if len(own_price) == 1:
-            ends = (self.least, self.most)
+            ends = self.outer
             sizes = [np.array([end * k / 40]) for end in ends for k in range(1, 41)]
         else:
             length = (own_price @ own_price).sqrt()
             if not length:
                 return best
-            sizes = [own_price / length * self.outer * k / 40 for k in range(1, 41)]
+            largest = max(self.outer[1], -self.outer[0])
+            sizes = [own_price / length * largest * k / 40 for k in range(1, 41)]
         for force in sizes:
             profit = own_price @ force
             if per_watt:
