@@ -46,8 +46,9 @@ INNER_SHARE = 0.3
 """Where a sector's inner point lies between its tip and its rim [1]."""
 NO_ROOM = 0.99
 """Least force of a fin over its largest one from which on there is no room between them [1]."""
-RIM_POINTS = 97
-"""Points on the rim of a sector that the search takes for a polygon."""
+RIM_STEP = 0.05
+"""Steps between points on the rim of a sector that the search takes for a polygon [rad]: inside by
+at most 3e-4 of the radius."""
 SMALL_LEAST = 0.01
 """Least force over the largest one up to which the search takes a sector whole [1]: its forces are
 means with an inner point, which lies further ahead."""
@@ -55,7 +56,7 @@ RING_PARTS = 8
 """Convex parts of the forces of one that turns all round and cannot stop."""
 RING_PIECE = math.pi / 8.0
 """Widest arc of a piece of forces that cannot be small [rad]."""
-SHIFTS = (0.0, 1.0, -1.0, 0.5, -0.5)
+SHIFTS = (0.0, 1.0, -1.0)
 """Where convex parts of an arc lie, from its middle to its ends [1]."""
 
 
@@ -406,8 +407,7 @@ def _sector(arc: _Arc, least: float, most: float) -> Part:
     piece = Piece(most, arc.center, arc.half_angle)
     if chord > SMALL_LEAST * most:
         inner_point = 0.5 * (chord + most) * direction
-        angle = arc.center + arc.half_angle * np.linspace(-1.0, 1.0, RIM_POINTS)
-        rim = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+        rim = _rim(arc.center - arc.half_angle, arc.center + arc.half_angle)
         # An edge is a little longer than 1, so that the chord between edges is farther out.
         inner = least * EDGE_LENGTH * rim[[-1, 0]]
         piece = Piece(most, corners=np.concatenate([most * rim, inner]))
@@ -425,9 +425,8 @@ def _beyond(arc: _Arc, ahead: float, least: float, most: float) -> Part:
     to_rim = math.acos(min(least / most, 1.0)) if most > 0.0 else 0.0
     low = max(arc.center - arc.half_angle, ahead - to_rim)
     high = min(arc.center + arc.half_angle, ahead + to_rim)
-    angle = np.linspace(low, high, RIM_POINTS)
-    rim = most * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-    along_line = least / np.maximum(np.cos(angle[[-1, 0]] - ahead), 1e-12)
+    rim = most * _rim(low, high)
+    along_line = least / np.maximum(np.cos(np.array([high, low]) - ahead), 1e-12)
     inner = np.minimum(along_line / most, 1.0)[:, None] * rim[[-1, 0]] if most > 0.0 else rim[:2]
     corners = np.concatenate([rim, inner])
     if arc.half_angle == 0.0:
@@ -441,9 +440,8 @@ def _outer_piece(arc: _Arc, least: float, most: float) -> Piece:
     radius = max(most, reverse)
     if arc.is_round or (reverse == 0.0 and least <= SMALL_LEAST * most and arc.half_angle > 0.0):
         return Piece(radius, arc.center, arc.half_angle)
-    angle = arc.center + arc.half_angle * np.linspace(-1.0, 1.0, RIM_POINTS)
-    rim = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-    return Piece(radius, corners=convex_hull(np.concatenate([most * rim, least * rim])))
+    rim = _rim(arc.center - arc.half_angle, arc.center + arc.half_angle)
+    return Piece(radius, corners=_convex_hull(np.concatenate([most * rim, least * rim])))
 
 
 def _cover(pieces: Sequence[Piece]) -> Piece:
@@ -456,15 +454,22 @@ def _cover(pieces: Sequence[Piece]) -> Piece:
         if piece.corners is not None:
             points.append(piece.corners)
             continue
-        angle = piece.center + piece.half_angle * np.linspace(-1.0, 1.0, RIM_POINTS)
-        points.append(piece.radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1))
+        rim = _rim(piece.center - piece.half_angle, piece.center + piece.half_angle)
+        points.append(piece.radius * rim)
         points.append(np.zeros((1, 2)))
-    return Piece(radius, corners=convex_hull(np.concatenate(points)))
+    return Piece(radius, corners=_convex_hull(np.concatenate(points)))
 
 
-def convex_hull(points: Array) -> Array:
-    """Returns the corners of the convex hull of points (P, 2), counter-clockwise; both ends of
-    points along a line."""
+def _rim(low: float, high: float) -> Array:
+    """Directions (P, 2) from one angle to another [rad]."""
+    n_steps = max(1, math.ceil((high - low) / RIM_STEP))
+    angle = np.linspace(low, high, n_steps + 1)
+    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+
+
+def _convex_hull(points: Array) -> Array:
+    """The corners (K, 2) of the convex hull of points (P, 2), counter-clockwise; of points along a
+    line both ends."""
     from scipy.spatial import ConvexHull, QhullError
 
     try:

@@ -21,10 +21,12 @@ from finlab.arrays import Array
 from finlab.forces.force_sets import SCALE
 from finlab.forces.reach import FINE
 
-MAX_CHOICES = 120
+MAX_CHOICES = 200
 """Most choices of parts that are looked at for one box."""
 MAX_NODES = 1500
 """Most choices of pieces that are looked at for one set of wrenches."""
+MAX_ROWS = 200_000
+"""Most wrenches of which splits of sets of forces may ask, for one statement."""
 COVER = 0
 """The choice of an actuator of which all parts count; part k has the number k + 1."""
 
@@ -94,6 +96,7 @@ class PartSearch:
         for i, points in enumerate(inner_points):
             for k, point in enumerate(points):
                 self._inner[i, k] = point
+        self._rows_left = MAX_ROWS
 
     @property
     def covers(self) -> Choice:
@@ -142,16 +145,28 @@ class PartSearch:
             wrench: wrenches (C, 6) [N, N m].
             first: a choice to begin with.
         """
-        stack = [self.covers, first]
+        stack = [self.covers]
+        if first != self.covers:
+            stack.append(first)
+        hardest = -1
         for _ in range(MAX_CHOICES):
-            if not stack:
+            if not stack or self._rows_left < 0:
                 return
             choice = stack.pop()
+            # The wrench that the last choice missed most often spares asking of all others.
+            if hardest >= 0:
+                asked = wrench[hardest : hardest + 1]
+                self._rows_left -= 1
+                if self.solve(lost, [choice], asked).share[0] < 1.0:
+                    continue
             found = self.solve(lost, [choice] * len(wrench), wrench)
             outside = self._outside(lost, choice, found.force)
+            if found.share.min() < 1.0:
+                hardest = int(found.share.argmin())
             if found.share.min() < 1.0 or not outside:
                 yield Tried(choice, found.share >= 1.0, found.force)
                 continue
+            self._rows_left -= len(wrench)
             # The actuator whose best part leaves out most forces; its best part is tried first.
             i = max(outside, key=lambda i: min(outside[i]))
             parts = sorted(range(len(outside[i])), key=lambda k: -outside[i][k])
@@ -183,6 +198,8 @@ class PartSearch:
         n_nodes = 0
         while open_nodes:
             n_nodes += len(open_nodes)
+            is_split = open_nodes[0].choice != self.covers
+            self._rows_left -= len(open_nodes) * is_split
             choices = [node.choice for node in open_nodes]
             asked = wrench[[node.question for node in open_nodes]]
             found = self.solve(lost, choices, asked)
@@ -202,7 +219,7 @@ class PartSearch:
                     node.branches.append(Tree(node.question, (*before, k, *after)))
                 children += node.branches
             open_nodes = [node for node in children if is_parted[node.question]]
-            if n_nodes + len(open_nodes) > MAX_NODES:
+            if n_nodes + len(open_nodes) > MAX_NODES or self._rows_left < 0:
                 for node in open_nodes:
                     is_parted[node.question] = False
                 open_nodes = []

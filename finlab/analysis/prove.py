@@ -25,12 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finlab.analysis import check_proof
-from finlab.analysis.proof_premises import (
-    NotSettledError,
-    Part,
-    decimals,
-    proof_actuators,
-)
+from finlab.analysis.proof_premises import NotSettledError, Part, decimals, proof_actuators
 from finlab.analysis.proof_search import PartSearch, Tree, Tried
 from finlab.arrays import Array
 from finlab.axes import AXES
@@ -53,9 +48,9 @@ WRENCH_TOLERANCE = 1e-9
 that rounded axes leave no exact answer [N, N m]."""
 NO_REACH = 1e-6
 """Share of the strongest actuator's wrench below which an axis counts as out of reach [1]."""
-MAX_SPLITS = 6
+MAX_SPLITS = 14
 """Most times that a box is split where forces are not convex, one split in the other."""
-MAX_BOXES = 400
+MAX_BOXES = 1000
 """Most boxes that are looked at for one statement."""
 GAP_LENGTHS = (1.0, 0.5, 0.1)
 """Lengths of wrenches of the box that may need forces between arcs, over the largest one [1]."""
@@ -415,8 +410,8 @@ class _Search:
             raise _CounterexampleError(example)
         is_convex = all(len(actuator.parts) == 1 for actuator in self._actuators)
         if is_convex or not splits or self._boxes_left <= 0:
-            last = failed[-1].is_reached
-            where = self._where(lost, corners, int(last.argmin()))
+            missed = int(failed[-1].is_reached.argmin()) if failed else 0
+            where = self._where(lost, corners, missed)
             raise NotSettledError(reason or f"{where}: out of reach of the convex parts tried")
         return self._split(lost, corners, failed, splits)
 
@@ -464,7 +459,9 @@ class _Search:
         self, lost: tuple[str, ...], corners: _Corners, failed: Sequence[Tried], splits: int
     ) -> dict[str, Any]:
         """A box in two halves, along the axis whose corners on either side want other parts."""
-        is_reached = np.array([tried.is_reached for tried in failed])
+        is_reached = np.zeros((len(failed) + 1, len(corners.names)), bool)
+        for row, tried in enumerate(failed):
+            is_reached[row] = tried.is_reached
         best = (-1, 0.0, 0)
         for k, (low, high) in enumerate(zip(corners.low, corners.high, strict=True)):
             above = np.array([name[k] == "+" for name in corners.names])

@@ -4,6 +4,7 @@ import copy
 import json
 import time
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -424,3 +425,31 @@ def test_an_arc_is_that_of_the_body_whichever_way_an_azimuth_turns(up: float) ->
     (sets,) = [case.sets for case in plot.cases[:1]]
     force = 1e3 * target / np.linalg.norm(target, axis=-1, keepdims=True)
     assert sets[0].cover.contains(force).tolist() == ahead_and_aside.tolist()
+
+
+@pytest.mark.parametrize("up", [1.0, -1.0])
+def test_levels_with_several_arcs_are_the_best_of_those_with_one_each(
+    four: tuple[Layout, Ship], up: float
+) -> None:
+    """Two pods with two and three arcs, one of them across the end of the turn: the share of each
+    load is the best of six ships whose pods have one of these arcs each."""
+    layout, ship = four
+    arcs = {"AZ1": ((-2.0, -0.4), (0.3, 1.2), (1.9, 4.0)), "AZ2": ((-1.3, 0.2), (1.0, 2.6))}
+    headings = [0.0, 40.0, 100.0, 190.0, 260.0, 310.0]
+
+    def shares(chosen: dict) -> np.ndarray:
+        actuators = []
+        for actuator in layout.actuators:
+            if actuator.name in chosen:
+                actuator = replace(actuator, arc=chosen[actuator.name], turn_axis=(0.0, 0.0, up))
+            actuators.append(actuator)
+        plot = dp_capability(replace(layout, actuators=tuple(actuators)), ship, headings)
+        assert faults(as_file(plot)) == []
+        return plot.share
+
+    of_one_each = []
+    for first, second in product(arcs["AZ1"], arcs["AZ2"]):
+        of_one_each.append(shares({"AZ1": first, "AZ2": second}))
+    assert shares(arcs)[..., 1:] == pytest.approx(
+        np.max(of_one_each, axis=0)[..., 1:], rel=1e-6, abs=1e-9
+    )
