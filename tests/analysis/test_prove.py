@@ -1,15 +1,20 @@
 """Proofs by boxes: what the checker accepts holds, and what is false is refused."""
 
 import json
+import math
 import os
 import random
 import subprocess
 import sys
+from dataclasses import replace
+from fractions import Fraction as F
+from itertools import pairwise, product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.optimize import linprog
 
 import finlab
 from finlab.analysis import check_proof
@@ -21,7 +26,7 @@ from finlab.forces.force_sets import SCALE, force_sets
 from finlab.interaction.jets import Jets
 from finlab.layout import Layout
 from tests.analysis.proof_oracle import is_true
-from tests.random_robots import KINDS, load, random_robot
+from tests.random_robots import KINDS, layout_of, load, random_robot
 
 ROBOTS_PER_KIND = int(os.environ.get("FINLAB_PROOF_ROBOTS", "0"))
 """Random robots of each kind; 20 are two hundred. By default one each of those that are quick."""
@@ -74,6 +79,111 @@ def test_random_robots_are_settled(kind: str) -> None:
     rudders in slipstreams are refused, see `test_propeller_rudder.py`."""
     for number in range(ROBOTS_PER_KIND or (kind not in SLOW)):
         assert verdicts(load(random_robot(kind, number, 63)))
+
+
+def pods_with_arcs(number: int, least_share: float = 0.0) -> dict[str, Any]:
+    """A planar robot of three or four pods with two or three arcs each; the least force is a share
+    of the largest one."""
+    rng = np.random.default_rng([0xA2C5, number])
+    pods = []
+    for k in range(int(rng.integers(3, 5))):
+        width = rng.dirichlet(np.ones(2 * int(rng.integers(2, 4))) * 3.0)
+        angles = rng.uniform(-180.0, 0.0) + 360.0 * np.cumsum(width)
+        most = float(rng.uniform(5.0, 30.0))
+        pods.append(
+            {
+                "name": f"p{k}",
+                "type": "azimuth",
+                "position_m": [*rng.uniform(-0.4, 0.4, 2).tolist(), 0.0],
+                "turn_axis": [0.0, 0.0, 1.0],
+                "zero": [1.0, 0.0, 0.0],
+                "force_n": [least_share * most, most],
+                "model": {"type": "power_law", "forward": 1.0},
+                "arc_deg": angles.reshape(-1, 2).tolist(),
+            }
+        )
+    layout = layout_of("pods", pods)
+    return {**layout, "axes": ["Fx", "Fy", "Tz"]}
+
+
+def forces_by_corners(pod: dict[str, Any], is_outer: bool) -> list[Any]:
+    """Convex polygons (K, 2) [N], inside or around the forces of a pod: each arc in pieces of at
+    most half a turn, of one that cannot stop of a degree."""
+    least, most = pod["force_n"]
+    polygons = []
+    for low, high in np.deg2rad(pod["arc_deg"]):
+        count = math.ceil((high - low) / (np.pi / 180.0 if least else np.pi))
+        for begin, end in pairwise(np.linspace(low, high, count + 1)):
+            steps = math.ceil((end - begin) / 0.02) + 1
+            angle = np.linspace(begin, end, steps + 1)
+            rim = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+            grown = 1.0 / np.cos(0.5 * (angle[1] - angle[0])) if is_outer else 1.0
+            shrunk = np.cos(0.5 * (end - begin)) if is_outer and least else 1.0
+            inner = least * shrunk / (1.0 if is_outer else np.cos(0.5 * (end - begin)))
+            polygons.append(np.concatenate([grown * most * rim, inner * rim[[-1, 0]]]))
+    return polygons
+
+
+def gives(pods: list[dict[str, Any]], wrench: Any, is_outer: bool) -> bool:
+    """Whether pods give a wrench (3,) of Fx, Fy, Tz: a linear programme for each choice of
+    polygons."""
+    for chosen in product(*(forces_by_corners(pod, is_outer) for pod in pods)):
+        columns = []
+        sums = np.zeros((len(pods), sum(map(len, chosen))))
+        at = 0
+        for k, (pod, corners) in enumerate(zip(pods, chosen, strict=True)):
+            x, y, _ = pod["position_m"]
+            columns.append(np.column_stack([corners, x * corners[:, 1] - y * corners[:, 0]]))
+            sums[k, at : at + len(corners)] = 1.0
+            at += len(corners)
+        equal = np.concatenate([np.concatenate(columns).T, sums])
+        right = np.concatenate([wrench, np.ones(len(pods))])
+        if linprog(np.zeros(at), A_eq=equal, b_eq=right, method="highs").status == 0:
+            return True
+    return False
+
+
+@pytest.mark.parametrize("number", range(3))
+def test_several_arcs_are_proved_and_refuted_as_linear_programmes_say(number: int) -> None:
+    """Of a box that is proved, wrenches at random are given, one lost or nobody; the wrench of a
+    counterexample is not."""
+    mapping = pods_with_arcs(number)
+    layout = load(mapping)
+    box = np.array(box_of(layout))
+    rng = np.random.default_rng([63, number])
+    found = []
+    for share, lost in ((1.0, 1), (1.0, 0), (0.2, 0), (0.05, 1)):
+        result = prove(layout, share * box, lost=lost)
+        found.append(settled(result))
+        if result.verdict == "refuted":
+            example = result.proof["counterexample"]
+            working = [pod for pod in mapping["actuators"] if pod["name"] not in example["lost"]]
+            wrench = [float(F(example["wrench"][axis])) for axis in layout.axes]
+            assert not gives(working, np.array(wrench), is_outer=False)
+            continue
+        for gone in [None, *layout.names][: 1 + lost * layout.n]:
+            working = [pod for pod in mapping["actuators"] if pod["name"] != gone]
+            for _ in range(4):
+                wrench = rng.uniform(-share, share, 3) * box[[0, 1, 5]]
+                assert gives(working, wrench, is_outer=True)
+    assert "refuted" in found
+
+
+@pytest.mark.parametrize(("turn_deg", "verdict"), [(0.0, "refuted"), (90.0, "proved")])
+def test_two_pods_that_cannot_stop_push_against_each_other(turn_deg: float, verdict: str) -> None:
+    """Side by side, and a wide zone of directions forbidden: against each other they turn the robot
+    where they push ahead and astern, and give small wrenches where they push aside."""
+    pods = []
+    for side in (-1.0, 1.0):
+        arcs = [[turn_deg - 70.0, turn_deg + 70.0], [turn_deg + 110.0, turn_deg + 250.0]]
+        pods.append(pods_with_arcs(0)["actuators"][0] | {"name": f"p{side:g}"})
+        pods[-1] |= {"position_m": [0.0, side, 0.0], "force_n": [10.0, 30.0], "arc_deg": arcs}
+    layout = load({**layout_of("pair", pods), "axes": ["Fx", "Fy", "Tz"]})
+    result = prove(layout, [0.5, 0.5, 0, 0, 0, 8.0], lost=0)
+    assert settled(result) == verdict
+    without_turns = replace(layout, axes=("Fx", "Fy"))
+    assert settled(prove(without_turns, [2.0, 2.0, 0, 0, 0, 0], lost=0)) == "proved"
+    assert settled(prove(without_turns, [2.0, 2.0, 0, 0, 0, 0], lost=1)) == "refuted"
 
 
 def test_two_losses_and_free_axes() -> None:
@@ -135,7 +245,8 @@ def test_statements_that_are_none(box: Any, options: Any, words: str) -> None:
 
 @pytest.fixture(scope="module")
 def files() -> list[str]:
-    """Files of small robots: proved and refuted, with and without a budget."""
+    """Files of small robots: proved and refuted, with and without a budget; with several arcs, wide
+    arcs and fins that cannot rest."""
     texts = []
     questions: list[tuple[str, list[float], float | None]] = [
         ("no_yaw", [1, 1, 2, 0.1, 0.1, 0], None),
@@ -148,6 +259,18 @@ def files() -> list[str]:
     ]
     for name, box, power in questions:
         result = prove(finlab.load_layout(name), box, power=power)
+        settled(result)
+        texts.append(json.dumps(result.proof))
+    for mapping, share, lost in (
+        (pods_with_arcs(1), 0.2, 0),
+        (pods_with_arcs(1), 1.0, 0),
+        (pods_with_arcs(2, least_share=0.1), 0.3, 1),
+        (random_robot("wide arcs", 14, 63), 0.6, 0),
+        (random_robot("wide arcs", 14, 63), 0.01, 1),
+        (random_robot("holes", 13, 63), 0.1, 0),
+    ):
+        layout = load(mapping)
+        result = prove(layout, share * np.array(box_of(layout)), lost=lost)
         settled(result)
         texts.append(json.dumps(result.proof))
     return texts
@@ -173,6 +296,75 @@ def test_files_with_a_changed_digit(files: list[str]) -> None:
             assert is_true(changed), f"{text[place - 40 : place]}[{text[place]} -> {digit}]"
     print(f"\nof {CHANGED_FILES} files {n_refused} are refused, the others are true")
     assert n_refused > CHANGED_FILES // 4
+
+
+RIGHT, LEFT, UP, DOWN = ([F(1), F(0)], [F(-1), F(0)], [F(0), F(1)], [F(0), F(-1)])
+NARROW = [[F(1), F("-0.2")], [F(1), F("0.2")]]
+"""An arc about the first axis."""
+
+
+def pod(arcs: Any, least: float = 0, mean: bool = False) -> dict[str, Any]:
+    """An actuator of a plane, as far as the checker asks about its forces."""
+    low = 0 if mean and check_proof.is_wide(arcs) else F(least)
+    return {"name": "pod", "axes": [0, 0], "arcs": arcs, "mean": mean} | {
+        "force_n": [F(least), F(10)],
+        "outer_force_n": [low, F(10)],
+    }
+
+
+@pytest.mark.parametrize(
+    ("arcs", "least", "mean", "part"),
+    [
+        ([[RIGHT, LEFT]], 0, False, {"arc": [LEFT, RIGHT]}),  # the other half
+        ([[RIGHT, UP], [LEFT, DOWN]], 0, False, {"arc": [RIGHT, LEFT]}),  # across a gap
+        ([[RIGHT, UP], [LEFT, DOWN]], 0, False, {}),  # both
+        ([[RIGHT, DOWN]], 0, False, {"arc": [LEFT, RIGHT]}),  # across the end
+        ([[RIGHT, DOWN]], 0, False, {}),  # wider than half a turn
+        ([[RIGHT, UP]], 0, False, {"arc": [RIGHT, [F(1), F("-0.1")]]}),  # nearly all round
+        (None, 1, False, {"arc": [RIGHT, LEFT]}),  # with its small forces
+        (None, 1, False, {"ahead": [F(2), F(0)]}),  # with most of them
+        ([NARROW], 1, True, {"arc": [[F("0.5"), F("-0.1")], NARROW[1]]}),  # a chord too near
+    ],
+)
+def test_parts_that_are_not_convex_or_leave_the_arcs(
+    arcs: Any, least: float, mean: bool, part: dict[str, Any]
+) -> None:
+    """The checker refuses them."""
+    with pytest.raises(check_proof.WrongProof):
+        check_proof.convex_part(pod(arcs, least, mean), part)
+
+
+@pytest.mark.parametrize(
+    ("arcs", "pieces", "mean"),
+    [
+        (None, [[RIGHT, RIGHT]], False),  # no turn
+        (None, [[RIGHT, UP], [UP, LEFT]], False),  # half of it
+        ([[RIGHT, DOWN]], [[RIGHT, DOWN]], False),  # a piece that is not convex
+        ([[RIGHT, DOWN]], [[RIGHT, UP], [LEFT, DOWN]], False),  # a gap
+        ([[RIGHT, UP], [LEFT, DOWN]], [[RIGHT, UP]], False),  # an arc is missing
+        ([[RIGHT, UP]], [[[F("0.5"), F(0)], UP]], False),  # another end
+        ([NARROW], [[NARROW[0], RIGHT], [RIGHT, NARROW[1]]], True),  # means of both pieces
+    ],
+)
+def test_pieces_that_leave_out_forces(arcs: Any, pieces: Any, mean: bool) -> None:
+    """The checker refuses a counterexample by such pieces, whatever the prices."""
+    price = {"price": [F(1)], "watt_price": F(0), "touch": {}}
+    tree = {"cut": "pod", "arcs": pieces, "each": [price for _ in pieces]}
+    actuator = pod(arcs, least=1, mean=mean) | {"columns": [[F(0)], [F(0)]], "power": None}
+    statement = {"power_w": None, "wrench_tolerance": F(0)}
+    with pytest.raises(check_proof.WrongProof, match=r"leave out|cannot be cut|too short"):
+        check_proof.check_tree(tree, [F(1)], {"pod": actuator}, statement)
+
+
+def test_wrenches_out_of_the_box_refute_nothing(files: list[str]) -> None:
+    """Nor do those of other axes."""
+    refuted = [text for text in files if '"refuted"' in text]
+    for text in refuted:
+        for change in ({"Fx": "1000"}, {"Fw": "0"}):
+            proof = json.loads(text)
+            proof["counterexample"]["wrench"] |= change
+            with pytest.raises(check_proof.WrongProof, match="wrench"):
+                check_proof.check(json.dumps(proof))
 
 
 def test_the_checker_needs_python_alone(tmp_path: Path, files: list[str]) -> None:
