@@ -49,9 +49,8 @@ NO_ROOM = 0.99
 RIM_STEP = 0.05
 """Steps between points on the rim of a sector that the search takes for a polygon [rad]: inside by
 at most 3e-4 of the radius."""
-SMALL_LEAST = 0.01
-"""Least force over the largest one up to which the search takes a sector whole [1]: its forces are
-means with an inner point, which lies further ahead."""
+SMALL_LEAST = 1e-6
+"""Least force over the largest one up to which the search takes a sector whole [1]."""
 RING_PARTS = 8
 """Convex parts of the forces of one that turns all round and cannot stop."""
 RING_PIECE = math.pi / 8.0
