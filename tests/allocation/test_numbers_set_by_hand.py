@@ -28,6 +28,7 @@ PYTHON_FILES = [
     ROOT / "finlab/actuators/rudder.py",
     ROOT / "finlab/actuators/thrust_power.py",
     ROOT / "finlab/actuators/thruster.py",
+    ROOT / "finlab/analysis/force_pieces.py",
     ROOT / "finlab/analysis/layout_bound.py",
     ROOT / "finlab/analysis/pose_set.py",
     ROOT / "finlab/analysis/split_sets.py",
