@@ -52,6 +52,10 @@ UNIT_ROUNDING = 1e-14
 """Differences up to this one are rounding [1, rad]: such vectors stay as they are, bit for bit."""
 MIN_LENGTH = 1e-6
 """Length below which a vector has no direction, and an axis no component along another one [1]."""
+SAME_DIRECTION = 1e-9
+"""Difference of direction that is rounding [rad]."""
+VERTICAL = 1e-6
+"""How far a direction may be off the vertical or the horizontal [1]."""
 DECIMALS = 12
 """Decimals to which axes and points are rounded after a rotation."""
 FULL_TURN_TOLERANCE_DEG = 1e-6
@@ -68,6 +72,41 @@ UP = np.array([0.0, 0.0, 1.0])
 def is_full_turn(arc: Any) -> Any:
     """Returns whether arcs [rad], a number, an array or a tensor, cover the circle."""
     return arc >= TURN - FULL_TURN_TOLERANCE
+
+
+def arcs_outside(
+    arc: tuple[float, float] | None, zones: Sequence[tuple[float, float]]
+) -> list[tuple[float, float]]:
+    """Returns what zones leave of an arc.
+
+    Args:
+        arc: least and greatest angle [rad]; None of all directions.
+        zones: least and greatest angle of each zone [rad], modulo a turn.
+
+    Returns:
+        Arcs [rad], ascending; none where the zones leave nothing.
+    """
+    begin, end = (0.0, TURN) if arc is None else arc
+    if arc is None and zones:
+        # Begin all round at the end of a zone, where no arc is cut in two.
+        begin = zones[0][1]
+        end = begin + TURN
+    taken = []
+    for low, high in zones:
+        first = begin + (low - begin) % TURN
+        for turn in (0.0, -TURN):
+            taken.append((first + turn, first + turn + high - low))
+    arcs = []
+    position = begin
+    for low, high in sorted(taken):
+        if low > position + SAME_DIRECTION:
+            arcs.append((position, min(low, end)))
+        position = max(position, high)
+        if position >= end:
+            break
+    if position < end - SAME_DIRECTION:
+        arcs.append((position, end))
+    return [(low, high) for low, high in arcs if high > low + SAME_DIRECTION]
 
 
 def wrapped(angle: ArrayLike) -> Array:

@@ -29,7 +29,7 @@ NAMES = {
     "finlab.fit": "FinFit Measurements fit_fin read_measurements write_fin",
     "finlab.swim.hull": "Surface contradicts displaced estimated hull_of lift_of",
     "finlab.layout": "Actuator Azimuth Body Damage Fin FinModelSpec Hull Layout Limits "
-    "MAX_ACTUATORS PropellerRudder Rudder Servo Thruster Tilt Uncertainty layout_effectiveness layout_to_dict "
+    "MAX_ACTUATORS PropellerRudder Rudder Servo Thruster Tilt Uncertainty kept_clear layout_effectiveness layout_to_dict "
     "load_layout own_effectiveness parse_layout save_layout",
     "finlab.log": "Judgement Log judge read_log",
     "finlab.physics": "FinLaw Plant TableLaw make_law plant_of read_table write_table",

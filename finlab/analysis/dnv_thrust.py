@@ -20,7 +20,7 @@ from finlab.analysis.force_pieces import Piece
 from finlab.analysis.ship_file import ActuatorType, Ship, ShipActuator
 from finlab.analysis.split_sets import SplitSet
 from finlab.arrays import Array
-from finlab.axes import TURN, is_full_turn
+from finlab.axes import SAME_DIRECTION, TURN, VERTICAL, arcs_outside, is_full_turn
 from finlab.errors import LayoutError
 from finlab.layout import Layout
 
@@ -69,10 +69,6 @@ SKEG_WIDTH = 0.6
 """Of the race at a skeg, half the width over the diameter."""
 CORNER_STEP = math.pi / 180.0
 """Steps of direction of a polygon: within its arc by at most 4e-5 of the radius."""
-SAME_DIRECTION = 1e-9
-"""Difference of direction that is rounding [rad]."""
-VERTICAL = 1e-6
-"""How far a direction may be off the vertical or the horizontal [1]."""
 
 
 @dataclass(frozen=True)
@@ -451,7 +447,7 @@ def _turning_set(
 ) -> tuple[Piece, tuple[Piece, ...]]:
     """A cover of the forces of an azimuth, and the convex parts of these; no parts where the cover
     is all of them."""
-    arcs = _allowed_arcs(thruster.arc, zones)
+    arcs = arcs_outside(thruster.arc, zones)
     if not arcs:
         return Piece(0.0), ()
     stretches = []
@@ -463,33 +459,6 @@ def _turning_set(
     if len(pieces) == 1 and len(arcs) == 1:
         return pieces[0], ()
     return _cover(arcs, pieces, thruster.forward, bool(notches)), tuple(pieces)
-
-
-def _allowed_arcs(
-    arc: tuple[float, float] | None, zones: Sequence[tuple[float, float]]
-) -> list[tuple[float, float]]:
-    """The arcs [rad] that forbidden zones leave of an arc, None of all directions."""
-    begin, end = (0.0, TURN) if arc is None else arc
-    if arc is None and zones:
-        # Begin all round at the end of a zone, where no arc is cut in two.
-        begin = zones[0][1]
-        end = begin + TURN
-    taken = []
-    for low, high in zones:
-        first = begin + (low - begin) % TURN
-        for turn in (0.0, -TURN):
-            taken.append((first + turn, first + turn + high - low))
-    arcs = []
-    position = begin
-    for low, high in sorted(taken):
-        if low > position + SAME_DIRECTION:
-            arcs.append((position, min(low, end)))
-        position = max(position, high)
-        if position >= end:
-            break
-    if position < end - SAME_DIRECTION:
-        arcs.append((position, end))
-    return [(low, high) for low, high in arcs if high > low + SAME_DIRECTION]
 
 
 def _corner_angles(arc: tuple[float, float], notches: Sequence[Notch]) -> Array:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from finlab.actuators.thruster import Thruster as Thruster
     from finlab.layout.body import Body as Body
     from finlab.layout.body import Hull as Hull
+    from finlab.layout.clear_sectors import kept_clear as kept_clear
     from finlab.layout.damage import Damage as Damage
     from finlab.layout.effectiveness import layout_effectiveness as layout_effectiveness
     from finlab.layout.effectiveness import own_effectiveness as own_effectiveness
@@ -47,6 +48,7 @@ __all__ = [
     "Thruster",
     "Tilt",
     "Uncertainty",
+    "kept_clear",
     "layout_effectiveness",
     "layout_to_dict",
     "load_layout",
@@ -69,6 +71,7 @@ _MODULE_OF_NAME = {
     "Thruster": "finlab.actuators.thruster",
     "Body": "finlab.layout.body",
     "Hull": "finlab.layout.body",
+    "kept_clear": "finlab.layout.clear_sectors",
     "Damage": "finlab.layout.damage",
     "layout_effectiveness": "finlab.layout.effectiveness",
     "own_effectiveness": "finlab.layout.effectiveness",
