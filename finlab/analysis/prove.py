@@ -500,7 +500,7 @@ class _Search:
         basis = self._basis(lost, parts)
         written = {}
         for index, name in enumerate(corners.names):
-            affordable = self._within_budget(lost, corners, index, forces[index])
+            affordable = self._within_budget(lost, parts, corners, index, forces[index])
             written[name] = self._exact(lost, basis, corners.exact[index], affordable)
         own_parts = {}
         for actuator, part in zip(self._actuators, parts, strict=True):
@@ -514,14 +514,17 @@ class _Search:
 
     def _basis(self, lost: Sequence[str], parts: Sequence[Part]) -> _Basis:
         """As many axes of working actuators as there are independent axes of the wrench."""
+        frames = []
         labels = []
         columns = []
-        for i, actuator in enumerate(self._actuators):
+        for i, (actuator, part) in enumerate(zip(self._actuators, parts, strict=True)):
+            frame = self._frame(i, part)
+            frames.append(frame)
             if actuator.name in lost:
                 continue
-            for k in range(actuator.n_axes):
+            for k, axis in enumerate(frame):
                 labels.append((i, k))
-                columns.append(self._effectiveness[i, k, self._rows] * actuator.radius)
+                columns.append(np.array(axis.column, np.float64) * actuator.radius)
         scaled = np.array(columns).T / SCALE[self._rows, None]
         column_order, rank = _pivots(scaled)
         chosen = column_order[:rank]
@@ -534,9 +537,25 @@ class _Search:
             line = []
             for column in chosen:
                 i, k = labels[column]
-                line.append(self._columns[i][k][row])
+                line.append(frames[i][k].column[row])
             matrix.append(line)
-        return _Basis([labels[column] for column in chosen], rows, _inverse(matrix))
+        return _Basis(frames, [labels[column] for column in chosen], rows, _inverse(matrix))
+
+    def _frame(self, index: int, part: Part) -> list[_FrameAxis]:
+        """The directions in which forces of a part may change: the actuator's axes, or a line."""
+        own = self._columns[index]
+        zero = Fraction(0)
+        if "line" not in part.values:
+            directions = [[Fraction(1), zero], [zero, Fraction(1)]][: len(own)]
+        else:
+            directions = [[_fraction(value) for value in part.values["line"]]]
+        frame = []
+        for direction in directions:
+            column = []
+            for row in range(len(self._rows)):
+                column.append(check_proof.dot(direction[: len(own)], [each[row] for each in own]))
+            frame.append(_FrameAxis(direction, column))
+        return frame
 
     def _exact(
         self, lost: Sequence[str], basis: _Basis, wrench: list[Fraction], forces: Array
@@ -544,32 +563,42 @@ class _Search:
         """Forces (n, 2) as fractions that give a wrench exactly, by name."""
         exact = []
         missing = [*wrench]
-        for i, actuator in enumerate(self._actuators):
+        for i, (actuator, frame) in enumerate(zip(self._actuators, basis.frames, strict=True)):
             own = []
-            for k in range(actuator.n_axes):
-                size = _rounded(float(forces[i, k]), actuator.radius)
+            for axis in frame:
+                direction = np.array(axis.direction, np.float64)
+                size = _rounded(float(direction @ forces[i]) / float(direction @ direction),
+                                actuator.radius)  # fmt: skip
                 own.append(size)
                 if actuator.name not in lost and size:
-                    column = self._columns[i][k]
-                    missing = [w - size * c for w, c in zip(missing, column, strict=True)]
+                    missing = [w - size * c for w, c in zip(missing, axis.column, strict=True)]
             exact.append(own)
         left = [missing[row] for row in basis.rows]
         for (i, k), line in zip(basis.axes, basis.inverse, strict=True):
             exact[i][k] += check_proof.dot(line, left)
         result = {}
-        for actuator, own in zip(self._actuators, exact, strict=True):
-            if actuator.name not in lost:
-                result[actuator.name] = [_text(size) for size in own]
+        for actuator, frame, own in zip(self._actuators, basis.frames, exact, strict=True):
+            if actuator.name in lost:
+                continue
+            force = []
+            for k in range(actuator.n_axes):
+                force.append(_text(check_proof.dot(own, [axis.direction[k] for axis in frame])))
+            result[actuator.name] = force
         return result
 
     def _within_budget(
-        self, lost: tuple[str, ...], corners: _Corners, index: int, inside: Array
+        self,
+        lost: tuple[str, ...],
+        parts: Sequence[Part],
+        corners: _Corners,
+        index: int,
+        inside: Array,
     ) -> Array:
         """Forces (n, 2) of a corner within the power budget, as far inside as it allows; those
         inside where there is no budget. Raises _CounterexampleError: no forces are within it."""
         if self._power is None:
             return inside
-        if self._watts(lost, inside) <= self._power:
+        if self._watts(lost, parts, inside) <= self._power:
             return inside
         result = self._answer(lost, corners.wrench[index])
         cheapest = np.zeros_like(inside)
@@ -578,18 +607,18 @@ class _Search:
             row = self._layout.names.index(actuator.name)
             for k, axis in enumerate(actuator.values["axes"]):
                 cheapest[i, k] = body[row] @ axis
-        if self._watts(lost, cheapest) > self._power:
+        if self._watts(lost, parts, cheapest) > self._power:
             wrench = corners.exact[index]
             example = self._too_dear(lost, wrench, result.multipliers, cheapest)
             if example is not None:
                 raise _CounterexampleError(example)
         for blend in BLENDS:
             mixed = blend * inside + (1.0 - blend) * cheapest
-            if self._watts(lost, mixed) <= self._power * (1.0 - 1e-9):
+            if self._watts(lost, parts, mixed) <= self._power * (1.0 - 1e-9):
                 return mixed
         raise check_proof.WrongProof(
             f"{self._where(lost, corners, index)}: takes about "
-            f"{self._watts(lost, cheapest):.6g} W, which is too near to the budget"
+            f"{self._watts(lost, parts, cheapest):.6g} W, which is too near to the budget"
         )
 
     def _answer(self, lost: tuple[str, ...], wrench: Array) -> Any:
@@ -600,14 +629,18 @@ class _Search:
             self._allocator = Allocator(self._layout)
         return self._allocator.allocate(wrench, lost=lost)
 
-    def _watts(self, lost: Sequence[str], forces: Array) -> float:
-        """Power of forces (n, 2), rounded up as the checker does [W]."""
+    def _watts(self, lost: Sequence[str], parts: Sequence[Part], forces: Array) -> float:
+        """Power of forces (n, 2) of parts, rounded up as the checker does [W]."""
         total = Fraction(0)
-        for actuator, own in zip(self._actuators, forces.tolist(), strict=True):
+        for actuator, part, own in zip(self._actuators, parts, forces.tolist(), strict=True):
             if actuator.name not in lost:
                 exact = [_rounded(size, actuator.radius) for size in own[: actuator.n_axes]]
                 values = check_proof.numbers_in(_as_text(actuator.values))
-                total += check_proof.most_watts(values, exact)
+                chosen = None
+                if actuator.n_axes == 2:
+                    in_file = check_proof.numbers_in(_as_text(part.values))
+                    chosen = check_proof.convex_part(values, in_file)
+                total += check_proof.most_watts(values, exact, chosen)
         return float(total)
 
     def _too_dear(
@@ -653,21 +686,34 @@ class _Search:
                 return None
             branches.append(written)
         actuator = self._actuators[tree.actuator]
-        return {"cut": actuator.name, "arcs": [cut.arc for cut in actuator.cuts], "each": branches}
+        sides = []
+        for is_astern in (False, True):
+            taken = [k for k, cut in enumerate(actuator.cuts) if cut.is_astern is is_astern]
+            each = [branches[k] for k in taken]
+            arcs = [actuator.cuts[k].arc for k in taken]
+            sides.append({"cut": actuator.name, "arcs": arcs, "each": each})
+        if not sides[1]["each"]:
+            return sides[0]
+        return {"cut": actuator.name, "sides": sides}
 
     def _separating_price(
         self, lost: Sequence[str], wrench: list[Fraction], tree: Tree
     ) -> dict[str, Any] | None:
         """A price that parts a wrench from all forces of a choice of pieces; None: none is
         known."""
-        premises = self._file("refuted")
-        for actuator, number in zip(premises["actuators"], tree.choice, strict=True):
-            if number:
-                index = self._names.index(actuator["name"])
-                actuator["arcs"] = [self._actuators[index].cuts[number - 1].arc]
-        actuators, statement = check_proof.checked_premises(
-            check_proof.numbers_in(_as_text(premises))
-        )
+        premises = check_proof.numbers_in(_as_text(self._file("refuted")))
+        actuators, statement = check_proof.checked_premises(premises)
+        for own, number in zip(self._actuators, tree.choice, strict=True):
+            if not number:
+                continue
+            cut = own.cuts[number - 1]
+            actuator = actuators[own.name]
+            actuator["arcs"] = check_proof.numbers_in(_as_text([cut.arc]))
+            low, high = actuator["outer_force_n"]
+            if cut.is_astern:
+                actuator["outer_force_n"] = [low, Fraction(0)]
+            else:
+                actuator["outer_force_n"] = [max(low, Fraction(0)), high]
         working = [each for name, each in actuators.items() if name not in lost]
         for normal in self._normals(lost, wrench, tree):
             price = (normal / SCALE)[self._rows]
@@ -729,9 +775,20 @@ class _CounterexampleError(Exception):
         self.example = example
 
 
+class _FrameAxis(NamedTuple):
+    """A direction in which the force of an actuator may change."""
+
+    direction: list[Fraction]
+    """Along the actuator's axes (2,)."""
+    column: list[Fraction]
+    """Its wrench, of the axes that count."""
+
+
 class _Basis(NamedTuple):
     """Axes of actuators whose forces make up for what is missing of a wrench."""
 
+    frames: list[list[_FrameAxis]]
+    """Those of each actuator."""
     axes: list[tuple[int, int]]
     """Index of the actuator, and of its axis."""
     rows: list[int]
