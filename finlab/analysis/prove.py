@@ -52,6 +52,8 @@ MAX_SPLITS = 14
 """Most times that a box is split where forces are not convex, one split in the other."""
 MAX_BOXES = 1000
 """Most boxes that are looked at for one statement."""
+MAX_MISSES = 40
+"""Most choices of parts of one statement that give all corners, but not within the budget."""
 GAP_LENGTHS = (1.0, 0.5, 0.1)
 """Lengths of wrenches of the box that may need forces between arcs, over the largest one [1]."""
 BLENDS = (0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 1e-4, 1e-5, 1e-6, 0.0)
@@ -241,6 +243,7 @@ class _Search:
         self._parts = self._inner.covers
         """The last parts that gave a box."""
         self._boxes_left = MAX_BOXES
+        self._misses_left = MAX_MISSES
         self._tolerance = 0.0
         self._allocator: Any = None
 
@@ -399,6 +402,9 @@ class _Search:
                 box = self._written_box(lost, parts, corners, tried.force)
             except check_proof.WrongProof as error:
                 reason = str(error)
+                self._misses_left -= 1
+                if self._misses_left <= 0:
+                    break
                 continue
             self._parts = tried.choice
             return box
@@ -409,7 +415,7 @@ class _Search:
         if example is not None:
             raise _CounterexampleError(example)
         is_convex = all(len(actuator.parts) == 1 for actuator in self._actuators)
-        if is_convex or not splits or self._boxes_left <= 0:
+        if is_convex or not splits or min(self._boxes_left, self._misses_left) <= 0:
             missed = int(failed[-1].is_reached.argmin()) if failed else 0
             where = self._where(lost, corners, missed)
             raise NotSettledError(reason or f"{where}: out of reach of the convex parts tried")
