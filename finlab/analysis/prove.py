@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finlab.analysis import check_proof
+from finlab.analysis.exact_forces import RANK_TOLERANCE, ExactForces, fraction_of, rounded, text_of
 from finlab.analysis.proof_premises import NotSettledError, Part, decimals, proof_actuators
 from finlab.analysis.proof_search import PartSearch, Tree, Tried
 from finlab.arrays import Array
@@ -38,11 +39,6 @@ Verdict = Literal["proved", "refuted", "not settled"]
 """What is known of a statement."""
 MAX_CASES = 3000
 """Most cases that are looked at: two losses of up to 64 actuators."""
-DIGITS = 9
-"""Digits of a force in a file, beyond those of its largest force; the last ones of each corner are
-fractions."""
-RANK_TOLERANCE = 1e-9
-"""Share of the strongest wrench below which a direction has no authority [1]."""
 WRENCH_TOLERANCE = 1e-9
 """How near to a corner a wrench has to be where the robot has no authority over some direction, so
 that rounded axes leave no exact answer [N, N m]."""
@@ -231,13 +227,14 @@ class _Search:
             raise NotSettledError("no actuator gives a force at rest")
         self._names = [actuator.name for actuator in self._actuators]
         self._rows = [AXES.index(axis) for axis in box]
-        half_widths = list(map(_fraction, box.values()))
+        half_widths = list(map(fraction_of, box.values()))
         self._whole = self._corners_of([-half for half in half_widths], half_widths)
         self._columns = self._exact_columns()
         self._effectiveness = np.zeros((len(self._actuators), 2, 6))
         for i, columns in enumerate(self._columns):
             for k, column in enumerate(columns):
                 self._effectiveness[i, k, self._rows] = np.array(column, np.float64)
+        self._exact_forces = ExactForces(self._actuators, self._columns, SCALE[self._rows])
         self._inner = self._inner_search()
         self._outer = self._outer_search()
         self._parts = self._inner.covers
@@ -430,6 +427,8 @@ class _Search:
         half_widths = np.array(list(self._box.values()))
         gone = self._gone(lost)
         working = [i for i in range(len(self._actuators)) if i not in gone]
+        if not working:
+            return []
         # Forces of least size over the largest, f = R R B^T (B R R B^T)^-1 w, of w within the box.
         radius = np.array([actuator.radius for actuator in self._actuators])
         own = self._effectiveness[working][..., self._rows] * radius[working, None, None]
@@ -457,8 +456,8 @@ class _Search:
         """A wrench of the axes that count, with few digits and within the box."""
         exact = []
         for value, half in zip(wrench.tolist(), self._whole.high, strict=True):
-            rounded = _rounded(value, float(half))
-            exact.append(min(max(rounded, -half), half))
+            short = rounded(value, float(half))
+            exact.append(min(max(short, -half), half))
         return exact
 
     def _split(
@@ -487,7 +486,7 @@ class _Search:
         above_corners = self._corners_of(low_above, corners.high)
         return {
             "axis": [*self._box][axis],
-            "at": _text(middle),
+            "at": text_of(middle),
             "below": self._box_of(lost, below, splits - 1),
             "above": self._box_of(lost, above_corners, splits - 1),
         }
@@ -503,11 +502,14 @@ class _Search:
         self, lost: tuple[str, ...], parts: Sequence[Part], corners: _Corners, forces: Array
     ) -> dict[str, Any]:
         """A box with forces (C, n, 2) that the checker accepts. Raises WrongProof: it does not."""
-        basis = self._basis(lost, parts)
+        basis = self._exact_forces.basis(lost, parts)
+        if len(basis.rows) < len(self._rows):
+            self._tolerance = WRENCH_TOLERANCE
         written = {}
         for index, name in enumerate(corners.names):
             affordable = self._within_budget(lost, parts, corners, index, forces[index])
-            written[name] = self._exact(lost, basis, corners.exact[index], affordable)
+            wrench = corners.exact[index]
+            written[name] = self._exact_forces.forces(lost, basis, wrench, affordable)
         own_parts = {}
         for actuator, part in zip(self._actuators, parts, strict=True):
             if part.values and actuator.name not in lost:
@@ -517,80 +519,6 @@ class _Search:
         premises = check_proof.checked_premises(proof)
         check_proof.check_box(proof["cases"][0], lost, corners.low, corners.high, premises)
         return box
-
-    def _basis(self, lost: Sequence[str], parts: Sequence[Part]) -> _Basis:
-        """As many axes of working actuators as there are independent axes of the wrench."""
-        frames = []
-        labels = []
-        columns = []
-        for i, (actuator, part) in enumerate(zip(self._actuators, parts, strict=True)):
-            frame = self._frame(i, part)
-            frames.append(frame)
-            if actuator.name in lost:
-                continue
-            for k, axis in enumerate(frame):
-                labels.append((i, k))
-                columns.append(np.array(axis.column, np.float64) * actuator.radius)
-        scaled = np.array(columns).T / SCALE[self._rows, None]
-        column_order, rank = _pivots(scaled)
-        chosen = column_order[:rank]
-        row_order, _ = _pivots(scaled[:, chosen].T)
-        rows = sorted(row_order[:rank])
-        if rank < len(self._rows):
-            self._tolerance = WRENCH_TOLERANCE
-        matrix = []
-        for row in rows:
-            line = []
-            for column in chosen:
-                i, k = labels[column]
-                line.append(frames[i][k].column[row])
-            matrix.append(line)
-        return _Basis(frames, [labels[column] for column in chosen], rows, _inverse(matrix))
-
-    def _frame(self, index: int, part: Part) -> list[_FrameAxis]:
-        """The directions in which forces of a part may change: the actuator's axes, or a line."""
-        own = self._columns[index]
-        zero = Fraction(0)
-        if "line" not in part.values:
-            directions = [[Fraction(1), zero], [zero, Fraction(1)]][: len(own)]
-        else:
-            directions = [[_fraction(value) for value in part.values["line"]]]
-        frame = []
-        for direction in directions:
-            column = []
-            for row in range(len(self._rows)):
-                column.append(check_proof.dot(direction[: len(own)], [each[row] for each in own]))
-            frame.append(_FrameAxis(direction, column))
-        return frame
-
-    def _exact(
-        self, lost: Sequence[str], basis: _Basis, wrench: list[Fraction], forces: Array
-    ) -> dict[str, list[str]]:
-        """Forces (n, 2) as fractions that give a wrench exactly, by name."""
-        exact = []
-        missing = [*wrench]
-        for i, (actuator, frame) in enumerate(zip(self._actuators, basis.frames, strict=True)):
-            own = []
-            for axis in frame:
-                direction = np.array(axis.direction, np.float64)
-                size = _rounded(float(direction @ forces[i]) / float(direction @ direction),
-                                actuator.radius)  # fmt: skip
-                own.append(size)
-                if actuator.name not in lost and size:
-                    missing = [w - size * c for w, c in zip(missing, axis.column, strict=True)]
-            exact.append(own)
-        left = [missing[row] for row in basis.rows]
-        for (i, k), line in zip(basis.axes, basis.inverse, strict=True):
-            exact[i][k] += check_proof.dot(line, left)
-        result = {}
-        for actuator, frame, own in zip(self._actuators, basis.frames, exact, strict=True):
-            if actuator.name in lost:
-                continue
-            force = []
-            for k in range(actuator.n_axes):
-                force.append(_text(check_proof.dot(own, [axis.direction[k] for axis in frame])))
-            result[actuator.name] = force
-        return result
 
     def _within_budget(
         self,
@@ -640,7 +568,7 @@ class _Search:
         total = Fraction(0)
         for actuator, part, own in zip(self._actuators, parts, forces.tolist(), strict=True):
             if actuator.name not in lost:
-                exact = [_rounded(size, actuator.radius) for size in own[: actuator.n_axes]]
+                exact = [rounded(size, actuator.radius) for size in own[: actuator.n_axes]]
                 values = check_proof.numbers_in(_as_text(actuator.values))
                 chosen = None
                 if actuator.n_axes == 2:
@@ -763,7 +691,7 @@ class _Search:
         """A counterexample that the checker accepts, None where it does not."""
         example = {
             "lost": list(lost),
-            "wrench": dict(zip(self._box, map(_text, wrench), strict=True)),
+            "wrench": dict(zip(self._box, map(text_of, wrench), strict=True)),
             "tree": tree,
         }
         try:
@@ -781,28 +709,6 @@ class _CounterexampleError(Exception):
         self.example = example
 
 
-class _FrameAxis(NamedTuple):
-    """A direction in which the force of an actuator may change."""
-
-    direction: list[Fraction]
-    """Along the actuator's axes (2,)."""
-    column: list[Fraction]
-    """Its wrench, of the axes that count."""
-
-
-class _Basis(NamedTuple):
-    """Axes of actuators whose forces make up for what is missing of a wrench."""
-
-    frames: list[list[_FrameAxis]]
-    """Those of each actuator."""
-    axes: list[tuple[int, int]]
-    """Index of the actuator, and of its axis."""
-    rows: list[int]
-    """Axes of the wrench that they give, by their indices among those that count."""
-    inverse: list[list[Fraction]]
-    """Forces per missing wrench."""
-
-
 def _directions_between(arcs: list[list[list[float]]] | None) -> list[Array]:
     """Directions (2,) in the middle of what several arcs, or one that is wider than half a turn,
     leave out, and beside its ends."""
@@ -816,65 +722,6 @@ def _directions_between(arcs: list[list[list[float]]] | None) -> list[Array]:
             angle = low + share * width
             found.append(np.array([math.cos(angle), math.sin(angle)]))
     return found
-
-
-def _pivots(matrix: Array) -> tuple[list[int], int]:
-    """The order of columns in which each is as far as possible from the span of those before it,
-    and the numerical rank (QR with column pivoting; Golub and Van Loan, 5.4)."""
-    left = matrix.copy()
-    order: list[int] = []
-    largest = float(np.linalg.norm(matrix, axis=0).max(initial=0.0))
-    for _ in range(min(matrix.shape)):
-        norms = np.linalg.norm(left, axis=0)
-        norms[order] = 0.0
-        best = int(norms.argmax())
-        if norms[best] <= RANK_TOLERANCE * largest:
-            break
-        order.append(best)
-        direction = left[:, best] / norms[best]
-        left = left - np.outer(direction, direction @ left)
-    return order, len(order)
-
-
-def _inverse(matrix: list[list[Fraction]]) -> list[list[Fraction]]:
-    """The inverse of a square matrix in fractions, by Gauss and Jordan's elimination."""
-    n = len(matrix)
-    rows = []
-    for i, line in enumerate(matrix):
-        rows.append([*line, *(Fraction(int(i == j)) for j in range(n))])
-    for i in range(n):
-        pivot = max(range(i, n), key=lambda row: abs(rows[row][i]))
-        rows[i], rows[pivot] = rows[pivot], rows[i]
-        head = rows[i][i]
-        rows[i] = [value / head for value in rows[i]]
-        for j in range(n):
-            factor = rows[j][i]
-            if j != i and factor:
-                rows[j] = [a - factor * b for a, b in zip(rows[j], rows[i], strict=True)]
-    return [row[n:] for row in rows]
-
-
-def _fraction(value: float) -> Fraction:
-    """A number as it is written in a file."""
-    return Fraction(repr(value))
-
-
-def _rounded(size: float, largest: float) -> Fraction:
-    """A force with `DIGITS` digits below those of the largest force."""
-    places = DIGITS - math.floor(math.log10(largest)) if largest > 0.0 else DIGITS
-    unit = Fraction(10) ** places
-    return Fraction(round(Fraction(size) * unit)) / unit
-
-
-def _text(value: Fraction) -> str:
-    """A fraction for a file, as a decimal where it is a short one."""
-    for places in range(2 * DIGITS):
-        scaled = value * 10**places
-        if scaled.denominator == 1:
-            digits = str(abs(scaled.numerator)).rjust(places + 1, "0")
-            sign = "-" if value < 0 else ""
-            return sign + (f"{digits[:-places]}.{digits[-places:]}" if places else digits)
-    return str(value)
 
 
 def _as_text(value: Any) -> Any:
