@@ -157,16 +157,41 @@ static const real *first_multipliers(const fl_work *work, const fl_question *q, 
   return 0;
 }
 
-/* Whether commands rest in a dead band that the drive cannot leave at once, or that it may have to
-   pass. */
-static int may_pass_bands(const real *block, const fl_work *work, real command[][3]) {
+/* Whether a command gives no force, or the least that its actuator can: it rests, is inside a dead
+   band, or is the smallest beat of a fin. */
+static int is_idle(const fl_actuator *a, const real *command) {
+  const command_form *form = fl_form_of(a);
+  const int force = form->force_number;
+  if (force != NO_NUMBER) {
+    const real rest = larger(a->dead_band, NEARLY * a->command_max[force]);
+    return FABS(command[force]) <= rest * (1 - NEARLY);
+  }
+  if (form->angle_number == NO_NUMBER) return 0;
+  for (int k = 0; k < 3; k++) {
+    const real range = a->command_max[k] - a->command_min[k];
+    if (k != form->angle_number && command[k] > a->command_min[k] + NEARLY * range) return 0;
+  }
+  return 1;
+}
+
+/* Whether a tick allows less of a number of a command than its actuator. */
+static int is_limited_by_tick(const fl_actuator *a, const fl_box *box, int i, int k) {
+  return box->command_min[i][k] > a->command_min[k] || box->command_max[i][k] < a->command_max[k];
+}
+
+/* Whether a tick keeps an idle actuator from what it may give later: a drive that cannot leave its
+   dead band at once, or that may have to pass it; or, where a wrench is missed, a pod or a fin that
+   is turned elsewhere. */
+static int may_give_later(const real *block, const fl_work *work, int is_missed,
+                          real command[][3]) {
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
-    const int k = fl_form_of(a)->force_number;
-    if (work->span.is_lost[i] || !fl_is_in_dead_band(a, command[i])) continue;
-    const int is_limited_below = work->box.command_min[i][k] > a->command_min[k];
-    const int is_limited_above = work->box.command_max[i][k] < a->command_max[k];
-    if (is_limited_below || is_limited_above) return 1;
+    const command_form *form = fl_form_of(a);
+    if (work->span.is_lost[i] || !is_idle(a, command[i])) continue;
+    const int has_band = form->force_number != NO_NUMBER && a->dead_band > 0;
+    if (has_band && is_limited_by_tick(a, &work->box, i, form->force_number)) return 1;
+    const int angle = form->angle_number;
+    if (is_missed && angle != NO_NUMBER && is_limited_by_tick(a, &work->box, i, angle)) return 1;
   }
   return 0;
 }
@@ -179,9 +204,11 @@ static void wrench_that_counts(const fl_span *span, const fl_question *q, real *
   }
 }
 
-/* Has drives that give nothing in a tick pass through their dead bands: each goes, within its band,
-   towards the command that it would have if drives were as quick as can be. */
-static void pass_bands(const real *block, fl_work *work, const fl_question *q, real command[][3]) {
+/* Has idle actuators prepare in a tick for the command that they would have if drives were as quick
+   as can be: they turn towards it, and pass through their dead bands. Else a policy that gives
+   nothing of a wrench would do so for ever, where pods or fins are turned elsewhere. */
+static void prepare_idle(const real *block, fl_work *work, const fl_question *q,
+                         real command[][3]) {
   const fl_box box = work->box;
   fl_answer later;
   real wrench[6];
@@ -190,14 +217,15 @@ static void pass_bands(const real *block, fl_work *work, const fl_question *q, r
   find_forces(block, work, wrench, q->policy, 0, &later);
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
-    const int k = fl_form_of(a)->force_number;
+    const int force = fl_form_of(a)->force_number;
+    const int angle = fl_form_of(a)->angle_number;
     const real most = a->dead_band * INSIDE_BAND;
-    if (work->span.is_lost[i] || !fl_is_in_dead_band(a, command[i])) continue;
-    if (size_of(later.force[i]) < most) continue;
+    if (work->span.is_lost[i] || !is_idle(a, command[i])) continue;
+    if (size_of(later.force[i]) < larger(most, NEARLY * a->force_max)) continue;
     real wanted[3];
     fl_command_for_force(block, i, &box, later.force[i], q->previous + 3 * i, wanted);
-    wanted[k] = clipped(wanted[k], -most, most);
-    memcpy(command[i], wanted, sizeof wanted);
+    if (force != NO_NUMBER) command[i][force] = clipped(wanted[force], -most, most);
+    if (angle != NO_NUMBER) command[i][angle] = wanted[angle];
   }
   work->box = box;
   work->is_whole = 0;
@@ -255,8 +283,8 @@ static void answer_question(const real *block, fl_work *work, const fl_question 
   out->error = fl_refine_commands(block, work, &work->box, out->wrench_served, out->command, steps);
   if (!is_budget_used_up) meet_by_laws(block, work, wrench_desired, out);
   fl_rest_in_dead_bands(block, &work->box, out->command);
-  if (q->previous && may_pass_bands(block, work, out->command)) {
-    pass_bands(block, work, q, out->command);
+  if (q->previous && may_give_later(block, work, !out->is_attainable, out->command)) {
+    prepare_idle(block, work, q, out->command);
   }
   fl_clip_commands(block, &work->box, out->command);
   out->newton_steps = work->newton_steps;
