@@ -179,10 +179,23 @@ static int is_limited_by_tick(const fl_actuator *a, const fl_box *box, int i, in
   return box->command_min[i][k] > a->command_min[k] || box->command_max[i][k] < a->command_max[k];
 }
 
+/* Whether a wrench is missed altogether: what is served of it goes another way, or nowhere. */
+static int is_missed(const real *block, const real *wrench_desired, const fl_answer *out) {
+  const real *sigma = HEAD(block)->wrench_scale;
+  real asked = 0;
+  real served = 0;
+  for (int k = 0; k < 6; k++) {
+    const real wanted = wrench_desired[k] / sigma[k];
+    asked += wanted * wanted;
+    served += wanted * out->wrench_served[k] / sigma[k];
+  }
+  return !out->is_attainable && served <= NEARLY * asked;
+}
+
 /* Whether a tick keeps an idle actuator from what it may give later: a drive that cannot leave its
-   dead band at once, or that may have to pass it; or, where a wrench is missed, a pod or a fin that
-   is turned elsewhere. */
-static int may_give_later(const real *block, const fl_work *work, int is_missed,
+   dead band at once, or that may have to pass it; or, where a wrench is missed altogether, a pod or
+   a fin that is turned elsewhere. */
+static int may_give_later(const real *block, const fl_work *work, int is_wrench_missed,
                           real command[][3]) {
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
@@ -191,7 +204,8 @@ static int may_give_later(const real *block, const fl_work *work, int is_missed,
     const int has_band = form->force_number != NO_NUMBER && a->dead_band > 0;
     if (has_band && is_limited_by_tick(a, &work->box, i, form->force_number)) return 1;
     const int angle = form->angle_number;
-    if (is_missed && angle != NO_NUMBER && is_limited_by_tick(a, &work->box, i, angle)) return 1;
+    if (is_wrench_missed && angle != NO_NUMBER && is_limited_by_tick(a, &work->box, i, angle))
+      return 1;
   }
   return 0;
 }
@@ -283,7 +297,8 @@ static void answer_question(const real *block, fl_work *work, const fl_question 
   out->error = fl_refine_commands(block, work, &work->box, out->wrench_served, out->command, steps);
   if (!is_budget_used_up) meet_by_laws(block, work, wrench_desired, out);
   fl_rest_in_dead_bands(block, &work->box, out->command);
-  if (q->previous && may_give_later(block, work, !out->is_attainable, out->command)) {
+  const int is_wrench_missed = is_missed(block, wrench_desired, out);
+  if (q->previous && may_give_later(block, work, is_wrench_missed, out->command)) {
     prepare_idle(block, work, q, out->command);
   }
   fl_clip_commands(block, &work->box, out->command);
