@@ -13,6 +13,8 @@
 #define BEYOND_TABLES (10 * CLOSE)
 /* A drive that passes a dead band stays within it by this share of the band. */
 #define INSIDE_BAND (1 - 10 * NEARLY)
+/* Least share of what its drive allows by which an idle actuator turns where a wrench is missed. */
+#define LEAST_TURN R(0.05)
 
 int fl_version(void) { return FL_VERSION; }
 
@@ -179,8 +181,8 @@ static int is_limited_by_tick(const fl_actuator *a, const fl_box *box, int i, in
   return box->command_min[i][k] > a->command_min[k] || box->command_max[i][k] < a->command_max[k];
 }
 
-/* Whether a wrench is missed altogether: what is served of it goes another way, or nowhere. */
-static int is_missed(const real *block, const real *wrench_desired, const fl_answer *out) {
+/* Whether anything of a wrench is served: by the component along it. */
+static int is_any_served(const real *block, const real *wrench_desired, const fl_answer *out) {
   const real *sigma = HEAD(block)->wrench_scale;
   real asked = 0;
   real served = 0;
@@ -189,13 +191,41 @@ static int is_missed(const real *block, const real *wrench_desired, const fl_ans
     asked += wanted * wanted;
     served += wanted * out->wrench_served[k] / sigma[k];
   }
-  return !out->is_attainable && served <= NEARLY * asked;
+  return served > NEARLY * asked;
+}
+
+/* Share of what drives allow in a tick that commands have changed by since the last one: of the
+   actuator that has changed most. */
+static real activity(const real *block, const fl_work *work, const real *previous,
+                     real command[][3]) {
+  real most = 0;
+  for (int i = 0; i < COUNT(block); i++) {
+    const fl_actuator *a = ACTUATOR(block, i);
+    const real *before = previous + 3 * i;
+    if (work->span.is_lost[i] || !fl_is_known_command(before)) continue;
+    for (int k = 0; k < 3; k++) {
+      if (!(a->max_change[k] > 0)) continue;
+      real change = command[i][k] - before[k];
+      if (k == fl_form_of(a)->angle_number) change = fl_wrap_angle(change);
+      most = larger(most, FABS(change) / a->max_change[k]);
+    }
+  }
+  return smaller(most, 1);
+}
+
+/* Share of what its drive allows by which an idle actuator turns in a tick where a wrench is
+   missed. Where others give a part of it, and it changes all the time, to turn after it would cost
+   more than it gains; where it stays, they would stay idle for ever. */
+static real turn_share_of(const real *block, const fl_work *work, const fl_question *q,
+                          const real *wrench_desired, fl_answer *out) {
+  if (!is_any_served(block, wrench_desired, out)) return 1;
+  return larger(LEAST_TURN, 1 - activity(block, work, q->previous, out->command));
 }
 
 /* Whether a tick keeps an idle actuator from what it may give later: a drive that cannot leave its
-   dead band at once, or that may have to pass it; or, where a wrench is missed altogether, a pod or
-   a fin that is turned elsewhere. */
-static int may_give_later(const real *block, const fl_work *work, int is_wrench_missed,
+   dead band at once, or that may have to pass it; or, where a wrench is missed, a pod or a fin that
+   is turned elsewhere. */
+static int may_give_later(const real *block, const fl_work *work, int is_missed,
                           real command[][3]) {
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
@@ -204,8 +234,7 @@ static int may_give_later(const real *block, const fl_work *work, int is_wrench_
     const int has_band = form->force_number != NO_NUMBER && a->dead_band > 0;
     if (has_band && is_limited_by_tick(a, &work->box, i, form->force_number)) return 1;
     const int angle = form->angle_number;
-    if (is_wrench_missed && angle != NO_NUMBER && is_limited_by_tick(a, &work->box, i, angle))
-      return 1;
+    if (is_missed && angle != NO_NUMBER && is_limited_by_tick(a, &work->box, i, angle)) return 1;
   }
   return 0;
 }
@@ -221,7 +250,7 @@ static void wrench_that_counts(const fl_span *span, const fl_question *q, real *
 /* Has idle actuators prepare in a tick for the command that they would have if drives were as quick
    as can be: they turn towards it, and pass through their dead bands. Else a policy that gives
    nothing of a wrench would do so for ever, where pods or fins are turned elsewhere. */
-static void prepare_idle(const real *block, fl_work *work, const fl_question *q,
+static void prepare_idle(const real *block, fl_work *work, const fl_question *q, real turn_share,
                          real command[][3]) {
   const fl_box box = work->box;
   fl_answer later;
@@ -239,7 +268,11 @@ static void prepare_idle(const real *block, fl_work *work, const fl_question *q,
     real wanted[3];
     fl_command_for_force(block, i, &box, later.force[i], q->previous + 3 * i, wanted);
     if (force != NO_NUMBER) command[i][force] = clipped(wanted[force], -most, most);
-    if (angle != NO_NUMBER) command[i][angle] = wanted[angle];
+    if (angle != NO_NUMBER) {
+      const real before = q->previous[3 * i + angle];
+      const real turn = fl_wrap_angle(wanted[angle] - before);
+      command[i][angle] = before + turn_share * turn;
+    }
   }
   work->box = box;
   work->is_whole = 0;
@@ -297,9 +330,9 @@ static void answer_question(const real *block, fl_work *work, const fl_question 
   out->error = fl_refine_commands(block, work, &work->box, out->wrench_served, out->command, steps);
   if (!is_budget_used_up) meet_by_laws(block, work, wrench_desired, out);
   fl_rest_in_dead_bands(block, &work->box, out->command);
-  const int is_wrench_missed = is_missed(block, wrench_desired, out);
-  if (q->previous && may_give_later(block, work, is_wrench_missed, out->command)) {
-    prepare_idle(block, work, q, out->command);
+  if (q->previous && may_give_later(block, work, !out->is_attainable, out->command)) {
+    const real turn_share = turn_share_of(block, work, q, wrench_desired, out);
+    prepare_idle(block, work, q, turn_share, out->command);
   }
   fl_clip_commands(block, &work->box, out->command);
   out->newton_steps = work->newton_steps;
