@@ -13,6 +13,8 @@
 #define BEYOND_TABLES (10 * CLOSE)
 /* A drive that passes a dead band stays within it by this share of the band. */
 #define INSIDE_BAND (1 - 10 * NEARLY)
+/* Error over the wrench scale up to which a wrench counts as reached. */
+#define REACHED R(1e-3)
 /* Least share of what its drive allows by which an idle actuator turns where a wrench is missed. */
 #define LEAST_TURN R(0.05)
 
@@ -164,6 +166,7 @@ static const real *first_multipliers(const fl_work *work, const fl_question *q, 
 static int is_idle(const fl_actuator *a, const real *command) {
   const command_form *form = fl_form_of(a);
   const int force = form->force_number;
+  if (!FL_AIMS) return fl_is_in_dead_band(a, command);
   if (force != NO_NUMBER) {
     const real rest = larger(a->dead_band, NEARLY * a->command_max[force]);
     return FABS(command[force]) <= rest * (1 - NEARLY);
@@ -179,19 +182,6 @@ static int is_idle(const fl_actuator *a, const real *command) {
 /* Whether a tick allows less of a number of a command than its actuator. */
 static int is_limited_by_tick(const fl_actuator *a, const fl_box *box, int i, int k) {
   return box->command_min[i][k] > a->command_min[k] || box->command_max[i][k] < a->command_max[k];
-}
-
-/* Whether anything of a wrench is served: by the component along it. */
-static int is_any_served(const real *block, const real *wrench_desired, const fl_answer *out) {
-  const real *sigma = HEAD(block)->wrench_scale;
-  real asked = 0;
-  real served = 0;
-  for (int k = 0; k < 6; k++) {
-    const real wanted = wrench_desired[k] / sigma[k];
-    asked += wanted * wanted;
-    served += wanted * out->wrench_served[k] / sigma[k];
-  }
-  return served > NEARLY * asked;
 }
 
 /* Share of what drives allow in a tick that commands have changed by since the last one: of the
@@ -213,19 +203,10 @@ static real activity(const real *block, const fl_work *work, const real *previou
   return smaller(most, 1);
 }
 
-/* Share of what its drive allows by which an idle actuator turns in a tick where a wrench is
-   missed. Where others give a part of it, and it changes all the time, to turn after it would cost
-   more than it gains; where it stays, they would stay idle for ever. */
-static real turn_share_of(const real *block, const fl_work *work, const fl_question *q,
-                          const real *wrench_desired, fl_answer *out) {
-  if (!is_any_served(block, wrench_desired, out)) return 1;
-  return larger(LEAST_TURN, 1 - activity(block, work, q->previous, out->command));
-}
-
 /* Whether a tick keeps an idle actuator from what it may give later: a drive that cannot leave its
    dead band at once, or that may have to pass it; or, where a wrench is missed, a pod or a fin that
    is turned elsewhere. */
-static int may_give_later(const real *block, const fl_work *work, int is_missed,
+static int may_give_later(const real *block, const fl_work *work, int has_missed,
                           real command[][3]) {
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
@@ -234,7 +215,7 @@ static int may_give_later(const real *block, const fl_work *work, int is_missed,
     const int has_band = form->force_number != NO_NUMBER && a->dead_band > 0;
     if (has_band && is_limited_by_tick(a, &work->box, i, form->force_number)) return 1;
     const int angle = form->angle_number;
-    if (is_missed && angle != NO_NUMBER && is_limited_by_tick(a, &work->box, i, angle)) return 1;
+    if (has_missed && angle != NO_NUMBER && is_limited_by_tick(a, &work->box, i, angle)) return 1;
   }
   return 0;
 }
@@ -249,10 +230,14 @@ static void wrench_that_counts(const fl_span *span, const fl_question *q, real *
 
 /* Has idle actuators prepare in a tick for the command that they would have if drives were as quick
    as can be: they turn towards it, and pass through their dead bands. Else a policy that gives
-   nothing of a wrench would do so for ever, where pods or fins are turned elsewhere. */
-static void prepare_idle(const real *block, fl_work *work, const fl_question *q, real turn_share,
+   nothing of a wrench would do so for ever, where pods or fins are turned elsewhere. Where others
+   give a part of it, and change all the time, turning after it costs more than it gains: the busier
+   the others are, the slower the idle ones turn. */
+static void prepare_idle(const real *block, fl_work *work, const fl_question *q,
                          real command[][3]) {
   const fl_box box = work->box;
+  real turn_share = 1;
+  if (FL_AIMS) turn_share = larger(LEAST_TURN, 1 - activity(block, work, q->previous, command));
   fl_answer later;
   real wrench[6];
   fl_limits_without_tick(block, work);
@@ -268,7 +253,7 @@ static void prepare_idle(const real *block, fl_work *work, const fl_question *q,
     real wanted[3];
     fl_command_for_force(block, i, &box, later.force[i], q->previous + 3 * i, wanted);
     if (force != NO_NUMBER) command[i][force] = clipped(wanted[force], -most, most);
-    if (angle != NO_NUMBER) {
+    if (FL_AIMS && angle != NO_NUMBER) {
       const real before = q->previous[3 * i + angle];
       const real turn = fl_wrap_angle(wanted[angle] - before);
       command[i][angle] = before + turn_share * turn;
@@ -278,14 +263,19 @@ static void prepare_idle(const real *block, fl_work *work, const fl_question *q,
   work->is_whole = 0;
 }
 
+/* Error over the wrench scale of what an answer serves. */
+static real error_of_served(const real *block, const real *wrench_desired, const fl_answer *out) {
+  const real *sigma = HEAD(block)->wrench_scale;
+  real missing[6];
+  for (int k = 0; k < 6; k++) missing[k] = (out->wrench_served[k] - wrench_desired[k]) / sigma[k];
+  return SQRT(dot(missing, missing, 6));
+}
+
 /* Meets a wrench a little beyond what the tables give by steps on commands: the last share of a
    force has no price that a table could hold. */
 static void meet_by_laws(const real *block, fl_work *work, const real *wrench_desired,
                          fl_answer *out) {
-  const real *sigma = HEAD(block)->wrench_scale;
-  real missing[6];
-  for (int k = 0; k < 6; k++) missing[k] = (out->wrench_served[k] - wrench_desired[k]) / sigma[k];
-  if (out->is_attainable || SQRT(dot(missing, missing, 6)) > BEYOND_TABLES) return;
+  if (out->is_attainable || error_of_served(block, wrench_desired, out) > BEYOND_TABLES) return;
   real command[FL_MOST][3];
   copy_commands(block, out->command, command);
   const real error =
@@ -330,9 +320,10 @@ static void answer_question(const real *block, fl_work *work, const fl_question 
   out->error = fl_refine_commands(block, work, &work->box, out->wrench_served, out->command, steps);
   if (!is_budget_used_up) meet_by_laws(block, work, wrench_desired, out);
   fl_rest_in_dead_bands(block, &work->box, out->command);
-  if (q->previous && may_give_later(block, work, !out->is_attainable, out->command)) {
-    const real turn_share = turn_share_of(block, work, q, wrench_desired, out);
-    prepare_idle(block, work, q, turn_share, out->command);
+  const int has_missed = FL_AIMS && !out->is_attainable &&
+                         error_of_served(block, wrench_desired, out) > REACHED;
+  if (q->previous && may_give_later(block, work, has_missed, out->command)) {
+    prepare_idle(block, work, q, out->command);
   }
   fl_clip_commands(block, &work->box, out->command);
   out->newton_steps = work->newton_steps;
