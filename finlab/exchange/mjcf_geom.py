@@ -1,4 +1,4 @@
-"""The geoms of MuJoCo's bodies: their shape, size and pose, of which a robot has masses and a hull."""
+"""Geoms of MuJoCo's bodies: their shape, size and pose, of which a robot has masses and a hull."""
 
 from dataclasses import dataclass
 from functools import cached_property

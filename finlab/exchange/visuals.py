@@ -109,9 +109,7 @@ def note_meshes(links: Sequence[str], part: str, exchange: Exchange) -> None:
         )
 
 
-def hull_of(
-    solids: Sequence[Solid], part: str, origin: Array, exchange: Exchange
-) -> Hull | None:
+def hull_of(solids: Sequence[Solid], part: str, origin: Array, exchange: Exchange) -> Hull | None:
     """Returns the hull of some solids: the largest one where it fills most of the box around all of
     them, else that box.
 
