@@ -226,8 +226,8 @@ def capability(
             computation.
 
     Raises:
-        LayoutError: there is no actuator of a name, the loads do not fit, or the layout has a power
-            budget.
+        LayoutError: there is no actuator of a name, the loads do not fit or one is 0, or the layout
+            has a power budget.
     """
     angles = _checked_headings(headings)
     _refuse_budget(layout)
@@ -243,6 +243,13 @@ def capability(
         raise LayoutError(
             f"loads: expected {len(angles)} x 6 finite numbers, a wrench for each heading, got an "
             f"array of shape {wrench.shape}"
+        )
+    has_no_load = ~wrench.any(axis=1)
+    if has_no_load.any():
+        heading = angles[int(np.argmax(has_no_load))]
+        raise LayoutError(
+            f"loads: expected a load from each heading, got none from {heading:g} deg, of which "
+            "any share is held; leave that heading out"
         )
     # An axis that a load is about counts, whether the robot commands it or not.
     counted = layout.commanded | (wrench != 0.0).any(axis=0)
