@@ -215,10 +215,10 @@ def capability(
 
     Args:
         layout: the robot.
-        loads: wrench (H, 6) on the robot of each heading [N, N m], body frame; None for 1 N
-            horizontally from the heading, so that the values are the largest forces, in newton.
-            All other axes that the robot commands are held at 0; those that it does not command
-            are free, unless a load is about them.
+        loads: wrench (H, 6) on the robot of each heading, none of them 0 [N, N m], body frame; None
+            for 1 N horizontally from the heading, so that the values are the largest forces, in
+            newton. All other axes that the robot commands are held at 0; those that it does not
+            command are free, unless a load is about them.
         headings: where the loads come from (H,) [deg], clockwise from ahead.
         lost: names of actuators that do not work already.
         flow: velocity of the robot relative to the water (6,) [m/s, rad/s]; None at rest.
@@ -226,8 +226,8 @@ def capability(
             computation.
 
     Raises:
-        LayoutError: there is no actuator of a name, the loads do not fit or one is 0, or the layout
-            has a power budget.
+        LayoutError: there is no actuator of a name, the loads do not fit, or the layout has a power
+            budget.
     """
     angles = _checked_headings(headings)
     _refuse_budget(layout)
