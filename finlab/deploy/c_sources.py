@@ -20,7 +20,7 @@ from finlab.allocation.dual.compiled import core_policy
 from finlab.allocation.dual.method import Dual, DualSettings
 from finlab.allocation.policy import CLOSEST, Policy, PolicyName
 from finlab.allocation.power_budget import PowerBudget, budget_of
-from finlab.allocation.question import check_flow
+from finlab.allocation.question import askable, check_flow
 from finlab.arrays import NOTHING, Array
 from finlab.axes import AXES
 from finlab.core.calls import Conditions, budget_record
@@ -263,7 +263,7 @@ def _budget_margin(method: Dual, budget: PowerBudget) -> float:
     rng = np.random.default_rng(1)
     most = 0.0
     for wrench in method.plant.wrench(method.plant.sample(rng, (MARGIN_SAMPLES,))):
-        target = (wrench * method.layout.commanded)[None]
+        target = askable(wrench * method.layout.commanded)[None]
         free = method.compiled.forces(target, CLOSEST).command
         taken = budget.power_of_buses(method.plant.power(free))[0]
         watts = np.maximum(taken * rng.uniform(0.3, 0.9), NOTHING)
@@ -520,11 +520,14 @@ def _self_test(layout: Layout, method: Dual, count: int) -> str:
         if len(rows) == count:
             break
         policy, reach = questions[k % len(questions)]
-        wrench = method.plant.wrench(method.plant.sample(rng, (1,)))[0] * layout.commanded
-        tick = allocator.allocate(0.5 * wrench, flow=flow).command if reach < 0.9 else None
-        answer = allocator.allocate(reach * wrench, policy=policy, previous=tick, flow=flow)
+        given = method.plant.wrench(method.plant.sample(rng, (1,)))[0] * layout.commanded
+        asked = askable(reach * given)
+        tick = None
+        if reach < 0.9:
+            tick = allocator.allocate(askable(0.5 * given), flow=flow).command
+        answer = allocator.allocate(asked, policy=policy, previous=tick, flow=flow)
         delivered = answer.wrench * layout.commanded
-        core_command = _core_command(method, reach * wrench, Policy(policy))
+        core_command = _core_command(method, asked, Policy(policy))
         core_error = method.problem.error(core_command, delivered[None] / method.scale)[0]
         if tick is None and core_error > MAX_CORE_ERROR:
             continue
@@ -532,7 +535,7 @@ def _self_test(layout: Layout, method: Dual, count: int) -> str:
         if tick is not None:
             previous_rows.append(f"static const fl_real {previous}[][3] = {_rows(tick)};")
         answered = f"{_row(delivered)}, {error!r}, {_rows(answer.command)}"
-        rows.append(f"  {{FL_{policy.upper()}, {_row(reach * wrench)}, {answered}, {previous}}},")
+        rows.append(f"  {{FL_{policy.upper()}, {_row(asked)}, {answered}, {previous}}},")
     calm = method.settings.calm
     counts = f"#define CALM {calm!r}\nenum {{ SAMPLES = {len(rows)} }};"
     return "\n".join([*previous_rows, "static const sample samples[] = {", *rows, "};", counts, ""])
