@@ -41,6 +41,10 @@ RANKED_PER_START = 6
 """Most vectors that are ranked for each start."""
 ASCENTS = 24
 """Random vectors from which the smooth goal of thrusters is raised."""
+HOPS = 2
+"""How often the best of them hop."""
+MAX_RAISED = 24
+"""Most raised vectors that are kept from search to search."""
 RAISED_STARTS = 3
 """The best of these, from which climbs begin."""
 MIN_ASCENT = 20
@@ -313,6 +317,7 @@ class _Search:
         self._cancelled = cancelled or (lambda: False)
         self._mapped = mapped
         self._ascent: SoftAscent | None = None
+        self._raised = np.zeros((0, len(moves.start)))
         self.vector = moves.start
         self.best = before
         self.gained = False
@@ -407,17 +412,28 @@ class _Search:
     def _raised_starts(
         self, goal: SlopedGoal, ascent: SoftAscent, seed: int
     ) -> Iterator[GoalPoint]:
-        """Yields the best of some random vectors after an ascent of a smooth goal."""
+        """Yields the best vectors after an ascent of a smooth goal from random ones, and after hops
+        from the best of these and of former searches."""
         moves = self._moves
         random = np.random.default_rng(seed)
         vectors = random.uniform(moves.lower, moves.upper, (RANDOM_VECTORS, len(moves.start)))
         valid = self._valid(vectors, False, ASCENTS, random)
-        if not len(valid):
-            return
-        raised = ascent.raised(valid, self._cancelled)
-        raised = raised[self._rules.violation(raised) <= 0.0]
-        for k in np.argsort(-ascent.least_distances(raised), kind="stable")[:RAISED_STARTS]:
-            yield goal.evaluate(raised[k])
+        if len(valid):
+            self._keep_raised(ascent, ascent.raised(valid, self._cancelled))
+        for _ in range(HOPS):
+            if len(self._raised) and not self._cancelled():
+                hopped = ascent.hopped(self._raised, random, self._cancelled)
+                self._keep_raised(ascent, hopped)
+        for vector in self._raised[:RAISED_STARTS]:
+            yield goal.evaluate(vector)
+
+    def _keep_raised(self, ascent: SoftAscent, vectors: Array) -> None:
+        """Keeps the best of the raised vectors so far and some others (P, D) that keep all rules,
+        the best first."""
+        keeps_rules = self._rules.violation(vectors) <= 0.0
+        candidates = np.concatenate([self._raised, vectors[keeps_rules]])
+        order = np.argsort(-ascent.least_distances(candidates), kind="stable")
+        self._raised = candidates[order[:MAX_RAISED]]
 
     def _valid(
         self, vectors: Array, mirrored: bool, count: int, random: np.random.Generator

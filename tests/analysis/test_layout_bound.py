@@ -95,7 +95,7 @@ def test_no_random_layout_exceeds_it(shipped: Layouts, n: int, count: int, bound
     information = np.swapaxes(columns, -1, -2) @ columns
     own = np.sqrt(factor / np.trace(np.linalg.inv(information), axis1=1, axis2=2))
     assert (exact <= own * (1.0 + 1e-6) + 1e-6).all()
-    assert (exact / own).max() > 0.8, "the case is no test where all are far from it"
+    assert (exact / own).max() > 0.7, "the case is no test where all are far from it"
     assert own.max() <= bound
 
 
@@ -150,17 +150,16 @@ def test_it_is_the_optimum_where_that_is_known(
 def test_it_is_near_the_optimum_of_four_uneven_ones_in_a_plane(
     shipped: Layouts, least: float
 ) -> None:
-    """All directions in steps of three degrees: what even limits would allow is exceeded by none,
-    and the bound of uneven ones is just above the best."""
+    """The bound is just above the best of all directions in steps of five degrees."""
     layout = with_limits(thrusters(shipped, 4), least, 40.0)
     bound = bound_of(layout, FLAT, axes=("Fx", "Fy"))
-    angle = np.radians(np.arange(0.0, 360.0, 3.0))
-    grid = np.meshgrid([0.0], angle, angle, angle[:60], indexing="ij")
+    angle = np.radians(np.arange(0.0, 360.0, 5.0))
+    grid = np.meshgrid([0.0], angle, angle, angle[:36], indexing="ij")
     angles = np.stack([one.ravel() for one in grid], axis=-1)
     angles[:, 1:] += 1e-6 * np.arange(1.0, 4.0)  # no two along one line
     columns = half_range(layout)[0] * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
     best = largest_ball(columns, unevenness_of(layout)).max()
-    assert 0.97 * bound <= best <= bound
+    assert 0.95 * bound <= best <= bound
 
 
 def test_a_keep_out_that_matters(shipped: Layouts) -> None:
@@ -261,7 +260,7 @@ def test_its_certificate_proves_it(shipped: Layouts) -> None:
 
 @pytest.mark.parametrize(
     ("n", "bounds", "mirror", "most"),
-    [(6, FLAT, (), 0.08), (8, FLAT, None, 0.15), (8, FLAT_BOTH_WAYS, (), 0.15)],
+    [(6, FLAT, (), 0.08), (8, FLAT, None, 0.12), (8, FLAT_BOTH_WAYS, (), 0.12)],
     ids=["six", "pairs", "eight"],
 )
 def test_a_search_comes_near_it(
@@ -270,7 +269,7 @@ def test_a_search_comes_near_it(
     layout = thrusters(shipped, n)
     everywhere = dict.fromkeys(layout.names, bounds)
     improvement = optimize_layout(
-        layout, layout.names, everywhere, mirror=mirror, searches=2, keep_outs=[HULL], bound=True
+        layout, layout.names, everywhere, mirror=mirror, keep_outs=[HULL], bound=True
     )
     assert improvement.improved
     assert improvement.gap is not None and 0.0 <= improvement.gap <= most
