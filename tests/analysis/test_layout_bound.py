@@ -9,6 +9,7 @@ import pytest
 from finlab.analysis import Bounds, KeepOut, layout_bound, optimize_layout
 from finlab.analysis.climb import CLEARANCE
 from finlab.analysis.keep_out import extreme_places, keep_out_rule
+from finlab.analysis.moves import Moves
 from finlab.analysis.pose_set import TOLERANCE, PoseSet
 from finlab.analysis.zonotope_ball import ball_factor
 from finlab.arrays import Array
@@ -109,6 +110,54 @@ def test_no_one_of_many_layouts_exceeds_it(shipped: Layouts, bounds: Bounds) -> 
         wrenches = random_wrenches(np.random.default_rng(seed), (10_000, 8), bounds)
         exact = largest_ball(wrenches * force[:, None], unevenness_of(layout))
         assert exact.max() <= bound
+
+
+POSES = [
+    pytest.param(n, turn, keep_outs, id=f"{n}-{turn}-{len(keep_outs)}")
+    for n in (6, 8)
+    for turn, keep_outs in ((180, ()), (90, (HULL,)), (25, (AHEAD, HULL)))
+]
+"""Numbers of thrusters, how far they turn [degrees], and keep-outs."""
+
+
+def most_of_poses(
+    shipped: Layouts, n: int, turn: float, keep_outs: tuple[KeepOut, ...], count: int
+) -> float:
+    """The largest share of the bound that random layouts of a search have, within what its angles
+    and keep-outs leave."""
+    layout = thrusters(shipped, n)
+    bounds = {
+        one.name: replace(Bounds.around(one, 0.1, np.radians(turn)), x=FLAT.x, y=FLAT.y, z=FLAT.z)
+        for one in layout.actuators
+    }
+    moves = Moves(layout, layout.names, bounds, ())
+    vectors = np.random.default_rng(n).uniform(moves.lower, moves.upper, (count, len(moves.start)))
+    position = moves.positions(vectors)
+    if keep_outs:
+        # Those that stand in one are moved to the rear of the box, which is in none.
+        is_inside = np.any([box.depth(position) > 0.0 for box in keep_outs], axis=0)
+        vectors.reshape(count, n, 5)[is_inside, 0] = FLAT.x[0]
+        position = moves.positions(vectors)
+        assert all((box.depth(position) == 0.0).all() for box in keep_outs)
+    columns = moves.sets(vectors).effectiveness[:, :, 0] * half_range(layout)[:, None]
+    exact = largest_ball(columns, unevenness_of(layout))
+    bound = layout_bound(layout, layout.names, bounds, mirror=(), keep_outs=keep_outs)
+    return float(exact.max() / bound.value)
+
+
+@pytest.mark.parametrize(("n", "turn", "keep_outs"), POSES)
+def test_no_layout_of_a_search_exceeds_it(
+    shipped: Layouts, n: int, turn: float, keep_outs: tuple[KeepOut, ...]
+) -> None:
+    assert 0.3 < most_of_poses(shipped, n, turn, keep_outs, 2000) <= 1.0
+
+
+@pytest.mark.exhaustive
+@pytest.mark.parametrize(("n", "turn", "keep_outs"), POSES)
+def test_no_one_of_many_layouts_of_a_search_exceeds_it(
+    shipped: Layouts, n: int, turn: float, keep_outs: tuple[KeepOut, ...]
+) -> None:
+    assert 0.3 < most_of_poses(shipped, n, turn, keep_outs, 100_000) <= 1.0
 
 
 @pytest.mark.parametrize("n", [7, 8])
