@@ -116,29 +116,7 @@ def layout_bound(
         no_length = (0.0,) * layout.n
         return LayoutBound(0.0, _as_tuples(zeros), no_length, 0.0, tuple(counted), 0)
     design = _Design(sets, force**2, rows)
-    best_value = math.inf
-    for n_rounds in range(1, rounds + 1):
-        metric = design.metric()
-        longest = design.longest(metric)
-        # A lost thruster is at best the one that counts most.
-        total = longest.sum() - (longest.max() if after_loss else 0.0)
-        value = math.sqrt(factor * total) * (1.0 + ROUNDING_SHARE)
-        if value < best_value:
-            best_value = value
-            certificate = LayoutBound(
-                value=value,
-                metric=_as_tuples(metric),
-                longest=tuple(longest.tolist()),
-                factor=factor,
-                axes=tuple(counted),
-                rounds=n_rounds,
-            )
-        if longest.sum() <= (1.0 + SETTLED) ** 2 * design.attained(metric):
-            break
-        if cancelled is not None and cancelled():
-            break
-        design.improve()
-    return certificate
+    return _least_bound(design, factor, counted, after_loss, rounds, cancelled)
 
 
 def check_bounded(
@@ -282,6 +260,41 @@ class _Design:
         self._columns = self._columns[is_kept]
         self._group = self._group[is_kept]
         self._share = self._share[is_kept]
+
+
+def _least_bound(
+    design: _Design,
+    factor: float,
+    axes: Sequence[Axis],
+    after_loss: bool,
+    rounds: int,
+    cancelled: Callable[[], bool] | None,
+) -> LayoutBound:
+    """The least bound by the metrics of a design that improves from round to round; arguments as
+    those of `layout_bound`."""
+    best_value = math.inf
+    for n_rounds in range(1, rounds + 1):
+        metric = design.metric()
+        longest = design.longest(metric)
+        # A lost thruster is at best the one that counts most.
+        total = longest.sum() - (longest.max() if after_loss else 0.0)
+        value = math.sqrt(factor * total) * (1.0 + ROUNDING_SHARE)
+        if value < best_value:
+            best_value = value
+            certificate = LayoutBound(
+                value=value,
+                metric=_as_tuples(metric),
+                longest=tuple(longest.tolist()),
+                factor=factor,
+                axes=tuple(axes),
+                rounds=n_rounds,
+            )
+        if longest.sum() <= (1.0 + SETTLED) ** 2 * design.attained(metric):
+            break
+        if cancelled is not None and cancelled():
+            break
+        design.improve()
+    return certificate
 
 
 def _as_tuples(matrix: Array) -> tuple[tuple[float, ...], ...]:
