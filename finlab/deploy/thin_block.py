@@ -21,8 +21,6 @@ CELLS = 128
 """Most cells of a table; of a foil's angles and lifts twice as many knots."""
 POINTS = 64
 """Most directions of a gauge."""
-STEERED_POINTS = 128
-"""The same of a propeller with a rudder, whose narrow arc has few of them."""
 ANGLES = 1024
 """Angles over its period from which those of a grid of foils are chosen; more say nothing in single
 precision."""
@@ -117,8 +115,7 @@ def _thinned_table(table: Table, users: Record) -> Array:
     if table.field in ("force_table", "force_table_reverse"):
         return _radial(table.numbers)
     if table.field == "gauge_table":
-        is_steered = (users["command_kind"] == constant("FL_STEERED")).any()
-        return _gauge(table.numbers, STEERED_POINTS if is_steered else POINTS)
+        return _gauge(table.numbers)
     if table.field == "law_grid":
         return _grid(table.numbers, users)
     return _curve(table.numbers)
@@ -135,10 +132,10 @@ def _radial(table: Array) -> Array:
     return table_numbers(float(table[0]), force, np.minimum(slope, slope_max), float(table[2]))
 
 
-def _gauge(table: Array, points: int) -> Array:
-    """A gauge with every so many of its directions, as many as `points` at most."""
+def _gauge(table: Array) -> Array:
+    """A gauge with every so many of its directions."""
     rows = table[1:].reshape(-1, 4)
-    rows = rows[:: max(len(rows) // points, 1)]
+    rows = rows[:: max(len(rows) // POINTS, 1)]
     return np.concatenate([[len(rows)], rows.ravel()])
 
 

@@ -194,7 +194,8 @@ class _Tables:
 
     def of(self, response: Response, form: Form) -> TableOffsets:
         """Returns the offsets of an actuator's tables."""
-        gauge = response.gauge if isinstance(response, Plane) else None
+        has_gauge_table = isinstance(response, Plane) and form.deflection is not None
+        gauge = response.gauge if has_gauge_table else None
         law = form.law
         command_table = form.command_table
         return TableOffsets(
