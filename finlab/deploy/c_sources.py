@@ -152,7 +152,8 @@ def c_sources(
     sources["fl_names.h"] = _prefixed_names(declared, name)
     zones = int(actuators_of(block)["barred_count"].max(initial=0.0))
     is_steered = actuators_of(block)["command_kind"] == constant("FL_STEERED")
-    size = ExportSize(layout.n, foils, zones, bool(is_steered.any()))
+    has_gauges = bool((actuators_of(block)["gauge_table"] > 0.0).any())
+    size = ExportSize(layout.n, foils, zones, bool(is_steered.any()), has_gauges)
     sources["finlab.h"] = _with_size(sources["finlab.h"], size, is_coupled)
     if budget is None:
         sources["finlab.h"] = _without_budgets(sources["finlab.h"])
@@ -211,6 +212,8 @@ class ExportSize(NamedTuple):
     """Most barred zones of a pod."""
     has_slipstreams: bool
     """Whether a rudder stands in the slipstream of a propeller."""
+    has_gauges: bool
+    """Whether the force of a fin differs by its direction."""
 
 
 def _with_size(header: str, size: ExportSize, is_coupled: bool) -> str:
@@ -221,6 +224,7 @@ def _with_size(header: str, size: ExportSize, is_coupled: bool) -> str:
         "FL_ARCS": min(size.foils, constant("FL_ARCS")),
         "FL_ZONES": size.zones,
         "FL_SLIPSTREAMS": int(size.has_slipstreams),
+        "FL_GAUGES": int(size.has_gauges),
     }
     for name, value in values.items():
         header = re.sub(rf"(#define {name}) \d+", rf"\1 {value}", header, count=1)

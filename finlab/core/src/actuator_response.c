@@ -29,7 +29,7 @@ typedef struct {
    slipstream. In reverse nothing meets that rudder. */
 static int has_gauge(const fl_actuator *a, const fl_set *set) {
   if (FL_SLIPSTREAMS && set->is_flipped) return 0;
-  return a->gauge_table > 0 || is_steered(a);
+  return has_gauge_table(a) || is_steered(a);
 }
 
 /* How far a plane pushes ahead in a direction [rad], over the size that limits hold: 1 of most. */
@@ -38,7 +38,7 @@ real fl_radius(const real *block, int i, real angle) {
 #if FL_SLIPSTREAMS
   if (is_steered(a)) return fl_steered_radius(block, i, angle);
 #endif
-  if (a->gauge_table > 0) return fl_gauge_radius(block + (int)a->gauge_table, angle);
+  if (has_gauge_table(a)) return fl_gauge_radius(block + (int)a->gauge_table, angle);
   return 1;
 }
 
@@ -72,8 +72,8 @@ static push_direction end_of_arc(const real *block, int i, const fl_set *set, re
 /* The direction g in which a plane responds to a price s: that of s, and of a gauge
    g = sigma e + sigma' e_across with e = s / |s|. `floor_squared` is added to |s|^2: below its root
    a price is rounding. */
-static push_direction direction_of(const real *block, int i, const fl_set *set,
-                                   const real *price, real floor_squared) {
+static push_direction direction_of(const real *block, int i, const fl_set *set, const real *price,
+                                   real floor_squared) {
   const real size = SQRT(price[0] * price[0] + price[1] * price[1] + floor_squared);
   const real x = price[0] / size;
   const real y = price[1] / size;

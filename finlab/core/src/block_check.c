@@ -116,6 +116,7 @@ static int has_tables(const real *block, const fl_actuator *a) {
   const command_form *form = fl_form_of(a);
   if (!is_table(block, a->force_table, FORCE_TABLE)) return 0;
   if (!is_table_or_none(block, a->force_table_reverse, FORCE_TABLE)) return 0;
+  if (!FL_GAUGES && a->gauge_table != 0) return 0;
   if (!is_table_or_none(block, a->gauge_table, GAUGE)) return 0;
   if (form->command_table == BEAT_TABLE && !is_table(block, a->command_table, BEAT)) return 0;
   if (form->command_table == CURVE_TABLE && !is_table(block, a->command_table, CURVE)) return 0;

@@ -206,7 +206,7 @@ static void pod_force(const real *block, const fl_actuator *a, const real *comma
   real along_x = COS(angle);
   real along_y = SIN(angle);
   real bend = 0; /* (d rho / d angle) / rho */
-  if (a->gauge_table > 0) {
+  if (has_gauge_table(a)) {
     const real *gauge = block + (int)a->gauge_table;
     const real rho = fl_gauge_radius(gauge, angle);
     if (has_slope) {
@@ -347,7 +347,7 @@ static void fin_command(const real *block, int i, const fl_box *box, const real 
   (void)before;
   const fl_actuator *a = ACTUATOR(block, i);
   const real *gauge = 0;
-  if (a->gauge_table > 0) gauge = block + (int)a->gauge_table;
+  if (has_gauge_table(a)) gauge = block + (int)a->gauge_table;
   const real size = size_of(force);
   const real direction = ATAN2(force[1], force[0]);
   real angle = direction;
@@ -400,7 +400,7 @@ static void pod_command(const real *block, int i, const fl_box *box, const real 
   const fl_actuator *a = ACTUATOR(block, i);
   const real direction = ATAN2(force[1], force[0]);
   real size = size_of(force);
-  if (a->gauge_table > 0) size /= fl_gauge_radius(block + (int)a->gauge_table, direction);
+  if (has_gauge_table(a)) size /= fl_gauge_radius(block + (int)a->gauge_table, direction);
   real angle = 0;
   if (before) angle = before[fl_form_of(a)->angle_number];
   if (size > 0) angle = direction;
@@ -488,7 +488,7 @@ static force_range fin_range(const real *block, int i, const fl_box *box) {
   sizes_in(block, i, box, &range.low, &range.high, &direction);
   /* where the force points at the middle of the commands' arc */
   range.middle += fl_wrap_angle(direction - range.middle);
-  if (a->gauge_table > 0) {
+  if (has_gauge_table(a)) {
     const real rho = fl_gauge_radius(block + (int)a->gauge_table, range.middle);
     range.low /= rho;
     range.high /= rho;

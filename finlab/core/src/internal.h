@@ -159,6 +159,9 @@ gauge_point fl_gauge_support(const real *gauge, real x, real y);
 real fl_gauge_radius(const real *gauge, real angle);
 real fl_gauge_lean(const real *gauge, real angle);
 
+/* Whether the forces of an actuator differ by direction, by a table. */
+static inline int has_gauge_table(const fl_actuator *a) { return FL_GAUGES && a->gauge_table > 0; }
+
 /* steered_curve.c: forces of propellers with a rudder by direction */
 real fl_steered_deflection(const real *block, int i, real angle);
 real fl_steered_radius(const real *block, int i, real angle);

@@ -10,7 +10,7 @@
 
 #if FL_SLIPSTREAMS
 
-#define MOST_TRIALS 60   /* of a root between two deflections; ten are usual */
+#define MOST_TRIALS 60     /* of a root between two deflections; ten are usual */
 #define CURVE_STEP R(1e-3) /* deflection [rad] over which g'' is taken */
 
 enum { POSITION, TANGENT }; /* of the curve: g, g' */
