@@ -165,27 +165,30 @@ def _grid(grid: Array, users: Record) -> Array:
 
 
 def _reached(knot: Array, value: Array, period: float, users: Record) -> tuple[Array, Array, float]:
-    """Returns the knots that foils reach, and three beyond; all of them where that is no less, and
-    of a grid of fins.
+    """Returns the knots that rudders reach, and three beyond; all of them where that is no less,
+    and of a grid of fins.
 
     Args:
         knot: angles (K,) of one period [rad].
         value: coefficients (K, c) there.
         period: of the angles [rad]; 0 for none.
-        users: actuators (m,) whose law it is, all foils or all fins.
+        users: actuators (m,) whose law it is, all of one kind.
 
     Returns:
         Knots, values, and their period: 0 where only a part of it is left.
     """
-    # The first user speaks for all: a law's columns are coefficients of foils or forces of fins, so
-    # that users of one grid share a kind. A fin's angle is number 2 of its command and may go all
-    # round, so that a fin reaches each knot; the angle of a foil is number 0, within limits.
+    # The first user speaks for all: a law's columns are coefficients of foils, forces of fins or
+    # those behind propellers, so that users of one grid share a kind. A fin's angle is number 2 of
+    # its command and may go all round, so that a fin reaches each knot; the angle of a rudder is
+    # number 0, within limits.
     is_of_fins = users["command_kind"][0] == constant("FL_FIN")
-    if not period or is_of_fins:
+    if is_of_fins:
         return knot, value, period
     angle_min = (users["command_min"][:, 0] - users["lean_angle"]).min()
     angle_max = (users["command_max"][:, 0] - users["lean_angle"]).max()
-    around = np.concatenate([knot - period, knot, knot + period])
+    around = knot
+    if period:
+        around = np.concatenate([knot - period, knot, knot + period])
     begin = np.searchsorted(around, angle_min) - 3
     stop = np.searchsorted(around, angle_max) + 3
     has_room = begin >= 0 and stop <= len(around) and stop - begin < len(knot)

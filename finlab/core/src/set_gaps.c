@@ -17,9 +17,10 @@ static real angle_from_middle(const fl_set *set, const real *force) {
 }
 
 /* Whether a force of a size and at an angle from a direction is one of the sector that a
-   plane gives around it. */
+   plane gives around it, but for a rounding [N]. */
 static int is_in_sector(const fl_set *set, real angle, real size, real largest, real rounding) {
-  return FABS(fl_wrap_angle(angle)) - set->sector_half_angle <= CLOSE && size <= largest + rounding;
+  const real beyond_end = FABS(fl_wrap_angle(angle)) - set->sector_half_angle;
+  return beyond_end * size <= rounding && size <= largest + rounding;
 }
 
 /* How far a plane's force is from all that it can give forward and in reverse. */
