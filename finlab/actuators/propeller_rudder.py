@@ -92,8 +92,8 @@ into deflections."""
 LAW_ANGLES = 2049
 """Deflections from -90 to 90 deg of the grid from which the core evaluates the law."""
 BEYOND_ENDS = 2e-4
-"""Angle [rad] by which the core's curve goes on beyond the ends of the arc: what lies beyond is then
-told from an end itself, in single precision too."""
+"""Angle [rad] by which the core's curve goes on beyond the ends of the arc: what lies beyond is
+then told from an end itself, in single precision too."""
 OFFSET = -1.0
 """Drag coefficient by which the core takes the offset (-p, 0) of a lost one off."""
 SEARCHED = 65

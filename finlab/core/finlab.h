@@ -165,6 +165,7 @@ enum {
   FL_BAD_VERSION,  /* a block of another FL_VERSION */
   FL_BAD_NUMBER,   /* of a robot: not finite, or out of its range */
   FL_BAD_ARGUMENT, /* of a question or of settings: the same */
+  FL_OVER_BUDGET,  /* of an export's short call: commands are given, but take too much power */
   FL_ERRORS        /* how many codes there are */
 };
 
