@@ -293,8 +293,8 @@ def _budget_words(budget: PowerBudget | None, margin: float, identifier: str) ->
     )
     if margin > 0.0:
         words += (
-            f" That is {100.0 * margin:.2g} % less than the layout has: by so much powers by the "
-            "laws may be above those of the tables here."
+            f" The budget here is {100.0 * margin:.2g} % below that of the layout: by so much powers "
+            "by the laws may be above those of the tables here."
         )
     return words
 
@@ -415,8 +415,7 @@ _PLAIN_HEADER = """/* The robot {title} in three functions, for C and C++.
 extern "C" {{
 #endif
 
-{rows}
-{budget}
+{rows}{budget}
 /* Finds commands of least power for a wrench; beyond reach those that give the largest share of
    it. Not for several threads at once.
 
