@@ -293,7 +293,7 @@ def _budget_words(budget: PowerBudget | None, margin: float, identifier: str) ->
     )
     if margin > 0.0:
         words += (
-            f" The budget here is {100.0 * margin:.2g} % below that of the layout: by so much powers "
+            f" It is {100.0 * margin:.2g} % below the budget of the layout: by so much powers "
             "by the laws may be above those of the tables here."
         )
     return words
