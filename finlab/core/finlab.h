@@ -46,6 +46,9 @@ typedef double fl_wide; /* where differences of large numbers matter, in single 
 #ifndef FL_GAUGES
 #define FL_GAUGES 1 /* whether a force may differ by direction; exports without such have 0 */
 #endif
+#ifndef FL_COUPLES
+#define FL_COUPLES 1 /* whether actuators may act on each other; exports of others have 0 */
+#endif
 #ifndef FL_KEEPS_BUDGETS
 #define FL_KEEPS_BUDGETS 1 /* whether power budgets are kept; exports without any have 0 */
 #endif

@@ -228,6 +228,7 @@ def _with_size(header: str, size: ExportSize, is_coupled: bool) -> str:
         "FL_ZONES": size.zones,
         "FL_SLIPSTREAMS": int(size.has_slipstreams),
         "FL_GAUGES": int(size.has_gauges),
+        "FL_COUPLES": int(is_coupled),
     }
     for name, value in values.items():
         header = re.sub(rf"(#define {name}) \d+", rf"\1 {value}", header, count=1)
