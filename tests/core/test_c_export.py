@@ -28,7 +28,7 @@ from finlab.layout.layout import Bus, Layout
 from finlab.physics import plant_of
 from tests.allocator_cache import AllocatorCache
 from tests.core.test_foil_arcs import beyond, tail
-from tests.random_robots import KINDS, load, random_robot, with_rates
+from tests.random_robots import KINDS, load, random_flow, random_robot, with_rates
 from tests.sampled_cases import sampled
 from tests.terminal import refused
 
@@ -131,6 +131,16 @@ def test_self_test_holds_on_any_robot(kind: str, seed: int, tmp_path: Path) -> N
     write_c(c_sources(load(with_rates(random_robot(kind, 4, 60 + seed))), 40), tmp_path)
     for single in PRECISIONS:
         ran(f"gcc -std=c99 -O1 {single} *.c -lm && ./a.out", tmp_path)
+
+
+@pytest.mark.parametrize(("number", "seed"), [(1, 61), (0, 8)])
+def test_self_test_of_rudders_in_slipstreams_holds(number: int, seed: int, tmp_path: Path) -> None:
+    """In a flow, where the slipstream is never without force, and at rest, where an arc ends beside
+    what is pushed astern."""
+    layout = load(random_robot("slipstreams", number, seed))
+    write_c(c_sources(layout, flow=random_flow("slipstreams", number, seed)), tmp_path)
+    for single in PRECISIONS:
+        ran(f"gcc -std=c99 -O0 {single} *.c -lm && ./a.out", tmp_path)
 
 
 @pytest.mark.parametrize("name", ["supply", "drillship"])
