@@ -49,6 +49,9 @@ typedef double fl_wide; /* where differences of large numbers matter, in single 
 #ifndef FL_COUPLES
 #define FL_COUPLES 1 /* whether actuators may act on each other; exports of others have 0 */
 #endif
+#ifndef FL_AIMS
+#define FL_AIMS 1 /* whether pods or fins turn; exports of robots without any have 0 */
+#endif
 #ifndef FL_KEEPS_BUDGETS
 #define FL_KEEPS_BUDGETS 1 /* whether power budgets are kept; exports without any have 0 */
 #endif
