@@ -43,6 +43,12 @@ typedef double fl_wide; /* where differences of large numbers matter, in single 
 #ifndef FL_SLIPSTREAMS
 #define FL_SLIPSTREAMS 1 /* whether rudders in slipstreams are known; exports without any have 0 */
 #endif
+#ifndef FL_GAUGES
+#define FL_GAUGES 1 /* whether a force may differ by direction; exports without such have 0 */
+#endif
+#ifndef FL_COUPLES
+#define FL_COUPLES 1 /* whether actuators may act on each other; exports of others have 0 */
+#endif
 #ifndef FL_AIMS
 #define FL_AIMS 1 /* whether pods or fins turn; exports of robots without any have 0 */
 #endif
@@ -165,6 +171,7 @@ enum {
   FL_BAD_VERSION,  /* a block of another FL_VERSION */
   FL_BAD_NUMBER,   /* of a robot: not finite, or out of its range */
   FL_BAD_ARGUMENT, /* of a question or of settings: the same */
+  FL_OVER_BUDGET,  /* of an export's short call: commands are given, but take too much power */
   FL_ERRORS        /* how many codes there are */
 };
 

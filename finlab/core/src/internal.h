@@ -159,6 +159,17 @@ gauge_point fl_gauge_support(const real *gauge, real x, real y);
 real fl_gauge_radius(const real *gauge, real angle);
 real fl_gauge_lean(const real *gauge, real angle);
 
+/* Whether the forces of an actuator differ by direction, by a table. */
+static inline int has_gauge_table(const fl_actuator *a) { return FL_GAUGES && a->gauge_table > 0; }
+
+/* steered_curve.c: forces of propellers with a rudder by direction */
+real fl_steered_deflection(const real *block, int i, real angle);
+real fl_steered_radius(const real *block, int i, real angle);
+gauge_point fl_steered_support(const real *block, int i, real x, real y);
+static inline int is_steered(const fl_actuator *a) {
+  return FL_SLIPSTREAMS && (int)a->command_kind == FL_STEERED;
+}
+
 /* force_set.c: what one actuator may give */
 void fl_empty_set(const real *block, int i, fl_set *set);
 line_response fl_unlimited_response(const real *block, const fl_actuator *a, real price);
@@ -183,6 +194,8 @@ response fl_response(const real *block, int i, const fl_set *set, const real *pr
 #define BLEND_REST R(1e-12) /* least width omega [W] of a blend */
 /* omega [W] of a blend of two responses whose largest force costs so much. */
 static inline real blend_width(real high_cost) { return FINE * high_cost + BLEND_REST; }
+real fl_radius(const real *block, int i, real angle);
+real fl_limited_size(const real *block, int i, const fl_set *set, const real *force);
 real fl_support_of_set(const real *block, int i, const fl_set *set, const real *price, wide *force,
                        real *slope);
 real fl_drag_of_lift(const real *block, int i, real force);
@@ -220,7 +233,7 @@ int fl_span_of_question(const real *block, fl_work *work, const unsigned char *l
 
 /* command_form.c: what the numbers of each kind of command are */
 enum { NO_NUMBER = -1 };
-enum { NO_TABLE, BEAT_TABLE, CURVE_TABLE }; /* kinds of command tables, see fl_work.h */
+enum { NO_TABLE, BEAT_TABLE, CURVE_TABLE, ENDS_TABLE }; /* kinds of command tables, see fl_work.h */
 typedef struct {
   signed char numbers;       /* how many of the three a command uses, from the first one on */
   signed char angle_number;  /* which one is an angle that wraps, or NO_NUMBER */
