@@ -201,6 +201,9 @@ struct fl_work {
   int is_rim_exact;        /* whether point and normal are known to rounding */
   fl_wide distance_enough; /* over the wrench scale, up to which a point is the nearest one */
   const fl_wide *ray; /* (6,) of which a mixture may take a share, in weighted axes; 0 for none */
+#ifdef FL_WITH_POWER_SETS
+  struct fl_power_sets *power_sets; /* what fl_reach_within asks about; 0 for none */
+#endif
 
   /* Sets with gaps. */
   fl_cut cut[FL_DEPTH]; /* cuts on the way to the part that is looked at */
