@@ -26,25 +26,38 @@ LEAST_RIM = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class PowerCurve:
-    """Power over the share of the largest forces: a power law, or points with chords between."""
+    """Power over the share of the largest forces: a power law, or knots with parabolas between."""
 
     watts: float
     """At the largest forces [W]."""
     exponent: float = 1.5
     """A share g takes `watts` g^exponent."""
-    points: Array | None = None
-    """Shares and powers (K, 2) [1, W], convex, in place of the power law."""
+    knots: Array | None = None
+    """Shares, powers and the slopes of the power (K, 3) [1, W, W], in place of the power law. The
+    slope is linear between knots, and does not fall."""
+
+    @classmethod
+    def of_slopes(cls, share: Array, slope: Array, least_watts: float) -> PowerCurve:
+        """Returns the curve with slopes (K,) [W] that do not fall at shares (K,) [1] that rise, and
+        a power at the first one [W]."""
+        rise = 0.5 * (slope[1:] + slope[:-1]) * np.diff(share)
+        watts = least_watts + np.append(0.0, np.cumsum(rise))
+        return cls(float(watts[-1]), knots=np.stack([share, watts, slope], axis=-1))
 
     def at(self, share: Array) -> Array:
         """Returns the power (...) [W] of shares (...) [1]."""
-        if self.points is not None:
-            return np.interp(share, self.points[:, 0], self.points[:, 1])
-        return np.asarray(self.watts * share**self.exponent)
+        if self.knots is None:
+            return np.asarray(self.watts * share**self.exponent)
+        shares, watts, slopes = self.knots.T
+        cell = np.clip(np.searchsorted(shares, share) - 1, 0, len(shares) - 2)
+        further = share - shares[cell]
+        bend = np.diff(slopes)[cell] / np.diff(shares)[cell]
+        return np.asarray(watts[cell] + further * (slopes[cell] + 0.5 * bend * further))
 
     def to_dict(self) -> dict[str, Any]:
         """Returns what a file holds of it."""
-        if self.points is not None:
-            return {"points": self.points.tolist()}
+        if self.knots is not None:
+            return {"knots": self.knots.tolist()}
         return {"watts": self.watts, "exponent": self.exponent}
 
 
@@ -125,7 +138,7 @@ def side_table(sets: Sequence[Sides]) -> SideTable:
         least_watts += [min(of_sides[k:]) for k in range(len(sides))]
         for side in sides:
             offsets = []
-            for table in (side.corners, side.curve.points):
+            for table in (side.corners, side.curve.knots):
                 if table is None:
                     offsets.append(0)
                     continue

@@ -1,8 +1,8 @@
 """The feasible forces of a robot with what they cost, so that all that `finlab.forces` says of them
 is within a power budget (Eq. 30).
 
-Powers are by the actuators' own laws, as method `dual` has them; those of fins and measured tables
-by chords of them.
+Powers are by the actuators' own laws, as method `dual` has them; those of fins and of measured
+tables by parabolas between knots.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ from finlab.forces.force_sets import (
 from finlab.forces.power_sides import PowerCurve, Side, Sides, power_sets
 from finlab.layout import Actuator, Layout
 
-CURVE_POINTS = 256
-"""Tangents that make up the curve of a power without a power law: at most about a millionth of the
-largest power below it."""
+CURVE_KNOTS = 513
+"""Knots of the curve of a power that follows no power law, denser near rest: it is off by about a
+millionth of the largest power."""
 
 
 def force_sets_within(
@@ -180,23 +180,20 @@ def _curve(actuator: Actuator, table: RadialTable, least: float, most: float) ->
             watts = price_at_most * most - float(table.conjugate(np.array(price_at_most)))
             price_at_most = model.exponent * watts / most
         return PowerCurve(watts, model.exponent)
-    points = _points_below(table, least, most, price_at_most)
-    return PowerCurve(float(points[-1, 1]), points=points)
+    return _curve_of_table(table, least, most, price_at_most)
 
 
-def _points_below(
+def _curve_of_table(
     table: RadialTable, least: float, most: float, price_at_most: float
-) -> Array:
-    """Points (K, 2) of shares of `most` and powers [1, W] whose chords are below the power of a
-    table: where its tangents y -> v y - c*(v) meet."""
-    force = np.linspace(least, most, CURVE_POINTS + 1)
-    price = np.unique(np.append(np.interp(force, table.force, table.price), price_at_most))
-    conjugate = table.conjugate(price)
-    meets = np.diff(conjugate) / np.diff(price)
-    touch = np.concatenate([[least], np.clip(meets, least, most), [most]])
-    tangent = np.append(0, np.arange(len(price)))
-    power = price[tangent] * touch - conjugate[tangent]
-    if table.force[0] > least:
+) -> PowerCurve:
+    """The power of forces from `least` to `most` [N] by the prices of a table, c'(T) = v."""
+    first = max(least, float(table.force[0]))
+    force = first + (most - first) * np.linspace(0.0, 1.0, CURVE_KNOTS) ** 2
+    price = np.interp(force, table.force, table.price)
+    price[-1] = price_at_most
+    least_watts = price[0] * first - float(table.conjugate(price[:1])[0])
+    if first > least:
         # The tiny force that a fin cannot go below is neglected, but not what it takes.
-        power[0] = table.power_at_least
-    return np.stack([touch / most, power], axis=-1)
+        force = np.append(least, force)
+        price = np.append(0.0, price)
+    return PowerCurve.of_slopes(force / most, price * most, least_watts)

@@ -579,7 +579,8 @@ typedef struct {
   real least_share; /* of the largest forces [1] */
   real watts;       /* of the largest forces: a share g takes watts g^exponent */
   real exponent;
-  real curve; /* offset of points in the tables, a count and pairs (share, W), in place of that */
+  real curve; /* offset of knots in the tables, in place of that: a count, and of each a share, its
+                 power [W], and the slope of that; else 0 */
 } fl_power_side;
 #define NUMBERS_OF_ACTUATOR 16 /* of fl_power_sets */
 typedef struct fl_power_sets {
@@ -590,8 +591,12 @@ typedef struct fl_power_sets {
   const real *budget;   /* (buses,) [W] */
   int buses;
   wide multiplier[FL_BUSES]; /* of the budgets, at the last normal */
+  wide expected[FL_BUSES];   /* the same over its length, where it was above 0 */
 } fl_power_sets;
+#define FL_SIDES_MOST 1024 /* sides of all actuators */
 void fl_farthest_within_budgets(fl_power_sets *sets, int n, const wide *normal, wide force[][2]);
+void fl_smooth_normal(const real *block, const fl_work *work, const wide *from, const wide *ray,
+                      wide close, wide *normal);
 #endif
 
 /* support_newton.c: the same by normals of the set */

@@ -41,6 +41,19 @@ void fl_reach(const real *block, fl_work *work, const real *sets, const wide *fr
 }
 
 #ifdef FL_WITH_POWER_SETS
+/* Makes a mixture the forces that are farthest along the normal of a smooth set. */
+static void begin_at_normal(const real *block, fl_work *work, const wide *from, const wide *ray,
+                            wide close, fl_mixture *m) {
+  fl_smooth_normal(block, work, from, ray, close, m->miss);
+  fl_farthest_within_budgets(work->power_sets, COUNT(block), m->miss, m->force[0]);
+  fl_point_of_forces(block, work, m->force[0], m->point[0]);
+  m->actuators = COUNT(block);
+  m->count = 1;
+  m->basis_count = 0;
+  m->weight[0] = 1;
+  m->ray_share[0] = 0;
+}
+
 /* The same within power budgets of buses, by sides of sets (fl_power_side) and their powers; and
    the multipliers (count, buses) of the budgets at the planes. */
 void fl_reach_within(const real *block, fl_work *work, const real *tables, const real *sides,
@@ -62,7 +75,9 @@ void fl_reach_within(const real *block, fl_work *work, const real *tables, const
       const real *columns = sets + NUMBERS_OF_ACTUATOR * i + 4;
       memcpy(work->effectiveness_weighted[i], columns, sizeof work->effectiveness_weighted[i]);
     }
+    memset(power_sets.expected, 0, sizeof power_sets.expected);
     work->mixture.count = 0;
+    if (close < farthest) begin_at_normal(block, work, from, ray, close, &work->mixture);
     size[k] = fl_farthest_along_ray(block, work, from, ray, -farthest, farthest, close,
                                     &work->mixture, normal);
     fl_mixed_forces(block, &work->mixture, (real(*)[2])force);
