@@ -37,6 +37,13 @@ CURVE_KNOTS = 513
 millionth of the largest power."""
 
 
+def counts_budget(layout: Layout, flow: ArrayLike | None = None) -> bool:
+    """Returns whether budgets are counted for a robot in a flow (6,) [m/s, rad/s], None at rest: not
+    where this drives actuators."""
+    is_any_driven = any(actuator.KIND.driven_by_flow for actuator in layout.actuators)
+    return not is_any_driven or not driven_by_flow(layout, shapes_of(layout, flow))
+
+
 def force_sets_within(
     layout: Layout,
     lost: Collection[str] = (),
