@@ -191,9 +191,7 @@ class ForceSets(NamedTuple):
             plain_block, self.powers.within, records, core_origin, core_ray, tolerance
         )
         unit = self.unit
-        least = self.powers.least_watts_of(self.sides)
-        least_of_buses = np.where(self.radius > 0.0, least, 0.0) @ self.powers.members.T
-        is_over = (least_of_buses > self.powers.within.budget).any(axis=-1)
+        is_over = self.powers.over_budget(self.sides, self.radius > 0.0).any(axis=-1)
         size = np.where(is_over, -np.inf, size * unit)
         is_working = self.radius[..., None] > 0.0
         force = np.where(is_working, force, 0.0)

@@ -22,6 +22,8 @@ from finlab.core.ray_reach import WithinBudgets
 
 LEAST_RIM = 1e-9
 """Share of the largest force below which an edge passes through the rest."""
+WITHIN = 1e-6
+"""Distance over the largest force up to which a force still counts as one of a side."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,17 +86,38 @@ class Side:
         """The least power of any of its forces [W]."""
         return float(self.curve.at(np.array(self.least_share)))
 
-    def share(self, force: Array) -> Array:
-        """Returns which share of its largest forces forces (R, 2) [N] of the side are [1]: of a
-        polygon that contains the rest, by its gauge."""
-        if self.corners is None or len(self.corners) < 3:
-            return np.asarray(np.linalg.norm(force, axis=-1) / self.radius)
+    def watts(self, force: Array) -> Array:
+        """Returns the power (R,) [W] of forces (R, 2) [N]; infinity of those that are not of the
+        side."""
+        share = np.linalg.norm(force, axis=-1) / self.radius
+        beyond = share - 1.0
+        if self.corners is None:
+            turn = np.arctan2(force[:, 1], force[:, 0]) - self.center
+            turn = (turn + np.pi) % (2.0 * np.pi) - np.pi
+            off_arc = np.maximum(np.abs(turn) - self.half_angle, 0.0)
+            beyond = np.maximum(beyond, share * np.sin(np.minimum(off_arc, 0.5 * np.pi)))
+        elif len(self.corners) == 1:
+            across = force - (force @ self.corners[0])[:, None] * self.corners[0] / self.radius**2
+            beyond = np.maximum(beyond, np.linalg.norm(across, axis=-1) / self.radius)
+            beyond = np.maximum(beyond, -(force @ self.corners[0]) / self.radius**2)
+        else:
+            share, beyond = self._shares_of_polygon(force)
+        watts = self.curve.at(np.clip(share, self.least_share, 1.0))
+        return np.where(beyond <= WITHIN, watts, np.inf)
+
+    def _shares_of_polygon(self, force: Array) -> tuple[Array, Array]:
+        """The shares (R,) of forces (R, 2) by the gauge of a polygon that contains the rest, and
+        how far they are outside of it, over the largest force."""
+        assert self.corners is not None
         edge = np.roll(self.corners, -1, axis=0) - self.corners
         outward = np.stack([edge[:, 1], -edge[:, 0]], axis=-1)
+        outward = outward / np.linalg.norm(outward, axis=-1, keepdims=True)
         offset = (outward * self.corners).sum(axis=-1)
+        along = force @ outward.T
         # An edge through the rest, such as those of a sector, bounds no share.
-        is_rim = offset > LEAST_RIM * self.radius * np.linalg.norm(edge, axis=-1)
-        return np.asarray((force @ (outward[is_rim] / offset[is_rim, None]).T).max(axis=-1))
+        is_rim = offset > LEAST_RIM * self.radius
+        share = (along[:, is_rim] / offset[is_rim]).max(axis=-1)
+        return share, (along - offset).max(axis=-1) / self.radius
 
     def to_dict(self) -> dict[str, Any]:
         """Returns what a file holds of it."""
@@ -176,8 +199,15 @@ class PowerSets(NamedTuple):
         columns = [of_actuator[part[:, i]] for i, of_actuator in enumerate(self.pieces)]
         return np.stack(columns, axis=1)
 
-    def least_watts_of(self, sides: Array) -> Array:
-        """Returns the least power (R, n) [W] of sets with some sides (R, n, 2)."""
+    def over_budget(self, sides: Array, is_working: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Returns which buses (R, b) have not enough for the least power of sets with some sides
+        (R, n, 2), of those actuators (R, n) that work."""
+        least = np.where(is_working, self._least_watts_of(sides), 0.0)
+        is_over: NDArray[np.bool_] = least @ self.members.T > self.within.budget
+        return is_over
+
+    def _least_watts_of(self, sides: Array) -> Array:
+        """The least power (R, n) [W] of sets with some sides (R, n, 2)."""
         begin = sides[..., 0].astype(np.intp)
         watts = np.append(self.least_watts, 0.0)[np.minimum(begin, len(self.least_watts))]
         return np.where(sides[..., 1] > 0.0, watts, 0.0)

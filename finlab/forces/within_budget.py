@@ -17,7 +17,7 @@ from finlab.actuators.fin.fin_response import FinGroup
 from finlab.actuators.kinds import groups_of
 from finlab.actuators.response import Line, Plane, RadialTable
 from finlab.actuators.thrust_model import PowerLaw
-from finlab.allocation.power_budget import PowerBudget, budget_of, check_power
+from finlab.allocation.power_budget import PowerBudget, layout_budget
 from finlab.arrays import Array
 from finlab.errors import AllocationError
 from finlab.forces.force_sets import (
@@ -65,18 +65,24 @@ def force_sets_within(
         LayoutError: there is no actuator of a name.
         AllocationError: the power is none, or the flow drives actuators whose power is not known.
     """
-    budget = budget_of(layout) if power is None else check_power(power, layout)
+    budget = layout_budget(layout, power)
     sets = force_sets(layout, lost, flow)
     if budget is None:
         return sets
     shapes = shapes_of(layout, flow)
+    check_counted(layout, shapes)
+    return with_power(sets, sides_of(layout, shapes), budget)
+
+
+def check_counted(layout: Layout, shapes: Sequence[Shape]) -> None:
+    """Raises AllocationError: budgets are not counted for a robot whose forces have these shapes,
+    see `counts_budget`."""
     driven = driven_by_flow(layout, shapes)
     if driven:
         raise AllocationError(
             f"power: no budget is counted where the flow drives {', '.join(driven)}: what they take "
             "is not in it; leave out `flow`, or lift the budget by power=math.inf"
         )
-    return with_power(sets, sides_of(layout, shapes), budget)
 
 
 def with_power(

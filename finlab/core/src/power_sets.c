@@ -124,6 +124,8 @@ static wide best_share(const fl_power_sets *sets, const fl_power_side *side, wid
   return share;
 }
 
+static int works(const real *numbers) { return numbers[3] > 0 && numbers[1] > 0; }
+
 /* What the actuators of a bus, or of none (-1), give at a multiplier of its budget. */
 static void respond(const fl_power_sets *sets, int n, int bus, const side_pool *full,
                     wide multiplier, bus_response *out) {
@@ -132,7 +134,7 @@ static void respond(const fl_power_sets *sets, int n, int bus, const side_pool *
   out->worth = 0;
   for (int i = 0; i < n; i++) {
     const real *numbers = sets->actuator + NUMBERS_OF_ACTUATOR * i;
-    if ((int)numbers[2] != bus || !(numbers[3] > 0)) continue;
+    if ((int)numbers[2] != bus || !works(numbers)) continue;
     const fl_power_side *side = sets->side + (int)numbers[0];
     wide best_profit = -LARGEST_NUMBER;
     wide power = 0;
@@ -215,7 +217,7 @@ static void take_forces(const fl_power_sets *sets, int n, int bus, const side_po
                         wide force[][2]) {
   for (int i = 0; i < n; i++) {
     const real *numbers = sets->actuator + NUMBERS_OF_ACTUATOR * i;
-    if ((int)numbers[2] != bus || !(numbers[3] > 0)) continue;
+    if ((int)numbers[2] != bus || !works(numbers)) continue;
     const wide *far = full->side[full->begin[i] + above->side[i]].force;
     const wide *near = full->side[full->begin[i] + below->side[i]].force;
     for (int q = 0; q < 2; q++) {
@@ -303,6 +305,14 @@ static void evaluate(const real *block, const fl_work *work, const wide *from, c
   add_scaled(p->gradient, -dot_wide(way, ray, 6) / dot_wide(ray, ray, 6), ray);
 }
 
+/* Whether any budget binds at the last normal. */
+static int binds(const fl_power_sets *sets) {
+  for (int bus = 0; bus < sets->buses; bus++) {
+    if (sets->multiplier[bus] > 0) return 1;
+  }
+  return 0;
+}
+
 /* A step from a point along a direction to where the dual is less and flatter (weak conditions of
    Wolfe); 0 where there is none. */
 static int search_step(const real *block, const fl_work *work, const wide *from, const wide *ray,
@@ -364,7 +374,7 @@ void fl_smooth_normal(const real *block, const fl_work *work, const wide *from, 
   evaluate(block, work, from, ray, &here);
   for (int k = 0; k < NORMAL_STEPS; k++) {
     const wide off_ray = norm_wide(here.gradient);
-    if (off_ray <= close) break;
+    if (off_ray <= close || !binds(work->power_sets)) break;
     wide direction[6];
     for (int j = 0; j < 6; j++) direction[j] = -dot_wide(inverse[j], here.gradient, 6);
     if (k == 0) {
