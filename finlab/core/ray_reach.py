@@ -98,6 +98,7 @@ def ray_reach_within(
     normal = np.empty((count, 6))
     force = np.empty((count, n, 2))
     multiplier = np.empty((count, len(within.budget)))
+    corners = np.zeros(len(within.sides), np.intc)
     work = ctypes.create_string_buffer(constant("sizeof fl_work"))
     core.fl_reach_within(
         block.ctypes.data,
@@ -111,6 +112,7 @@ def ray_reach_within(
         ray.ctypes.data,
         count,
         min(close, LARGEST_CLOSE),
+        corners.ctypes.data,
         size.ctypes.data,
         normal.ctypes.data,
         force.ctypes.data,

@@ -592,6 +592,7 @@ typedef struct fl_power_sets {
   int buses;
   wide multiplier[FL_BUSES]; /* of the budgets, at the last normal */
   wide expected[FL_BUSES];   /* the same over its length, where it was above 0 */
+  int *corner;               /* of each side, the farthest one at the last normal */
 } fl_power_sets;
 #define FL_SIDES_MOST 1024 /* sides of all actuators */
 void fl_farthest_within_budgets(fl_power_sets *sets, int n, const wide *normal, wide force[][2]);

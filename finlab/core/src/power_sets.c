@@ -12,11 +12,14 @@
 
 #ifdef FL_WITH_POWER_SETS
 
-#define MU_FACTOR 1.2    /* from the multiplier that is expected to the one beside it */
-#define MU_GROWTH 3      /* of the logarithm of this factor, until two bracket the budget */
-#define MU_TRIES 12      /* of these, at most: then it is a factor of 1e42000, or no number */
-#define MU_STEPS 100     /* between both of them, at most */
-#define MU_CLOSE 1e-14   /* share to which multipliers, and powers, are known */
+#define MU_FACTOR 1.2 /* from the multiplier that is expected to the one beside it */
+#define MU_GROWTH 3   /* of the logarithm of this factor, until two bracket the budget */
+#define MU_TRIES 12   /* of these, at most: then it is a factor of 1e42000, or no number */
+#define MU_STEPS 100  /* between both of them, at most */
+#define MU_CLOSE 1e-7 /* logarithm of their ratio at which they are mixed: the rest is its square */
+#define POWER_CLOSE \
+  1e-9                   /* share of the budget to which one of them meets it, so that it is most
+                            of the mixture */
 #define LEAST_RATIO 1e-9 /* share of the bracket that a step leaves on either side */
 
 typedef struct {
@@ -39,23 +42,37 @@ typedef struct {
   int side[FL_MOST]; /* the one of its sides that is taken */
 } bus_response;
 
-/* The largest force of a side that is farthest along prices s (2,). */
-static full_force farthest_of_side(const fl_power_sets *sets, const fl_power_side *side,
-                                   const wide *s) {
-  full_force best = {-LARGEST_NUMBER, {0, 0}};
-  if (side->polygon > 0) {
-    const real *polygon = sets->tables + (int)side->polygon;
-    for (int k = 0; k < (int)polygon[0]; k++) {
-      const wide x = polygon[1 + 2 * k];
-      const wide y = polygon[2 + 2 * k];
-      const wide reach = s[0] * x + s[1] * y;
-      if (!(reach > best.reach)) continue;
-      best.reach = reach;
-      best.force[0] = x;
-      best.force[1] = y;
+/* The corner of a convex polygon that is farthest along prices s (2,): uphill from a corner that was
+   the farthest one before, as corners are in order; that becomes the one which is found. */
+static full_force farthest_corner(const real *polygon, const wide *s, int *corner) {
+  const int count = (int)polygon[0];
+  const real *point = polygon + 1;
+  int at = *corner;
+  wide reach = s[0] * point[2 * at] + s[1] * point[2 * at + 1];
+  int step = 1;
+  int n_turns = 0;
+  for (int k = 0; k < 2 * count && n_turns < 2; k++) {
+    const int to = (at + step + count) % count;
+    const wide other = s[0] * point[2 * to] + s[1] * point[2 * to + 1];
+    if (other > reach) {
+      at = to;
+      reach = other;
+      continue;
     }
-    return best;
+    step = -step;
+    n_turns++;
   }
+  *corner = at;
+  const full_force best = {reach, {point[2 * at], point[2 * at + 1]}};
+  return best;
+}
+
+/* The largest force of a side that is farthest along prices s (2,). */
+static full_force farthest_of_side(fl_power_sets *sets, int i, const wide *s) {
+  const fl_power_side *side = sets->side + i;
+  if (side->polygon > 0)
+    return farthest_corner(sets->tables + (int)side->polygon, s, sets->corner + i);
+  full_force best = {-LARGEST_NUMBER, {0, 0}};
   const wide size = sqrt(s[0] * s[0] + s[1] * s[1]);
   const wide turn = remainder(atan2(s[1], s[0]) - side->center, 2 * PI);
   if (size > 0 && fabs(turn) <= side->half_angle) {
@@ -194,7 +211,8 @@ static void close_in(const fl_power_sets *sets, int n, int bus, const side_pool 
     const wide low = log(larger_wide(above->multiplier, TINY_WIDE));
     const wide high = log(below->multiplier);
     const int is_close = high - low <= MU_CLOSE;
-    if (is_close || budget - below->power <= MU_CLOSE * budget) return;
+    const wide enough = POWER_CLOSE * budget;
+    if (is_close || budget - below->power <= enough || above->power - budget <= enough) return;
     wide part = 0.5;
     if (k % 3 != 2 && below->power > 0) {
       const wide excess = log(above->power / budget);
@@ -237,7 +255,6 @@ void fl_farthest_within_budgets(fl_power_sets *sets, int n, const wide *normal, 
   int count = 0;
   for (int i = 0; i < n; i++) {
     const real *numbers = sets->actuator + NUMBERS_OF_ACTUATOR * i;
-    const fl_power_side *side = sets->side + (int)numbers[0];
     wide s[2] = {0, 0};
     for (int k = 0; k < 6; k++) {
       s[0] += numbers[4 + k] * normal[k];
@@ -247,7 +264,7 @@ void fl_farthest_within_budgets(fl_power_sets *sets, int n, const wide *normal, 
     force[i][1] = 0;
     pool.begin[i] = count;
     for (int k = 0; k < (int)numbers[1]; k++) {
-      pool.side[count] = farthest_of_side(sets, side + k, s);
+      pool.side[count] = farthest_of_side(sets, (int)numbers[0] + k, s);
       count++;
     }
   }

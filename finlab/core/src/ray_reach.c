@@ -55,11 +55,12 @@ static void begin_at_normal(const real *block, fl_work *work, const wide *from, 
 }
 
 /* The same within power budgets of buses, by sides of sets (fl_power_side) and their powers; and
-   the multipliers (count, buses) of the budgets at the planes. */
+   the multipliers (count, buses) of the budgets at the planes. `corners` has a number for each
+   side, 0 at first, to be used by this function alone. */
 void fl_reach_within(const real *block, fl_work *work, const real *tables, const real *sides,
                      const real *budget, int buses, const real *sets, const wide *from,
-                     const wide *ray, int count, wide close, wide *size, wide *normal, real *force,
-                     wide *multiplier) {
+                     const wide *ray, int count, wide close, int *corners, wide *size, wide *normal,
+                     real *force, wide *multiplier) {
   const int n = COUNT(block);
   const wide farthest = 1e30;
   fl_power_sets power_sets;
@@ -68,6 +69,7 @@ void fl_reach_within(const real *block, fl_work *work, const real *tables, const
   power_sets.side = (const fl_power_side *)sides;
   power_sets.budget = budget;
   power_sets.buses = buses;
+  power_sets.corner = corners;
   work->power_sets = &power_sets;
   for (int k = 0; k < count; k++) {
     power_sets.actuator = sets;
