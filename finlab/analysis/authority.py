@@ -139,10 +139,7 @@ def _authorities(
     layout: Layout, failures: Sequence[Collection[str]], flow: ArrayLike | None
 ) -> list[Authority]:
     """The authority after each of several losses; one call for all is quicker than many."""
-    power = None if counts_budget(layout, flow) else math.inf
-    sets = force_sets_within(layout, flow=flow, power=power).tile(len(failures))
-    for row, lost in enumerate(failures):
-        sets.lose(row, list(layout.indices(tuple(lost), "lost")))
+    sets = _sets_after(layout, failures, flow)
     counted_rows = np.flatnonzero(layout.commanded)
     counting = sets.along(counted_rows)
     values, vectors = singular_values(counting)
@@ -162,6 +159,29 @@ def _authorities(
         )
         for k in range(len(failures))
     ]
+
+
+def _sets_after(
+    layout: Layout, failures: Sequence[Collection[str]], flow: ArrayLike | None
+) -> ForceSets:
+    """Feasible forces after each of several losses, within the layout's power budget where one is
+    counted."""
+    power = None if counts_budget(layout, flow) else math.inf
+    sets = force_sets_within(layout, flow=flow, power=power).tile(len(failures))
+    for row, lost in enumerate(failures):
+        sets.lose(row, list(layout.indices(tuple(lost), "lost")))
+    return sets
+
+
+def reach_alone(
+    layout: Layout, lost: Collection[str] = (), flow: ArrayLike | None = None
+) -> Array:
+    """Returns the largest wrench (2, 6) [N, N m] along each axis, and against it, with the other
+    five at zero, as `largest` and `most_negative` of `Authority`; arguments and errors as for
+    `losses`."""
+    sets = _sets_after(layout, [lost], flow)
+    size = _largest_sizes(sets, held_axes(layout, sets), layout, flow)
+    return np.asarray(size.reshape(2, 6) * SCALE)
 
 
 def reachable_axes(

@@ -158,32 +158,35 @@ class Capability:
         return np.minimum(self.values.astype(np.intp) + 1, len(self.conditions) - 1)
 
     @property
-    def limited_by(self) -> tuple[tuple[str, ...], ...]:
-        """What limits each heading, C rows of H: `thrust`, or buses whose power is used up, as
-        `bus aft`; `power` where one budget counts for all."""
+    def binding_buses(self) -> NDArray[np.bool_]:
+        """Which buses (C, H, B) have no power left at the limiting load of each heading."""
         worth = np.take_along_axis(self.budget_worth, self.limiting[..., None, None], axis=2)
-        rows = []
-        for of_case in worth[:, :, 0]:
-            words = []
-            for of_heading in of_case:
-                bound = [
-                    bus_words(name)
-                    for name, share in zip(self.buses, of_heading, strict=True)
-                    if share > NO_WORTH
-                ]
-                words.append(" and ".join(bound) or THRUST)
-            rows.append(tuple(words))
-        return tuple(rows)
+        return np.asarray(worth[:, :, 0] > NO_WORTH)
+
+    @property
+    def worst_binding_buses(self) -> NDArray[np.bool_]:
+        """The same (H, B) after the loss that `worst` is about."""
+        binding = self.binding_buses
+        if len(self.cases) == 1:
+            return binding[0]
+        of_losses = self.values[1:].argmin(axis=0)
+        return binding[1 + of_losses, np.arange(len(self.headings))]
+
+    @property
+    def limited_by(self) -> tuple[tuple[str, ...], ...]:
+        """What limits each heading, C rows of H: `thrust`, or buses that have no power left, as
+        `bus aft`; `power` where one budget counts for all."""
+        return tuple(self._limit_words(of_case) for of_case in self.binding_buses)
 
     @property
     def worst_limited_by(self) -> tuple[str, ...]:
         """What limits each heading (H,) after the loss that `worst` is about."""
-        if len(self.cases) == 1:
-            return self.limited_by[0]
-        limited_by = self.limited_by
-        return tuple(
-            limited_by[k + 1][h] for h, k in enumerate(self.values[1:].argmin(axis=0).tolist())
-        )
+        return self._limit_words(self.worst_binding_buses)
+
+    def _limit_words(self, binding: NDArray[np.bool_]) -> tuple[str, ...]:
+        """What limits headings (H,) where buses (H, B) have no power left."""
+        words = np.array([bus_words(name) for name in self.buses])
+        return tuple(" and ".join(words[of_heading]) or THRUST for of_heading in binding)
 
     @property
     def notation(self) -> tuple[int, int, int, int] | None:

@@ -341,8 +341,9 @@ class _Search:
         if len(missed):
             of_missed = within.take(missed)
             # From the forces of least power, as in `solve`.
-            _, inside_force = of_missed.farthest(np.zeros_like(ray[missed]))
-            inside = of_missed.wrench(inside_force)
+            rest = np.zeros_like(ray[missed])
+            _, _, least_forces, _ = of_missed.reach_within(rest, rest, np.inf)
+            inside = of_missed.wrench(least_forces)
             target = ray[missed] * length[missed, None]
             _, normal[missed], _, multiplier[missed] = of_missed.reach_within(
                 inside, target - inside, FINE

@@ -9,6 +9,7 @@ from markupsafe import Markup
 
 from finlab.analysis import Improvement, Progress
 from finlab.analysis.improvement_text import goal_value, improvement_remarks
+from finlab.forces.within_budget import counts_budget
 from webapp.handles import add_html
 from webapp.markup.score_card import remarks_markup, score_table
 from webapp.markup.words import fins_words, html, marker, three_digits
@@ -44,8 +45,11 @@ def _analysis_card(
             "<span class='dim'>The body lacks at most {} {} of the true set.</span>", gap, unit
         )
     layout = analysis.question.layout
-    if layout.power_w is not None or layout.buses:
-        note += Markup("<span class='dim'>The power budget does not count here.</span>")
+    has_budget = layout.power_w is not None or bool(layout.buses)
+    if has_budget and not counts_budget(layout, analysis.question.flow):
+        note += Markup(
+            "<span class='dim'>The power budget does not count here: the flow drives actuators.</span>"
+        )
     table = score_table(layout, analysis.card, analysis.before)
     return html("<div class='fl'>{}</div>{}", note, table)
 

@@ -17,9 +17,7 @@
 #define MU_TRIES 12   /* of these, at most: then it is a factor of 1e42000, or no number */
 #define MU_STEPS 100  /* between both of them, at most */
 #define MU_CLOSE 1e-7 /* logarithm of their ratio at which they are mixed: the rest is its square */
-#define POWER_CLOSE \
-  1e-9                   /* share of the budget to which one of them meets it, so that it is most
-                            of the mixture */
+#define POWER_CLOSE 1e-9 /* share of the budget to which one of them is mixed in all but alone */
 #define LEAST_RATIO 1e-9 /* share of the bracket that a step leaves on either side */
 
 typedef struct {
