@@ -173,9 +173,7 @@ def _sets_after(
     return sets
 
 
-def reach_alone(
-    layout: Layout, lost: Collection[str] = (), flow: ArrayLike | None = None
-) -> Array:
+def reach_alone(layout: Layout, lost: Collection[str] = (), flow: ArrayLike | None = None) -> Array:
     """Returns the largest wrench (2, 6) [N, N m] along each axis, and against it, with the other
     five at zero, as `largest` and `most_negative` of `Authority`; arguments and errors as for
     `losses`."""

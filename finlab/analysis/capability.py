@@ -17,12 +17,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from finlab.allocation.power_budget import PowerBudget, bus_words, layout_budget
 from finlab.analysis.capability_text import capability_blocks, capability_picture
 from finlab.analysis.dnv_loads import WEATHER, total_load
 from finlab.analysis.dnv_thrust import CONSTANT_LOSS, LOSSES, ship_sets, ship_thrusters, thrust_left
 from finlab.analysis.ship_file import Ship
 from finlab.analysis.split_sets import Leaf, SplitSet, largest_shares, split_set
-from finlab.allocation.power_budget import PowerBudget, bus_words, layout_budget
 from finlab.arrays import NEARLY, NOTHING, Array
 from finlab.display import html, text
 from finlab.errors import LayoutError
@@ -166,11 +166,10 @@ class Capability:
     @property
     def worst_binding_buses(self) -> NDArray[np.bool_]:
         """The same (H, B) after the loss that `worst` is about."""
-        binding = self.binding_buses
         if len(self.cases) == 1:
-            return binding[0]
+            return np.asarray(self.binding_buses[0])
         of_losses = self.values[1:].argmin(axis=0)
-        return binding[1 + of_losses, np.arange(len(self.headings))]
+        return np.asarray(self.binding_buses[1 + of_losses, np.arange(len(self.headings))])
 
     @property
     def limited_by(self) -> tuple[tuple[str, ...], ...]:
@@ -325,8 +324,8 @@ def capability(
         sides = sides_of(layout, shapes)
     buses = _buses(layout, budget)
     every = []
-    for name, *own in zip(layout.names, effectiveness, shapes, sides, strict=True):
-        every.append(split_set(name, *own, buses.of_actuator.get(name)))
+    for name, gain, shape, own in zip(layout.names, effectiveness, shapes, sides, strict=True):
+        every.append(split_set(name, gain, shape, own, buses.of_actuator.get(name)))
     working = [name for name in layout.names if name not in lost]
     cases = []
     for name, taken in [("intact", ()), *((name, (name,)) for name in working)]:

@@ -181,9 +181,7 @@ def _powers(layout: Layout, ship: Ship) -> Iterator[tuple[PowerCurve, PowerCurve
     power^(2/3) ([3.9.2]), up to the brake power of the ship's file either way; without one, as the
     model of the layout says."""
     nothing = PowerCurve(0.0)
-    for actuator, sides in zip(
-        layout.actuators, sides_of(layout, shapes_of(layout)), strict=True
-    ):
+    for actuator, sides in zip(layout.actuators, sides_of(layout, shapes_of(layout)), strict=True):
         data = ship.actuators.get(actuator.name, ShipActuator())
         if data.power_kw is not None:
             at_most = PowerCurve(1e3 * data.power_kw, THRUST_EXPONENT)
@@ -193,7 +191,8 @@ def _powers(layout: Layout, ship: Ship) -> Iterator[tuple[PowerCurve, PowerCurve
         is_astern_alone = len(curves) == 1 and getattr(actuator, "force", (0.0, 0.0))[1] <= 0.0
         if is_astern_alone:
             curves.insert(0, nothing)
-        yield (*curves, nothing, nothing)[:2]
+        forward, reverse, *_ = (*curves, nothing, nothing)
+        yield forward, reverse
 
 
 def _azimuth_arc(azimuth: Azimuth) -> tuple[tuple[float, float] | None, ActuatorType]:

@@ -5,8 +5,8 @@ the sum of what each one can earn by itself, its support function; a load that w
 out of reach. Actuators whose sets are not convex are covered by several prices: one for each leaf
 of a tree that chooses among their parts.
 
-Where buses have a power budget, their power has a price, too: an actuator earns what its force does,
-less the price of the power that this takes, and to the sum comes what all budgets are worth.
+Where buses have a power budget, their power has a price, too: an actuator earns what its force
+does, less the price of the power that this takes, and to the sum comes what all budgets are worth.
 
 This file imports nothing of finlab, so that it can be read, and trusted, by itself.
 """
@@ -68,7 +68,7 @@ def best_of_knots(knots: list[list[float]], reach: float, watt_price: float) -> 
     """Returns the most of  g reach - price P(g)  where P has knots of g, P and its slope, and a
     slope that is linear between them."""
     best = max(share * reach - watt_price * watts for share, watts, _ in knots)
-    for (share, watts, slope), (next_share, _, next_slope) in zip(knots, knots[1:]):
+    for (share, watts, slope), (next_share, _, next_slope) in zip(knots, knots[1:], strict=False):
         if watt_price * slope < reach < watt_price * next_slope:
             rise = reach / watt_price - slope
             further = (next_share - share) * rise / (next_slope - slope)
@@ -103,7 +103,7 @@ def proven_share(
         return math.inf
     earned = 0.0
     for bus, watt_price in watt_prices.items():
-        earned += watt_price * (buses or {})[bus]
+        earned += watt_price * (buses or {}).get(bus, math.inf)
     for actuator, scale in zip(sets, scales, strict=True):
         first, second = (
             sum(p * w for p, w in zip(price, column, strict=True))

@@ -197,7 +197,9 @@ def _note_on_budget(layout: Layout, flow: Array | None) -> str:
             "Largest wrenches and the weakest direction are within the layout's power budget, the "
             "powers are not: method dual keeps none for such a robot."
         )
-    return "Largest wrenches, the weakest direction and powers are within the layout's power budget."
+    return (
+        "Largest wrenches, the weakest direction and powers are within the layout's power budget."
+    )
 
 
 def _refused_by_dual(layout: Layout) -> bool:

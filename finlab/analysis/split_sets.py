@@ -349,7 +349,7 @@ class _Search:
                 inside, target - inside, FINE
             )
             # Actuators that take more than a budget at rest refuse every wrench by its price alone.
-            over = powers.over_budget(of_missed.sides, of_missed.radius > 0.0)
+            over = powers.over_budget(sides[missed], of_missed.radius > 0.0)
             is_over = over.any(axis=-1)
             normal[missed[is_over]] = 0.0
             multiplier[missed[is_over]] = over[is_over]
@@ -433,9 +433,7 @@ class _Search:
         return {each.name: part - 1 for each, part in chosen if part > 0}
 
 
-def _powers(
-    sets: Sequence[SplitSet], watts_of_buses: Mapping[str, float]
-) -> PowerSets | None:
+def _powers(sets: Sequence[SplitSet], watts_of_buses: Mapping[str, float]) -> PowerSets | None:
     """Powers and budgets of actuators; None without budgets."""
     if not watts_of_buses:
         return None

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-
 from numpy.typing import NDArray
 
 from finlab.allocation.power_budget import PowerBudget
@@ -152,7 +151,7 @@ def side_table(sets: Sequence[Sides]) -> SideTable:
     """Returns the sides of P sets."""
     tables = [np.zeros(1)]
     end = 1
-    numbers = []
+    numbers: list[tuple[float, ...]] = []
     begin = np.zeros((len(sets), 2))
     least_watts: list[float] = []
     for place, sides in enumerate(sets):

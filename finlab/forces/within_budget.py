@@ -18,7 +18,6 @@ from finlab.actuators.kinds import groups_of
 from finlab.actuators.response import Line, Plane, RadialTable
 from finlab.actuators.thrust_model import PowerLaw
 from finlab.allocation.power_budget import PowerBudget, layout_budget
-from finlab.arrays import Array
 from finlab.errors import AllocationError
 from finlab.forces.force_sets import (
     HALF_TURN_TOLERANCE,
@@ -38,17 +37,14 @@ millionth of the largest power."""
 
 
 def counts_budget(layout: Layout, flow: ArrayLike | None = None) -> bool:
-    """Returns whether budgets are counted for a robot in a flow (6,) [m/s, rad/s], None at rest: not
-    where this drives actuators."""
+    """Returns whether budgets are counted for a robot in a flow (6,) [m/s, rad/s], None at rest:
+    not where this drives actuators."""
     is_any_driven = any(actuator.KIND.driven_by_flow for actuator in layout.actuators)
     return not is_any_driven or not driven_by_flow(layout, shapes_of(layout, flow))
 
 
 def force_sets_within(
-    layout: Layout,
-    lost: Collection[str] = (),
-    flow: ArrayLike | None = None,
-    power: object = None,
+    layout: Layout, lost: Collection[str] = (), flow: ArrayLike | None = None, power: object = None
 ) -> ForceSets:
     """Returns the feasible forces of one robot within a power budget, as `force_sets` does without
     one.
@@ -80,14 +76,12 @@ def check_counted(layout: Layout, shapes: Sequence[Shape]) -> None:
     driven = driven_by_flow(layout, shapes)
     if driven:
         raise AllocationError(
-            f"power: no budget is counted where the flow drives {', '.join(driven)}: what they take "
-            "is not in it; leave out `flow`, or lift the budget by power=math.inf"
+            f"power: no budget is counted where the flow drives {', '.join(driven)}, as what they "
+            "take is not in it; leave out `flow`, or lift the budget by power=math.inf"
         )
 
 
-def with_power(
-    sets: ForceSets, sides: Sequence[Sequence[Sides]], budget: PowerBudget
-) -> ForceSets:
+def with_power(sets: ForceSets, sides: Sequence[Sequence[Sides]], budget: PowerBudget) -> ForceSets:
     """Returns sets of forces of robots alike within a budget; `sides` as from `sides_of`."""
     powers = power_sets(sides, budget)
     whole = np.array([of_actuator[0] for of_actuator in powers.pieces])

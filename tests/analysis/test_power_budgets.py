@@ -251,7 +251,9 @@ def test_words_files_and_pictures_say_what_limits(within_buses: Plot) -> None:
     labels = [line.get_label() for line in capability_picture(plot).axes[0].lines]
     assert labels.count("limited by power") == 1
     free = capability(replace(within_buses.layout, buses=()), headings=[0.0])
-    assert "limited by" not in str(free) and not free.to_csv().splitlines()[0].endswith("limited_by")
+    assert "limited by" not in str(free) and not free.to_csv().splitlines()[0].endswith(
+        "limited_by"
+    )
 
 
 def test_where_the_flow_drives_actuators_a_plot_refuses_a_budget() -> None:

@@ -93,10 +93,11 @@ def curves_of(capability: Capability, names: Sequence[str]) -> list[Curve]:
     the robot as it is; arguments as for `polar_plot`."""
     scale = shown_values(capability).scale
     values = scale * capability.values
-    limited = limited_after = None
+    limited: NDArray[np.bool_] | None = None
+    limited_after: NDArray[np.bool_] | None = None
     if capability.buses:
-        limited = capability.binding_buses[0].any(axis=-1)
-        limited_after = capability.worst_binding_buses.any(axis=-1)
+        limited = np.asarray(capability.binding_buses[0].any(axis=-1))
+        limited_after = np.asarray(capability.worst_binding_buses.any(axis=-1))
     curves = []
     if len(capability.cases) > 1:
         worst = scale * capability.worst
