@@ -131,7 +131,7 @@ def test_the_support_function_is_the_least_over_multipliers(shipped: Layouts) ->
     support, force = sets.farthest(normals)
 
     def bound(multiplier: float, normal: Array) -> float:
-        """mu P + sum of max over y of  s y - mu c(y)."""
+        """xi P + sum of max over y of  s y - xi c(y)."""
         total = multiplier * 90.0
         for actuator, columns in zip(layout.actuators, own_effectiveness(layout), strict=True):
             assert isinstance(actuator, Thruster)

@@ -594,7 +594,7 @@ typedef struct fl_power_sets {
   wide expected[FL_BUSES];   /* the same over its length, where it was above 0 */
   int *corner;               /* of each side, the farthest one at the last normal */
 } fl_power_sets;
-#define FL_SIDES_MOST 1024 /* sides of all actuators */
+#define FL_SIDES_MOST 2560 /* of FL_MOST actuators: five arcs each, as two halves */
 void fl_farthest_within_budgets(fl_power_sets *sets, int n, const wide *normal, wide force[][2]);
 void fl_smooth_normal(const real *block, const fl_work *work, const wide *from, const wide *ray,
                       wide close, wide *normal);

@@ -1,22 +1,22 @@
 /* The farthest forces of sets within power budgets (Eq. 30), for ray_reach.c.
 
-       h(m) = min over mu >= 0 of  sum over buses b of  mu_b P_b
-              + sum over actuators i of b of  max over y in Y_i of  s_i.y - mu_b c_i(y)
+       h(m) = min over xi >= 0 of  sum over buses b of  xi_b P_b
+              + sum over actuators i of b of  max over y in Y_i of  s_i.y - xi_b c_i(y)
 
    with the prices s_i = B_i' m. The inner maximum is that of the best side of a set: a force g f
    of it, a share g of one of its largest forces f, costs C(g), so that f is the farthest of them
-   and g maximizes g s.f - mu C(g). The power of a bus falls with mu; where it jumps over the
+   and g maximizes g s.f - xi C(g). The power of a bus falls with xi; where it jumps over the
    budget, as where s.f is 0 or C is piecewise linear, a mixture of the forces on both sides of the
    jump takes just the budget, and is as far. */
 #include "internal.h"
 
 #ifdef FL_WITH_POWER_SETS
 
-#define MU_FACTOR 1.2 /* from the multiplier that is expected to the one beside it */
-#define MU_GROWTH 3   /* of the logarithm of this factor, until two bracket the budget */
-#define MU_TRIES 12   /* of these, at most: then it is a factor of 1e42000, or no number */
-#define MU_STEPS 100  /* between both of them, at most */
-#define MU_CLOSE 1e-7 /* logarithm of their ratio at which they are mixed: the rest is its square */
+#define XI_FACTOR 1.2 /* from the multiplier that is expected to the one beside it */
+#define XI_GROWTH 3   /* of the logarithm of this factor, until two bracket the budget */
+#define XI_TRIES 12   /* of these, at most: then it is a factor of 1e42000, or no number */
+#define XI_STEPS 100  /* between both of them, at most */
+#define XI_CLOSE 1e-7 /* logarithm of their ratio at which they are mixed: the rest is its square */
 #define POWER_CLOSE 1e-9 /* share of the budget to which one of them is mixed in all but alone */
 #define LEAST_RATIO 1e-9 /* share of the bracket that a step leaves on either side */
 
@@ -176,17 +176,17 @@ static int bracket(const fl_power_sets *sets, int n, int bus, const side_pool *f
                    bus_response *above, bus_response *below) {
   const wide budget = sets->budget[bus];
   bus_response next;
-  wide factor = MU_FACTOR;
+  wide factor = XI_FACTOR;
   respond(sets, n, bus, full, expected, &next);
   const int is_below = next.power <= budget;
   if (is_below)
     *below = next;
   else
     *above = next;
-  for (int k = 0; k < MU_TRIES; k++) {
+  for (int k = 0; k < XI_TRIES; k++) {
     wide multiplier = next.multiplier * factor;
     if (is_below) multiplier = next.multiplier / factor;
-    factor = pow(factor, MU_GROWTH);
+    factor = pow(factor, XI_GROWTH);
     if (is_below && !(multiplier > TINY_WIDE)) return 1;
     respond(sets, n, bus, full, multiplier, &next);
     const int is_other_side = (next.power <= budget) != is_below;
@@ -205,10 +205,10 @@ static int bracket(const fl_power_sets *sets, int n, int bus, const side_pool *f
 static void close_in(const fl_power_sets *sets, int n, int bus, const side_pool *full,
                      bus_response *above, bus_response *below) {
   const wide budget = sets->budget[bus];
-  for (int k = 0; k < MU_STEPS; k++) {
+  for (int k = 0; k < XI_STEPS; k++) {
     const wide low = log(larger_wide(above->multiplier, TINY_WIDE));
     const wide high = log(below->multiplier);
-    const int is_close = high - low <= MU_CLOSE;
+    const int is_close = high - low <= XI_CLOSE;
     const wide enough = POWER_CLOSE * budget;
     if (is_close || budget - below->power <= enough || above->power - budget <= enough) return;
     wide part = 0.5;
@@ -279,7 +279,7 @@ void fl_farthest_within_budgets(fl_power_sets *sets, int n, const wide *normal, 
       take_forces(sets, n, bus, full, &above, &above, 0, force);
       continue;
     }
-    /* Profits are not below 0 where actuators can rest: so mu P is not above what all is worth. */
+    /* Profits are not below 0 where actuators can rest: so xi P is not above what all is worth. */
     wide expected = larger_wide(above.worth, TINY_WIDE) / sets->budget[bus];
     if (sets->expected[bus] > 0) expected = sets->expected[bus] * length;
     wide part = 0;
