@@ -583,7 +583,7 @@ typedef struct {
                  power [W], and the slope of that; else 0 */
 } fl_power_side;
 #define NUMBERS_OF_ACTUATOR 16 /* of fl_power_sets */
-typedef struct fl_power_sets {
+struct fl_power_sets {
   const real *tables;
   const fl_power_side *side;
   const real *actuator; /* (n, 16): first side, how many, bus or -1, whether it works; then the
@@ -593,7 +593,7 @@ typedef struct fl_power_sets {
   wide multiplier[FL_BUSES]; /* of the budgets, at the last normal */
   wide expected[FL_BUSES];   /* the same over its length, where it was above 0 */
   int *corner;               /* of each side, the farthest one at the last normal */
-} fl_power_sets;
+};
 #define FL_SIDES_MOST 2560 /* of FL_MOST actuators: five arcs each, as two halves */
 void fl_farthest_within_budgets(fl_power_sets *sets, int n, const wide *normal, wide force[][2]);
 void fl_smooth_normal(const real *block, const fl_work *work, const wide *from, const wide *ray,

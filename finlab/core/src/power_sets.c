@@ -40,8 +40,8 @@ typedef struct {
   int side[FL_MOST]; /* the one of its sides that is taken */
 } bus_response;
 
-/* The corner of a convex polygon that is farthest along prices s (2,): uphill from a corner that was
-   the farthest one before, as corners are in order; that becomes the one which is found. */
+/* The corner of a convex polygon that is farthest along prices s (2,): uphill from the one that was
+   the farthest before, as corners are in order; `corner` becomes what is found. */
 static full_force farthest_corner(const real *polygon, const wide *s, int *corner) {
   const int count = (int)polygon[0];
   const real *point = polygon + 1;
