@@ -1,5 +1,5 @@
-"""What keeps a robot from delivering a wrench: limits, power budgets, rates and dead bands of its
-actuators, in sentences; `Allocation.binding` and the judge of logs ask for them."""
+"""Causes that keep a robot from delivering a wrench: limits, power budgets, rates and dead bands of
+its actuators, in sentences; `Allocation.binding` and the judge of logs ask for them."""
 
 from typing import TYPE_CHECKING
 
