@@ -379,6 +379,25 @@ void fl_reach(const fl_real *block, fl_work *work, const fl_real *sets, const fl
               const fl_wide *ray, int count, fl_wide close, fl_wide *size, fl_wide *normal,
               fl_real *force);
 
+#ifdef FL_WITH_POWER_SETS
+/* Says the same within power budgets of buses.
+
+   @param tables     corners and curves of the sides, one behind the other; the first number is
+                     not used
+   @param sides      (., 8): sets of forces and their powers, fl_power_side of internal.h
+   @param budget     (buses,) the most power of each bus [W]
+   @param buses      how many, FL_BUSES at most
+   @param sets       (count, n, 16): of each actuator its first side and how many it has, of which
+                     any may be taken, its bus or -1, whether it works; then the wrench per newton
+   @param corners    a number for each side, 0 at first, for this function alone
+   @param multiplier (count, buses) of the budgets at the planes, in the unit of `from` over W */
+void fl_reach_within(const fl_real *block, fl_work *work, const fl_real *tables,
+                     const fl_real *sides, const fl_real *budget, int buses, const fl_real *sets,
+                     const fl_wide *from, const fl_wide *ray, int count, fl_wide close,
+                     int *corners, fl_wide *size, fl_wide *normal, fl_real *force,
+                     fl_wide *multiplier);
+#endif
+
 /* Takes some steps of Newton's method on the dual from given multipliers, and evaluates it there.
 
    @param question    losses, free axes and limits; the rest does not count

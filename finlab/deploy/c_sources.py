@@ -53,6 +53,7 @@ FILES_LEFT_OUT = (
     "actuator_formulas.c",
     "messages.c",
     "ray_reach.c",
+    "power_sets.c",
     "for_python.c",
     "prepared_call.c",
     "answer_many.c",

@@ -267,6 +267,9 @@ int fl_prepare_question(const real *block, fl_work *work, const fl_question *q) 
 int fl_prepare(const real *block, fl_work *work) {
   memset(&work->span, 0, sizeof work->span);
   work->ray = 0;
+#ifdef FL_WITH_POWER_SETS
+  work->power_sets = 0;
+#endif
   work->refine_steps = 0;
   work->has_lambda_begin = 0;
   work->residual_enough = TOLERANCE;

@@ -580,6 +580,39 @@ wide fl_farthest_along_ray(const real *block, const fl_work *work, const wide *f
                            wide *plane);
 void fl_mixed_forces(const real *block, const fl_mixture *m, real force[][2]);
 
+#ifdef FL_WITH_POWER_SETS
+/* power_sets.c: the farthest forces within power budgets. A side is a convex set of forces of one
+   actuator, from a share of its largest ones on, whose power grows with that share; Python writes
+   it, as `Side.numbers` of finlab/forces/power_sides.py. */
+typedef struct {
+  real polygon; /* offset of its corners in the tables, a count and pairs [N]; 0 for a sector */
+  real radius;  /* of a sector [N] */
+  real center;  /* of its arc [rad] */
+  real half_angle;
+  real least_share; /* of the largest forces [1] */
+  real watts;       /* of the largest forces: a share g takes watts g^exponent */
+  real exponent;
+  real curve; /* offset of knots in the tables, in place of that: a count, and of each a share, its
+                 power [W], and the slope of that; else 0 */
+} fl_power_side;
+#define NUMBERS_OF_ACTUATOR 16 /* of fl_power_sets */
+struct fl_power_sets {
+  const real *tables;
+  const fl_power_side *side;
+  const real *actuator; /* (n, 16): first side, how many, bus or -1, whether it works; then the
+                           wrench (2, 6) per newton along both directions */
+  const real *budget;   /* (buses,) [W] */
+  int buses;
+  wide multiplier[FL_BUSES]; /* of the budgets, at the last normal */
+  wide expected[FL_BUSES];   /* the same over its length, where it was above 0 */
+  int *corner;               /* of each side, the farthest one at the last normal */
+};
+#define FL_SIDES_MOST 2560 /* of FL_MOST actuators: five arcs each, as two halves */
+void fl_farthest_within_budgets(fl_power_sets *sets, int n, const wide *normal, wide force[][2]);
+void fl_smooth_normal(const real *block, const fl_work *work, const wide *from, const wide *ray,
+                      wide close, wide *normal);
+#endif
+
 /* support_newton.c: the same by normals of the set */
 int fl_nearest_by_normal(const real *block, const fl_work *work, const wide *target_weighted,
                          const wide *normal, wide close, fl_mixture *m);

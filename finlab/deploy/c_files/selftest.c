@@ -27,7 +27,7 @@ typedef struct {
 #define DRAG_SLACK 10  /* where foils drag, a share of the ray may be off by so many times APART */
 /* Where rudders stand in slipstreams, groups after the first may be off by so many times APART in
    single precision: along a curved rim they gain the root of what rounding, a millionth, takes from
-   the groups before. */
+   the groups before. The root of TOLERANCE, 1e-6, is 1e-3. */
 #if defined(FL_SINGLE) && FL_SLIPSTREAMS
 #define LATER_SLACK 10
 #else
