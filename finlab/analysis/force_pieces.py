@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from finlab.arrays import Array
 from finlab.core.ray_reach import block_of_planes
 from finlab.forces.force_sets import ForceSets
+from finlab.forces.power_sides import Sides
 
 INSIDE = 1e-7
 """Distance by which a force may be outside of a part and still count as within, over the largest
@@ -30,6 +31,8 @@ class Piece(NamedTuple):
     """Half of that arc [rad]; pi for a disc."""
     corners: Array | None = None
     """Corners (K, 2) [N] of a polygon, in place of the arc."""
+    sides: Sides = ()
+    """What its forces cost; none where no power budget counts."""
 
     @property
     def middle(self) -> Array:
@@ -58,6 +61,8 @@ class Piece(NamedTuple):
 
     def to_dict(self) -> dict[str, Any]:
         """Returns what a file holds of it."""
+        if self.sides:
+            return {"sides": [side.to_dict() for side in self.sides]}
         if self.corners is not None:
             return {"corners_n": self.corners.tolist()}
         return {
@@ -100,6 +105,10 @@ class PieceTable:
             polygon_offset=self._offset[piece],
             block=self._block,
         )
+
+    def numbers(self, choice: NDArray[np.intp]) -> NDArray[np.intp]:
+        """Returns the numbers (R, n) of chosen pieces (R, n) in the order of all."""
+        return np.asarray(self._begin + choice)
 
     def middles(self, choice: NDArray[np.intp]) -> Array:
         """Returns a force (R, n, 2) [N] within each piece of a choice (R, n)."""
