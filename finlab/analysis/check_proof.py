@@ -278,7 +278,7 @@ def no_number(text: Any) -> None:
 
 
 def each_key_once(pairs: Any) -> Any:
-    """A mapping of a file. Of what a key says twice Python sees one, and a reader perhaps another."""
+    """A mapping of a file. Of what a key says twice Python sees one, a reader perhaps another."""
     mapping = dict(pairs)
     need(len(mapping) == len(pairs), f"a key stands twice among {', '.join(mapping)}"[:200])
     return mapping
