@@ -143,8 +143,29 @@ function checkPoints({ name, axes, power: { points, error_w: error } }, low, hig
   need(isAtLeast(last, farthest) && error.sign() >= 0, `${name}: its power is not known`);
 }
 
-// The arc, the largest force, and n, c with n.p >= c, of a convex part of an actuator's forces p.
+// A convex part of an actuator's forces: a line, all forces up to some size, forces ahead, or (`sign` -1) astern.
 function convexPart(actuator, part) {
+  const { name, arcs: whole } = actuator;
+  const [least, most] = actuator.force_n;
+  const { line } = part;
+  if (line !== undefined) {
+    const onArc = whole === null || whole.some((arc) => inArc(arc, line));
+    need(onArc && dot(line, line).sign() > 0, `${name}: the line is in no arc`);
+    return { line };
+  }
+  if ("disc" in part) {
+    need(least.sign() <= 0 && isWide(whole), `${name}: does not push in all directions`);
+    return { sides: ["forward", "reverse"], sign: 1, arc: null, most: smallest([most, least.negative()]), normal: [ZERO, ZERO], bound: ZERO };
+  }
+  if ("astern" in part) {
+    need(least.sign() <= 0, `${name}: does not push astern`);
+    return { sides: ["reverse"], sign: -1, ...partBounds({ ...actuator, force_n: [ZERO, least.negative()] }, part) };
+  }
+  return { sides: ["forward"], sign: 1, ...partBounds(actuator, part) };
+}
+
+// The arc, the largest force, and n, c with n.p >= c, of forces p ahead.
+function partBounds(actuator, part) {
   const { name, arcs: whole } = actuator;
   const [least, most] = actuator.force_n;
   const arc = part.arc ?? (whole && whole.length === 1 ? whole[0] : null);
@@ -169,19 +190,34 @@ function inPart(actuator, part, force) {
     const [least, most] = actuator.force_n;
     return least.isAtMost(force[0]) && force[0].isAtMost(most);
   }
-  const { arc, most, normal, bound } = part;
-  const isAhead = (arc === null || inArc(arc, force)) && isAtLeast(dot(normal, force), bound);
-  return isAhead && dot(force, force).isAtMost(most.times(most));
+  need(force.length === 2, "a force of a plane has two numbers");
+  const square = dot(force, force);
+  if (part.line !== undefined) {
+    const [least, farthest] = actuator.force_n;
+    const end = dot(part.line, force).sign() >= 0 ? farthest : smallest([least, ZERO]);
+    return cross(part.line, force).sign() === 0 && least.sign() <= 0 && square.isAtMost(end.times(end));
+  }
+  const { sign, arc, most, normal, bound } = part;
+  const ahead = sign < 0 ? force.map((p) => p.negative()) : force;
+  const isAhead = (arc === null || inArc(arc, ahead)) && isAtLeast(dot(normal, ahead), bound);
+  return isAhead && square.isAtMost(most.times(most));
 }
 
-// An upper bound of the power of a force.
-function mostWatts(actuator, force) {
+// The laws of power that may be those of a force.
+function sidesOf(part, force) {
+  if (part !== undefined && part.line === undefined) return part.sides;
+  const along = part === undefined ? force[0] : dot(part.line, force);
+  return along.sign() < 0 ? ["reverse"] : ["forward"];
+}
+
+// An upper bound of the power of a force of a part, undefined of one along a line.
+function mostWatts(actuator, force, part) {
   const law = actuator.power;
   const isPlane = force.length === 2;
   let size = isPlane ? rootAbove(dot(force, force)) : force[0].size();
   if (isPlane) size = largest([size, actuator.force_n[0]]);
   if (!("points" in law)) {
-    const factor = force[0].sign() < 0 && !isPlane ? law.reverse : law.forward;
+    const factor = largest(sidesOf(part, force).map((side) => law[side]));
     return factor.times(raised(size, law.exponent, rootAbove, largest));
   }
   const x = isPlane ? size : force[0];
@@ -294,7 +330,7 @@ function checkBox(box, lost, low, high, { actuators, statement }) {
       need(force.length === actuator.axes.length, `${where}: ${actuator.name} has other axes`);
       need(inPart(actuator, parts.get(actuator.name), force), `${where}: ${actuator.name} cannot push so`);
       force.forEach((size, k) => (missing = missing.map((w, row) => w.minus(size.times(actuator.columns[k][row])))));
-      if (statement.power_w !== null) watts = watts.plus(mostWatts(actuator, force));
+      if (statement.power_w !== null) watts = watts.plus(mostWatts(actuator, force, parts.get(actuator.name)));
     }
     need(missing.every((w) => w.size().isAtMost(statement.wrench_tolerance)), `${where}: the wrench is another`);
     need(statement.power_w === null || watts.isAtMost(statement.power_w), `${where}: takes more power`);
@@ -318,6 +354,12 @@ function checkTree(tree, wrench, actuators, statement) {
   const { cut, arcs: pieces, each } = tree;
   need(actuators.has(cut), `${cut}: is not there`);
   const actuator = actuators.get(cut);
+  if ("sides" in tree) {
+    const [low, high] = actuator.outer_force_n;
+    need(low.sign() <= 0 && tree.sides.length === 2, `${cut}: does not push astern`);
+    [[ZERO, high], [low, ZERO]].forEach((ends, k) => checkTree(tree.sides[k], wrench, new Map(actuators).set(cut, { ...actuator, outer_force_n: ends }), statement));
+    return;
+  }
   need(covers(pieces, actuator.arcs), `${cut}: pieces leave out directions`);
   const hasMeans = actuator.mean && actuator.outer_force_n[0].sign() > 0;
   need(!hasMeans || sameArcs(pieces, actuator.arcs), `${cut}: its arcs cannot be cut`);

@@ -156,8 +156,29 @@ def check_actuator(actuator: Any) -> None:
 
 
 def convex_part(actuator: Any, part: Any) -> Any:
-    """The arc, the largest force, and n, c with n.p >= c, of a convex part of an actuator's forces
-    p."""
+    """A convex part of an actuator's forces p: its arc, its largest force, and n, c with n.p >= c.
+    Of one that also pushes against its direction it may be a line, or all forces up to some size,
+    or (`astern`) the forces -p."""
+    name = actuator["name"]
+    least, most = actuator["force_n"]
+    whole = actuator["arcs"]
+    if "line" in part:
+        on_arc = whole is None or any(in_arc(arc, part["line"]) for arc in whole)
+        need(on_arc and dot(part["line"], part["line"]) > 0, f"{name}: the line is in no arc")
+        return part
+    if "disc" in part:
+        need(least <= 0 and is_wide(whole), f"{name}: does not push in all directions")
+        return {"sides": ("forward", "reverse"), "bounds": (None, min(most, -least), (0, 0), 0)}
+    if "astern" in part:
+        need(least <= 0, f"{name}: does not push astern")
+        ahead = {**actuator, "force_n": [Fraction(0), -least]}
+        bounds = part_bounds(ahead, part)
+        return {"sides": ("reverse",), "sign": -1, "bounds": bounds}
+    return {"sides": ("forward",), "bounds": part_bounds(actuator, part)}
+
+
+def part_bounds(actuator: Any, part: Any) -> Any:
+    """The arc, the largest force, and n, c with n.p >= c of forces p ahead."""
     name = actuator["name"]
     least, most = actuator["force_n"]
     whole = actuator["arcs"]
@@ -182,19 +203,32 @@ def in_part(actuator: Any, part: Any, force: Any) -> Any:
     if len(actuator["axes"]) == 1:
         least, most = actuator["force_n"]
         return least <= force[0] <= most
-    arc, most, normal, bound = part
+    if "line" in part:
+        least, most = actuator["force_n"]
+        end = most if dot(part["line"], force) >= 0 else min(least, 0)
+        return cross(part["line"], force) == 0 and least <= 0 and dot(force, force) <= end**2
+    force = [part.get("sign", 1) * p for p in force]
+    arc, most, normal, bound = part["bounds"]
     is_ahead = (arc is None or in_arc(arc, force)) and dot(normal, force) >= bound
     return is_ahead and dot(force, force) <= most**2
 
 
-def most_watts(actuator: Any, force: Any) -> Any:
-    """An upper bound of the power of a force."""
+def sides_of(part: Any, force: Any) -> Any:
+    """The laws of power that may be those of a force."""
+    if part is None or "line" in part:
+        along = force[0] if part is None else dot(part["line"], force)
+        return ("reverse",) if along < 0 else ("forward",)
+    return part["sides"]
+
+
+def most_watts(actuator: Any, force: Any, part: Any) -> Any:
+    """An upper bound of the power of a force of a part, None of one along a line."""
     power = actuator["power"]
     is_plane = len(force) == 2
     size = root_above(dot(force, force)) if is_plane else abs(force[0])
     size = max(size, actuator["force_n"][0]) if is_plane else size  # means are of forces so large
     if "points" not in power:
-        factor = power["reverse" if force[0] < 0 and not is_plane else "forward"]
+        factor = max(power[side] for side in sides_of(part, force))
         return factor * raised(size, power["exponent"], root_above, max)
     x = size if is_plane else force[0]
     points = power["points"]
@@ -352,7 +386,7 @@ def check_box(case: Any, lost: Any, low: Any, high: Any, premises: Any) -> None:
             for size, column in zip(force, actuator["columns"], strict=True):
                 missing = [w - size * c for w, c in zip(missing, column, strict=True)]
             if budget is not None:
-                watts += most_watts(actuator, force)
+                watts += most_watts(actuator, force, parts.get(name))
         near = max(map(abs, missing)) <= statement["wrench_tolerance"]
         need(near, f"{where}: the wrench is another")
         need(budget is None or watts <= budget, f"{where}: takes more power")
@@ -378,6 +412,15 @@ def check_tree(tree: Any, wrench: Any, actuators: Any, statement: Any) -> None:
         check_price(tree, wrench, actuators.values(), statement)
         return
     actuator = actuators[tree["cut"]]
+    if "sides" in tree:  # ahead, then astern
+        low, high = actuator["outer_force_n"]
+        need(low <= 0 and len(tree["sides"]) == 2, f"{tree['cut']}: does not push astern")
+        for ends, branch in zip(
+            ([Fraction(0), high], [low, Fraction(0)]), tree["sides"], strict=True
+        ):
+            one = {**actuators, tree["cut"]: {**actuator, "outer_force_n": ends}}
+            check_tree(branch, wrench, one, statement)
+        return
     pieces = tree["arcs"]
     need(covers(pieces, actuator["arcs"]), f"{tree['cut']}: pieces leave out directions")
     has_means = actuator["mean"] and actuator["outer_force_n"][0] > 0  # of forces in one arc

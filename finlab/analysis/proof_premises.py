@@ -79,6 +79,8 @@ class Cut(NamedTuple):
 
     arc: list[list[float]]
     """Its ends as a file has them."""
+    is_astern: bool
+    """Whether the forces are those against its directions."""
     piece: Piece
     """Convex set that contains all forces in it."""
 
@@ -348,6 +350,8 @@ def _plane(values: dict[str, Any], arcs: Sequence[_Arc]) -> ProofActuator:
     parts = []
     for arc in arcs:
         parts += _parts(arc, max(least, 0.0), most, values["mean"])
+        if least < 0.0 and not is_round:
+            parts += _reversing_parts(arc, least, most)
     if len(arcs) == 1 and len(parts) == 1:
         parts[0].values.pop("arc", None)
     cover = _cover([part.piece for part in parts])
@@ -361,7 +365,11 @@ def _plane(values: dict[str, Any], arcs: Sequence[_Arc]) -> ProofActuator:
         edges = [arc.edges[0], *(piece.edges[0] for piece in chain[1:])]
         edges.append(edges[0] if is_round else arc.edges[1])
         for piece, *ends in zip(chain, edges, edges[1:], strict=False):
-            cuts.append(Cut(ends, _outer_piece(piece, outer_least, outer_most)))
+            cuts.append(Cut(ends, False, _outer_piece(piece, max(outer_least, 0.0), outer_most)))
+        for piece, *ends in zip(chain, edges, edges[1:], strict=False):
+            if outer_least < 0.0:
+                astern = _outer_piece(piece, 0.0, -outer_least)
+                cuts.append(Cut(ends, True, _mirrored(astern)))
     outer_cover = _cover([cut.piece for cut in cuts])
     if len(cuts) == 1 or (is_round and not is_ring):
         cuts = []
@@ -394,6 +402,30 @@ def _parts(arc: _Arc, least: float, most: float, has_means: bool) -> list[Part]:
             center = arc.center + shift * (room - 1e-9)
             parts.append(_beyond(_Arc(center, quarter), center, least, most))
     return parts
+
+
+def _reversing_parts(arc: _Arc, least: float, most: float) -> list[Part]:
+    """Further convex parts of one that also pushes against its directions: those forces, lines
+    across 0, and of a wide arc all forces up to some size."""
+    parts = []
+    for ahead in _parts(arc, 0.0, -least, has_means=False):
+        values = {**ahead.values, "astern": True}
+        parts.append(Part(values, _mirrored(ahead.piece), -ahead.inner_point))
+    if not arc.is_narrow:
+        parts.append(Part({"disc": True}, Piece(min(most, -least)), np.zeros(2)))
+        return parts
+    for shift in SHIFTS:
+        direction = decimals(_direction(arc.center + shift * (1.0 - 1e-9) * arc.half_angle))
+        unit = np.array(direction) / np.linalg.norm(direction)
+        piece = Piece(max(most, -least), corners=np.outer([least, most], unit))
+        parts.append(Part({"line": direction}, piece, 0.25 * (least + most) * unit))
+    return parts
+
+
+def _mirrored(piece: Piece) -> Piece:
+    """The forces against those of a piece."""
+    corners = None if piece.corners is None else -piece.corners
+    return piece._replace(center=piece.center + math.pi, corners=corners)
 
 
 def _sector(arc: _Arc, least: float, most: float) -> Part:

@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finlab.analysis import check_proof
+from finlab.analysis.exact_forces import RANK_TOLERANCE, ExactForces, fraction_of, rounded, text_of
 from finlab.analysis.proof_premises import NotSettledError, Part, decimals, proof_actuators
 from finlab.analysis.proof_search import PartSearch, Tree, Tried
 from finlab.arrays import Array
@@ -38,11 +39,6 @@ Verdict = Literal["proved", "refuted", "not settled"]
 """What is known of a statement."""
 MAX_CASES = 3000
 """Most cases that are looked at: two losses of up to 64 actuators."""
-DIGITS = 9
-"""Digits of a force in a file, beyond those of its largest force; the last ones of each corner are
-fractions."""
-RANK_TOLERANCE = 1e-9
-"""Share of the strongest wrench below which a direction has no authority [1]."""
 WRENCH_TOLERANCE = 1e-9
 """How near to a corner a wrench has to be where the robot has no authority over some direction, so
 that rounded axes leave no exact answer [N, N m]."""
@@ -52,6 +48,8 @@ MAX_SPLITS = 14
 """Most times that a box is split where forces are not convex, one split in the other."""
 MAX_BOXES = 1000
 """Most boxes that are looked at for one statement."""
+MAX_MISSES = 40
+"""Most choices of parts of one statement that give all corners, but not within the budget."""
 GAP_LENGTHS = (1.0, 0.5, 0.1)
 """Lengths of wrenches of the box that may need forces between arcs, over the largest one [1]."""
 BLENDS = (0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 1e-4, 1e-5, 1e-6, 0.0)
@@ -229,18 +227,20 @@ class _Search:
             raise NotSettledError("no actuator gives a force at rest")
         self._names = [actuator.name for actuator in self._actuators]
         self._rows = [AXES.index(axis) for axis in box]
-        half_widths = list(map(_fraction, box.values()))
+        half_widths = list(map(fraction_of, box.values()))
         self._whole = self._corners_of([-half for half in half_widths], half_widths)
         self._columns = self._exact_columns()
         self._effectiveness = np.zeros((len(self._actuators), 2, 6))
         for i, columns in enumerate(self._columns):
             for k, column in enumerate(columns):
                 self._effectiveness[i, k, self._rows] = np.array(column, np.float64)
+        self._exact_forces = ExactForces(self._actuators, self._columns, SCALE[self._rows])
         self._inner = self._inner_search()
         self._outer = self._outer_search()
         self._parts = self._inner.covers
         """The last parts that gave a box."""
         self._boxes_left = MAX_BOXES
+        self._misses_left = MAX_MISSES
         self._tolerance = 0.0
         self._allocator: Any = None
 
@@ -399,6 +399,9 @@ class _Search:
                 box = self._written_box(lost, parts, corners, tried.force)
             except check_proof.WrongProof as error:
                 reason = str(error)
+                self._misses_left -= 1
+                if self._misses_left <= 0:
+                    break
                 continue
             self._parts = tried.choice
             return box
@@ -409,7 +412,7 @@ class _Search:
         if example is not None:
             raise _CounterexampleError(example)
         is_convex = all(len(actuator.parts) == 1 for actuator in self._actuators)
-        if is_convex or not splits or self._boxes_left <= 0:
+        if is_convex or not splits or min(self._boxes_left, self._misses_left) <= 0:
             missed = int(failed[-1].is_reached.argmin()) if failed else 0
             where = self._where(lost, corners, missed)
             raise NotSettledError(reason or f"{where}: out of reach of the convex parts tried")
@@ -424,6 +427,8 @@ class _Search:
         half_widths = np.array(list(self._box.values()))
         gone = self._gone(lost)
         working = [i for i in range(len(self._actuators)) if i not in gone]
+        if not working:
+            return []
         # Forces of least size over the largest, f = R R B^T (B R R B^T)^-1 w, of w within the box.
         radius = np.array([actuator.radius for actuator in self._actuators])
         own = self._effectiveness[working][..., self._rows] * radius[working, None, None]
@@ -451,8 +456,8 @@ class _Search:
         """A wrench of the axes that count, with few digits and within the box."""
         exact = []
         for value, half in zip(wrench.tolist(), self._whole.high, strict=True):
-            rounded = _rounded(value, float(half))
-            exact.append(min(max(rounded, -half), half))
+            short = rounded(value, float(half))
+            exact.append(min(max(short, -half), half))
         return exact
 
     def _split(
@@ -481,7 +486,7 @@ class _Search:
         above_corners = self._corners_of(low_above, corners.high)
         return {
             "axis": [*self._box][axis],
-            "at": _text(middle),
+            "at": text_of(middle),
             "below": self._box_of(lost, below, splits - 1),
             "above": self._box_of(lost, above_corners, splits - 1),
         }
@@ -497,11 +502,14 @@ class _Search:
         self, lost: tuple[str, ...], parts: Sequence[Part], corners: _Corners, forces: Array
     ) -> dict[str, Any]:
         """A box with forces (C, n, 2) that the checker accepts. Raises WrongProof: it does not."""
-        basis = self._basis(lost, parts)
+        basis = self._exact_forces.basis(lost, parts)
+        if len(basis.rows) < len(self._rows):
+            self._tolerance = WRENCH_TOLERANCE
         written = {}
         for index, name in enumerate(corners.names):
-            affordable = self._within_budget(lost, corners, index, forces[index])
-            written[name] = self._exact(lost, basis, corners.exact[index], affordable)
+            affordable = self._within_budget(lost, parts, corners, index, forces[index])
+            wrench = corners.exact[index]
+            written[name] = self._exact_forces.forces(lost, basis, wrench, affordable)
         own_parts = {}
         for actuator, part in zip(self._actuators, parts, strict=True):
             if part.values and actuator.name not in lost:
@@ -512,64 +520,19 @@ class _Search:
         check_proof.check_box(proof["cases"][0], lost, corners.low, corners.high, premises)
         return box
 
-    def _basis(self, lost: Sequence[str], parts: Sequence[Part]) -> _Basis:
-        """As many axes of working actuators as there are independent axes of the wrench."""
-        labels = []
-        columns = []
-        for i, actuator in enumerate(self._actuators):
-            if actuator.name in lost:
-                continue
-            for k in range(actuator.n_axes):
-                labels.append((i, k))
-                columns.append(self._effectiveness[i, k, self._rows] * actuator.radius)
-        scaled = np.array(columns).T / SCALE[self._rows, None]
-        column_order, rank = _pivots(scaled)
-        chosen = column_order[:rank]
-        row_order, _ = _pivots(scaled[:, chosen].T)
-        rows = sorted(row_order[:rank])
-        if rank < len(self._rows):
-            self._tolerance = WRENCH_TOLERANCE
-        matrix = []
-        for row in rows:
-            line = []
-            for column in chosen:
-                i, k = labels[column]
-                line.append(self._columns[i][k][row])
-            matrix.append(line)
-        return _Basis([labels[column] for column in chosen], rows, _inverse(matrix))
-
-    def _exact(
-        self, lost: Sequence[str], basis: _Basis, wrench: list[Fraction], forces: Array
-    ) -> dict[str, list[str]]:
-        """Forces (n, 2) as fractions that give a wrench exactly, by name."""
-        exact = []
-        missing = [*wrench]
-        for i, actuator in enumerate(self._actuators):
-            own = []
-            for k in range(actuator.n_axes):
-                size = _rounded(float(forces[i, k]), actuator.radius)
-                own.append(size)
-                if actuator.name not in lost and size:
-                    column = self._columns[i][k]
-                    missing = [w - size * c for w, c in zip(missing, column, strict=True)]
-            exact.append(own)
-        left = [missing[row] for row in basis.rows]
-        for (i, k), line in zip(basis.axes, basis.inverse, strict=True):
-            exact[i][k] += check_proof.dot(line, left)
-        result = {}
-        for actuator, own in zip(self._actuators, exact, strict=True):
-            if actuator.name not in lost:
-                result[actuator.name] = [_text(size) for size in own]
-        return result
-
     def _within_budget(
-        self, lost: tuple[str, ...], corners: _Corners, index: int, inside: Array
+        self,
+        lost: tuple[str, ...],
+        parts: Sequence[Part],
+        corners: _Corners,
+        index: int,
+        inside: Array,
     ) -> Array:
         """Forces (n, 2) of a corner within the power budget, as far inside as it allows; those
         inside where there is no budget. Raises _CounterexampleError: no forces are within it."""
         if self._power is None:
             return inside
-        if self._watts(lost, inside) <= self._power:
+        if self._watts(lost, parts, inside) <= self._power:
             return inside
         result = self._answer(lost, corners.wrench[index])
         cheapest = np.zeros_like(inside)
@@ -578,18 +541,18 @@ class _Search:
             row = self._layout.names.index(actuator.name)
             for k, axis in enumerate(actuator.values["axes"]):
                 cheapest[i, k] = body[row] @ axis
-        if self._watts(lost, cheapest) > self._power:
+        if self._watts(lost, parts, cheapest) > self._power:
             wrench = corners.exact[index]
             example = self._too_dear(lost, wrench, result.multipliers, cheapest)
             if example is not None:
                 raise _CounterexampleError(example)
         for blend in BLENDS:
             mixed = blend * inside + (1.0 - blend) * cheapest
-            if self._watts(lost, mixed) <= self._power * (1.0 - 1e-9):
+            if self._watts(lost, parts, mixed) <= self._power * (1.0 - 1e-9):
                 return mixed
         raise check_proof.WrongProof(
             f"{self._where(lost, corners, index)}: takes about "
-            f"{self._watts(lost, cheapest):.6g} W, which is too near to the budget"
+            f"{self._watts(lost, parts, cheapest):.6g} W, which is too near to the budget"
         )
 
     def _answer(self, lost: tuple[str, ...], wrench: Array) -> Any:
@@ -600,14 +563,18 @@ class _Search:
             self._allocator = Allocator(self._layout)
         return self._allocator.allocate(wrench, lost=lost)
 
-    def _watts(self, lost: Sequence[str], forces: Array) -> float:
-        """Power of forces (n, 2), rounded up as the checker does [W]."""
+    def _watts(self, lost: Sequence[str], parts: Sequence[Part], forces: Array) -> float:
+        """Power of forces (n, 2) of parts, rounded up as the checker does [W]."""
         total = Fraction(0)
-        for actuator, own in zip(self._actuators, forces.tolist(), strict=True):
+        for actuator, part, own in zip(self._actuators, parts, forces.tolist(), strict=True):
             if actuator.name not in lost:
-                exact = [_rounded(size, actuator.radius) for size in own[: actuator.n_axes]]
+                exact = [rounded(size, actuator.radius) for size in own[: actuator.n_axes]]
                 values = check_proof.numbers_in(_as_text(actuator.values))
-                total += check_proof.most_watts(values, exact)
+                chosen = None
+                if actuator.n_axes == 2:
+                    in_file = check_proof.numbers_in(_as_text(part.values))
+                    chosen = check_proof.convex_part(values, in_file)
+                total += check_proof.most_watts(values, exact, chosen)
         return float(total)
 
     def _too_dear(
@@ -653,21 +620,34 @@ class _Search:
                 return None
             branches.append(written)
         actuator = self._actuators[tree.actuator]
-        return {"cut": actuator.name, "arcs": [cut.arc for cut in actuator.cuts], "each": branches}
+        sides = []
+        for is_astern in (False, True):
+            taken = [k for k, cut in enumerate(actuator.cuts) if cut.is_astern is is_astern]
+            each = [branches[k] for k in taken]
+            arcs = [actuator.cuts[k].arc for k in taken]
+            sides.append({"cut": actuator.name, "arcs": arcs, "each": each})
+        if not sides[1]["each"]:
+            return sides[0]
+        return {"cut": actuator.name, "sides": sides}
 
     def _separating_price(
         self, lost: Sequence[str], wrench: list[Fraction], tree: Tree
     ) -> dict[str, Any] | None:
         """A price that parts a wrench from all forces of a choice of pieces; None: none is
         known."""
-        premises = self._file("refuted")
-        for actuator, number in zip(premises["actuators"], tree.choice, strict=True):
-            if number:
-                index = self._names.index(actuator["name"])
-                actuator["arcs"] = [self._actuators[index].cuts[number - 1].arc]
-        actuators, statement = check_proof.checked_premises(
-            check_proof.numbers_in(_as_text(premises))
-        )
+        premises = check_proof.numbers_in(_as_text(self._file("refuted")))
+        actuators, statement = check_proof.checked_premises(premises)
+        for own, number in zip(self._actuators, tree.choice, strict=True):
+            if not number:
+                continue
+            cut = own.cuts[number - 1]
+            actuator = actuators[own.name]
+            actuator["arcs"] = check_proof.numbers_in(_as_text([cut.arc]))
+            low, high = actuator["outer_force_n"]
+            if cut.is_astern:
+                actuator["outer_force_n"] = [low, Fraction(0)]
+            else:
+                actuator["outer_force_n"] = [max(low, Fraction(0)), high]
         working = [each for name, each in actuators.items() if name not in lost]
         for normal in self._normals(lost, wrench, tree):
             price = (normal / SCALE)[self._rows]
@@ -711,7 +691,7 @@ class _Search:
         """A counterexample that the checker accepts, None where it does not."""
         example = {
             "lost": list(lost),
-            "wrench": dict(zip(self._box, map(_text, wrench), strict=True)),
+            "wrench": dict(zip(self._box, map(text_of, wrench), strict=True)),
             "tree": tree,
         }
         try:
@@ -729,17 +709,6 @@ class _CounterexampleError(Exception):
         self.example = example
 
 
-class _Basis(NamedTuple):
-    """Axes of actuators whose forces make up for what is missing of a wrench."""
-
-    axes: list[tuple[int, int]]
-    """Index of the actuator, and of its axis."""
-    rows: list[int]
-    """Axes of the wrench that they give, by their indices among those that count."""
-    inverse: list[list[Fraction]]
-    """Forces per missing wrench."""
-
-
 def _directions_between(arcs: list[list[list[float]]] | None) -> list[Array]:
     """Directions (2,) in the middle of what several arcs, or one that is wider than half a turn,
     leave out, and beside its ends."""
@@ -753,65 +722,6 @@ def _directions_between(arcs: list[list[list[float]]] | None) -> list[Array]:
             angle = low + share * width
             found.append(np.array([math.cos(angle), math.sin(angle)]))
     return found
-
-
-def _pivots(matrix: Array) -> tuple[list[int], int]:
-    """The order of columns in which each is as far as possible from the span of those before it,
-    and the numerical rank (QR with column pivoting; Golub and Van Loan, 5.4)."""
-    left = matrix.copy()
-    order: list[int] = []
-    largest = float(np.linalg.norm(matrix, axis=0).max(initial=0.0))
-    for _ in range(min(matrix.shape)):
-        norms = np.linalg.norm(left, axis=0)
-        norms[order] = 0.0
-        best = int(norms.argmax())
-        if norms[best] <= RANK_TOLERANCE * largest:
-            break
-        order.append(best)
-        direction = left[:, best] / norms[best]
-        left = left - np.outer(direction, direction @ left)
-    return order, len(order)
-
-
-def _inverse(matrix: list[list[Fraction]]) -> list[list[Fraction]]:
-    """The inverse of a square matrix in fractions, by Gauss and Jordan's elimination."""
-    n = len(matrix)
-    rows = []
-    for i, line in enumerate(matrix):
-        rows.append([*line, *(Fraction(int(i == j)) for j in range(n))])
-    for i in range(n):
-        pivot = max(range(i, n), key=lambda row: abs(rows[row][i]))
-        rows[i], rows[pivot] = rows[pivot], rows[i]
-        head = rows[i][i]
-        rows[i] = [value / head for value in rows[i]]
-        for j in range(n):
-            factor = rows[j][i]
-            if j != i and factor:
-                rows[j] = [a - factor * b for a, b in zip(rows[j], rows[i], strict=True)]
-    return [row[n:] for row in rows]
-
-
-def _fraction(value: float) -> Fraction:
-    """A number as it is written in a file."""
-    return Fraction(repr(value))
-
-
-def _rounded(size: float, largest: float) -> Fraction:
-    """A force with `DIGITS` digits below those of the largest force."""
-    places = DIGITS - math.floor(math.log10(largest)) if largest > 0.0 else DIGITS
-    unit = Fraction(10) ** places
-    return Fraction(round(Fraction(size) * unit)) / unit
-
-
-def _text(value: Fraction) -> str:
-    """A fraction for a file, as a decimal where it is a short one."""
-    for places in range(2 * DIGITS):
-        scaled = value * 10**places
-        if scaled.denominator == 1:
-            digits = str(abs(scaled.numerator)).rjust(places + 1, "0")
-            sign = "-" if value < 0 else ""
-            return sign + (f"{digits[:-places]}.{digits[-places:]}" if places else digits)
-    return str(value)
 
 
 def _as_text(value: Any) -> Any:

@@ -133,7 +133,7 @@ def _gives(
             return False
         wrench = wrench + size @ working[name].columns
         if budget is not None:
-            watts += working[name].watts(size)
+            watts += working[name].watts(size, parts[name])
     is_near = max(abs(wrench - target)) <= tolerance + EXACT
     return bool(is_near and (budget is None or watts <= budget))
 
@@ -153,14 +153,14 @@ def _separates(
     if any(abs(w) > half for w, half in zip(target, box.values(), strict=True)):
         return False
     working = {name: part for name, part in robot.items() if name not in lost}
-    arcs = {name: part.arcs for name, part in working.items()}
-    return _tree_separates(example["tree"], working, arcs, target, budget, tolerance)
+    sets = {name: (part.arcs, part.outer) for name, part in working.items()}
+    return _tree_separates(example["tree"], working, sets, target, budget, tolerance)
 
 
 def _tree_separates(
     tree: dict[str, Any],
     working: dict[str, "_Oracle"],
-    arcs: dict[str, list[Angles] | None],
+    sets: dict[str, tuple[list[Angles] | None, list[Decimal]]],
     target: Any,
     budget: Decimal | None,
     tolerance: Decimal,
@@ -168,12 +168,23 @@ def _tree_separates(
     """Whether each choice of pieces of the arcs has a price that separates."""
     if "cut" in tree:
         name = tree["cut"]
+        arcs, (low, high) = sets[name]
+        if "sides" in tree:
+            if low > 0 or len(tree["sides"]) != 2:
+                return False
+            halves = []
+            for ends, branch in zip(
+                ([Decimal(0), high], [low, Decimal(0)]), tree["sides"], strict=True
+            ):
+                chosen = {**sets, name: (arcs, ends)}
+                halves.append(_tree_separates(branch, working, chosen, target, budget, tolerance))
+            return all(halves)
         pieces = [_angles(piece) for piece in tree["arcs"]]
-        if not working[name].may_cut(arcs[name], pieces):
+        if not working[name].may_cut(arcs, pieces):
             return False
         branches = []
         for piece, branch in zip(pieces, tree["each"], strict=True):
-            chosen = {**arcs, name: [piece]}
+            chosen = {**sets, name: ([piece], [low, high])}
             branches.append(_tree_separates(branch, working, chosen, target, budget, tolerance))
         return all(branches)
     price = _array(tree["price"])
@@ -182,7 +193,7 @@ def _tree_separates(
         return False
     profit = per_watt * (budget or 0)
     for name, part in working.items():
-        profit += part.most_profit(part.columns @ price, per_watt, arcs[name])
+        profit += part.most_profit(part.columns @ price, per_watt, *sets[name])
     # The profit here is a little too small, by samples: what it does not separate is false.
     return bool(profit < price @ target - tolerance * sum(abs(price)))
 
@@ -245,6 +256,14 @@ class _Oracle:
         """Whether the part that a file names is convex, and one of the forces'."""
         if len(self.columns) == 1:
             return True
+        if "line" in part:
+            x, y = np.array(_array(part["line"]), float)
+            return bool(self.least <= 0 and _is_in(self.arcs, math.atan2(y, x)))
+        if "disc" in part:
+            wide = self.arcs is None or max(width for _, width in self.arcs) >= math.pi - NEAR
+            return bool(self.least <= 0 and wide)
+        if "astern" in part and self.least > 0:
+            return False
         if "arc" not in part:
             return self.arcs is None or (len(self.arcs) == 1 and self.arcs[0][1] <= math.pi + NEAR)
         arc = _angles(part["arc"])
@@ -257,10 +276,21 @@ class _Oracle:
             return False
         if len(force) == 1:
             return bool(self.least <= force[0] <= self.most)
+        square = force @ force
+        if "line" in part:
+            line = _array(part["line"])
+            end = self.most if line @ force >= 0 else self.least
+            off = abs(line[0] * force[1] - line[1] * force[0])
+            return bool(off <= EXACT and square <= end**2 * (1 + EXACT))
+        if "disc" in part:
+            return bool(square <= min(self.most, -self.least) ** 2 * (1 + EXACT))
+        if "astern" in part:
+            force = -force
+        most = -self.least if "astern" in part else self.most
         arc = _angles(part["arc"]) if "arc" in part else (self.arcs or [None])[0]
         x, y = np.array(force, float)
         size = math.hypot(x, y)
-        inside = size < NEAR * float(self.most) or arc is None
+        inside = size < NEAR * float(most) or arc is None
         inside = inside or _is_in([arc], math.atan2(y, x))
         if self.least > 0:
             if arc is not None and self.mean and arc[1] > 0.0:
@@ -271,7 +301,7 @@ class _Oracle:
             elif not self.mean or arc is not None:
                 ahead = _array(part["ahead"])
                 inside = inside and ahead @ ahead <= 1 and ahead @ force >= self.least
-        return bool(inside and force @ force <= self.most**2 * (1 + EXACT))
+        return bool(inside and square <= most**2 * (1 + EXACT))
 
     def may_cut(self, arcs: list[Angles] | None, pieces: list[Angles]) -> bool:
         """Whether pieces have all directions of arcs, and no means of forces go across them."""
@@ -279,14 +309,20 @@ class _Oracle:
             return arcs is not None and np.allclose(arcs, pieces, atol=NEAR)
         return all(_is_in(pieces, angle) for angle in _directions(arcs))
 
-    def watts(self, force: Any) -> Decimal:
+    def watts(self, force: Any, part: dict[str, Any] | None = None) -> Decimal:
         size = (force @ force).sqrt()
         if len(force) == 2:
             size = max(size, self.least)
-        side = "reverse" if len(force) == 1 and force[0] < 0 else "forward"
-        if side in self.power:
+        along = force[0]
+        if len(force) == 2:
+            line = _array(part["line"]) if part and "line" in part else force
+            along = -size if part and "astern" in part else line @ force
+        sides = ["reverse" if along < 0 else "forward"]
+        if part and "disc" in part:
+            sides = ["reverse", "forward"]
+        if "exponent" in self.power:
             power: Decimal = size ** _decimal(self.power["exponent"])
-            return _decimal(self.power[side]) * power
+            return max(_decimal(self.power[side]) for side in sides) * power
         x, y = _array(self.power["points"]).T
         along = force[0] if len(force) == 1 else size
         i = min(max(int(np.searchsorted(x, along)), 1), len(x) - 1)
@@ -294,21 +330,26 @@ class _Oracle:
         watts: Decimal = y[i - 1] + slope * (along - x[i - 1])
         return watts
 
-    def most_profit(self, own_price: Any, per_watt: Decimal, arcs: list[Angles] | None) -> Decimal:
+    def most_profit(
+        self, own_price: Any, per_watt: Decimal, arcs: list[Angles] | None, outer: list[Decimal]
+    ) -> Decimal:
         best = Decimal(0) if per_watt else Decimal("-Infinity")
         error = _decimal(self.power["error_w"]) if self.power and "error_w" in self.power else 0
-        for force in self._forces(own_price, arcs):
+        for force, part in self._forces(own_price, arcs, outer):
             profit = own_price @ force
             if per_watt:
-                profit -= per_watt * (self.watts(force) - error)
+                profit -= per_watt * (self.watts(force, part) - error)
             best = max(best, profit)
         return best
 
-    def _forces(self, own_price: Any, arcs: list[Angles] | None) -> list[Any]:
-        """Forces among which that of the largest profit is nearly."""
-        low, high = self.outer
+    def _forces(
+        self, own_price: Any, arcs: list[Angles] | None, outer: list[Decimal]
+    ) -> list[tuple[Any, dict[str, Any]]]:
+        """Forces among which that of the largest profit is nearly, and whether it is astern."""
+        low, high = outer
         if len(own_price) == 1:
-            return [np.array([end * k / 40]) for end in (low, high) for k in range(1, 41)]
+            ends = [end * k / 40 for end in outer for k in range(1, 41)]
+            return [(np.array([size]), {}) for size in ends]
         toward = math.atan2(float(own_price[1]), float(own_price[0]))
         angles = [] if arcs is None else [*_directions(arcs)]
         angles += [turn for turn in (toward, toward + math.pi) if _is_in(arcs, turn)]
@@ -324,4 +365,8 @@ class _Oracle:
             gains.append((own_price @ direction, direction))
         ahead = max(gains, key=lambda gain: gain[0])[1]
         astern = min(gains, key=lambda gain: gain[0])[1]
-        return [size * (ahead if size >= 0 else astern) for size in sizes]
+        found = []
+        for size in sizes:
+            direction = ahead if size >= 0 else astern
+            found.append((size * direction, {} if size >= 0 else {"astern": True}))
+        return found

@@ -108,6 +108,51 @@ def pods_with_arcs(number: int, least_share: float = 0.0) -> dict[str, Any]:
     return {**layout, "axes": ["Fx", "Fy", "Tz"]}
 
 
+def reversing_tilts(number: int) -> dict[str, Any]:
+    """A planar robot of three tilts that also push astern within an arc, and two thrusters."""
+    rng = np.random.default_rng([0xB0E, number])
+    actuators = []
+    for k in range(5):
+        most = float(rng.uniform(5.0, 30.0))
+        angle = float(rng.uniform(-math.pi, math.pi))
+        actuator = {
+            "name": f"a{k}",
+            "position_m": [*rng.uniform(-0.4, 0.4, 2).tolist(), 0.0],
+            "force_n": [-float(rng.uniform(0.3, 1.0)) * most, most],
+            "model": {"type": "power_law", "forward": 1.0, "reverse": 1.7},
+        }
+        if k < 3:
+            half_deg = float(rng.uniform(10.0, 60.0))
+            actuator |= {"type": "tilt", "turn_axis": [0, 0, 1], "arc_deg": [-half_deg, half_deg]}
+            actuator["zero"] = [math.cos(angle), math.sin(angle), 0.0]
+        else:
+            actuator |= {"type": "thruster", "axis": [math.cos(angle), math.sin(angle), 0.0]}
+        actuators.append(actuator)
+    return {**layout_of("tilts", actuators), "axes": ["Fx", "Fy", "Tz"]}
+
+
+@pytest.mark.parametrize("number", range(4))
+def test_tilts_that_push_astern_are_settled(number: int) -> None:
+    """Each box; wrenches at random of one that is proved are answered exactly, and with a budget
+    far above or below what its corners take it is proved or refuted."""
+    layout = load(reversing_tilts(number))
+    box = np.array(box_of(layout))
+    verdicts_of = {}
+    for share in (1.0, 0.5, 0.25):
+        verdicts_of[share] = settled(prove(layout, share * box, 0))
+        settled(prove(layout, share * box, 1))
+    share = 0.25
+    assert verdicts_of[share] == "proved"
+    allocator = finlab.Allocator(layout)
+    rng = np.random.default_rng(number)
+    wrenches = rng.uniform(-share, share, (20, 6)) * box
+    assert allocator.allocate_batch(wrenches).err_norm.max() < 1e-5
+    corners = np.array(np.meshgrid(*([-1, 1],) * 6)).reshape(6, -1).T * share * box
+    answers = allocator.allocate_batch(corners)
+    assert settled(prove(layout, share * box, 0, power=0.3 * answers.bound.max())) == "refuted"
+    assert settled(prove(layout, share * box, 0, power=10.0 * answers.power.max())) == "proved"
+
+
 def forces_by_corners(pod: dict[str, Any], is_outer: bool) -> list[Any]:
     """Convex polygons (K, 2) [N], inside or around the forces of a pod: each arc in pieces of at
     most half a turn, of one that cannot stop of a degree."""
@@ -270,6 +315,8 @@ def files() -> list[str]:
         (random_robot("wide arcs", 14, 63), 0.6, 0),
         (random_robot("wide arcs", 14, 63), 0.01, 1),
         (random_robot("holes", 13, 63), 0.1, 0),
+        (reversing_tilts(0), 1.0, 0),
+        (reversing_tilts(1), 0.25, 0),
     ):
         layout = load(mapping)
         result = prove(layout, share * np.array(box_of(layout)), lost=lost)
@@ -326,6 +373,10 @@ def pod(arcs: Any, least: float = 0, mean: bool = False) -> dict[str, Any]:
         (None, 1, False, {"arc": [RIGHT, LEFT]}),  # with its small forces
         (None, 1, False, {"ahead": [F(2), F(0)]}),  # with most of them
         ([NARROW], 1, True, {"arc": [[F("0.5"), F("-0.1")], NARROW[1]]}),  # a chord too near
+        ([NARROW], -5, False, {"line": UP}),  # a line that it does not push along
+        ([NARROW], -5, False, {"disc": True}),  # directions that it does not push in
+        ([NARROW], 1, False, {"disc": True}),  # small forces that it does not have
+        ([NARROW], 1, False, {"astern": True}),  # it pushes ahead alone
     ],
 )
 def test_parts_that_are_not_convex_or_leave_the_arcs(
