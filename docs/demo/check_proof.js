@@ -25,7 +25,23 @@ const allOf = (set, members) => members.every((member) => set.has(member));
 // The values of a file, with fractions in place of its numbers; numbers are kept as their text until then.
 function valuesOf(text) {
   const quoted = text.replace(/"(?:[^"\\]|\\.)*"|-?(?:0|[1-9]\d*)(?:\.\d+)?(?:[eE][-+]?\d+)?/g, (word) => (word[0] === '"' ? word : `"${word}"`));
-  return withFractions(JSON.parse(quoted), "");
+  const values = JSON.parse(quoted);
+  needEachKeyOnce(quoted);
+  return withFractions(values, "");
+}
+
+// Of what a key says twice JavaScript sees one, and a reader perhaps another. `text` is JSON.
+function needEachKeyOnce(text) {
+  const open = [];
+  for (const [word, inside, colon] of text.matchAll(/[{}]|"((?:[^"\\]|\\.)*)"(\s*:)?/g)) {
+    if (word === "{") open.push(new Set());
+    else if (word === "}") open.pop();
+    else if (colon) {
+      const key = JSON.parse(`"${inside}"`);
+      need(!open.at(-1).has(key), `the key ${key} stands twice`);
+      open.at(-1).add(key);
+    }
+  }
 }
 
 function withFractions(value, key) {
@@ -377,8 +393,13 @@ function checkPrice({ price, watt_price: wattPrice, touch }, wrench, actuators, 
   need(sum([wattPrice.times(budget ?? ZERO), ...profits]).isBelow(value), "the price does not separate the corner");
 }
 
-// A number as people read it, with six digits.
+// A number as people read it, with six digits; it says where it is another.
 function shown(fraction) {
+  const text = sixDigits(fraction);
+  return Fraction.of(text).equals(fraction) ? text : `about ${text}`;
+}
+
+function sixDigits(fraction) {
   const value = fraction.toNumber();
   if (value === 0) return "0";
   const [digits, exponent] = value.toExponential(5).split("e").map(Number);

@@ -31,6 +31,10 @@ class WrongProof(Exception):
     """The file does not prove what it says."""
 
 
+# What comes of a file that has another form than a proof.
+OTHER_FORM = (LookupError, TypeError, ValueError, ArithmeticError, AttributeError, RecursionError)
+
+
 def need(condition: Any, words: Any) -> None:
     if not condition:
         raise WrongProof(words)
@@ -303,9 +307,33 @@ def checked_premises(proof: Any) -> Any:
     return actuators, {**statement, "rows": rows, "half_widths": half_widths}
 
 
+def no_number(text: Any) -> None:
+    raise WrongProof(f"{text} is no number")
+
+
+def each_key_once(pairs: Any) -> Any:
+    """A mapping of a file. Of what a key says twice Python sees one, a reader perhaps another."""
+    mapping = dict(pairs)
+    need(len(mapping) == len(pairs), f"a key stands twice among {', '.join(mapping)}"[:200])
+    return mapping
+
+
+def shown(number: Any) -> str:
+    """A number as people read it, with six digits; it says where it is another."""
+    text = f"{float(number):g}"
+    return text if Fraction(text) == number else f"about {text}"
+
+
 def check(text: Any) -> str:
     """Returns the verdict of a file, in a sentence; raises WrongProof where it proves nothing."""
-    proof = numbers_in(json.loads(text, parse_float=str, parse_int=str))
+    values = json.loads(
+        text,
+        parse_float=str,
+        parse_int=str,
+        parse_constant=no_number,
+        object_pairs_hook=each_key_once,
+    )
+    proof = numbers_in(values)
     actuators, statement = premises = checked_premises(proof)
     count = int(statement["lost"])
     if proof["verdict"] == "refuted":
@@ -319,12 +347,12 @@ def check(text: Any) -> str:
                 case = cases[frozenset(lost)]
                 high = statement["half_widths"]
                 check_box(case, case["lost"], [-half for half in high], high, premises)
-    box = ", ".join(f"{axis} +-{float(half):g}" for axis, half in statement["box"].items())
+    box = ", ".join(f"{axis} +-{shown(half)}" for axis, half in statement["box"].items())
     free = f", {', '.join(statement['free'])} free" if statement["free"] else ""
     power = statement["power_w"]
-    budget = "" if power is None else f", within {float(power):g} W"
+    budget = "" if power is None else f", within {shown(power)} W"
     tolerance = statement["wrench_tolerance"]
-    near = f", to within {float(tolerance):g}" if tolerance else ""
+    near = f", to within {shown(tolerance)}" if tolerance else ""
     means = [name for name, actuator in actuators.items() if actuator["mean"]]
     mean = f"; small forces as means over time: {', '.join(means)}" if means else ""
     return f"{proof['verdict']}: any wrench of {box}{free}, any {count} lost{budget}{near}{mean}"
@@ -451,11 +479,11 @@ def main(path: Any) -> int:
     try:
         with open(path, encoding="utf-8") as file:
             print(check(file.read()))
-    except (WrongProof, OSError, LookupError, TypeError, ValueError, ArithmeticError) as error:
+    except (WrongProof, OSError, *OTHER_FORM) as error:
         print(f"refused: {type(error).__name__}: {error}")
         return 1
     return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main(*sys.argv[1:]))
+    sys.exit(main(sys.argv[1]) if len(sys.argv) == 2 else "usage: python check_proof.py FILE")

@@ -4,8 +4,10 @@ import json
 import math
 import os
 import random
+import re
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction as F
 from itertools import pairwise, product
@@ -416,6 +418,49 @@ def test_wrenches_out_of_the_box_refute_nothing(files: list[str]) -> None:
             proof["counterexample"]["wrench"] |= change
             with pytest.raises(check_proof.WrongProof, match="wrench"):
                 check_proof.check(json.dumps(proof))
+
+
+STRANGE_FILES = [
+    (lambda text: text.replace('"lost": 1,', '"lost": 2, "lost": 1,', 1), "a key stands twice"),
+    (lambda text: re.sub(r'("position_m": \[)[^,]*', r"\1NaN", text, count=1), "NaN is no number"),
+    (
+        lambda text: re.sub(r'("power_w": )[^,]*', r"\1Infinity", text, count=1),
+        "Infinity is no num",
+    ),
+    (lambda text: "[" * 100_000 + text, "recursion"),
+    (lambda text: re.sub(r'"box": \{[^}]*\}', '"box": []', text), ""),
+    (lambda text: text.replace('"cases": [', '"cases": [3, '), ""),
+    (lambda text: text[:-1], ""),
+    (lambda text: "null", ""),
+]
+"""What somebody does to a true file, and what the refusal says."""
+
+
+@pytest.mark.parametrize(("changed", "words"), STRANGE_FILES)
+def test_a_file_of_another_form_is_refused_in_a_sentence(
+    changed: Callable[[str], str],
+    words: str,
+    files: list[str],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    text = next(text for text in files if '"verdict": "proved"' in text and '"lost": 1,' in text)
+    assert changed(text) != text
+    path = tmp_path / "proof.json"
+    path.write_text(changed(text), "utf-8")
+    assert check_proof.main(path) == 1
+    said = capsys.readouterr().out
+    assert said.startswith("refused: ") and words in said
+
+
+def test_a_rounded_number_of_the_statement_is_said_to_be_one() -> None:
+    half = 3.9999996
+    layout = load(random_robot("thrusters", 6, 5))
+    result = prove(layout, [1e-6 * half, 0, 0, 0, 0, 0], lost=0)
+    assert result.verdict == "proved"
+    assert "Fx +-about 4e-06" in check_proof.check(json.dumps(result.proof))
+    exact = prove(layout, [4e-6, 0, 0, 0, 0, 0], lost=0)
+    assert "Fx +-4e-06," in check_proof.check(json.dumps(exact.proof))
 
 
 def test_the_checker_needs_python_alone(tmp_path: Path, files: list[str]) -> None:
