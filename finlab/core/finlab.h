@@ -309,6 +309,15 @@ void fl_forces_of_commands(const fl_real *block, const fl_real *command, int cou
 int fl_figures_of_command(const fl_formula *laws, int n, const fl_real *effectiveness,
                           const fl_real *frames, const fl_real *command, fl_real *figures);
 
+/* Has budgets be kept by the laws of all actuators, from now on.
+
+   @param work    a prepared work area
+   @param laws    (n,) of the actuators
+   @param curves  (n,) of a propeller whose power was measured its curve, else 0: K, then at K
+                  rising forces these [N], powers [W] and marginal costs [W/N], which are linear
+                  between; of it the law has kind and dead band alone */
+void fl_use_laws(fl_work *work, const fl_formula *laws, const fl_real *const *curves);
+
 /* Evaluates the conjugates of all costs at multipliers of the wrench, Eq. 4, for proofs of a lower
    bound of the power.
 

@@ -45,10 +45,14 @@ SLACK = 1e-9
 """Share by which an answer may exceed a budget and count as within it: rounding."""
 NEAR = 1e-3
 """Share within which a power that is to be that of a budget is by the tables of the core."""
-CORRECTIONS = 4
+CORRECTIONS = 8
 """Budgets at which the core is asked, until powers are exact by the laws."""
+LEAST_RISE = 0.2
+"""Least slope of powers by the laws over those by tables, both as logarithms."""
 ENOUGH = 1e-8
-"""Share of its power to which a bus is brought to its budget."""
+"""Share of its power to which a bus is brought to its budget from outside of the core."""
+SHORT = 2e-7
+"""Share of its budget that a bus may leave which would give more if it had more."""
 MOST_STEPS = 60
 """Steps of Newton's method on the multipliers of budgets."""
 LARGEST_STEP = 4.0
@@ -267,8 +271,8 @@ class BudgetMethod(Protocol):
         """The actuators' own laws."""
 
     @property
-    def has_exact_power(self) -> bool:
-        """Whether the core's tables say the power of all actuators exactly."""
+    def knows_power(self) -> bool:
+        """Whether the core keeps budgets by the actuators' own laws."""
 
     @property
     def budgeted(self) -> BudgetedCore:
@@ -340,21 +344,20 @@ def _solve_one(
     else by watts that make up for what they are off, and else by `BudgetedCore`."""
     policy = question.policy
     multipliers = question.multipliers
-    watts = budget.watts
-    record = budget.record
+    asked = conditions._replace(budget=budget.record)
+    knows_power = method.knows_power
+    solved = method.solve_under(asked, targets, policy, multipliers)
+    if knows_power and not isinstance(solved, Solution):
+        return solved
+    correction = _Correction(budget)
     for _ in range(CORRECTIONS):
+        if not correction.goes_on(solved, _power_of_buses(method, solved, budget)):
+            break
+        record = budget_record(budget.members, correction.watts)
         asked = conditions._replace(budget=record)
         solved = method.solve_under(asked, targets, policy, multipliers)
-        if method.has_exact_power and not isinstance(solved, Solution):
-            return solved
-        power = _power_of_buses(method, solved, budget)
-        if _is_kept(power, budget.watts):
-            return solved
-        over = power / budget.watts
-        if (over > 1.0 + NEAR).any():
-            break  # the core has found nothing within the budget
-        watts = np.where(over > 1.0 - NEAR, watts / over, watts)
-        record = budget_record(budget.members, watts)
+    if correction.best is not None:
+        return correction.best
     solved = method.solve_under(conditions, targets, policy, multipliers)
     power = _power_of_buses(method, solved, budget)
     if not (power > (1.0 + SLACK) * budget.watts).any():
@@ -364,6 +367,43 @@ def _solve_one(
     return method.solution_of(
         conditions, targets, answer.command[None], answer.multipliers[None], None, sentences
     )
+
+
+class _Correction:
+    """Budgets that the core is asked for by its tables, so that by the laws they are those of a
+    question: secants of powers over budgets, both as logarithms, for each bus."""
+
+    def __init__(self, budget: PowerBudget) -> None:
+        self._budget = budget
+        self.watts = budget.watts
+        """What is asked for next (b,) [W]."""
+        self.best: Solved | None = None
+        """The answer within the budgets that leaves least of one."""
+        self._least_left = np.inf
+        self._last: tuple[Array, Array] | None = None
+
+    def goes_on(self, solved: Solved, power: Array) -> bool:
+        """Takes an answer in which buses take powers (b,) [W]; returns whether another one may
+        be better."""
+        over = np.log(np.maximum(power / self._budget.watts, LEAST_SQUARE))
+        asked = np.log(self.watts / self._budget.watts)
+        is_short = (over < -SHORT) & (over > -NEAR)
+        left = float(np.where(is_short, -over, 0.0).max())
+        if (over <= SLACK).all() and left < self._least_left:
+            self.best = solved
+            self._least_left = left
+        is_off = (over > SLACK) | is_short
+        if not is_off.any():
+            return False
+        slope = np.ones(len(over))
+        if self._last is not None:
+            moved = asked - self._last[1]
+            has_moved = np.abs(moved) > EXACT * SHORT
+            rise = (over - self._last[0]) / np.where(has_moved, moved, 1.0)
+            slope = np.where(has_moved, np.clip(rise, LEAST_RISE, 1.0 / LEAST_RISE), 1.0)
+        self._last = over, asked
+        self.watts = np.where(is_off, self.watts * np.exp(-(over + SHORT / 2.0) / slope), self.watts)
+        return True
 
 
 def _answer_kept(
@@ -392,14 +432,6 @@ def _answer_kept(
 def _power_of_buses(method: BudgetMethod, solved: Solved, budget: PowerBudget) -> Array:
     """Power (b,) [W] of the buses at the command of a solution of one target."""
     return np.asarray(budget.power_of_buses(method.plant.power(solved.command))[0])
-
-
-def _is_kept(power: Array, watts: Array) -> bool:
-    """Whether no bus takes more than it has, and none is so near to that that it ought to take
-    all."""
-    share = power / watts
-    is_short = (share > 1.0 - NEAR) & (share < 1.0 - ENOUGH)
-    return bool((share <= 1.0 + SLACK).all()) and not is_short.any()
 
 
 class _Asked:

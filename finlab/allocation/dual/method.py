@@ -283,6 +283,18 @@ class Dual(Method):
                 return False
         return True
 
+    @cached_property
+    def knows_power(self) -> bool:
+        """Whether the core keeps budgets by the actuators' own laws, or by tables that say the
+        same; of others Python asks for corrected budgets."""
+        if self.has_exact_power:
+            return True
+        laws = self.plant.power_formulas
+        if laws is None:
+            return False
+        self.compiled.core.use_laws(laws)
+        return True
+
     def prepared_answers(
         self,
         policy: Policy,
@@ -293,7 +305,7 @@ class Dual(Method):
         """Prepares questions about single wrenches; see `Method.prepared_answers`."""
         if not self._most_core_error >= 0.0:
             return None
-        if budget is not None and not self.has_exact_power:
+        if budget is not None and not self.knows_power:
             return None
         from finlab.core.prepared_call import RowBound, prepared_call
 

@@ -34,6 +34,18 @@
 
 enum { NOTHING_MISSES, AXES_MISS, RAY_MISSES };
 
+/* Multipliers, and what they give. `state` has forces and their derivatives. */
+typedef struct {
+  real lambda[6];
+  real factor[FL_BUSES + 1]; /* mu of each bus; the last one, of no bus, is 1 */
+  real residual[6];          /* r */
+  real power[FL_BUSES + 1];  /* of each bus [W] */
+  real missing[6];           /* scaled wrench; of a ray the share in missing[0] */
+  real value;                /* g [W] */
+  real size;                 /* of residual and excess powers, over the budgets */
+  fl_state *state;
+} budget_point;
+
 /* A target, and what may miss of it. */
 typedef struct {
   const real *block;
@@ -54,19 +66,14 @@ typedef struct {
   real settled_force[FL_MOST][2]; /* [N] */
   real settled_power[FL_MOST];    /* [W] */
   int is_open[FL_BUSES];          /* whether a bus feeds any that are not settled */
+  int has_settled;                /* whether any is settled */
+  int exceeds;                    /* whether a bus takes more whatever is given */
+  /* What is found of sets with gaps. */
+  budget_point part;       /* of the part that is looked at */
+  budget_point part_begin; /* of all parts together */
+  budget_point part_best;  /* of the best part */
+  real force[FL_MOST][2];  /* that are in no gap [N] */
 } budget_problem;
-
-/* Multipliers, and what they give. `state` has forces and their derivatives. */
-typedef struct {
-  real lambda[6];
-  real factor[FL_BUSES + 1]; /* mu of each bus; the last one, of no bus, is 1 */
-  real residual[6];          /* r */
-  real power[FL_BUSES + 1];  /* of each bus [W] */
-  real missing[6];           /* scaled wrench; of a ray the share in missing[0] */
-  real value;                /* g [W] */
-  real size;                 /* of residual and excess powers, over the budgets */
-  fl_state *state;
-} budget_point;
 
 /* A step of all multipliers. */
 typedef struct {
@@ -510,6 +517,77 @@ static int find_best(budget_problem *p, budget_point *at) {
   }
 }
 
+/* Tells searches of gaps of what Newton's method came to. */
+static void tell_point(const budget_problem *p, const budget_point *at) {
+  at->state->dual_value = at->value;
+  for (int i = 0; i < COUNT(p->block); i++) p->work->over_cost[i] = 1 / at->factor[p->bus[i]];
+}
+
+/* Whether the sets of forces leave a bus no answer within its budget. */
+static int is_any_too_small(const budget_problem *p) {
+  real least[FL_BUSES + 1] = {0};
+  const real nothing[2] = {0, 0};
+  for (int i = 0; i < COUNT(p->block); i++) least[p->bus[i]] -= response_to(p, i, nothing).conjugate;
+  for (int b = 0; b < p->budget->buses; b++) {
+    if (p->is_open[b] && !(least[b] < p->budget->watts[b])) return 1;
+  }
+  return 0;
+}
+
+/* Newton's method for one part of sets with gaps: fl_part_problem.solve. */
+static int solve_part(void *data) {
+  budget_problem *p = data;
+  int status = FL_BEYOND;
+  if (!is_any_too_small(p)) status = find_optimum(p, &p->part);
+  if (status == FL_NO_PROGRESS) { /* from anew */
+    p->part = p->part_begin;
+    status = find_optimum(p, &p->part);
+  }
+  if (status == FL_MET) {
+    tell_point(p, &p->part);
+    return status;
+  }
+  tell_point(p, &p->part);
+  const budget_point found = p->part;
+  p->part = p->part_begin;
+  p->part.state = found.state;
+  return status;
+}
+
+/* What it has found is the best so far: fl_part_problem.keep. */
+static void keep_part(void *data) {
+  budget_problem *p = data;
+  p->part_best = p->part;
+}
+
+/* Forces that are in no gap of their sets, and multipliers, of a problem from a point on; returns
+   FL_MET ... */
+static int find_forces_within(budget_problem *p, budget_point *at) {
+  fl_work *work = p->work;
+  int status;
+  if (p->misses == NOTHING_MISSES) {
+    status = find_optimum(p, at);
+  } else {
+    status = find_best(p, at);
+  }
+  copy_forces(p->block, at->state->force, p->force);
+  if (status == FL_BEYOND || !fl_may_have_gaps(p->block, work, p->force)) return status;
+  tell_point(p, at);
+  if (fl_worst_gap(p->block, work, p->force, at->state->lambda_reduced) < 0) return status;
+
+  const fl_part_problem parts = {p->target, solve_part, keep_part, p};
+  real bound;
+  p->part = *at;
+  p->part_begin = *at;
+  if (!fl_search_parts(p->block, work, &parts, status, &bound)) return FL_NO_PROGRESS;
+  copy_forces(p->block, work->best_force, p->force);
+  *at = p->part_best;
+  at->state = work->state;
+  work->state_found = work->state;
+  evaluate(p, at);
+  return FL_MET;
+}
+
 /* Power [W] of a force (2,) of an actuator, by its tables. */
 static real power_of(const real *block, const fl_work *work, int i, const real *force) {
   const fl_actuator *a = ACTUATOR(block, i);
@@ -654,7 +732,7 @@ static int meet_wrench(budget_problem *p, const real *wrench, const real *lambda
   fl_reduce_wrench(p->work, wrench, p->target);
   memcpy(at->lambda, lambda_reduced, sizeof at->lambda);
   for (int b = 0; b < p->budget->buses; b++) at->factor[b] = 1;
-  return find_optimum(p, at);
+  return find_forces_within(p, at);
 }
 
 /* An answer without budgets, from which policies begin. */
@@ -686,7 +764,7 @@ static int serve_closest(budget_problem *p, const fl_policy *policy, const real 
   let_axes_miss(p, weight, wrench);
   begin_with_share(p, before, &begin);
   begin_at(p, &begin, at);
-  return find_best(p, at);
+  return find_forces_within(p, at);
 }
 
 static int serve_direction(budget_problem *p, const real *wrench, const budget_free_answer *before,
@@ -695,7 +773,7 @@ static int serve_direction(budget_problem *p, const real *wrench, const budget_f
   let_ray_miss(p, wrench);
   begin_with_share(p, before, &begin);
   begin_at(p, &begin, at);
-  return find_best(p, at);
+  return find_forces_within(p, at);
 }
 
 /* Weights of axes when a group is served: those of groups before it are held. Returns whether it
@@ -765,29 +843,30 @@ static int has_no_choice(const budget_problem *p, const budget_point *at, int i)
   return factor >= DEAR || size_of(price) >= DEAR * factor * usual;
 }
 
+/* Leaves an actuator a force [N] and nothing else. */
+static void settle_at(budget_problem *p, int i, const real *force) {
+  p->settled_power[i] = power_of(p->block, p->work, i, force);
+  p->settled_force[i][0] = force[0];
+  p->settled_force[i][1] = force[1];
+  p->is_settled[i] = 1;
+  p->has_settled = 1;
+  fl_fix_force(p->block, i, p->work->set + i, force);
+}
+
 /* Settles the forces of actuators of which what is missing leaves no choice. Returns whether that
    are all. */
 static int settle(budget_problem *p, budget_point *at) {
-  const fl_state *state = at->state;
   int has_choice = 0;
   int is_open[FL_BUSES + 1] = {0};
   for (int i = 0; i < COUNT(p->block); i++) {
     if (p->is_settled[i] || p->work->span.is_lost[i]) continue;
-    if (!has_no_choice(p, at, i)) {
+    const int goes_either_way = p->work->set[i].force_max_reverse > 0;
+    if (goes_either_way || !has_no_choice(p, at, i)) {
       has_choice = 1;
       is_open[p->bus[i]] = 1;
       continue;
     }
-    const real factor = at->factor[p->bus[i]];
-    real v[2];
-    actuator_price(p->work, i, state->lambda_reduced, v);
-    v[0] /= factor;
-    v[1] /= factor;
-    const response y = fl_response(p->block, i, p->work->set + i, v);
-    p->is_settled[i] = 1;
-    p->settled_force[i][0] = y.force[0];
-    p->settled_force[i][1] = y.force[1];
-    p->settled_power[i] = dot(v, y.force, 2) - y.conjugate;
+    settle_at(p, i, p->force[i]);
   }
   for (int b = 0; b < p->budget->buses; b++) {
     p->is_open[b] = is_open[b];
@@ -821,7 +900,7 @@ static int serve_groups(budget_problem *p, const fl_policy *policy, const real *
       if (first > 0) begin_with_held(p, weight, before, &held, power_held, &begin);
       begin_at(p, &begin, at);
     }
-    status = find_best(p, at);
+    status = find_forces_within(p, at);
     if (status != FL_MET) return status;
     real missed = 0;
     int binds = 0;
@@ -839,10 +918,8 @@ static int serve_groups(budget_problem *p, const fl_policy *policy, const real *
   return status;
 }
 
-/* Takes what Newton's method came to, whose wrench is `out->wrench_served`, into an answer; 0 where
-   forces lie in gaps of their sets. */
-static int take_point(const budget_problem *p, const budget_point *at, fl_answer *out) {
-  fl_work *work = p->work;
+/* Takes what was found, whose wrench is `out->wrench_served`, into an answer. */
+static void take_point(budget_problem *p, const budget_point *at, fl_answer *out) {
   real weighted = 0;
   real sum = 0;
   for (int b = 0; b <= p->budget->buses; b++) {
@@ -852,34 +929,69 @@ static int take_point(const budget_problem *p, const budget_point *at, fl_answer
   real mean = 1; /* the price of the power itself: buses share it by what they take */
   if (sum > 0) mean = weighted / sum;
   for (int j = 0; j < 6; j++) out->lambda_reduced[j] = at->state->lambda_reduced[j] / mean;
-  copy_forces(p->block, at->state->force, out->force);
-  if (!fl_may_have_gaps(p->block, work, out->force)) return 1;
-  return fl_worst_gap(p->block, work, out->force, out->lambda_reduced) < 0;
+  for (int b = 0; b < p->budget->buses; b++) p->work->bus_binds[b] = at->factor[b] > 1;
+  copy_forces(p->block, p->force, out->force);
+  out->gap_power_bound = 0;
 }
 
-int fl_keep_budget(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,
-                   const fl_budget *budget, fl_answer *out) {
-  budget_problem p;
+/* Where a bus takes more than it has whatever is given, as where rates hold its actuators: they
+   take as little as they can. */
+static void close_buses(budget_problem *p) {
+  real least[FL_BUSES + 1] = {0};
+  const real nothing[2] = {0, 0};
+  for (int i = 0; i < COUNT(p->block); i++) least[p->bus[i]] -= response_to(p, i, nothing).conjugate;
+  for (int b = 0; b < p->budget->buses; b++) {
+    if (least[b] < p->budget->watts[b]) continue;
+    p->is_open[b] = 0;
+    p->exceeds |= least[b] > (1 + BUDGET_KEPT) * p->budget->watts[b];
+    for (int i = 0; i < COUNT(p->block); i++) {
+      const fl_set *set = p->work->set + i;
+      if (p->bus[i] != b || p->work->span.is_lost[i]) continue;
+      response y = response_to(p, i, nothing);
+      if (is_plane(ACTUATOR(p->block, i)) && size_of(y.force) < set->force_min) {
+        y.force[0] = set->force_min * set->cos_center;
+        y.force[1] = set->force_min * set->sin_center;
+      }
+      settle_at(p, i, y.force);
+    }
+  }
+}
+
+/* Prepares the problem of a question. */
+static void begin_problem(const real *block, fl_work *work, const fl_budget *budget,
+                          budget_problem *p) {
+  p->block = block;
+  p->work = work;
+  p->budget = budget;
+  p->keeps_budgets = 1;
+  p->exceeds = 0;
+  p->has_settled = 0;
+  p->miss_cost = 0;
+  for (int b = 0; b < FL_BUSES; b++) p->is_open[b] = 1;
+  for (int i = 0; i < COUNT(block); i++) {
+    p->bus[i] = bus_of(budget, i);
+    p->is_settled[i] = 0;
+    p->miss_cost += MISS_COST * work->power_max[i];
+  }
+}
+
+/* Finds forces for a wrench within the budgets, or for what a policy gives in its place; returns
+   whether it has. */
+static int find_within_budget(budget_problem *p, const real *wrench, const fl_policy *policy,
+                              fl_answer *out) {
+  const real *block = p->block;
+  fl_work *work = p->work;
+  const fl_budget *budget = p->budget;
   budget_point at;
   budget_free_answer before;
-  if (work->has_turn_cost || work->has_drag || !policy) return 0;
-  p.block = block;
-  p.work = work;
-  p.budget = budget;
-  p.keeps_budgets = 1;
-  p.miss_cost = 0;
-  for (int b = 0; b < FL_BUSES; b++) p.is_open[b] = 1;
-  for (int i = 0; i < COUNT(block); i++) {
-    p.bus[i] = bus_of(budget, i);
-    p.is_settled[i] = 0;
-    p.miss_cost += MISS_COST * work->power_max[i];
-  }
+  close_buses(p);
   const int is_bus_of_all = feeds_all(block, work, budget);
   before.is_met = out->is_attainable;
   before.share = share_within(block, work, budget, out->force);
   if (before.is_met && !is_bus_of_all) {
-    if (meet_wrench(&p, wrench, out->lambda_reduced, &at) == FL_MET) {
-      return take_point(&p, &at, out);
+    if (meet_wrench(p, wrench, out->lambda_reduced, &at) == FL_MET) {
+      take_point(p, &at, out);
+      return !p->exceeds;
     }
   }
 
@@ -889,17 +1001,31 @@ int fl_keep_budget(const real *block, fl_work *work, const real *wrench, const f
   out->is_attainable = 0;
   int status;
   if (policy->kind == FL_DIRECTION) {
-    status = serve_direction(&p, wrench, &before, &at);
+    status = serve_direction(p, wrench, &before, &at);
   } else if (policy->kind == FL_PRIORITY) {
-    status = serve_groups(&p, policy, wrench, is_bus_of_all, &before, &at);
+    status = serve_groups(p, policy, wrench, is_bus_of_all, &before, &at);
   } else {
-    status = serve_closest(&p, policy, wrench, &before, &at);
+    status = serve_closest(p, policy, wrench, &before, &at);
   }
   if (status != FL_MET) return 0;
   if (policy->kind == FL_DIRECTION) {
     for (int k = 0; k < 6; k++) out->wrench_served[k] = (1 - at.missing[0]) * wrench[k];
   } else {
-    fl_wrench_of_forces(block, work, at.state->force, out->wrench_served);
+    fl_wrench_of_forces(block, work, p->force, out->wrench_served);
   }
-  return take_point(&p, &at, out);
+  take_point(p, &at, out);
+  return !p->exceeds;
+}
+
+int fl_keep_budget(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,
+                   const fl_budget *budget, fl_answer *out) {
+  budget_problem p;
+  fl_set before[FL_MOST];
+  if (work->has_turn_cost || work->has_drag || !policy) return 0;
+  copy_sets(block, work->set, before);
+  begin_problem(block, work, budget, &p);
+  const int is_kept = find_within_budget(&p, wrench, policy, out);
+  if (p.has_settled) fl_restore_sets(block, work, before);
+  for (int i = 0; i < COUNT(block); i++) work->over_cost[i] = 1;
+  return is_kept && !p.exceeds;
 }
