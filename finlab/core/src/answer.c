@@ -300,6 +300,7 @@ static void answer_within_budget(const real *block, fl_work *work, const fl_ques
   real log_share[FL_BUSES] = {0};
   real log_asked[FL_BUSES] = {0};
   fl_answer without = *out;
+  work->budget_begins = 0;
   asked_question.budget = &asked;
   for (int tries = 0;; tries++) {
     const int is_used_up = keep_budget(block, work, &asked_question, wrench_desired, out);

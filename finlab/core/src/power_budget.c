@@ -69,6 +69,7 @@ typedef struct {
   int has_settled;                /* whether any is settled */
   int exceeds;                    /* whether a bus takes more whatever is given */
   /* What is found of sets with gaps. */
+  int targets; /* that were looked for */
   budget_point part;       /* of the part that is looked at */
   budget_point part_begin; /* of all parts together */
   budget_point part_best;  /* of the best part */
@@ -565,11 +566,20 @@ static void keep_part(void *data) {
 static int find_forces_within(budget_problem *p, budget_point *at) {
   fl_work *work = p->work;
   int status;
+  fl_budget_begin *begin = work->budget_begin + p->targets;
+  if (p->targets < work->budget_begins) {
+    memcpy(at->lambda, begin->lambda, sizeof begin->lambda);
+    memcpy(at->factor, begin->factor, sizeof begin->factor);
+  }
   if (p->misses == NOTHING_MISSES) {
     status = find_optimum(p, at);
   } else {
     status = find_best(p, at);
   }
+  memcpy(begin->lambda, at->lambda, sizeof begin->lambda);
+  memcpy(begin->factor, at->factor, sizeof begin->factor);
+  p->targets++;
+  work->budget_begins = p->targets;
   copy_forces(p->block, at->state->force, p->force);
   if (status == FL_BEYOND || !fl_may_have_gaps(p->block, work, p->force)) return status;
   tell_point(p, at);
@@ -966,6 +976,7 @@ static void begin_problem(const real *block, fl_work *work, const fl_budget *bud
   p->keeps_budgets = 1;
   p->exceeds = 0;
   p->has_settled = 0;
+  p->targets = 0;
   p->miss_cost = 0;
   for (int b = 0; b < FL_BUSES; b++) p->is_open[b] = 1;
   for (int i = 0; i < COUNT(block); i++) {
@@ -989,10 +1000,15 @@ static int find_within_budget(budget_problem *p, const real *wrench, const fl_po
   before.is_met = out->is_attainable;
   before.share = share_within(block, work, budget, out->force);
   if (before.is_met && !is_bus_of_all) {
-    if (meet_wrench(p, wrench, out->lambda_reduced, &at) == FL_MET) {
+    const int is_known = work->budget_begins > 0 && work->is_budget_too_small;
+    if (is_known) {
+      p->targets = 1;
+    } else if (meet_wrench(p, wrench, out->lambda_reduced, &at) == FL_MET) {
+      work->is_budget_too_small = 0;
       take_point(p, &at, out);
       return !p->exceeds;
     }
+    work->is_budget_too_small = 1;
   }
 
   memcpy(before.lambda_reduced, out->lambda_reduced, sizeof before.lambda_reduced);
