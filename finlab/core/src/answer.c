@@ -10,7 +10,8 @@
 #define CALM_STEPS 10    /* halves of the range of what turning costs, to keep a budget */
 #define CORRECTIONS 8    /* of budgets, until powers are those by the laws */
 #define OVER_BUDGET NOTHING            /* share by which an answer may exceed a budget: rounding */
-#define SHORT_OF_BUDGET (NEARLY / 10)  /* share that a bus that binds may leave of its budget */
+#define SHORT_OF_BUDGET (NEARLY / 2)   /* share that a bus that binds may leave of its budget */
+#define AIM_BELOW (NEARLY / 10)        /* by which share less than a budget is aimed at */
 #define LEAST_SLOPE R(0.2) /* of powers by the laws over those by tables, both as logarithms */
 #define STEPS_BY_LAWS 12 /* on commands, to a wrench a little beyond the tables */
 /* Error over the wrench scale, beyond reach, up to which the laws may yet meet the target. */
@@ -284,7 +285,7 @@ static int correct_budget(const fl_work *work, const fl_budget *budget, const re
     const int is_stuck = tries > 0 && y == last_log_share;
     if ((y <= OVER_BUDGET && !is_short) || is_stuck) continue;
     is_kept = 0;
-    asked->watts[b] *= EXP(-(y + SHORT_OF_BUDGET / 2) / slope);
+    asked->watts[b] *= EXP(-(y + AIM_BELOW) / slope);
   }
   return !is_kept;
 }
@@ -299,6 +300,9 @@ static void answer_within_budget(const real *block, fl_work *work, const fl_ques
   real share[FL_BUSES];
   real log_share[FL_BUSES] = {0};
   real log_asked[FL_BUSES] = {0};
+  if (has_laws && fl_exceeds_budget(block, work, q->budget, out->force)) {
+    for (int b = 0; b < asked.buses; b++) asked.watts[b] *= 1 - AIM_BELOW;
+  }
   fl_answer without = *out;
   work->budget_begins = 0;
   asked_question.budget = &asked;

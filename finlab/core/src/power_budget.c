@@ -24,12 +24,15 @@
 #define BUDGET_STEPS FL_STEPS /* of Newton's method for one target */
 #define DEAR 100              /* multiple of a usual price that only what is missing explains */
 #define SHORT_SHARE R(0.1)    /* of a step, from which on mu falls */
+#define BUDGET_SLOPE_ENOUGH R(0.3) /* share of the slope that a search along a step may leave */
 #define BUDGET_IDLE 12        /* steps without progress after which it ends */
 /* There, of TOLERANCE, what may be left: rounding where multipliers lie far apart. */
 #define STANDSTILL 100
 /* The cost of a miss with which the way along costs begins, over MISS_COST, and its steps. */
 #define COST_BEGIN R(1e-6)
 #define COST_TIMES 10
+#define COST_FIRST R(1e-4) /* cost of a miss, over MISS_COST, from which multipliers are told */
+#define COST_STEP R(1e-3)  /* share by which it changes, to find how they change with it */
 #define EXPONENT_GUESS (R(2.0) / 3) /* of forces over powers, to begin with: costs ~ T^1.5 */
 
 enum { NOTHING_MISSES, AXES_MISS, RAY_MISSES };
@@ -69,7 +72,9 @@ typedef struct {
   int has_settled;                /* whether any is settled */
   int exceeds;                    /* whether a bus takes more whatever is given */
   /* What is found of sets with gaps. */
-  int targets; /* that were looked for */
+  int targets;             /* that were looked for */
+  int begins_anew;         /* whether a target begins at a guess */
+  int may_not_bind;        /* whether a bus may bind while another does not */
   budget_point part;       /* of the part that is looked at */
   budget_point part_begin; /* of all parts together */
   budget_point part_best;  /* of the best part */
@@ -394,7 +399,7 @@ static real share_kept_at_top(const budget_problem *p, const budget_step *step,
     share = low + part * (high - low);
     go_along(p, at, step, share, trial);
     const real slope = slope_along(p, trial, step);
-    if (FABS(slope) <= SLOPE_ENOUGH * result->slope_begin) break;
+    if (FABS(slope) <= BUDGET_SLOPE_ENOUGH * result->slope_begin) break;
     if (slope > 0) {
       low = share;
       slope_low = slope;
@@ -456,7 +461,7 @@ static int find_optimum(const budget_problem *p, budget_point *at) {
       is_next = share > 0;
       mu_next = larger(mu * MU_KEPT_LEAST, ROUNDING);
       /* Where sets end, Newton's steps alone go from side to side. */
-      if (share < SHORT_SHARE) mu_next = MU_SINGULAR * larger(mu, NEARLY);
+      if (share < SHORT_SHARE) mu_next = MU_SINGULAR * larger(mu, CLOSE);
     }
     if (is_next) {
       budget_point *before = from;
@@ -496,11 +501,45 @@ static void follow_cost(const budget_problem *p, real times, budget_point *at) {
   if (grown.value > at->value) *at = grown;
 }
 
+/* Makes multipliers so many times as large, those of the budgets at least 1. */
+static void scale_point(const budget_problem *p, real times, budget_point *at) {
+  for (int j = 0; j < 6; j++) at->lambda[j] *= times;
+  for (int b = 0; b < p->budget->buses; b++) at->factor[b] = larger(at->factor[b] * times, 1);
+}
+
+/* Newton's method from a point where one bus may not bind. At the whole cost K of what is missing
+   its mu would have to fall from where the others are, K over the power, to 1. So K is small at
+   first; and as multipliers are K l + m + O(1 / K), their slope there tells them at the whole one. */
+static int find_by_small_cost(budget_problem *p, budget_point *at) {
+  budget_step step;
+  make_dearer(p, COST_FIRST);
+  scale_point(p, COST_FIRST, at);
+  int status = find_optimum(p, at);
+  make_dearer(p, 1 + COST_STEP);
+  if (status == FL_MET) {
+    evaluate(p, at);
+    if (find_step(p, at, ROUNDING, &step)) {
+      const real times = (1 / COST_FIRST - 1) / COST_STEP;
+      add_to(at->lambda, times, step.lambda);
+      for (int b = 0; b < p->budget->buses; b++) {
+        at->factor[b] = larger(at->factor[b] + times * step.factor[b], 1);
+      }
+    }
+  }
+  make_dearer(p, 1 / (COST_FIRST * (1 + COST_STEP)));
+  if (status != FL_MET) return status;
+  return find_optimum(p, at);
+}
+
 /* Newton's method where something may miss, from a point. Where it makes no progress, it begins
    anew at a cost of what is missing that saturates no actuator, and follows that cost up. */
 static int find_best(budget_problem *p, budget_point *at) {
   const budget_point begin = *at;
-  int status = find_optimum(p, at);
+  int status = FL_NO_PROGRESS;
+  if (p->begins_anew && p->may_not_bind) status = find_by_small_cost(p, at);
+  if (status == FL_MET) return status;
+  *at = begin;
+  status = find_optimum(p, at);
   if (status != FL_NO_PROGRESS) return status;
   real dearness = COST_BEGIN;
   *at = begin;
@@ -570,6 +609,7 @@ static int find_forces_within(budget_problem *p, budget_point *at) {
   if (p->targets < work->budget_begins) {
     memcpy(at->lambda, begin->lambda, sizeof begin->lambda);
     memcpy(at->factor, begin->factor, sizeof begin->factor);
+    p->begins_anew = 0;
   }
   if (p->misses == NOTHING_MISSES) {
     status = find_optimum(p, at);
@@ -579,6 +619,7 @@ static int find_forces_within(budget_problem *p, budget_point *at) {
   memcpy(begin->lambda, at->lambda, sizeof begin->lambda);
   memcpy(begin->factor, at->factor, sizeof begin->factor);
   p->targets++;
+  p->begins_anew = 0;
   work->budget_begins = p->targets;
   copy_forces(p->block, at->state->force, p->force);
   if (status == FL_BEYOND || !fl_may_have_gaps(p->block, work, p->force)) return status;
@@ -672,8 +713,9 @@ typedef struct {
 
 /* Begins at prices, with a scale mu of all multipliers at which those of what misses are the
    same. */
-static void begin_at(const budget_problem *p, const budget_begin *begin, budget_point *at) {
+static void begin_at(budget_problem *p, const budget_begin *begin, budget_point *at) {
   real factor = 1;
+  p->begins_anew = 1;
   if (p->misses == RAY_MISSES) {
     const real worth = dot(begin->nu, p->target, 6);
     const real share = dot(begin->given, p->target, 6) / dot(p->target, p->target, 6);
@@ -977,6 +1019,7 @@ static void begin_problem(const real *block, fl_work *work, const fl_budget *bud
   p->exceeds = 0;
   p->has_settled = 0;
   p->targets = 0;
+  p->may_not_bind = !feeds_all(block, work, budget);
   p->miss_cost = 0;
   for (int b = 0; b < FL_BUSES; b++) p->is_open[b] = 1;
   for (int i = 0; i < COUNT(block); i++) {
