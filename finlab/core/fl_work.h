@@ -164,7 +164,7 @@ typedef struct {
 } fl_span;
 
 /* Multipliers lambda, and 1 + zeta of each bus, at which a target within budgets begins. */
-#define FL_BUDGET_TARGETS 7 /* the wrench itself, and a policy's groups */
+#define FL_BUDGET_TARGETS 8 /* the wrench itself, a policy's groups, and what is closest */
 typedef struct {
   fl_real lambda[6];
   fl_real factor[FL_BUSES];

@@ -30,7 +30,6 @@ from finlab.physics.objective import judged_power
 if TYPE_CHECKING:
     from typing_extensions import Self  # Python 3.10 has none of its own
 
-    from finlab.allocation.dual.budget import BudgetedCore
     from finlab.allocation.levenberg_marquardt import CommandProblem
     from finlab.allocation.power_budget import PowerBudget
     from finlab.core.coupled_core import CoupledCore
@@ -238,13 +237,6 @@ class Dual(Method):
         return method.solve_under(
             conditions, question.targets, question.policy, question.multipliers
         )
-
-    @cached_property
-    def budgeted(self) -> "BudgetedCore":
-        """The robot in the core with powers that have a scale, for power budgets."""
-        from finlab.allocation.dual.budget import BudgetedCore
-
-        return BudgetedCore(self.compiled.contents, self.plant, self.scale)
 
     def check_budget(self, budget: "PowerBudget", policy: Policy) -> None:
         """Refuses budgets where the core's power is not that of the actuators alone; see

@@ -20,6 +20,7 @@
 
 #define MISS_COST R(1e6)      /* K over the robot's largest power, of a miss of the wrench scale */
 #define HELD_AXIS R(1e4)      /* weight of axes that are served over those that follow */
+#define ACROSS_RAY 100        /* weight of what is across a ray over what is along it */
 #define BUDGET_KEPT TOLERANCE /* share of a budget by which a power may be off */
 #define BUDGET_STEPS FL_STEPS /* of Newton's method for one target */
 #define DEAR 100              /* multiple of a usual price that only what is missing explains */
@@ -35,7 +36,7 @@
 #define COST_STEP R(1e-3)  /* share by which it changes, to find how they change with it */
 #define EXPONENT_GUESS (R(2.0) / 3) /* of forces over powers, to begin with: costs ~ T^1.5 */
 
-enum { NOTHING_MISSES, AXES_MISS, RAY_MISSES };
+enum { NOTHING_MISSES, AXES_MISS = 1, RAY_MISSES = 2 }; /* or both: what is near to a ray */
 
 /* Multipliers, and what they give. `state` has forces and their derivatives. */
 typedef struct {
@@ -43,7 +44,8 @@ typedef struct {
   real factor[FL_BUSES + 1]; /* mu of each bus; the last one, of no bus, is 1 */
   real residual[6];          /* r */
   real power[FL_BUSES + 1];  /* of each bus [W] */
-  real missing[6];           /* scaled wrench; of a ray the share in missing[0] */
+  real missing[6];           /* scaled wrench along axes */
+  real missing_share;        /* of a ray */
   real value;                /* g [W] */
   real size;                 /* of residual and excess powers, over the budgets */
   fl_state *state;
@@ -119,17 +121,22 @@ static void along_axes(const budget_problem *p, const real *reduced, real *wrenc
   }
 }
 
-/* What misses at multipliers, and h(lambda) [W]. */
-static real find_missing(const budget_problem *p, const real *lambda, real *missing) {
-  memset(missing, 0, 6 * sizeof *missing);
-  if (p->misses == RAY_MISSES) {
-    const real worth = dot(lambda, p->target, 6);
-    missing[0] = clipped(worth / p->ray_cost, 0, 1);
-    return missing[0] * (worth - p->ray_cost * missing[0] / 2);
+/* What misses at the multipliers of a point; returns h(lambda) [W]. */
+static real find_missing(const budget_problem *p, budget_point *at) {
+  real conjugate = 0;
+  at->missing_share = 0;
+  memset(at->missing, 0, sizeof at->missing);
+  if (p->misses & RAY_MISSES) {
+    const real worth = dot(at->lambda, p->target, 6);
+    const real share = clipped(worth / p->ray_cost, 0, 1);
+    at->missing_share = share;
+    conjugate += share * (worth - p->ray_cost * share / 2);
   }
-  if (p->misses == NOTHING_MISSES) return 0;
-  for (int k = 0; k < 6; k++) missing[k] = p->looseness[k] * lambda[k];
-  return dot(missing, lambda, 6) / 2;
+  if (p->misses & AXES_MISS) {
+    for (int k = 0; k < 6; k++) at->missing[k] = p->looseness[k] * at->lambda[k];
+    conjugate += dot(at->missing, at->lambda, 6) / 2;
+  }
+  return conjugate;
 }
 
 /* By how much a bus takes more than it has, over that, or less where that costs it something. */
@@ -154,7 +161,7 @@ static void evaluate(const budget_problem *p, budget_point *at) {
   fl_state *state = at->state;
   real wrench[6] = {0}; /* sum B y, in the basis */
   real given[6];
-  real conjugate = find_missing(p, at->lambda, at->missing);
+  real conjugate = find_missing(p, at);
   in_basis(p, at->lambda, state->lambda_reduced);
   memset(at->power, 0, sizeof at->power);
   for (int i = 0; i < COUNT(p->block); i++) {
@@ -183,8 +190,7 @@ static void evaluate(const budget_problem *p, budget_point *at) {
   along_axes(p, wrench, given);
   at->value = dot(at->lambda, p->target, 6) - conjugate;
   for (int j = 0; j < 6; j++) {
-    real missing = at->missing[j];
-    if (p->misses == RAY_MISSES) missing = at->missing[0] * p->target[j];
+    const real missing = at->missing[j] + at->missing_share * p->target[j];
     at->residual[j] = p->target[j] - given[j] - missing;
   }
   real squared = dot(at->residual, at->residual, 6);
@@ -300,11 +306,11 @@ static void find_hessian(const budget_problem *p, const budget_point *at, real m
     for (int k = 0; k <= j; k++) h->G[j][k] += weight * p->work->metric[j][k];
   }
   if (p->is_in_axes) turn_to_axes(p, h);
-  if (p->misses == AXES_MISS) {
+  if (p->misses & AXES_MISS) {
     for (int k = 0; k < 6; k++) h->G[k][k] += p->looseness[k];
   }
-  const int is_share_free = at->missing[0] > 0 && at->missing[0] < 1;
-  if (p->misses == RAY_MISSES && is_share_free) {
+  const int is_share_free = at->missing_share > 0 && at->missing_share < 1;
+  if (is_share_free) {
     fl_add_square(h->G, p->target, 1 / p->ray_cost);
   }
 }
@@ -563,11 +569,17 @@ static void tell_point(const budget_problem *p, const budget_point *at) {
   for (int i = 0; i < COUNT(p->block); i++) p->work->over_cost[i] = 1 / at->factor[p->bus[i]];
 }
 
+/* The least power of each bus [W]. */
+static void find_least_power(const budget_problem *p, real *least) {
+  const real nothing[2] = {0, 0};
+  for (int b = 0; b <= p->budget->buses; b++) least[b] = 0;
+  for (int i = 0; i < COUNT(p->block); i++) least[p->bus[i]] -= response_to(p, i, nothing).conjugate;
+}
+
 /* Whether the sets of forces leave a bus no answer within its budget. */
 static int is_any_too_small(const budget_problem *p) {
-  real least[FL_BUSES + 1] = {0};
-  const real nothing[2] = {0, 0};
-  for (int i = 0; i < COUNT(p->block); i++) least[p->bus[i]] -= response_to(p, i, nothing).conjugate;
+  real least[FL_BUSES + 1];
+  find_least_power(p, least);
   for (int b = 0; b < p->budget->buses; b++) {
     if (p->is_open[b] && !(least[b] < p->budget->watts[b])) return 1;
   }
@@ -716,11 +728,11 @@ typedef struct {
 static void begin_at(budget_problem *p, const budget_begin *begin, budget_point *at) {
   real factor = 1;
   p->begins_anew = 1;
-  if (p->misses == RAY_MISSES) {
+  if (p->misses & RAY_MISSES) {
     const real worth = dot(begin->nu, p->target, 6);
     const real share = dot(begin->given, p->target, 6) / dot(p->target, p->target, 6);
     if (worth > 0) factor = p->ray_cost * clipped(1 - share, 0, 1) / worth;
-  } else if (p->misses == AXES_MISS) {
+  } else if (p->misses & AXES_MISS) {
     real worth = 0;
     real squared = 0;
     for (int k = 0; k < 6; k++) {
@@ -761,18 +773,31 @@ static void let_axes_miss(budget_problem *p, const real *weight, const real *wre
   }
 }
 
-/* Asks for a wrench of which a share may miss. */
-static void let_ray_miss(budget_problem *p, const real *wrench) {
+/* What the whole of a wrench costs that misses [W]. */
+static real cost_of_ray(const budget_problem *p, const real *wrench) {
   real squared = 0;
   for (int k = 0; k < 6; k++) {
     const real normalized = wrench[k] / HEAD(p->block)->wrench_scale[k];
     squared += normalized * normalized;
   }
+  return p->miss_cost * larger(squared, NOTHING);
+}
+
+/* Asks for a wrench of which a share may miss. */
+static void let_ray_miss(budget_problem *p, const real *wrench) {
   p->misses = RAY_MISSES;
   p->is_in_axes = 0;
   p->most_power = INFEASIBLE_COST;
-  p->ray_cost = p->miss_cost * larger(squared, NOTHING);
+  p->ray_cost = cost_of_ray(p, wrench);
   fl_reduce_wrench(p->work, wrench, p->target);
+}
+
+/* Asks for a wrench of which a share may miss, and for more, any wrench across it. */
+static void let_all_miss(budget_problem *p, const real *wrench) {
+  const real weight[6] = {ACROSS_RAY, ACROSS_RAY, ACROSS_RAY, ACROSS_RAY, ACROSS_RAY, ACROSS_RAY};
+  let_axes_miss(p, weight, wrench);
+  p->misses = AXES_MISS | RAY_MISSES;
+  p->ray_cost = cost_of_ray(p, wrench);
 }
 
 /* The least power for a wrench within the budgets, where that is not the least of all. */
@@ -819,10 +844,16 @@ static int serve_closest(budget_problem *p, const fl_policy *policy, const real 
   return find_forces_within(p, at);
 }
 
+/* Where actuators that cannot rest give no share of the wrench alone, what is nearest to one. */
 static int serve_direction(budget_problem *p, const real *wrench, const budget_free_answer *before,
                            budget_point *at) {
   budget_begin begin;
   let_ray_miss(p, wrench);
+  begin_with_share(p, before, &begin);
+  begin_at(p, &begin, at);
+  const int status = find_forces_within(p, at);
+  if (status == FL_MET) return status;
+  let_all_miss(p, wrench);
   begin_with_share(p, before, &begin);
   begin_at(p, &begin, at);
   return find_forces_within(p, at);
@@ -986,27 +1017,45 @@ static void take_point(budget_problem *p, const budget_point *at, fl_answer *out
   out->gap_power_bound = 0;
 }
 
-/* Where a bus takes more than it has whatever is given, as where rates hold its actuators: they
-   take as little as they can. */
-static void close_buses(budget_problem *p) {
-  real least[FL_BUSES + 1] = {0};
+/* Has the actuators of a bus take as little as they can. */
+static void close_bus(budget_problem *p, int bus) {
   const real nothing[2] = {0, 0};
-  for (int i = 0; i < COUNT(p->block); i++) least[p->bus[i]] -= response_to(p, i, nothing).conjugate;
+  p->is_open[bus] = 0;
+  for (int i = 0; i < COUNT(p->block); i++) {
+    const fl_set *set = p->work->set + i;
+    if (p->bus[i] != bus || p->work->span.is_lost[i]) continue;
+    response y = response_to(p, i, nothing);
+    if (is_plane(ACTUATOR(p->block, i)) && size_of(y.force) < set->force_min) {
+      y.force[0] = set->force_min * set->cos_center;
+      y.force[1] = set->force_min * set->sin_center;
+    }
+    settle_at(p, i, y.force);
+  }
+}
+
+/* Closes buses that take more than they have whatever is given, as where rates hold their
+   actuators. */
+static void close_buses(budget_problem *p) {
+  real least[FL_BUSES + 1];
+  find_least_power(p, least);
   for (int b = 0; b < p->budget->buses; b++) {
     if (least[b] < p->budget->watts[b]) continue;
-    p->is_open[b] = 0;
     p->exceeds |= least[b] > (1 + BUDGET_KEPT) * p->budget->watts[b];
-    for (int i = 0; i < COUNT(p->block); i++) {
-      const fl_set *set = p->work->set + i;
-      if (p->bus[i] != b || p->work->span.is_lost[i]) continue;
-      response y = response_to(p, i, nothing);
-      if (is_plane(ACTUATOR(p->block, i)) && size_of(y.force) < set->force_min) {
-        y.force[0] = set->force_min * set->cos_center;
-        y.force[1] = set->force_min * set->sin_center;
-      }
-      settle_at(p, i, y.force);
-    }
+    close_bus(p, b);
   }
+}
+
+/* Where no answer was found within the budgets: least power of all that have one. */
+static void take_least_power(budget_problem *p, fl_answer *out) {
+  for (int b = 0; b < p->budget->buses; b++) close_bus(p, b);
+  for (int i = 0; i < COUNT(p->block); i++) {
+    if (!p->is_settled[i]) continue;
+    out->force[i][0] = p->settled_force[i][0];
+    out->force[i][1] = p->settled_force[i][1];
+  }
+  fl_wrench_of_forces(p->block, p->work, out->force, out->wrench_served);
+  out->gap_power_bound = 0;
+  p->exceeds = 1;
 }
 
 /* Prepares the problem of a question. */
@@ -1066,9 +1115,15 @@ static int find_within_budget(budget_problem *p, const real *wrench, const fl_po
   } else {
     status = serve_closest(p, policy, wrench, &before, &at);
   }
-  if (status != FL_MET) return 0;
-  if (policy->kind == FL_DIRECTION) {
-    for (int k = 0; k < 6; k++) out->wrench_served[k] = (1 - at.missing[0]) * wrench[k];
+  if (status != FL_MET && policy->kind != FL_CLOSEST) {
+    status = serve_closest(p, policy, wrench, &before, &at);
+  }
+  if (status != FL_MET) {
+    take_least_power(p, out);
+    return 0;
+  }
+  if (p->misses == RAY_MISSES) {
+    for (int k = 0; k < 6; k++) out->wrench_served[k] = (1 - at.missing_share) * wrench[k];
   } else {
     fl_wrench_of_forces(block, work, p->force, out->wrench_served);
   }
