@@ -313,7 +313,9 @@ class _Program:
     def miss(self, target: Array, axes: Sequence[int]) -> int:
         """The norm of what is missing of a wrench (6,) along some axes, over the scales."""
         miss = self.cones.number()
-        parts = [({k: -v for k, v in self.wrench[axis].items()}, float(target[axis])) for axis in axes]
+        parts = [
+            ({k: -v for k, v in self.wrench[axis].items()}, float(target[axis])) for axis in axes
+        ]
         self.cones.norm_at_most(miss, parts)
         return miss
 

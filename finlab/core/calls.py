@@ -541,7 +541,7 @@ class Core:
         self._answer_into_row = self._core.fl_answer_into_row
         self._question = QuestionRecord(n)
         self._rows = AnswerRows(n)
-        self._laws: "PowerFormulas | None" = None
+        self._laws: PowerFormulas | None = None
         """To which the work area points, so that they live as long."""
         self._is_busy = np.zeros(1, np.int32)
         """Not 0 while a batch is answered in the work area, without the interpreter's lock."""

@@ -201,7 +201,7 @@ struct fl_work {
   fl_real over_cost[FL_MOST];   /* 1 / (1 + zeta) of the bus of each actuator, by which prices
                                    count in searches within power budgets; else 1 */
   fl_budget_begin budget_begin[FL_BUDGET_TARGETS]; /* where targets within budgets ended */
-  int budget_begins;                 /* how many of these are of this question */
+  int budget_begins;                               /* how many of these are of this question */
   int is_budget_too_small;           /* whether the first of them is proved to be beyond */
   unsigned char bus_binds[FL_BUSES]; /* 1 of a bus that would give more if it had more */
   fl_law_power law_power; /* of fl_use_laws, and what it reads; 0 where tables say powers */

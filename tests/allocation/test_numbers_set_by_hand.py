@@ -68,6 +68,7 @@ NO_CHOICE = {
     "FL_FOILS_CHEAPER",
     "FL_BOUND",
     "FL_BUDGETS",
+    "FL_BUDGET_TARGET",
     "UNKNOWNS",
     "FL_DEPTH",
     "DEPENDENT",

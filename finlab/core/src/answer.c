@@ -7,13 +7,12 @@
 
 #define LARGEST R(1e12) /* wrench, price or command of a question */
 #define MOST_CALM 1000
-#define CALM_STEPS 10    /* halves of the range of what turning costs, to keep a budget */
-#define CORRECTIONS 8    /* of budgets, until powers are those by the laws */
-#define OVER_BUDGET NOTHING            /* share by which an answer may exceed a budget: rounding */
-#define SHORT_OF_BUDGET (NEARLY / 2)   /* share that a bus that binds may leave of its budget */
-#define AIM_BELOW (NEARLY / 10)        /* by which share less than a budget is aimed at */
+#define CALM_STEPS 10       /* halves of the range of what turning costs, to keep a budget */
+#define OVER_BUDGET NOTHING /* share by which an answer may exceed a budget: rounding */
+#define SHORT_OF_BUDGET (NEARLY / 2) /* share that a bus that binds may leave of its budget */
+#define AIM_BELOW (NEARLY / 10)      /* by which share less than a budget is aimed at */
 #define LEAST_SLOPE R(0.2) /* of powers by the laws over those by tables, both as logarithms */
-#define STEPS_BY_LAWS 12 /* on commands, to a wrench a little beyond the tables */
+#define STEPS_BY_LAWS 12   /* on commands, to a wrench a little beyond the tables */
 /* Error over the wrench scale, beyond reach, up to which the laws may yet meet the target. */
 #define BEYOND_TABLES (10 * CLOSE)
 /* A drive that passes a dead band stays within it by this share of the band. */
@@ -261,15 +260,16 @@ static void find_shares(const real *block, const fl_work *work, const fl_budget 
                         const fl_answer *out, real *share) {
   real power[FL_BUSES + 1] = {0};
   for (int i = 0; i < COUNT(block); i++) {
-    if (!work->span.is_lost[i]) power[budget->bus_of[i]] += work->law_power(work, i, out->command[i]);
+    if (!work->span.is_lost[i])
+      power[budget->bus_of[i]] += work->law_power(work, i, out->command[i]);
   }
   for (int b = 0; b < budget->buses; b++) share[b] = power[b + 1] / budget->watts[b];
 }
 
 /* Changes what buses are asked to take by tables, so that by the laws they take what they have, and
    returns 1; 0 where they do already. `log_share` and `log_asked` are of the try before. */
-static int correct_budget(const fl_work *work, const fl_budget *budget, const real *share, int tries,
-                          real *log_share, real *log_asked, fl_budget *asked) {
+static int correct_budget(const fl_work *work, const fl_budget *budget, const real *share,
+                          int tries, real *log_share, real *log_asked, fl_budget *asked) {
   int is_kept = 1;
   for (int b = 0; b < budget->buses; b++) {
     const real y = LOG(larger(share[b], TINY));
@@ -312,7 +312,7 @@ static void answer_within_budget(const real *block, fl_work *work, const fl_ques
     if (!has_laws) return;
     find_shares(block, work, q->budget, out, share);
     if (!correct_budget(work, q->budget, share, tries, log_share, log_asked, &asked)) break;
-    if (tries == CORRECTIONS) break;
+    if (tries == FL_BUDGET_TRIES - 1) break;
     *out = without;
     if (q->previous) fl_limits_of_tick(block, work, q);
   }

@@ -26,7 +26,7 @@
 #define DEAR 100              /* multiple of a usual price that only what is missing explains */
 #define SHORT_SHARE R(0.1)    /* of a step, from which on mu falls */
 #define BUDGET_SLOPE_ENOUGH R(0.3) /* share of the slope that a search along a step may leave */
-#define BUDGET_IDLE 12        /* steps without progress after which it ends */
+#define BUDGET_IDLE 12             /* steps without progress after which it ends */
 /* There, of TOLERANCE, what may be left: rounding where multipliers lie far apart. */
 #define STANDSTILL 100
 /* The cost of a miss with which the way along costs begins, over MISS_COST, and its steps. */
@@ -573,7 +573,8 @@ static void tell_point(const budget_problem *p, const budget_point *at) {
 static void find_least_power(const budget_problem *p, real *least) {
   const real nothing[2] = {0, 0};
   for (int b = 0; b <= p->budget->buses; b++) least[b] = 0;
-  for (int i = 0; i < COUNT(p->block); i++) least[p->bus[i]] -= response_to(p, i, nothing).conjugate;
+  for (int i = 0; i < COUNT(p->block); i++)
+    least[p->bus[i]] -= response_to(p, i, nothing).conjugate;
 }
 
 /* Whether the sets of forces leave a bus no answer within its budget. */
