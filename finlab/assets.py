@@ -1,4 +1,4 @@
-"""What is installed with finlab: shipped layouts, checkpoints and the web app, and the extras that
+"""Files installed with finlab: shipped layouts, checkpoints and the web app; and the extras that
 bring optional packages.
 
 The shipped folders stand at the top of a source tree, and inside the package in a wheel.
@@ -62,18 +62,18 @@ def other_distribution(folders: Iterable[str] | None = None) -> str | None:
 def warning_of_other_distribution() -> str | None:
     """Returns a sentence where the other distribution is installed beside this one, at the first
     start alone; None otherwise. A file in the user's cache says that it was said."""
-    found = other_distribution()
-    if found is None:
+    other_path = other_distribution()
+    if other_path is None:
         return None
     cache = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
-    mark = Path(cache) / DISTRIBUTION / f"told-of-{os.path.basename(found)}"
+    mark = Path(cache) / DISTRIBUTION / f"told-of-{os.path.basename(other_path)}"
     if mark.exists():
         return None
     with suppress(OSError):  # then it is said again
         mark.parent.mkdir(parents=True, exist_ok=True)
         mark.touch()
     return (
-        f"{found}: another distribution, {OTHER_DISTRIBUTION!r}, is installed beside "
+        f"{other_path}: another distribution, {OTHER_DISTRIBUTION!r}, is installed beside "
         f"{DISTRIBUTION!r}; both bring a package and a script of the name finlab, and the later "
         "one has overwritten files of the other. Give each an environment of its own; the script "
         f"{DISTRIBUTION} is this one's."

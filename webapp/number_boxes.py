@@ -1,5 +1,5 @@
-"""What is typed into the number boxes of one page. `habits.js` sends the text as it was typed; here
-it is read, so that no sign of it is dropped on the way."""
+"""Text typed into the number boxes of one page. `habits.js` sends it as it was typed; here it is
+read, so that no sign of it is dropped on the way."""
 
 import re
 from collections.abc import Callable

@@ -305,7 +305,11 @@ class Azimuth(Propeller):
         if not is_rising or high - low > TURN + FILE_TURN_TOLERANCE:
             words = ", ".join(f"{math.degrees(end):g}" for end in ends)
             words = words if len(ends) > 2 else words.replace(", ", " and ")
-            raise LayoutError(f"must rise, by at most one turn, got {words} deg", "arc")
+            raise LayoutError(
+                f"must rise, by at most one turn, got {words} deg; put the arcs in order, and join "
+                "those that overlap",
+                "arc",
+            )
         if self.barred and self.force[0] < 0.0:
             raise LayoutError(
                 f"several arcs are of one that pushes ahead only, got a least force of "

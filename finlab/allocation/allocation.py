@@ -104,12 +104,12 @@ class LazyFigures(NamedTuple):
     def notes(self) -> tuple[str, ...]:
         """Returns sentences about the robot and the method, not about single answers."""
         state = self.state
-        asked = self.wrenches
+        wrenches = self.wrenches
         if state.freed is not None:
             # What was asked of an axis that the layout does not command stays: a note tells of it.
-            asked = np.where(state.freed, 0.0, asked)
+            wrenches = np.where(state.freed, 0.0, wrenches)
         of_solution = () if self.solution.notes is None else self.solution.notes()
-        return answer_notes(state.healthy, state.method, self.question.flow, asked, of_solution)
+        return answer_notes(state.healthy, state.method, self.question.flow, wrenches, of_solution)
 
     def candidates(self) -> Candidates | None:
         """Returns the refined candidates of all n actuators; None where the method has none."""

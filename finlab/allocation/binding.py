@@ -1,5 +1,5 @@
-"""What keeps a robot from delivering a wrench: limits, power budgets, rates and dead bands of its
-actuators, in sentences; `Allocation.binding` and the judge of logs ask for them."""
+"""Causes that keep a robot from delivering a wrench: limits, power budgets, rates and dead bands of
+its actuators, in sentences; `Allocation.binding` and the judge of logs ask for them."""
 
 from typing import TYPE_CHECKING
 
@@ -20,6 +20,8 @@ WITHIN = 1e-3
 """Share of a range, or of what a rate allows in a tick, within which a command is at its end."""
 END_SLACK = 1e-9
 """By how much a command may miss the end of a range that has no width."""
+STILL_RAD = 1e-6
+"""Turn in a tick [rad] up to which an actuator stands still: rounding."""
 MISSING_SHARE = 0.1
 """Share of what is missing along the worst axis from which on another axis is named."""
 
@@ -121,6 +123,28 @@ def rate_words(layout: Layout, previous: Array, command: Array, period_s: float)
     return tuple(words)
 
 
+def turning_words(layout: Layout, previous: Array, command: Array) -> tuple[str, ...]:
+    """Names the actuators that turn in a tick, as idle ones do towards what they will give.
+
+    Args:
+        layout: the robot of n actuators.
+        previous: command (n, 3) of the tick before; NaN for an unknown one.
+        command: (n, 3), NaN for a lost one.
+
+    Returns:
+        A sentence for each.
+    """
+    words: list[str] = []
+    for actuator, row_previous, row in zip(layout.actuators, previous, command, strict=True):
+        angle = actuator.KIND.aiming_number
+        if angle is None:
+            continue
+        turn = abs(float(wrapped(row[angle] - row_previous[angle])))
+        if turn > STILL_RAD:
+            words.append(f"{actuator.name} still turns")
+    return tuple(words)
+
+
 def gives_all_axes_apart(layout: Layout, works: NDArray[np.bool_]) -> bool:
     """Whether a robot away from its limits changes each axis that counts and leaves the others.
 
@@ -216,15 +240,16 @@ def what_binds(
         power: of each actuator (n,) [W], where there is a budget.
 
     Returns:
-        Limits, then buses, then rates; where there are none of these, dead bands, and then the axes
-        that these actuators do not give apart from the others. Nothing where they do: then it is
-        the method that does not find the command.
+        Limits, then buses, then rates; where there are none of these, what still turns, else dead
+        bands, else the axes that these actuators do not give apart from the others. Nothing where
+        they do: then it is the method that does not find the command.
     """
     words = limits_reached(layout, command)
     if budget is not None and power is not None:
         words += budget_words(budget, power)
     if previous is not None:
         words += rate_words(layout, previous, command, period_s)
+        words = words or turning_words(layout, previous, command)
     if words:
         return words
     words = band_words(layout, command)

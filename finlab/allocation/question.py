@@ -179,6 +179,16 @@ def check_target(wrench: ArrayLike) -> Array:
     return _within_limit(array, "wrench")
 
 
+def askable(wrench: Array) -> Array:
+    """Returns a wrench (6,), or the longest share of it that may be asked for: what large robots
+    give may have components above `MAX_WRENCH`."""
+    largest = float(np.abs(wrench).max())
+    if largest <= MAX_WRENCH:
+        return wrench
+    shortened = wrench * (MAX_WRENCH / largest)
+    return np.clip(shortened, -MAX_WRENCH, MAX_WRENCH)  # but for rounding as long
+
+
 def check_wrenches(wrench: ArrayLike) -> Array:
     """Returns desired wrenches (N, 6) [N, N m] as finite float64, a copy.
 

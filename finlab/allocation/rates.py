@@ -1,4 +1,4 @@
-"""What commands may follow those of the tick before: they change no faster than the drives allow.
+"""Commands that may follow those of the tick before: they change no faster than the drives allow.
 
 Used by `Method.rates`, and by the fault monitor, which knows what a healthy drive can do.
 """

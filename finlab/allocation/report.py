@@ -1,4 +1,4 @@
-"""What is said of an answer: two small tables and sentences for people, a JSON object for programs.
+"""An answer in words: two small tables and sentences for people, a JSON object for programs.
 
 `print(result)`, the command line, the app and a robot's program say it in these words. The app has
 tables of its own (`webapp/markup/answer.py`): they follow each step of a slider, with bars, loads
@@ -351,14 +351,14 @@ def answer_notes(
     idle = _idle_axes(method.undriven, layout.axes)
     if not idle:
         return method.notes + notes
-    asked = _asked_axes(target, method.scale, idle)
-    if not asked:
+    asked_axes = _asked_axes(target, method.scale, idle)
+    if not asked_axes:
         return method.notes + notes
-    undriven = [axis for axis in asked if axis in method.undriven]
+    undriven = [axis for axis in asked_axes if axis in method.undriven]
     if undriven:
         axes = " or ".join(undriven)
         notes = (*notes, f"no actuator gives {axes}: what is asked of it is left out")
-    uncommanded = [axis for axis in asked if axis not in layout.axes]
+    uncommanded = [axis for axis in asked_axes if axis not in layout.axes]
     if uncommanded:
         axes = " or ".join(uncommanded)
         notes = (

@@ -305,9 +305,11 @@ def joined(
         One solution for N targets and all n actuators, with commands, bound, wrenches and notes.
     """
     if len(parts) == 1 and _is_whole(*parts[0], count, works):
-        whole = parts[0][1]
-        notes_of_whole = whole.notes or _no_notes
-        return Solution(whole.command, whole.bound, wrench=whole.wrench, notes=notes_of_whole)
+        only_part = parts[0][1]
+        notes_of_whole = only_part.notes or _no_notes
+        return Solution(
+            only_part.command, only_part.bound, wrench=only_part.wrench, notes=notes_of_whole
+        )
     command = np.full((count, len(works), 3), np.nan) if memory is None else memory
     working = np.flatnonzero(works)
     parts_have_all = True

@@ -215,10 +215,10 @@ def capability(
 
     Args:
         layout: the robot.
-        loads: wrench (H, 6) on the robot of each heading [N, N m], body frame; None for 1 N
-            horizontally from the heading, so that the values are the largest forces, in newton.
-            All other axes that the robot commands are held at 0; those that it does not command
-            are free, unless a load is about them.
+        loads: wrench (H, 6) on the robot of each heading, none of them 0 [N, N m], body frame; None
+            for 1 N horizontally from the heading, so that the values are the largest forces, in
+            newton. All other axes that the robot commands are held at 0; those that it does not
+            command are free, unless a load is about them.
         headings: where the loads come from (H,) [deg], clockwise from ahead.
         lost: names of actuators that do not work already.
         flow: velocity of the robot relative to the water (6,) [m/s, rad/s]; None at rest.
@@ -243,6 +243,13 @@ def capability(
         raise LayoutError(
             f"loads: expected {len(angles)} x 6 finite numbers, a wrench for each heading, got an "
             f"array of shape {wrench.shape}"
+        )
+    has_no_load = ~wrench.any(axis=1)
+    if has_no_load.any():
+        heading = angles[int(np.argmax(has_no_load))]
+        raise LayoutError(
+            f"loads: expected a load from each heading, got none from {heading:g} deg, of which "
+            "any share is held; leave that heading out"
         )
     # An axis that a load is about counts, whether the robot commands it or not.
     counted = layout.commanded | (wrench != 0.0).any(axis=0)

@@ -355,13 +355,13 @@ class CoupledCore:
         n = self.n
         if self._raised is not None:
             return  # the answer is lost already: C only has to come to its end
-        asked = self._wrench_offset
+        offset_of = self._wrench_offset
         try:
             forces = _numbers_at(force, (n, 3))
-            if slope is None and asked.offset is not None:
-                _numbers_at(wrench, (6,))[:] = asked.offset(forces, asked.inflow)
+            if slope is None and offset_of.offset is not None:
+                _numbers_at(wrench, (6,))[:] = offset_of.offset(forces, offset_of.inflow)
                 return
-            offset, derivatives = asked.effect(forces, asked.inflow)
+            offset, derivatives = offset_of.effect(forces, offset_of.inflow)
             _numbers_at(wrench, (6,))[:] = offset
             if slope is not None:
                 _numbers_at(slope, (n, 3, 6))[:] = derivatives

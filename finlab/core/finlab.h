@@ -43,6 +43,9 @@ typedef double fl_wide; /* where differences of large numbers matter, in single 
 #ifndef FL_SLIPSTREAMS
 #define FL_SLIPSTREAMS 1 /* whether rudders in slipstreams are known; exports without any have 0 */
 #endif
+#ifndef FL_AIMS
+#define FL_AIMS 1 /* whether pods or fins turn; exports of robots without any have 0 */
+#endif
 #ifndef FL_KEEPS_BUDGETS
 #define FL_KEEPS_BUDGETS 1 /* whether power budgets are kept; exports without any have 0 */
 #endif

@@ -1,5 +1,5 @@
-"""What an export to C has of a robot whose actuators act on each other: the numbers that the core's
-`fl_answer_coupled` works with, and the functions that ask it.
+"""The part of an export to C for a robot whose actuators act on each other: the numbers that the
+core's `fl_answer_coupled` works with, and the functions that call it.
 
 `finlab.deploy.c_sources` writes the rest of the export.
 """

@@ -14,12 +14,13 @@ from numpy.typing import ArrayLike
 
 import finlab
 from finlab import core
+from finlab.actuators.actuator import Kind
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.dual.compiled import core_policy
 from finlab.allocation.dual.method import Dual, DualSettings
 from finlab.allocation.policy import CLOSEST, Policy, PolicyName
 from finlab.allocation.power_budget import PowerBudget, budget_of
-from finlab.allocation.question import check_flow
+from finlab.allocation.question import askable, check_flow
 from finlab.arrays import NOTHING, Array
 from finlab.axes import AXES
 from finlab.core.calls import Conditions, budget_record
@@ -83,8 +84,12 @@ tick, with the command for half that wrench before it."""
 TEMPLATES = Path(__file__).with_name("c_files")
 """Files that go into an export as they are, but for the README's fields."""
 STUBS = Path(__file__).with_name("c_stubs")
-"""Files that stand in place of those of foils, in exports of robots without them: a tenth of the
+"""Files that stand in place of others, in exports of robots that do not need them: a tenth of the
 code."""
+STUB_OF_FOILS = "foil_drag.c"
+"""Stands in their place for other robots."""
+STUB_OF_PODS = "turning_cost.c"
+"""Stands in place of the file of that name for robots without pods, whose turning costs nothing."""
 FILES_OF_FOILS = (
     "foil_arcs.c",
     "foil_choices.c",
@@ -129,30 +134,16 @@ def c_sources(
         budget = PowerBudget(budget.names, budget.members, budget.watts / (1.0 + margin))
     block = method.compiled.block
     thin = thinned(block)
-    folder = Path(core.__path__[0])
-    files = [*folder.glob("*.h"), *folder.glob("src/*.[ch]")]
-    sources = {
-        path.name: path.read_text("utf-8") for path in files if path.name not in FILES_LEFT_OUT
-    }
     foils = int((actuators_of(block)["flow_speed"] > 0.0).sum())
-    if foils == 0:
-        for file in FILES_OF_FOILS:
-            del sources[file]
-        sources |= {path.name: path.read_text("utf-8") for path in STUBS.glob("*.c")}
-    if budget is None:
-        del sources[FILE_OF_BUDGETS]
-    headers = ["finlab.h", "internal.h"]
-    if is_coupled:
-        headers += HEADERS
-    else:
-        for file in FILES_OF_INTERACTION:
-            del sources[file]
+    sources = _core_sources(layout, foils > 0, budget is not None, is_coupled)
+    headers = ["finlab.h", "internal.h", *(HEADERS if is_coupled else ())]
     name = _identifier(layout.name)
     declared = "".join(sources[header] for header in headers)
     sources["fl_names.h"] = _prefixed_names(declared, name)
     zones = int(actuators_of(block)["barred_count"].max(initial=0.0))
     is_steered = actuators_of(block)["command_kind"] == constant("FL_STEERED")
-    size = ExportSize(layout.n, foils, zones, bool(is_steered.any()))
+    aims = any(actuator.KIND.aiming_number is not None for actuator in layout.actuators)
+    size = ExportSize(layout.n, foils, zones, bool(is_steered.any()), aims)
     sources["finlab.h"] = _with_size(sources["finlab.h"], size, is_coupled)
     if budget is None:
         sources["finlab.h"] = _without_budgets(sources["finlab.h"])
@@ -200,6 +191,34 @@ def write_c(files: dict[str, bytes], folder: str | os.PathLike[str]) -> None:
     write_folder(folder, files, foreign, "an export")
 
 
+def _core_sources(
+    layout: Layout, has_foils: bool, has_budget: bool, is_coupled: bool
+) -> dict[str, str]:
+    """The files of the core that a robot needs, and stubs in place of others, by name."""
+    folder = Path(core.__path__[0])
+    files = [*folder.glob("*.h"), *folder.glob("src/*.[ch]")]
+    sources = {
+        path.name: path.read_text("utf-8") for path in files if path.name not in FILES_LEFT_OUT
+    }
+    if not has_foils:
+        for file in FILES_OF_FOILS:
+            del sources[file]
+        sources[STUB_OF_FOILS] = (STUBS / STUB_OF_FOILS).read_text("utf-8")
+    if not any(_is_pod(actuator.KIND) for actuator in layout.actuators):
+        sources[STUB_OF_PODS] = (STUBS / STUB_OF_PODS).read_text("utf-8")
+    if not has_budget:
+        del sources[FILE_OF_BUDGETS]
+    if not is_coupled:
+        for file in FILES_OF_INTERACTION:
+            del sources[file]
+    return sources
+
+
+def _is_pod(kind: Kind) -> bool:
+    """Whether the command of a kind is a force and its angle, whose turning costs in ticks."""
+    return kind.aiming_number is not None and kind.force_number is not None
+
+
 class ExportSize(NamedTuple):
     """What of the core the code of a robot needs."""
 
@@ -211,6 +230,8 @@ class ExportSize(NamedTuple):
     """Most barred zones of a pod."""
     has_slipstreams: bool
     """Whether a rudder stands in the slipstream of a propeller."""
+    aims: bool
+    """Whether some actuator turns to aim its force."""
 
 
 def _with_size(header: str, size: ExportSize, is_coupled: bool) -> str:
@@ -221,6 +242,7 @@ def _with_size(header: str, size: ExportSize, is_coupled: bool) -> str:
         "FL_ARCS": min(size.foils, constant("FL_ARCS")),
         "FL_ZONES": size.zones,
         "FL_SLIPSTREAMS": int(size.has_slipstreams),
+        "FL_AIMS": int(size.aims),
     }
     for name, value in values.items():
         header = re.sub(rf"(#define {name}) \d+", rf"\1 {value}", header, count=1)
@@ -241,7 +263,7 @@ def _budget_margin(method: Dual, budget: PowerBudget) -> float:
     rng = np.random.default_rng(1)
     most = 0.0
     for wrench in method.plant.wrench(method.plant.sample(rng, (MARGIN_SAMPLES,))):
-        target = (wrench * method.layout.commanded)[None]
+        target = askable(wrench * method.layout.commanded)[None]
         free = method.compiled.forces(target, CLOSEST).command
         taken = budget.power_of_buses(method.plant.power(free))[0]
         watts = np.maximum(taken * rng.uniform(0.3, 0.9), NOTHING)
@@ -498,11 +520,14 @@ def _self_test(layout: Layout, method: Dual, count: int) -> str:
         if len(rows) == count:
             break
         policy, reach = questions[k % len(questions)]
-        wrench = method.plant.wrench(method.plant.sample(rng, (1,)))[0] * layout.commanded
-        tick = allocator.allocate(0.5 * wrench, flow=flow).command if reach < 0.9 else None
-        answer = allocator.allocate(reach * wrench, policy=policy, previous=tick, flow=flow)
+        given = method.plant.wrench(method.plant.sample(rng, (1,)))[0] * layout.commanded
+        asked = askable(reach * given)
+        tick = None
+        if reach < 0.9:
+            tick = allocator.allocate(askable(0.5 * given), flow=flow).command
+        answer = allocator.allocate(asked, policy=policy, previous=tick, flow=flow)
         delivered = answer.wrench * layout.commanded
-        core_command = _core_command(method, reach * wrench, Policy(policy))
+        core_command = _core_command(method, asked, Policy(policy))
         core_error = method.problem.error(core_command, delivered[None] / method.scale)[0]
         if tick is None and core_error > MAX_CORE_ERROR:
             continue
@@ -510,7 +535,7 @@ def _self_test(layout: Layout, method: Dual, count: int) -> str:
         if tick is not None:
             previous_rows.append(f"static const fl_real {previous}[][3] = {_rows(tick)};")
         answered = f"{_row(delivered)}, {error!r}, {_rows(answer.command)}"
-        rows.append(f"  {{FL_{policy.upper()}, {_row(reach * wrench)}, {answered}, {previous}}},")
+        rows.append(f"  {{FL_{policy.upper()}, {_row(asked)}, {answered}, {previous}}},")
     calm = method.settings.calm
     counts = f"#define CALM {calm!r}\nenum {{ SAMPLES = {len(rows)} }};"
     return "\n".join([*previous_rows, "static const sample samples[] = {", *rows, "};", counts, ""])

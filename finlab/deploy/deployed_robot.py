@@ -19,6 +19,7 @@ from finlab.allocation.allocator import Allocator
 from finlab.allocation.bundled_method import bundled_method
 from finlab.allocation.methods import method_class
 from finlab.allocation.policy import POLICY_NAMES
+from finlab.allocation.question import askable
 from finlab.arrays import Array
 from finlab.axes import AXES
 from finlab.bundle_files import Files, check_bundle_files, is_bundle, read_bundle_files
@@ -169,7 +170,7 @@ def self_tests(allocator: Allocator, lost: tuple[str, ...]) -> tuple[SelfTestCas
     plant = plant_of(layout.without(lost) if lost else layout)
     cases = []
     for wrench in plant.wrench(plant.sample(np.random.default_rng(0), (N_SELF_TEST,))):
-        target = _rounded(wrench)
+        target = _rounded(askable(wrench))
         answer = _rounded(allocator.allocate(target, lost=lost).command)
         delivered = _rounded(plant.wrench(answer[~np.isnan(answer).any(axis=1)]))
         rows = [
@@ -233,6 +234,7 @@ def extremes(robot: DeployedRobot) -> Finding:
             for sign in (-1.0, 1.0):
                 target = np.zeros(6)
                 target[i] = sign * EXTREME_SIZE * robot.allocator.scale[i]
+                target = askable(target)
                 n = n + 1
                 try:
                     robot.allocate(target, lost=lost, policy=policy)

@@ -75,7 +75,7 @@ def read_asking(text: str, file: str, answers: Answers) -> Reading:
     Raises:
         LayoutError: the file cannot be read, whatever is answered.
     """
-    asked: dict[Option, Question] = {}
+    question_of: dict[Option, Question] = {}
     tried: dict[Option, tuple[str, ...]] = dict(answers)
     for _ in range(MAX_ROUNDS):
         exchange = exchange_of(tried)
@@ -89,23 +89,23 @@ def read_asking(text: str, file: str, answers: Answers) -> Reading:
                     f"cannot be read by these answers: {words} Choose others", error.key
                 ) from None
             for question in new:
-                asked[question.option] = question
+                question_of[question.option] = question
                 tried[question.option] = question.default
             if not any(question.default for question in new):
                 break  # nothing is likely, and no default does
         except LayoutError:
-            if not asked:
+            if not question_of:
                 raise
             break  # the default does not do
         else:
             for note in exchange.taken:
                 if note.question is not None and note.question.option not in answers:
-                    asked[note.question.option] = note.question
-            return Reading(layout, tuple(exchange.taken), _ordered(asked))
-    return Reading(None, (), _ordered(asked))
+                    question_of[note.question.option] = note.question
+            return Reading(layout, tuple(exchange.taken), _ordered(question_of))
+    return Reading(None, (), _ordered(question_of))
 
 
-def _ordered(asked: Mapping[Option, Question]) -> tuple[Question, ...]:
+def _ordered(question_of: Mapping[Option, Question]) -> tuple[Question, ...]:
     """Questions in the order in which people think of a robot."""
     order = get_args(Option)
-    return tuple(sorted(asked.values(), key=lambda question: order.index(question.option)))
+    return tuple(sorted(question_of.values(), key=lambda question: order.index(question.option)))

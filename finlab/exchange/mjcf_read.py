@@ -23,10 +23,12 @@ from finlab.exchange.labels import listed
 from finlab.exchange.link_names import questions_of_links
 from finlab.exchange.links import TURNING, Joint, LinkMass, combined
 from finlab.exchange.mjcf_file import ACTUATOR_TAGS, Attributes, MjcfFile
+from finlab.exchange.mjcf_geom import Geom, read_geom, solid_of
 from finlab.exchange.mjcf_mass import geom_mass
 from finlab.exchange.mounts import fin_on, on_mount
 from finlab.exchange.questions import QuestionError, which_origin, which_robot
-from finlab.layout import MAX_ACTUATORS, Actuator, Layout, Thruster
+from finlab.exchange.visuals import Solid, hull_of, note_meshes
+from finlab.layout import MAX_ACTUATORS, Actuator, Body, Layout, Thruster
 
 MAX_PARTS = 20_000
 """Most bodies, frames, joints, sites and geoms of a robot."""
@@ -64,6 +66,10 @@ class _Robot:
     masses: list[LinkMass] = field(default_factory=list)
     is_free: bool = False
     """Whether it has a free joint."""
+    solids: list[Solid] = field(default_factory=list)
+    """What the bodies that do not move in it look like."""
+    meshes: list[str] = field(default_factory=list)
+    """Names of the bodies that look like a mesh, of those that do not move in it."""
     without_mass: list[str] = field(default_factory=list)
     """Geoms whose mass is that of a mesh, or of a hull without thickness."""
     not_made: list[str] = field(default_factory=list)
@@ -134,6 +140,10 @@ def read_mjcf(root: Element, name: str, exchange: Exchange) -> Layout:
         exchange.note(f"Left out, since they are no thrusters: {listed(_shown(left_out))}.")
     _note_model(file, robot, description, exchange)
     body = body_of(description, exchange) if at_gravity else None
+    note_meshes(robot.meshes, "body", exchange)
+    hull = hull_of(robot.solids, "body", origin, exchange)
+    if hull is not None:
+        body = replace(body or Body(), hull=hull)
     origin_name = "centre of gravity" if at_gravity else f"frame of body {robot.name}"
     return Layout(description.name, tuple(actuators), f"Origin at the {origin_name}.", body)
 
@@ -314,11 +324,13 @@ class _Part(NamedTuple):
 def _parts(file: MjcfFile, base: Element, child_class: str) -> _Robot:
     """Joints, sites and masses of an outermost body and all inside it."""
     robot = _Robot(base.get("name", "robot"))
-    stack = [(_Part(base, np.eye(4), child_class), robot.name, "")]
+    stack = [(_Part(base, np.eye(4), child_class), robot.name, "", False)]
     count = 0
     while stack:
-        body, link, parent = stack.pop()
+        body, link, parent, moves = stack.pop()
         parts = _parts_in(file, body)
+        if parent:
+            moves |= any(part.element.tag == "joint" for part in parts)
         count += len(parts)
         if count > MAX_PARTS:
             raise LayoutError(f"has a robot of more than {MAX_PARTS:,} parts; make it smaller")
@@ -329,7 +341,7 @@ def _parts(file: MjcfFile, base: Element, child_class: str) -> _Robot:
                 what = f"body {name!r:.60}"
                 place = part.pose @ file.pose(element.attrib, what)
                 inner = _Part(element, place, part.child_class)
-                stack.append((inner, name or f"body {i + 1} of {link:.40}", link))
+                stack.append((inner, name or f"body {i + 1} of {link:.40}", link, moves))
             elif element.tag == "site":
                 if name in robot.sites:
                     raise LayoutError(f"has two sites of the name {name!r:.60}")
@@ -340,7 +352,10 @@ def _parts(file: MjcfFile, base: Element, child_class: str) -> _Robot:
                 _add_joint(robot, file, part, link, parent)
             elif element.tag in MAKERS:
                 robot.not_made.append(f"<{element.tag}> in {link}")
-        _add_mass(robot, file, parts, link)
+        geoms = _geoms_of(file, parts)
+        _add_mass(robot, file, parts, geoms, link)
+        if not moves:
+            _add_solids(robot, geoms, link)
     return robot
 
 
@@ -362,21 +377,40 @@ def _parts_in(file: MjcfFile, body: _Part) -> list[_Part]:
     return parts
 
 
-def _add_mass(robot: _Robot, file: MjcfFile, parts: list[_Part], link: str) -> None:
+def _geoms_of(file: MjcfFile, parts: list[_Part]) -> list[Geom]:
+    """The geoms among the parts of a body."""
+    geoms = []
+    for part in parts:
+        if part.element.tag == "geom":
+            geoms.append(read_geom(file, part.element, part.pose, part.child_class))
+    return geoms
+
+
+def _add_mass(
+    robot: _Robot, file: MjcfFile, parts: list[_Part], geoms: list[Geom], link: str
+) -> None:
     """Adds the mass of a body, which its <inertial> or its geoms tell."""
     inertials = [part for part in parts if part.element.tag == "inertial"]
     source = file.compiler.get("inertiafromgeom", "auto")
     if source == "false" or (source == "auto" and inertials):
         robot.masses += [_inertial(file, part) for part in inertials[:1]]
         return
-    for part in parts:
-        if part.element.tag == "geom":
-            mass = geom_mass(file, part.element, part.pose, part.child_class)
-            if mass is None:
-                name = part.element.get("name") or part.element.get("mesh") or "one"
-                robot.without_mass.append(f"{name} of {link}")
-            else:
-                robot.masses.append(mass)
+    for geom in geoms:
+        mass = geom_mass(file, geom)
+        if mass is None:
+            robot.without_mass.append(f"{geom.name or 'one'} of {link}")
+        else:
+            robot.masses.append(mass)
+
+
+def _add_solids(robot: _Robot, geoms: list[Geom], link: str) -> None:
+    """Adds what a body looks like."""
+    for geom in geoms:
+        solid = solid_of(geom, link)
+        if solid is not None:
+            robot.solids.append(solid)
+        elif geom.is_mesh:
+            robot.meshes.append(link)
 
 
 def _add_joint(robot: _Robot, file: MjcfFile, part: _Part, link: str, parent: str) -> None:

@@ -1,4 +1,4 @@
-"""What a joint makes of what sits on it: an azimuth of a thruster whose mount turns, or a fin."""
+"""Actuators that sit on a joint: an azimuth where the mount of a thruster turns, or a fin."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Where a thruster sits and points, by the words of others, as one position and one direction.
+"""Position and direction of a thruster, from the forms in which files of others give them.
 
 Files say it by two vectors, by components with a key each (`x`, `x-dir`, `dx`), by a pose of six
 numbers, by roll, pitch and yaw, by a quaternion, or by heading and pitch. `split` brings the record
@@ -120,13 +120,13 @@ def _join_angles(record: Record) -> None:
 
 def _join_turns(record: Record, name: str, entries: list[labels.Entry]) -> None:
     """Makes one list of angles, in radians where the first that is there names its unit."""
-    given = [entry for entry in entries if entry.key]
+    present = [entry for entry in entries if entry.key]
     values = [0.0 if entry.value is None else entry.value for entry in entries]
     if not all(isinstance(value, int | float) for value in values):
         return
-    has_unit = any(entry.names_unit for entry in given)
+    has_unit = any(entry.names_unit for entry in present)
     turned = [value * entry.unit for value, entry in zip(values, entries, strict=True)]
-    for entry in given:
+    for entry in present:
         record.pop(entry.key, None)
     record[f"{name}_rad" if has_unit else name] = turned if has_unit else values
 
@@ -154,17 +154,17 @@ def name_unit_orientations(records: Iterable[Record], exchange: Exchange) -> Non
     """Calls `orientation` of all thrusters `direction` where each has length 1, and they do not
     just point along the axes: no angles of several thrusters are so."""
     entries = [(record, lookup(record, labels.AMBIGUOUS)) for record in records]
-    found = [(record, entry) for record, entry in entries if entry.key]
-    vectors = [numbers_in(entry.value) for _, entry in found]
+    present = [(record, entry) for record, entry in entries if entry.key]
+    vectors = [numbers_in(entry.value) for _, entry in present]
     known = [vector for vector in vectors if vector is not None and vector.shape == (3,)]
-    if not found or len(known) < len(found):
+    if not present or len(known) < len(present):
         return
     is_unit = all(abs(float(np.linalg.norm(vector)) - 1.0) < SAME_LENGTH for vector in known)
     leans = any(np.count_nonzero(vector) > 1 for vector in known)
     if not is_unit or not leans:
         return
-    exchange.note(f"{found[0][1].key} has length 1 throughout, and is read as a direction.")
-    for record, entry in found:
+    exchange.note(f"{present[0][1].key} has length 1 throughout, and is read as a direction.")
+    for record, entry in present:
         record["direction"] = record.pop(entry.key)
 
 

@@ -1,7 +1,8 @@
 """The hull of a robot description: what its visuals draw, as one shape.
 
 Boxes, cylinders, balls, ellipsoids and capsules are read, and meshes are not, since no other file
-is opened. Where no visual is one of these, collisions stand for them.
+is opened. Where no visual is one of these, collisions stand for them. `mjcf_geom` makes the same
+solids of the geoms of MuJoCo.
 """
 
 from collections.abc import Sequence
@@ -25,12 +26,12 @@ ALONG = 0.99
 
 
 class Solid(NamedTuple):
-    """A solid that a visual draws, in the frame of its description."""
+    """A solid that a visual or geom draws, in the frame of its description."""
 
     kind: str
     """`box`, `ellipsoid`, `cylinder` or `capsule`."""
     link: str
-    """The link that has it."""
+    """The link, or body of MuJoCo, that has it."""
     center: Array
     """(3,) [m]."""
     axes: Array
@@ -89,16 +90,40 @@ def hull_in(description: Description, origin: Array, exchange: Exchange) -> Hull
         if solids:
             break
     meshes = [visual.link for visual in fixed if visual.element.find("geometry/mesh") is not None]
-    if meshes:
+    note_meshes(meshes, "link", exchange)
+    return hull_of(solids, "link", origin, exchange)
+
+
+def note_meshes(links: Sequence[str], part: str, exchange: Exchange) -> None:
+    """Says whose meshes are not opened.
+
+    Args:
+        links: names of the parts that have one, each as often as it has; may be none.
+        part: what the file calls a part: `link` or `body`.
+        exchange: gets the note.
+    """
+    if links:
         exchange.note(
-            f"The mesh of link {listed(list(dict.fromkeys(meshes)))} is not opened",
+            f"The mesh of {part} {listed(list(dict.fromkeys(links)))} is not opened",
             "body.hull.mesh names one",
         )
-    return _hull_of(solids, origin, exchange) if solids else None
 
 
-def _hull_of(solids: Sequence[Solid], origin: Array, exchange: Exchange) -> Hull | None:
-    """The hull of some solids; None where they are too large for one."""
+def hull_of(solids: Sequence[Solid], part: str, origin: Array, exchange: Exchange) -> Hull | None:
+    """Returns the hull of some solids: the largest one where it fills most of the box around all of
+    them, else that box.
+
+    Args:
+        solids: in the frame of the description; may be none.
+        part: what the file calls the parts that have them: `link` or `body`.
+        origin: the layout's origin in the description's frame, (3,) [m].
+        exchange: gets the notes.
+
+    Returns:
+        The hull; None where there are no solids, or they are too large for one.
+    """
+    if not solids:
+        return None
     lower = np.min([solid.center - solid.half_extents for solid in solids], axis=0)
     upper = np.max([solid.center + solid.half_extents for solid in solids], axis=0)
     main = max(solids, key=lambda solid: float(np.prod(solid.half_extents)))
@@ -108,7 +133,7 @@ def _hull_of(solids: Sequence[Solid], origin: Array, exchange: Exchange) -> Hull
         lower = main.center - main.half_extents
         upper = main.center + main.half_extents
         shape = main.shape
-        what = f"the {main.kind} of link {main.link:.60}"
+        what = f"the {main.kind} of {part} {main.link:.60}"
     size = np.maximum(upper - lower, SIZES[0])
     if size.max() > SIZES[1]:
         exchange.note(f"The hull is left out: {what} is {size.max():.4g} m long.")

@@ -34,10 +34,13 @@ if TYPE_CHECKING:
 Checkable = TypeVar("Checkable")
 """A type that plain values are checked against."""
 
-_MESSAGE_AND_PATH = re.compile(r"(?s)(.*) - at `(?:key` in `)?\$(.*)`")
-"""A message of msgspec and the path that it names, such as `$.actuators[2].name`."""
+_MESSAGE_AND_PATH = re.compile(r"(?s)(.*) - at `(key` in `)?\$(.*)`")
+"""A message of msgspec, whether it is about a key of a mapping, and the path that it names, such as
+`$.actuators[2].name`."""
 _STEP = re.compile(r"\.([^.\[\]]+)|\[(\d+)\]|\[(\.\.\.)\]")
-"""One step of such a path: a key, an index, or any index."""
+"""One step of such a path: a key, an index, or any key."""
+_ANY_KEY = "[...]"
+"""The step of such a path to a value of a mapping whose keys are of its own choice."""
 _TYPES = {
     "float": "a number",
     "int": "a whole number",
@@ -85,12 +88,13 @@ def checked(
         message = str(problem)
     except (RecursionError, TypeError, ValueError, OverflowError):
         message = "Expected `object`"
-    path = ""
+    place = _Place("", "", values, inspect.type_info(kind))
     match = _MESSAGE_AND_PATH.fullmatch(message)
     if match:
-        message, path = match.groups()
-    fault = _fault(message, path, values, kind)
-    path = ".".join(step for step in (path.lstrip("."), fault.key) if step)
+        place = _place_of(match[3], match[2] is not None, message, values, kind)
+        message = match[1]
+    fault = _fault(message, place)
+    path = ".".join(step for step in (place.shown.lstrip("."), fault.key) if step)
     if key and path:
         path = key + ("" if path.startswith("[") else ".") + path
     raise error.in_file(source, fault.sentence, path or key)
@@ -101,6 +105,75 @@ def _plain(value: Any) -> Any:
     return value.tolist() if hasattr(value, "tolist") else repr(value)
 
 
+class _Place(NamedTuple):
+    """Where in some values a message of msgspec has found a fault."""
+
+    shown: str
+    """Its path in a sentence."""
+    subject: str
+    """What of it is meant, where that is not the value there: `as a key in it`."""
+    value: Any
+    """The value that does not fit; None where it is not there."""
+    type_info: Any
+    """The type that it does not fit, as msgspec describes it."""
+
+
+def _place_of(path: str, is_key: bool, message: str, values: Any, kind: Any) -> _Place:
+    """The place of a fault.
+
+    Args:
+        path: that of the message, which names no keys of mappings whose keys are of their own
+            choice.
+        is_key: whether the message is about a key of the mapping there.
+        message: the whole message.
+        values: the plain values.
+        kind: the type that they do not fit.
+    """
+    type_info = inspect.type_info(kind)
+    shown_path = path
+    at = path.find(_ANY_KEY)
+    while at >= 0:
+        values, key = _with_one_item(path[:at], message, values, kind)
+        step = f".{key}" if key.isprintable() and len(key) <= 64 else f".{shown(key)}"
+        shown_path = shown_path.replace(_ANY_KEY, step, 1)
+        at = path.find(_ANY_KEY, at + len(_ANY_KEY))
+    if not is_key:
+        return _Place(shown_path, "", *_value_at(path, values, type_info))
+    values, key = _with_one_item(path, message, values, kind)
+    _, mapping_type = _value_at(path, values, type_info)
+    key_type = _resolve(getattr(mapping_type, "key_type", None), key)
+    return _Place(shown_path, "as a key in it, ", key, key_type)
+
+
+def _with_one_item(path: str, message: str, values: Any, kind: Any) -> tuple[Any, str]:
+    """The values with one item alone in the mapping at a path, of which msgspec says the same, and
+    the key of that item."""
+    mapping, _ = _value_at(path, values, inspect.type_info(kind))
+    for key, item in mapping.items():
+        alone = _with_value(path, values, {key: item})
+        try:
+            msgspec.convert(alone, kind)
+        except msgspec.ValidationError as problem:
+            if str(problem) == message:
+                return alone, str(key)
+    raise AssertionError(f"msgspec finds no fault in any item of {path}: {message}")
+
+
+def _with_value(path: str, values: Any, value: Any) -> Any:
+    """The values with another one at a path."""
+    step = _STEP.match(path)
+    if step is None:
+        return value
+    rest = path[step.end() :]
+    name, index, _ = step.groups()
+    if index is not None:
+        items = list(values)
+        items[int(index)] = _with_value(rest, items[int(index)], value)
+        return items
+    key = next(iter(values)) if name is None else name
+    return {**values, key: _with_value(rest, values[key], value)}
+
+
 class _Fault(NamedTuple):
     """A fault of a value."""
 
@@ -109,16 +182,10 @@ class _Fault(NamedTuple):
     """The key below the path of the value that it is about; empty for the value itself."""
 
 
-def _fault(message: str, path: str, values: Any, kind: Any) -> _Fault:
-    """A message of msgspec as one of our sentences.
-
-    Args:
-        message: the message, without the path.
-        path: the path in the values that it is about.
-        values: the plain values.
-        kind: the type that they do not fit.
-    """
-    value, type_info = _value_at(path, values, inspect.type_info(kind))
+def _fault(message: str, place: _Place) -> _Fault:
+    """A message of msgspec, without its path, as one of our sentences."""
+    value = place.value
+    type_info = place.type_info
     match = re.fullmatch(r"Object missing required field `(.*)`", message)
     if match:
         return _Fault("required key is missing", match[1])
@@ -130,8 +197,9 @@ def _fault(message: str, path: str, values: Any, kind: Any) -> _Fault:
         return _Fault(f"unknown key, expected one of {keys}", key if is_short else shown(key))
     match = re.fullmatch(r"Expected `(\w+)` of length (>=|<=)? ?(\d+)(?:, got \d+)?", message)
     if match:
-        return _Fault(_length_sentence(match[1], int(match[3]), value, type_info))
-    return _Fault(f"{_expectation(message, type_info)}, got {shown(value)}")
+        sentence = _length_sentence(match[1], int(match[3]), value, type_info)
+        return _Fault(place.subject + sentence)
+    return _Fault(f"{place.subject}{_expectation(message, type_info)}, got {shown(value)}")
 
 
 def _length_sentence(type_name: str, length: int, value: Any, type_info: Any) -> str:
@@ -171,11 +239,14 @@ def _expectation(message: str, type_info: Any) -> str:
 
 
 def _value_at(path: str, value: Any, type_info: Any) -> tuple[Any, Any]:
-    """The value at a path, and its type as msgspec describes it; None for what is not there."""
-    for name, index, _ in _STEP.findall(path):
+    """The value at a path, and its type as msgspec describes it; None for what is not there. A
+    mapping whose key the path does not name has one item."""
+    for name, index, any_key in _STEP.findall(path):
         type_info = _type_below(_resolve(type_info, value), name, index)
         if name:
             value = value.get(name) if isinstance(value, Mapping) else None
+        elif any_key and isinstance(value, Mapping):
+            value = next(iter(value.values()))
         else:
             is_item = isinstance(value, Sequence) and index and int(index) < len(value)
             value = value[int(index)] if is_item else None

@@ -229,6 +229,22 @@ def read_columns(
                 f"{path}: column {missing} is missing, found {header:.200}; expected {expected}"
             )
     numbers, lines = table.numbers(used)
+    values, column_of, left_aside = _one_column_each(table, headers, used, numbers)
+    header_of = {name: table.header[i] for name, i in column_of.items()}
+    without_unit = tuple(name for name, i in column_of.items() if not headers[i].unit)
+    sources = tuple(f"{Path(path).name} line {line}" for line in lines)
+    return Columns(values, header_of, without_unit, sources, tuple(left_aside))
+
+
+def _one_column_each(
+    table: CsvTable, headers: Sequence[Header], used: Sequence[int], numbers: Array
+) -> tuple[dict[str, Array], dict[str, int], list[str]]:
+    """One column in SI units for each quantity; which of the table's it is; and the names of those
+    that are proportional to one that is taken, but in a unit that is not named.
+
+    Raises:
+        DataError: columns for the same quantity differ.
+    """
     values: dict[str, Array] = {}
     column_of: dict[str, int] = {}
     left_aside: list[str] = []
@@ -251,11 +267,10 @@ def read_columns(
             left_aside.append(table.header[unnamed])
         else:
             pair = f"{table.header[column_of[name]]:.40} and {table.header[i]:.40}"
-            raise DataError(f"{path}: two columns stand for {name}, {pair}, and differ; keep one")
-    header_of = {name: table.header[i] for name, i in column_of.items()}
-    without_unit = tuple(name for name, i in column_of.items() if not headers[i].unit)
-    sources = tuple(f"{Path(path).name} line {line}" for line in lines)
-    return Columns(values, header_of, without_unit, sources, tuple(left_aside))
+            raise DataError(
+                f"{table.source}: two columns stand for {name}, {pair}, and differ; keep one"
+            )
+    return values, column_of, left_aside
 
 
 def _agree(one: Array, other: Array) -> bool:

@@ -274,10 +274,10 @@ def _columns_of(table: CsvTable) -> list[Columns]:
     """The columns of a table; those of each voltage, where the headers name several side by side
     (`pwm 12V, force 12V, pwm 16V, force 16V`). Columns without a voltage belong to all."""
     by_voltage: dict[str, dict[int, str]] = {}
-    found = [_VOLTAGE.search(cell) for cell in table.header]
-    for volts in {match[0]: match for match in found if match}.values():
+    matches = [_VOLTAGE.search(cell) for cell in table.header]
+    for volts in {match[0]: match for match in matches if match}.values():
         names = {}
-        for i, (cell, match) in enumerate(zip(table.header, found, strict=True)):
+        for i, (cell, match) in enumerate(zip(table.header, matches, strict=True)):
             if match is None or match[1] == volts[1]:
                 names[i] = _VOLTAGE.sub("", cell).strip()
         if _is_header([*names.values()]):

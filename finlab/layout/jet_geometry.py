@@ -1,4 +1,4 @@
-"""What an interaction needs of a layout: points and jets of its actuators, its hull as an
+"""Geometry of a layout for an interaction: points and jets of its actuators, its hull as an
 ellipsoid.
 
 The plant hands it to the layout's `InteractionModel`.

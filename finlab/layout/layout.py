@@ -99,11 +99,30 @@ class Layout(Checked):
                     f"actuators[{i}].name",
                 )
             first_use[name] = i
+        self._check_parts(first_use)
         object.__setattr__(self, "buses", tuple(self.buses))
         self._check_buses()
         pairs = tuple([(first, second) for first, second in self.mirror_pairs])
         object.__setattr__(self, "mirror_pairs", pairs)
         self._check_mirror_pairs()
+
+    def _check_parts(self, first_use: Mapping[str, int]) -> None:
+        """Raises LayoutError: a part of an actuator has the name of an actuator, or of another
+        part.
+
+        Args:
+            first_use: indices of the actuators by their names.
+        """
+        taken = {name: f"actuator {i + 1}" for name, i in first_use.items()}
+        for i, actuator in enumerate(self.actuators):
+            for part in actuator.parts:
+                if part in taken:
+                    raise LayoutError(
+                        f"its part {part!r} has the name of {taken[part]}, and a question by that "
+                        "name would mean both; expected another one",
+                        f"actuators[{i}]",
+                    )
+                taken[part] = f"a part of actuator {i + 1}"
 
     def _check_mirror_pairs(self) -> None:
         """Raises LayoutError: a pair has an actuator that there is not, or one that is in a pair

@@ -407,8 +407,9 @@ def _buses(buses: Mapping[str, Any], actuators: Sequence[Actuator]) -> tuple[Bus
     result = []
     for name, bus in buses.items():
         fed = tuple(actuator for actuator in bus.actuators if actuator not in parts)
-        if fed or not bus.actuators:
-            result.append(Bus(name, bus.power_w, fed))
+        if fed:
+            with layout_errors_at("buses"):
+                result.append(Bus(name, bus.power_w, fed))
     return tuple(result)
 
 

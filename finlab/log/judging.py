@@ -251,10 +251,10 @@ class Account:
         scale = self.scale
         span = log.span
         impulse = self.impulse
-        asked = span @ np.abs(self.demand)
+        demanded = span @ np.abs(self.demand)
         notes = [*log.notes]
         unexplained = ((span @ np.abs(self.deviation) - impulse) / scale).max()
-        if unexplained > UNEXPLAINED_SHARE * (asked / scale).max():
+        if unexplained > UNEXPLAINED_SHARE * (demanded / scale).max():
             notes.append(
                 "With no actuator at a limit the outputs gave another wrench than was asked for: "
                 "forces of the robot, or what a setpoint stands for (--scale), differ from those "
@@ -268,7 +268,7 @@ class Account:
             robot=log.robot,
             scale=scale,
             seconds=float(span.sum()),
-            asked=six(asked, scale),
+            asked=six(demanded, scale),
             missing=six(impulse, scale),
             lost_s=six(span @ self.lost, np.zeros(6)),
             saturated_s=float(span @ self.lost.any(axis=1)),

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from finlab.actuators.actuator import Actuator
 from finlab.actuators.thrust_model import PowerTable
@@ -240,14 +240,7 @@ def log_of_record(source: str, record: LogRecord, robot: Layout, scale: ArrayLik
         )
         if record.unmet is not None:
             unmet = np.nan_to_num(record.unmet.values * unit, posinf=0.0, neginf=0.0)
-    counts = working_time(source, record, time, notes)
-    if counts is not None:
-        is_kept &= counts
-    elif command is not None:
-        is_idle = (np.nan_to_num(command) == rest_command(robot)).all(axis=(1, 2))
-        is_kept &= ~is_idle
-        if is_idle.any():
-            notes.append("Times at which no output moved, such as before arming, are left out.")
+    is_kept &= _at_work(source, record, time, command, robot, notes)
     if is_kept.sum() < 2:
         raise DataError(
             f"{source}: holds no demands while outputs moved; there is nothing to judge"
@@ -277,6 +270,27 @@ def log_of_record(source: str, record: LogRecord, robot: Layout, scale: ArrayLik
         notes=tuple(dict.fromkeys(notes)),
         asks=tuple(asks),
     )
+
+
+def _at_work(
+    source: str,
+    record: LogRecord,
+    time: Array,
+    command: Array | None,
+    robot: Layout,
+    notes: list[str],
+) -> NDArray[np.bool_]:
+    """Whether the robot was at work at each time (N,): by what the record says of it, else by
+    commands (N, n, 3) that differ from those at rest; adds notes on what is left out."""
+    counts = working_time(source, record, time, notes)
+    if counts is not None:
+        return counts
+    if command is None:
+        return np.ones(len(time), bool)
+    is_idle = (np.nan_to_num(command) == rest_command(robot)).all(axis=(1, 2))
+    if is_idle.any():
+        notes.append("Times at which no output moved, such as before arming, are left out.")
+    return np.asarray(~is_idle)
 
 
 def _with_given(

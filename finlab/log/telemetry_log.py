@@ -259,10 +259,10 @@ def _frame_starts(content: bytes) -> tuple[list[int], bool, bool]:
             position = following
             continue
         is_damaged = True
-        found = FIRST_BYTE.search(content, position + 1)
-        if found is None:
+        match = FIRST_BYTE.search(content, position + 1)
+        if match is None:
             break
-        position = found.start()
+        position = match.start()
     is_complete = position - STAMP_BYTES == size
     if starts and position - STAMP_BYTES > size:
         starts.pop()

@@ -29,13 +29,13 @@ def timeline_picture(judgement: Judgement) -> Figure:
     *wrench_axes, limit_axes = rows[:, 0]
     for k, axes in zip(shown, wrench_axes, strict=True):
         demand = timeline.demand[:, k]
-        given = timeline.given[:, k]
+        delivered = timeline.given[:, k]
         axes.step(time, demand, where="post", color="0.55", label="asked for")
-        axes.step(time, given, where="post", color=COLORS[0], label="given")
+        axes.step(time, delivered, where="post", color=COLORS[0], label="given")
         axes.fill_between(
             time,
             demand,
-            given,
+            delivered,
             where=np.abs(timeline.missing[:, k]) > 0.0,
             step="post",
             color=COLORS[1],

@@ -9,6 +9,7 @@ import json
 import math
 import subprocess
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -285,6 +286,20 @@ def test_a_rudder_that_is_to_stay_alone_does() -> None:
     layout = parse_layout(data)
     assert layout.names == ("screw", "rudder") and layout.parts_notes == ()
     assert parse_layout(layout_to_dict(layout)) == layout
+
+
+def test_the_name_of_the_rudder_is_that_of_nothing_else() -> None:
+    layout = parse_layout(boat_of(THRUSTER, RUDDER))
+    unit = layout.actuators[0]
+    assert unit.parts == ("rudder",)
+    for others in (
+        (unit.copied("rudder"),),
+        (replace(unit, name="second"),),  # with a rudder of the same name
+    ):
+        with pytest.raises(LayoutError, match=r"its part 'rudder' has the name of a"):
+            replace(layout, actuators=(unit, *others))
+    with pytest.raises(LayoutError, match=r"its part 'screw' has the name of actuator 1"):
+        layout.replace_actuator("screw", rudder_name="screw")
 
 
 def test_a_question_about_the_rudder_is_told_what_to_ask(

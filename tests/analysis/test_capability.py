@@ -338,6 +338,13 @@ def test_a_load_of_twice_the_size_has_half_the_share() -> None:
     assert twice.values == pytest.approx(0.5 * once.values, rel=1e-6)
 
 
+def test_a_heading_without_a_load_is_refused() -> None:
+    """Any share of it is held, beside which all others would be nothing."""
+    loads = np.array([[-30.0, 0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 0.0, 0.0]])
+    with pytest.raises(LayoutError, match="got none from 60 deg, .*; leave that heading out"):
+        capability(load_layout("catamaran"), loads, headings=[0.0, 60.0])
+
+
 def test_words_name_the_worst_loss(plot: Capability) -> None:
     words = str(plot)
     assert "DP capability-L1(8, 6, " in words

@@ -18,9 +18,12 @@ import numpy as np
 import pytest
 
 from finlab import Allocator
+from finlab.allocation.question import MAX_WRENCH
 from finlab.cli import main
 from finlab.core.fields import actuators_of, constant
+from finlab.deploy.bundle import make_bundle
 from finlab.deploy.c_sources import c_sources, write_c
+from finlab.deploy.deployed_robot import extremes, parse_robot, self_check
 from finlab.deploy.thin_block import tables_of, thinned
 from finlab.errors import AllocationError
 from finlab.layout import load_layout
@@ -139,6 +142,27 @@ def test_self_test_of_a_ship_holds(name: str) -> None:
     folder = exported(name, 40)
     for single in PRECISIONS:
         assert ran(f"gcc -std=c99 -O1 {single} *.c -lm && ./a.out", folder).startswith("0 of 40 ")
+
+
+def test_what_the_largest_robot_gives_and_nobody_may_ask_is_not_asked(tmp_path: Path) -> None:
+    """Its torque is beyond the largest wrench of a question."""
+    force_n = [-1e9, 1e9]
+    model = {"type": "power_law", "forward": 0.01, "reverse": 0.01}
+    actuators = []
+    for name, x in (("aft", -1000.0), ("fore", 1000.0)):
+        place = {"position_m": [x, 0.0, 0.0], "axis": [0, 1, 0], "force_n": force_n}
+        actuators.append({"name": name, "type": "thruster", "model": model, **place})
+    layout = load(
+        {"format": "finlab-layout", "version": 2, "name": "largest", "actuators": actuators}
+    )
+    turning = np.array([[-1e9, 0.0, 0.0], [1e9, 0.0, 0.0]])
+    assert plant_of(layout).wrench(turning[None])[0, 5] == pytest.approx(2.0 * MAX_WRENCH)
+    write_c(c_sources(layout), tmp_path / "c")
+    for single in PRECISIONS:
+        done = ran(f"gcc -std=c99 -O1 {single} *.c -lm && ./a.out", tmp_path / "c")
+        assert done.startswith("0 of 24 ")
+    robot = parse_robot(make_bundle(Allocator(layout)).files)
+    assert all(finding.good for finding in (*self_check(robot), extremes(robot)))
 
 
 @pytest.mark.exhaustive

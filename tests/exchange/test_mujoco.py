@@ -13,7 +13,7 @@ from finlab.assets import shipped_layouts
 from finlab.errors import LayoutError
 from finlab.exchange import Exchange, convert, mujoco_control, read_any, read_robot
 from finlab.exchange.mjcf_write import write_mjcf
-from finlab.layout import Azimuth, Fin, Layout, Thruster, own_effectiveness
+from finlab.layout import Azimuth, Fin, Hull, Layout, Thruster, own_effectiveness
 from tests.random_robots import KINDS, load, random_robot
 
 mujoco = pytest.importorskip("mujoco")
@@ -456,6 +456,73 @@ def test_what_the_habits_say() -> None:
     assert "added mass and damping are unknown" in notes
     layout, _ = read(ROBOTS["arm"], origin="base")
     assert layout.body is None and "frame of body hull" in layout.description
+
+
+def half_extents_of(model: Any, data: Any, geom: int) -> Array:
+    """Half of the sides (3,) of the box around a geom along the axes of the world [m]."""
+    axes = data.geom_xmat[geom].reshape(3, 3)
+    size = model.geom_size[geom]
+    kind = mujoco.mjtGeom(model.geom_type[geom]).name
+    if kind == "mjGEOM_BOX":
+        return np.abs(axes) @ size
+    if kind == "mjGEOM_SPHERE":
+        return np.full(3, size[0])
+    if kind == "mjGEOM_ELLIPSOID":
+        return np.sqrt((axes**2) @ size**2)
+    along = size[1] * np.abs(axes[:, 2])
+    if kind == "mjGEOM_CAPSULE":
+        return along + size[0]
+    return along + size[0] * np.hypot(axes[:, 0], axes[:, 1])
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_the_hull_is_the_box_around_the_geoms_of_mujoco(seed: int) -> None:
+    content, _ = random_model(seed)
+    content = content.replace('size="9"', 'size="0.3"')  # that would hide all others
+    model = mujoco.MjModel.from_xml_string(content)
+    data = mujoco.MjData(model)
+    data.qpos[:7] = [0, 0, 0, 1, 0, 0, 0]
+    mujoco.mj_forward(model, data)
+    geoms = np.flatnonzero(model.geom_bodyid)  # but the plane of the world
+    half = np.array([half_extents_of(model, data, geom) for geom in geoms])
+    place = data.geom_xpos[geoms]
+    lower = (place - half).min(axis=0)
+    upper = (place + half).max(axis=0)
+    largest = int(np.argmax(half.prod(axis=1)))
+    if 8.0 * half[largest].prod() >= 0.5 * (upper - lower).prod():  # it is the hull by itself
+        lower = place[largest] - half[largest]
+        upper = place[largest] + half[largest]
+    layout, _ = read(content)
+    center, _ = center_and_inertia(model)
+    assert layout.body is not None and layout.body.hull is not None
+    np.testing.assert_allclose(layout.body.hull.size_m, upper - lower, rtol=0, atol=1e-8)
+    middle = 0.5 * (lower + upper) - center
+    np.testing.assert_allclose(layout.body.hull.center_m, middle, rtol=0, atol=1e-8)
+
+
+MOVING_ARM = (
+    '<body name="arm"><joint name="elbow" axis="0 1 0"/><geom type="box" size="3 3 3" mass="0"/>'
+    '<body name="hand"><geom type="box" size="4 4 4" mass="0"/></body></body>'
+)
+"""A body that moves, and one that is fixed to it."""
+
+
+def test_what_moves_is_no_part_of_the_hull_and_meshes_are_named() -> None:
+    box = '<geom type="box" pos="0.2 0 0" size="0.5 0.2 0.1"/>'
+    layout, notes = read(hull(SITES + box + MOVING_ARM, "", MOTORS))
+    assert layout.body is not None and layout.body.mass_kg == pytest.approx(12.0)
+    drawn = layout.body.hull
+    assert drawn == Hull(shape="box", size_m=(1.0, 0.4, 0.2), center_m=(0.1, 0.0, 0.02))
+    assert "The hull is the box of body hull" in notes
+
+    at_base, _ = read(hull(SITES + box, "", MOTORS), origin="base")
+    assert at_base.body is not None and at_base.body.mass_kg is None
+    assert at_base.body.hull == Hull(shape="box", size_m=(1.0, 0.4, 0.2), center_m=(0.2, 0.0, 0.0))
+
+    mesh = '<geom type="mesh" mesh="shell"/><geom type="plane" size="9 9 1"/>'
+    layout, notes = read(hull(SITES + mesh, "", MOTORS))
+    assert layout.body is not None and layout.body.hull is None
+    assert "The mesh of body hull is not opened" in notes
 
 
 POD = (

@@ -7,6 +7,7 @@ import re
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
@@ -314,6 +315,33 @@ def test_power_buses_that_make_no_sense() -> None:
         replace(layout, buses=(bus,), power_w=100.0)
     with pytest.raises(LayoutError, match="power_w"):
         Bus("front", -1.0, layout.names[:2])
+
+
+@pytest.mark.parametrize(
+    ("buses", "says"),
+    [
+        (
+            {"aft": {"power_w": -4, "actuators": ["left"]}},
+            "buses.aft.power_w: .*more than 0, got -4",
+        ),
+        ({"aft": {"power_w": 4, "actuators": []}}, "buses.aft.actuators: .*1 to 256 values, got 0"),
+        ({"aft": {"power_w": 4, "actuators": [7]}}, r"buses.aft.actuators\[0\]: .*text, got 7"),
+        ({"aft": {"power_w": 4}}, "buses.aft.actuators: required key is missing"),
+        (
+            {"aft": {"power_w": 4, "actuators": ["left"], "volts": 3}},
+            "buses.aft.volts: unknown key",
+        ),
+        ({"aft": 4}, "buses.aft: expected keys and values, got 4"),
+        ({"aft": {"power_w": 4, "actuators": ["left"]}, "bow": 5}, "buses.bow: .*got 5"),
+        ({"a.b": {"power_w": 0, "actuators": ["left"]}}, "buses.a.b.power_w: .*got 0"),
+        ({"": {"power_w": 4, "actuators": ["left"]}}, "buses: as a key.*1 to 64 characters, got 0"),
+        ({" a": {"power_w": 4, "actuators": ["left"]}}, "buses: as a key in it, .*got ' a'"),
+        ({"a\tb": {"power_w": 4, "actuators": ["left"]}}, "buses.*printable"),
+    ],
+)
+def test_a_refused_bus_is_named_with_what_the_file_has(buses: dict[str, Any], says: str) -> None:
+    with pytest.raises(LayoutError, match=says):
+        parse_layout({**GOOD_LAYOUT, "buses": buses})
 
 
 def test_mirror_pairs_of_a_file_come_back_and_follow_their_actuators(tmp_path: Path) -> None:

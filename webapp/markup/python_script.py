@@ -27,21 +27,21 @@ def script_of(state: State, checkpoint: str | None = None) -> str:
         made_of.append(f"checkpoint={checkpoint!r}")
     if state.method in DRAWING and state.temperature is not None:
         made_of.append(f"temperature={state.temperature!r}")
-    asked = ["wrench"]
+    arguments = ["wrench"]
     if state.damage != NO_DAMAGE:
-        asked.append(f"damage=finlab.Damage({_damage_arguments(state.damage)})")
+        arguments.append(f"damage=finlab.Damage({_damage_arguments(state.damage)})")
     if free:
-        asked.append(f"free={free!r}")
+        arguments.append(f"free={free!r}")
     if state.policy != "closest":
-        asked.append(f"policy={state.policy!r}")
+        arguments.append(f"policy={state.policy!r}")
     if state.flow is not None:
-        asked.append(f"flow={list(state.flow)!r}")
+        arguments.append(f"flow={list(state.flow)!r}")
     if opened.power:
-        asked.append(f"power={opened.power}")
-    if len(asked) == 1:
+        arguments.append(f"power={opened.power}")
+    if len(arguments) == 1:
         call = ["answer = allocator.allocate(wrench)"]
     else:
-        call = ["answer = allocator.allocate(", *[f"    {each}," for each in asked], ")"]
+        call = ["answer = allocator.allocate(", *[f"    {each}," for each in arguments], ")"]
     lines = [
         "import finlab",
         "",

@@ -1,4 +1,4 @@
-"""What became of the samples of a network in their refinement, in words.
+"""Refinement of the samples of a network, in words: what became of them.
 
 The drawer of candidates (`panels/modes_tab.py`) shows them beside the plot.
 """

@@ -96,11 +96,11 @@ def add_fit(page: Page) -> None:
         fitting.start(session.selected, name, content)
         session.show_task("Design")
 
-    def ask_voltage(asked: WhichVoltage) -> None:
+    def ask_voltage(choice: WhichVoltage) -> None:
         answers = {}
-        for level in asked.levels:
-            answers[f"{level:.4g} V"] = partial(fitting.start_at, asked, level)
-        text = f"{asked.upload.name} was measured at several. Which does the robot have?"
+        for level in choice.levels:
+            answers[f"{level:.4g} V"] = partial(fitting.start_at, choice, level)
+        text = f"{choice.upload.name} was measured at several. Which does the robot have?"
         page.ask("At which voltage?", text, answers)
 
     fitting.ask_voltage = ask_voltage

@@ -210,9 +210,9 @@ def moved_markup(judgement: "Judgement | None") -> str:
 def _gain_words(judgement: "Judgement") -> str:
     """What the improved robot misses and takes on the same demands, beside the log's own; nothing
     until both have been asked."""
-    whole = [replay for replay in judgement.replays if replay.lost is None]
-    of_improved = {replay.name: replay for replay in whole if replay.robot == IMPROVED}
-    for before in whole:
+    undamaged = [replay for replay in judgement.replays if replay.lost is None]
+    of_improved = {replay.name: replay for replay in undamaged if replay.robot == IMPROVED}
+    for before in undamaged:
         after = of_improved.get(before.name)
         if before.robot == IMPROVED or after is None:
             continue

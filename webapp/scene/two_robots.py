@@ -81,11 +81,11 @@ def placement(left: Layout, right: Layout, view: str, is_folded: bool = False) -
     down = np.cross(line, across)
     widths = [half_extent(layout, across) for layout in (left, right)]
     gap = GAP * 2.0 * max(widths)
-    whole = 2.0 * sum(widths) + gap
-    left_place = -(0.5 * whole - widths[0]) * across
-    right_place = (0.5 * whole - widths[1]) * across
+    total_width = 2.0 * sum(widths) + gap
+    left_place = -(0.5 * total_width - widths[0]) * across
+    right_place = (0.5 * total_width - widths[1]) * across
     half_view = HALF_HIGH_VIEW if is_folded else HALF_VIEW
-    size = max(view_size(left), view_size(right), 0.5 * whole / half_view)
+    size = max(view_size(left), view_size(right), 0.5 * total_width / half_view)
     return Placement(left_place, right_place, size, down)
 
 
@@ -221,8 +221,8 @@ class PairedRobot:
         top = hull_top(layout)
         # An axis that the robot does not command takes what comes.
         demanded = (np.array(state.target) * layout.commanded).tolist()
-        asked = self._wrench.refresh(demanded, delivered, missing, top, *lengths, size)
-        self.outlines = halo + asked
+        lines = self._wrench.refresh(demanded, delivered, missing, top, *lengths, size)
+        self.outlines = halo + lines
 
 
 def _leave_alone(*_: object) -> None:

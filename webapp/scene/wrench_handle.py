@@ -78,12 +78,12 @@ def pulled_force(
     linear_end = max(LINEAR_M * size, float(np.linalg.norm(grip.start)))
     growth = math.exp(max(distance - linear_end, 0.0) / (GROWTH_M * size))
     growth *= min(distance, linear_end) / distance if distance > 0.0 else 1.0
-    asked = tip * (per_meter * growth)
-    size_n = max(float(np.linalg.norm(asked)), per_meter * linear_end)
+    pull = tip * (per_meter * growth)
+    size_n = max(float(np.linalg.norm(pull)), per_meter * linear_end)
     force = list(grip.target[:AXIS_COUNT])
     for axis in range(AXIS_COUNT):
         if abs(tip[axis] - grip.start[axis]) > MOVED:
-            force[axis] = _stepped(float(asked[axis]), reach[axis], size_n)
+            force[axis] = _stepped(float(pull[axis]), reach[axis], size_n)
     Fx, Fy, Fz = force
     return Pull((Fx, Fy, Fz), float(f"{newtons * max(growth, 1.0):.2g}"))
 

@@ -1,4 +1,5 @@
-"""What a page shows of its session, and a session that shows the same while it follows another one.
+"""The part of a session that a page shows, and a session that shows the same while it follows
+another one.
 
 The tasks that connect the pages are in `webapp/tasks/following.py`.
 """

@@ -1,4 +1,4 @@
-"""What was taken for granted of a robot that was read from a file.
+"""Assumptions on a robot that was read from a file.
 
 Its rows are settled one by one, as the user corrects or confirms them.
 """

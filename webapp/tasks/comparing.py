@@ -43,16 +43,16 @@ class Run(NamedTuple):
     def answers_other_than(self, now: State) -> bool:
         """Whether the methods were asked something else than a state asks; by which method it is
         answered there does not count, for all have been asked."""
-        asked = self.state
-        if asked is None:
+        compared = self.state
+        if compared is None:
             return False
         is_as_asked = (
-            is_same_robot(asked, now)
-            and asked.target == now.target
-            and asked.policy == now.policy
-            and asked.speed == now.speed
-            and asked.temperature == now.temperature
-            and asked.network == now.network
+            is_same_robot(compared, now)
+            and compared.target == now.target
+            and compared.policy == now.policy
+            and compared.speed == now.speed
+            and compared.temperature == now.temperature
+            and compared.network == now.network
         )
         return not is_as_asked
 

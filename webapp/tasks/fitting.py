@@ -83,10 +83,10 @@ class Fitting(Slot[Upload, FitResult | WhichVoltage]):
         super().forget()
         self.result = None
 
-    def start_at(self, asked: WhichVoltage, voltage: float) -> None:
+    def start_at(self, choice: WhichVoltage, voltage: float) -> None:
         """Fit a file by its rows at one voltage [V]."""
         self.forget()
-        self.ask(replace(asked.upload, voltage=voltage))
+        self.ask(replace(choice.upload, voltage=voltage))
 
     def start(self, actuator_name: str, file_name: str, content: bytes) -> None:
         """Begin with a file for an actuator.
@@ -218,9 +218,9 @@ def _model(actuator: Actuator) -> object:
     return getattr(actuator, "model", None)
 
 
-def _bench_fit(path: Path, upload: Upload, whole: Upload) -> FitResult | WhichVoltage:
+def _bench_fit(path: Path, upload: Upload, full_upload: Upload) -> FitResult | WhichVoltage:
     """A thruster, fixed or turning, by its bench table, or by a finished one; or the question which
-    voltage counts, about the `whole` upload."""
+    voltage counts, about the `full_upload` upload."""
     from finlab.fit.thruster_bench import VoltageError, read_bench
     from finlab.fit.thruster_fit import fit_thruster
 
@@ -237,7 +237,7 @@ def _bench_fit(path: Path, upload: Upload, whole: Upload) -> FitResult | WhichVo
     try:
         bench = in_worker(read_bench, [path], upload.voltage)
     except VoltageError as error:
-        return WhichVoltage(whole, error.levels)
+        return WhichVoltage(full_upload, error.levels)
     fit = fit_thruster(bench)
     more = {"dead_band": fit.dead_band, "torque_per_newton": fit.torque_per_newton}
     return FitResult(upload, {**fields_of(fit.table), **more, "uncertainty": None}, fit)

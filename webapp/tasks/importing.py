@@ -63,45 +63,45 @@ class Importing:
 
         def ready() -> Opened | Unanswered | FinlabError:
             try:
-                found = read()
+                result = read()
             except FinlabError as error:
                 if not source.answers:
                     raise
                 return error  # by the answers; they can be changed
-            if isinstance(found, Opened):
-                hull_of(found.layout)  # what is drawn of it takes its time
-            return found
+            if isinstance(result, Opened):
+                hull_of(result.layout)  # what is drawn of it takes its time
+            return result
 
         self._deferred.make(ready, partial(self._use, source), "open")
 
-    def _use(self, source: SourceFile, found: Opened | Unanswered | FinlabError) -> None:
+    def _use(self, source: SourceFile, result: Opened | Unanswered | FinlabError) -> None:
         """Opens what was read, or asks what it leaves open."""
-        if isinstance(found, FinlabError):
+        if isinstance(result, FinlabError):
             questions = [
                 replace(question, default=source.answers[question.option])
                 for question in source.asked.values()
                 if question.option in source.answers
             ]
-            self._ask(source, tuple(questions), str(found))
-        elif isinstance(found, Unanswered):
-            self._ask(source, found.questions, INTRODUCTION)
+            self._ask(source, tuple(questions), str(result))
+        elif isinstance(result, Unanswered):
+            self._ask(source, result.questions, INTRODUCTION)
         else:
-            remarks = remarks_of(found.notes)
+            remarks = remarks_of(result.notes)
             # Questions whose defaults were taken can be asked as well.
-            asked = dict(source.asked)
-            for note in found.notes:
+            questions_of = dict(source.asked)
+            for note in result.notes:
                 if note.question is not None:
-                    asked.setdefault(note.question.option, note.question)
-            self._take(found, replace(source, asked=asked, remarks=remarks))
+                    questions_of.setdefault(note.question.option, note.question)
+            self._take(result, replace(source, asked=questions_of, remarks=remarks))
 
     def _ask(self, source: SourceFile, questions: tuple[Question, ...], text: str) -> None:
         """Asks questions about a file, and reads it with the answers."""
 
         def answered(answers: Mapping[Any, tuple[str, ...]]) -> None:
-            asked = dict(source.asked)
+            questions_of = dict(source.asked)
             for question in questions:
-                asked[question.option] = question
-            self._read(replace(source, answers={**source.answers, **answers}, asked=asked))
+                questions_of[question.option] = question
+            self._read(replace(source, answers={**source.answers, **answers}, asked=questions_of))
 
         self._inquiry.ask(TITLE.format(source.name), text, questions, answered)
 

@@ -1,4 +1,4 @@
-"""What a robot can be taken home as: C, parameters of autopilots and of ROS, descriptions for
+"""Formats in which a robot is taken home: C, parameters of autopilots and of ROS, descriptions for
 simulators, a matrix; and why not, where a format cannot hold it.
 
 The texts are those that the command line writes (`finlab.exchange.convert.text_in`,

@@ -76,7 +76,7 @@ class _SampledLaw:
         """price_max / v (M + 1,) at prices beyond the table."""
         self._profit_over_price = self._largest_beyond()
         """c*(v) / v (M + 1,) [N] there, which is convex in 1 / v."""
-        least = min(float(box.force(asked).min()) for asked in self._asked)
+        least = min(float(box.force(commands).min()) for commands in self._asked)
         self.least_force_error = max(float(table.force[0]) - least, 0.0)
         """By how much the law may give less than the table's least force [N]."""
 
@@ -157,7 +157,7 @@ class _SampledLaw:
         high = box.upper[:2]
         amplitude, frequency = (_spread(low[k], high[k], GRID_ASKED[k]) for k in range(2))
         along_amplitude, along_frequency = (_spread(low[k], high[k], EDGE_ASKED) for k in range(2))
-        asked = []
+        grids = []
         for amplitudes, frequencies in (
             (amplitude, frequency),
             (low[:1], along_frequency),
@@ -166,8 +166,8 @@ class _SampledLaw:
             (along_amplitude, high[1:]),
         ):
             beat = np.stack(np.meshgrid(amplitudes, frequencies, indexing="ij"), axis=-1)
-            asked.append(box.command(beat.reshape(-1, 2)))
-        return asked
+            grids.append(box.command(beat.reshape(-1, 2)))
+        return grids
 
     def _best_of_asked(self, price: Array) -> Optimum:
         """The best commands at prices (K,) [W/N] that are near the grid or an edge."""
@@ -178,11 +178,11 @@ class _SampledLaw:
             starts.append(commands[profit.argmax(axis=1), :2])
         # Each is followed uphill: on a ridge the highest one is not always where the best lies.
         count = len(starts)
-        found = box.optimum(np.tile(price, count), np.concatenate(starts)[None])
-        profit = found.profit.reshape(count, -1)
+        optimum = box.optimum(np.tile(price, count), np.concatenate(starts)[None])
+        profit = optimum.profit.reshape(count, -1)
         best = profit.argmax(axis=0)
         row = np.arange(len(price))
-        command = found.command.reshape(count, -1, 3)[best, row]
+        command = optimum.command.reshape(count, -1, 3)[best, row]
         return Optimum(command, profit[best, row])
 
     def _better_beats(self, beat: Array) -> Array:
@@ -222,13 +222,13 @@ class _SampledLaw:
     def _improved(self, best: Optimum, rows: NDArray[np.intp], starts: Array) -> Optimum:
         """The best commands at the table's prices, some `rows` (R,) of which, each any number of
         times, are looked for from `starts` (R, 2)."""
-        found = self._box.optimum(self._table.price[rows], starts[None])
+        optimum = self._box.optimum(self._table.price[rows], starts[None])
         command = best.command.copy()
         profit = best.profit.copy()
-        for row in np.argsort(found.profit):  # of each row the best one last
-            if found.profit[row] > profit[rows[row]]:
-                command[rows[row]] = found.command[row]
-                profit[rows[row]] = found.profit[row]
+        for row in np.argsort(optimum.profit):  # of each row the best one last
+            if optimum.profit[row] > profit[rows[row]]:
+                command[rows[row]] = optimum.command[row]
+                profit[rows[row]] = optimum.profit[row]
         return Optimum(command, profit)
 
     def _largest_beyond(self) -> Array:

@@ -1,5 +1,5 @@
-"""Where pods turn when the wrenches of the next ticks are known; docs/theory/method.md, "Turning
-ahead".
+"""Angles to which pods turn when the wrenches of the next ticks are known; docs/theory/method.md,
+"Turning ahead".
 
 Beside the wrench of now, that of a later tick is answered, within what the drives allow until then,
 and with what turning costs over that time. Its angles are those that the pods will want. Their

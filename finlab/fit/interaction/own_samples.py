@@ -1,4 +1,4 @@
-"""What samples of one robot say of the weights of its interaction, in closed form.
+"""Posterior weights of an interaction by samples of one robot, in closed form.
 
 Bayesian linear regression (Bishop, 2006, section 3.3) on the latent numbers z of the robot, whose
 weights are `m + L z`. With the terms Phi of its samples over the deviations of their noise, and y

@@ -1,4 +1,4 @@
-"""What a network reads of a robot: a token for each actuator that works, all without units.
+"""Input of a network for a robot: a token for each actuator that works, all without units.
 
 An actuator is described by its effectiveness, and by what it gives for a few prices. So thrusters,
 pods and fins, their limits, arcs and laws are told in the same numbers, and an actuator of a kind

@@ -92,9 +92,9 @@ def answers_of(
     """
     robot = RobotTokens.of(layout, lost)
     plant = plant_of(layout).counting(layout.commanded)
-    found: list[Array] = []
+    met: list[Array] = []
     answers = []
-    while sum(map(len, found)) < wrenches:
+    while sum(map(len, met)) < wrenches:
         force = plant.force(plant.sample(rng, (wrenches,)))
         if lost is not None:
             force[:, lost] = 0.0
@@ -102,9 +102,9 @@ def answers_of(
         wrench = share * np.einsum("tna,nak->tk", force, plant.effectiveness)
         answer = robot.compiled.core.answer_many(wrench, None, robot.conditions)
         is_met = answer.is_attainable
-        found.append(wrench[is_met])
+        met.append(wrench[is_met])
         answers.append(answer.multipliers[is_met])
-    wrench = np.concatenate(found)[:wrenches]
+    wrench = np.concatenate(met)[:wrenches]
     points = robot.compiled.core.dual_points(
         wrench, np.concatenate(answers)[:wrenches], 0, robot.conditions
     )

@@ -1,4 +1,4 @@
-"""Where Newton's method on the dual may begin: multipliers for many wrenches of one robot.
+"""First multipliers for Newton's method on the dual, for many wrenches of one robot.
 
 Each class is made once for a robot in its state of losses, and then gives multipliers for any
 number of wrenches. `Core.answer_many` goes on from there, and its answers are the same to rounding,
@@ -96,8 +96,8 @@ class FittedStart:
 
     def _features(self, wrench: Array) -> Array:
         """(N, U + 6)."""
-        given = wrench @ self._into.T
-        roots = np.copysign(np.sqrt(np.abs(given)), given)
+        scaled = wrench @ self._into.T
+        roots = np.copysign(np.sqrt(np.abs(scaled)), scaled)
         return np.concatenate([roots, wrench @ self._whiten.T], axis=1)
 
     def multipliers(self, wrench: Array) -> Array:

@@ -23,11 +23,11 @@ def claims(rows: Rows) -> list[Comparison]:
     Args:
         rows: of a report.
     """
-    found: list[Comparison] = []
+    comparisons: list[Comparison] = []
     for name, judge in JUDGES.items():
         if name in rows:
-            found += judge(rows[name])
-    return found + _two_tables(rows)
+            comparisons += judge(rows[name])
+    return comparisons + _two_tables(rows)
 
 
 def found_row(rows: Sequence[Row], **values: object) -> Row:
@@ -169,10 +169,10 @@ def _ranking_words(rows: Rows) -> str:
     """What ranking by physics brings."""
     table = rows.get("ablation", ())
     likely = found_row(table, variant="nll_selection", scored_by="plant")
-    whole = found_row(table, variant="ours", scored_by="plant")
+    ours = found_row(table, variant="ours", scored_by="plant")
     printed = paper_figures()["ablation"]
     theirs = printed["nll_selection"]["err_norm_mean"] / printed["ours"]["err_norm_mean"]
-    gain = quotient("", theirs, likely, whole, "j_norm_mean")
+    gain = quotient("", theirs, likely, ours, "j_norm_mean")
     if gain.figure is None:
         return ""
     ends = ""
@@ -189,14 +189,14 @@ def _tables_words(rows: Rows) -> str:
     """That the paper's two tables of one pipeline contradict each other."""
     if not _two_tables(rows):
         return ""
-    whole = math.sqrt(paper_figures()["ablation"]["ours"]["err_norm_mean"])
+    root_of_j_norm = math.sqrt(paper_figures()["ablation"]["ours"]["err_norm_mean"])
     tracking = paper_figures()["wrench_tracking"]["id"]["ours"]["err_norm_mean"]
     ours = found_row(rows["wrench"], split="id", method="paper")["err_norm_mean"]
     stage = _stage(rows, "ours")
     assert stage is not None
     return (
         "The paper's two tables contradict each other: the same pipeline errs by "
-        f"{format_error(whole)}, the root of J_norm in its ablation, and by "
+        f"{format_error(root_of_j_norm)}, the root of J_norm in its ablation, and by "
         f"{format_error(tracking)} in its table of layouts. Ours errs by "
         f"{format_error(math.sqrt(stage))} and {format_error(ours)}."
     )
@@ -230,7 +230,7 @@ def _of(table: Mapping[str, Mapping[str, float]], name: str) -> float:
 def _ablation(rows: Sequence[Row]) -> list[Comparison]:
     """What each stage of the pipeline brings, and whether the paper's two tables agree."""
     printed = paper_figures()["ablation"]
-    whole = printed["ours"]["err_norm_mean"]
+    err_of_pipeline = printed["ours"]["err_norm_mean"]
     ours = found_row(rows, variant="ours", scored_by="plant")
     judged = []
     words = {
@@ -241,7 +241,7 @@ def _ablation(rows: Sequence[Row]) -> list[Comparison]:
     }
     for variant, what in words.items():
         row = found_row(rows, variant=variant, scored_by="plant")
-        ratio = printed[variant]["err_norm_mean"] / whole
+        ratio = printed[variant]["err_norm_mean"] / err_of_pipeline
         judged.append(quotient(what, ratio, row, ours, "j_norm_mean"))
     mean = found_row(rows, variant="mean_only", scored_by="plant")
     drawn = found_row(rows, variant="without_refinement", scored_by="plant")
@@ -254,7 +254,7 @@ def _ablation(rows: Sequence[Row]) -> list[Comparison]:
 def _two_tables(rows: Rows) -> list[Comparison]:
     """The error of one pipeline by the two tables that have it: in the paper they contradict each
     other."""
-    whole = paper_figures()["ablation"]["ours"]["err_norm_mean"]
+    err_of_pipeline = paper_figures()["ablation"]["ours"]["err_norm_mean"]
     tracking = paper_figures()["wrench_tracking"]["id"]["ours"]["err_norm_mean"]
     ours = found_row(rows.get("wrench", ()), split="id", method="paper")
     stage = found_row(rows.get("ablation", ()), variant="ours", scored_by="plant")
@@ -264,10 +264,10 @@ def _two_tables(rows: Rows) -> list[Comparison]:
         Comparison(
             "error of the whole pipeline in the table of layouts over the root of its J_norm in "
             "the ablation",
-            tracking / math.sqrt(whole),
+            tracking / math.sqrt(err_of_pipeline),
             ours["err_norm_mean"] / math.sqrt(stage["j_norm_mean"]),
             None,
-            f"The paper's two tables contradict each other: {math.sqrt(whole):.3f} and "
+            f"The paper's two tables contradict each other: {math.sqrt(err_of_pipeline):.3f} and "
             f"{tracking:.3f} for one pipeline.",
         )
     ]
@@ -309,13 +309,13 @@ def _trajectory(rows: Sequence[Row]) -> list[Comparison]:
     printed = paper_figures()["fault_tolerance"]
     healthy = printed["healthy"]["ours"]["ate"]
     about = {"layout": "A", "controller": "waypoint", "method": "paper"}
-    whole = found_row(rows, lost=0, **about)
+    undamaged = found_row(rows, lost=0, **about)
     judged = []
     for count, name in ((1, "one_fin"), (2, "two_fins")):
         ratio = printed[name]["ours"]["ate"] / healthy
         what = f"ATE with {count} lost over that of the whole robot, layout A"
         damaged = found_row(rows, lost=count, **about)
-        compared = quotient(what, ratio, damaged, whole, "ate")
+        compared = quotient(what, ratio, damaged, undamaged, "ate")
         judged.append(replace(compared, obstacle=OTHER_FIN))
     return judged
 

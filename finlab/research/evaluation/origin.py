@@ -1,4 +1,4 @@
-"""Where figures come from: the commit of the tree, the machine, and versions of packages."""
+"""Origin of figures: the commit of the tree, the machine, and versions of packages."""
 
 import os
 import platform

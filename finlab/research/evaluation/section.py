@@ -95,12 +95,12 @@ def piece_options(experiment: Experiment, options: Mapping[str, Any]) -> list[di
         experiment: the experiment.
         options: of the whole run.
     """
-    whole = experiment.check(options)
-    names = [name for name in experiment.pieces if whole[name] is not None]
+    all_options = experiment.check(options)
+    names = [name for name in experiment.pieces if all_options[name] is not None]
     pieces = []
-    for values in product(*(whole[name] for name in names)):
+    for values in product(*(all_options[name] for name in names)):
         chosen = {name: (value,) for name, value in zip(names, values, strict=True)}
-        pieces.append({**whole, **chosen})
+        pieces.append({**all_options, **chosen})
     return pieces
 
 
@@ -120,8 +120,8 @@ def made_section(experiment: Experiment, options: Mapping[str, Any], out: Path) 
     stored = read_section(path) if path.exists() else []
     pieces: list[Piece] = []
     for wanted in piece_options(experiment, options):
-        found = [piece for piece in stored if piece.options == _plain(wanted)]
-        pieces.append(_current(experiment, wanted, found[0] if found else None))
+        earlier = [piece for piece in stored if piece.options == _plain(wanted)]
+        pieces.append(_current(experiment, wanted, earlier[0] if earlier else None))
         # What is stored of pieces yet to come stays until their turn.
         to_come = [piece for piece in stored if piece.options not in [p.options for p in pieces]]
         _write(path, [*pieces, *to_come])

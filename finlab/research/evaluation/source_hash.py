@@ -33,12 +33,12 @@ def package_hashes(packages: Iterable[str]) -> dict[str, str]:
 
 def _hash_of(path: Path) -> str:
     """The first digits of the SHA-256 of a file, or of all files of a folder."""
-    found = hashlib.sha256()
+    sha256 = hashlib.sha256()
     for file in [path] if path.is_file() else _files_of(path):
         content = meaning(file)
-        found.update(len(content).to_bytes(8, "big"))
-        found.update(content)
-    return found.hexdigest()[:16]
+        sha256.update(len(content).to_bytes(8, "big"))
+        sha256.update(content)
+    return sha256.hexdigest()[:16]
 
 
 def _files_of(folder: Path) -> list[Path]:

@@ -119,20 +119,22 @@ class Mdn(LearnedMethod):
         seed = question.seed
         if len(target) == 1:
             with self._one_thread():
-                found = self._proposed_and_refined(policy, target, seed)
+                refined_proposals = self._proposed_and_refined(policy, target, seed)
                 if previous is not None:
-                    found = self._in_motion(target, found, previous)
+                    refined_proposals = self._in_motion(target, refined_proposals, previous)
             return Solution(
-                self.robot.commands.feasible(found.answers.command[:, 0]),
-                candidates=lambda: self._candidates(target, *self._refined(found)),
-                samples=lambda: self._candidates(target, *self._cheapest(found.proposal)),
+                self.robot.commands.feasible(refined_proposals.answers.command[:, 0]),
+                candidates=lambda: self._candidates(target, *self._refined(refined_proposals)),
+                samples=lambda: self._candidates(
+                    target, *self._cheapest(refined_proposals.proposal)
+                ),
             )
         command = np.empty((len(target), self.layout.n, 3))
         with self._one_thread():
             for k in range(0, len(target), CHUNK):
                 chunk = slice(k, k + CHUNK)
-                found = self._proposed_and_refined(policy, target[chunk], seed + k)
-                command[chunk] = found.answers.command[:, 0]
+                refined_proposals = self._proposed_and_refined(policy, target[chunk], seed + k)
+                command[chunk] = refined_proposals.answers.command[:, 0]
         return Solution(command)
 
     def refinement(self, target: Array, *, flow: Array | None, seed: int) -> tuple[Candidates, ...]:
@@ -231,26 +233,32 @@ class Mdn(LearnedMethod):
         present_force = plant.force(present)
         planar_force = present_force[:, 1] + 1j * present_force[:, 2]
         force = np.insert(free.proposal.force, 0, planar_force, axis=1)
-        found = follow(in_tick, target, force, self.settings.n_refined, STEPS, kept=1)
-        found = found._replace(origin=np.where(found.origin == 0, PRESENT_MOTION, found.origin - 1))
-        present_first = np.argsort(found.origin[0] != PRESENT_MOTION, kind="stable")
-        found = ranked(
-            in_tick, RefinedAnswers._make(values[:, present_first] for values in found), SWITCH_GAIN
+        refined_answers = follow(in_tick, target, force, self.settings.n_refined, STEPS, kept=1)
+        refined_answers = refined_answers._replace(
+            origin=np.where(refined_answers.origin == 0, PRESENT_MOTION, refined_answers.origin - 1)
         )
-        if found.error[0, 0] > in_tick.exact:
-            found = refined(in_tick, target, found.command, found.origin, MORE_STEPS)
-        if first.effort[0, 0] < (1.0 - DISTANT_SWITCH_GAIN) * found.effort[0, 0]:
+        present_first = np.argsort(refined_answers.origin[0] != PRESENT_MOTION, kind="stable")
+        refined_answers = ranked(
+            in_tick,
+            RefinedAnswers._make(values[:, present_first] for values in refined_answers),
+            SWITCH_GAIN,
+        )
+        if refined_answers.error[0, 0] > in_tick.exact:
+            refined_answers = refined(
+                in_tick, target, refined_answers.command, refined_answers.origin, MORE_STEPS
+            )
+        if first.effort[0, 0] < (1.0 - DISTANT_SWITCH_GAIN) * refined_answers.effort[0, 0]:
             towards = in_tick.commands.feasible(first.command[:, :1])
             other = refined(in_tick, target, towards, first.origin[:, :1], MORE_STEPS)
-            if other.error[0, 0] <= max(in_tick.exact, found.error[0, 0]):
-                found = other.before(found)
-        return free._replace(answers=found)
+            if other.error[0, 0] <= max(in_tick.exact, refined_answers.error[0, 0]):
+                refined_answers = other.before(refined_answers)
+        return free._replace(answers=refined_answers)
 
-    def _refined(self, found: RefinedProposals) -> tuple[Array, tuple[str, ...]]:
+    def _refined(self, proposals: RefinedProposals) -> tuple[Array, tuple[str, ...]]:
         """The refined commands (P, n, 3) for a single target, and the components they come from."""
-        names = names_of(found.proposal)
-        origin = found.answers.origin[0].tolist()
-        return found.answers.command[0], tuple(
+        names = names_of(proposals.proposal)
+        origin = proposals.answers.origin[0].tolist()
+        return proposals.answers.command[0], tuple(
             names[k] if k >= 0 else ORIGIN_NAMES[k] for k in origin
         )
 

@@ -1,4 +1,4 @@
-"""What a step of a training costs, beside the matrix products that it cannot do without."""
+"""Cost of a step of a training, beside the matrix products that it cannot do without."""
 
 import statistics
 import time

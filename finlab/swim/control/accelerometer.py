@@ -1,4 +1,4 @@
-"""What an accelerometer shows of a robot whose state the fault monitor estimates.
+"""Measurement model of an accelerometer, for the state that the fault monitor estimates.
 
 Without a velocity log, forces are seen by it at once: velocities need no drag to be known, and a
 thruster without a lever about any axis shows as well as one that turns the robot.

@@ -1,5 +1,5 @@
-"""What drives say of themselves, as a further evidence of the fault monitor: speeds and currents,
-as ESCs send them.
+"""Telemetry of drives as a further evidence of the fault monitor: speeds and currents, as ESCs send
+them.
 
 A propeller whose force is F turns at a speed that goes with the root of |F|, and takes a current
 that goes with the third power of the speed. How large both are is learned of each drive. Beside

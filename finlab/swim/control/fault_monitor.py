@@ -604,8 +604,8 @@ class FaultMonitor:
         if not self._is_lost[k] or not self._model.sticks_at_angle[k]:
             return False
         held = self._hypotheses.held[self._model.held_of[k]]
-        asked = float(self._model.motion.direction[k])
-        along = held[0] * math.cos(asked) + held[1] * math.sin(asked)
+        commanded_angle = float(self._model.motion.direction[k])
+        along = held[0] * math.cos(commanded_angle) + held[1] * math.sin(commanded_angle)
         return bool(along >= SAME_DIRECTION * math.hypot(held[0], held[1]))
 
     def _is_negligible(self, k: int) -> bool:

@@ -107,33 +107,13 @@ class Hypotheses:
         # Accelerations of the settings as wrenches of this robot.
         radius = gyration_radius(inertia)
         self._by_acceleration = inertia * np.concatenate([np.ones(3), 1.0 / radius])
-        variance = np.zeros(d)
-        variance[MOTION] = 0.02**2
-        variance[TILT] = 0.02**2
-        variance[DEPTH] = 0.05**2
-        variance[CURRENT] = np.square(s.current * np.array([1.0, 1.0, 0.2]))
-        variance[UNKNOWN] = np.square(s.unknown * self._by_acceleration)
-        variance[INERTIA] = s.inertia**2
-        variance[COUPLING] = s.coupling**2
-        variance[DAMPING] = s.damping**2
-        variance[RIGHTING] = s.damping**2
-        variance[BIAS] = s.acceleration_bias**2
-        variance[model.strength] = s.strength**2
-        variance[model.place] = s.place**2
+        variance = _variance_at_start(model, settings, self._by_acceleration)
         self._variance_at_start = variance
         self.shared_covariance = SharedArray(np.diag(variance))
         self._limit = SharedArray(np.full(d, np.inf))
         learned = slice(CURRENT.start, model.place.stop)
         self._limit.array[learned] = variance[learned]
-        noise = np.zeros(d)
-        noise[MOTION] = np.square(s.disturbance * self._by_acceleration / inertia)
-        noise[CURRENT] = np.square(s.current_drift * np.array([1.0, 1.0, 0.2]))
-        noise[UNKNOWN] = np.square(s.unknown_drift * self._by_acceleration)
-        noise[INERTIA] = noise[DAMPING] = noise[RIGHTING] = s.body_drift**2
-        noise[COUPLING] = (s.body_drift * s.coupling / s.inertia) ** 2
-        noise[BIAS] = s.acceleration_bias_drift**2
-        noise[model.strength] = s.strength_drift**2
-        self._noise = noise
+        self._noise = _noise(model, settings, self._by_acceleration)
         self._misfit_noise = np.square(MISFIT_ACCELERATION * self._by_acceleration / inertia)
         scale = np.where(model.sticks_at_angle, 1.0, model.force_max)
         self.held_scale: Array = scale[model.held_owner]
@@ -147,16 +127,8 @@ class Hypotheses:
         """Time since the beginning [s]."""
         self.acceleration_variance = np.zeros(6)
         """Of mean accelerations over the last period, beside those of the state (6,)."""
-        # Columns of a jump: strengths, what stuck ones give, an unknown wrench.
-        columns = np.concatenate(
-            [
-                np.arange(model.strength.start, model.strength.stop),
-                np.arange(model.held.start, model.held.stop),
-                np.arange(UNKNOWN.start, UNKNOWN.stop),
-            ]
-        )
-        self._columns: NDArray[np.int32] = columns.astype(np.int32)
-        c = len(columns)
+        self._columns = _columns_of_jumps(model)
+        c = len(self._columns)
         self._n_columns = c
         self._column_indices = np.arange(c)
         self._jolt_columns = np.arange(c - 6, c)
@@ -468,3 +440,48 @@ class Hypotheses:
     def settled(self) -> bool:
         """Whether there was time to learn current and trim."""
         return self.age_s >= self.settings.settle_s
+
+
+def _variance_at_start(model: MotionModel, s: MonitorSettings, by_acceleration: Array) -> Array:
+    """Variances (d,) of a state of which nothing has been measured yet; by_acceleration (6,) has
+    the wrenches of an acceleration of 1 [N s^2/m, N m s^2/m]."""
+    variance = np.zeros(model.size)
+    variance[MOTION] = 0.02**2
+    variance[TILT] = 0.02**2
+    variance[DEPTH] = 0.05**2
+    variance[CURRENT] = np.square(s.current * np.array([1.0, 1.0, 0.2]))
+    variance[UNKNOWN] = np.square(s.unknown * by_acceleration)
+    variance[INERTIA] = s.inertia**2
+    variance[COUPLING] = s.coupling**2
+    variance[DAMPING] = s.damping**2
+    variance[RIGHTING] = s.damping**2
+    variance[BIAS] = s.acceleration_bias**2
+    variance[model.strength] = s.strength**2
+    variance[model.place] = s.place**2
+    return variance
+
+
+def _noise(model: MotionModel, s: MonitorSettings, by_acceleration: Array) -> Array:
+    """Growth of the variances (d,) in a second, from what drifts; by_acceleration as above."""
+    noise = np.zeros(model.size)
+    noise[MOTION] = np.square(s.disturbance * by_acceleration / model.inertia)
+    noise[CURRENT] = np.square(s.current_drift * np.array([1.0, 1.0, 0.2]))
+    noise[UNKNOWN] = np.square(s.unknown_drift * by_acceleration)
+    noise[INERTIA] = noise[DAMPING] = noise[RIGHTING] = s.body_drift**2
+    noise[COUPLING] = (s.body_drift * s.coupling / s.inertia) ** 2
+    noise[BIAS] = s.acceleration_bias_drift**2
+    noise[model.strength] = s.strength_drift**2
+    return noise
+
+
+def _columns_of_jumps(model: MotionModel) -> NDArray[np.int32]:
+    """Numbers (c,) of the state that may jump: strengths, what stuck ones give, an unknown
+    wrench."""
+    columns = np.concatenate(
+        [
+            np.arange(model.strength.start, model.strength.stop),
+            np.arange(model.held.start, model.held.stop),
+            np.arange(UNKNOWN.start, UNKNOWN.stop),
+        ]
+    )
+    return columns.astype(np.int32)

@@ -1,4 +1,4 @@
-"""How likely jumps of a robot's state are: that an actuator has come to be lost, weak or stuck at
+"""Likelihood of jumps of a robot's state: that an actuator has come to be lost, weak or stuck at
 some moment, that two were lost at once, or that a wrench pulls that no fault explains.
 
 What the filter of `hypotheses.py` has gathered about each jump is its information Lambda and its
@@ -93,6 +93,11 @@ ONSET_EVERY_S = 0.1
 """Least time between the moments at which a jump may have happened [s]."""
 ONSETS = 13
 """How many of them are kept."""
+
+
+_Gathered = tuple[int, int, int, int]
+"""Addresses of the information, of the scores and of the slots of gathered jumps, and how many
+slots there are: the first arguments of the core's functions."""
 
 
 class GatheredJumps(NamedTuple):
@@ -239,9 +244,7 @@ class JumpEvidence:
             of_drives: logarithms of likelihood ratios of what drives say of each kind (o, n, 5), to
                 what is believed; None where they say nothing.
         """
-        model = self._model
-        settings = self._settings
-        n = model.n
+        n = self._model.n
         o = len(slots)
         # Each onset stands for the time since the one before it.
         gaps = age - np.append(age[1:], 0.0)
@@ -251,14 +254,32 @@ class JumpEvidence:
         self._prior.array[:] = np.where(self._possible(strength, held), self._log_rate, -np.inf)
         self._works[:] = strength > 0.5
         jumps = self._jumps
-        gathered = (jumps.information.address, jumps.score.address, slots.ctypes.data, o)
-        core = library()
-        core.fl_jumps_of_actuators(
+        gathered: _Gathered = (jumps.information.address, jumps.score.address, slots.ctypes.data, o)
+        self._weigh_actuators(gathered, temper)
+        self._weigh_pairs(gathered, temper)
+        self._weigh_wrench(gathered, temper)
+        if of_drives is not None:
+            self._add(of_drives)
+        return Evidence(
+            log_odds=self._log_odds.array[:o].copy(),
+            jolt=self._jolt.array[:o].copy(),
+            both=self._both.array[:o].copy(),
+            mean=self._mean.array[:o],
+            variance=self._variance.array[:o],
+            span=self._span.array[:o].copy(),
+            by_kind=self._sum_kinds.of(self._log_odds, o).reshape(n, len(KINDS)),
+            of_pairs=self._sum_pairs.of(self._both, o).reshape(n, n),
+        )
+
+    def _weigh_actuators(self, gathered: _Gathered, temper: float) -> None:
+        """Weighs jumps of one actuator each."""
+        jumps = self._jumps
+        library().fl_jumps_of_actuators(
             *gathered,
             self._n_columns,
             self._actuators.address,
-            n,
-            model.n_held,
+            self._model.n,
+            self._model.n_held,
             self._targets.address,
             len(TARGETS),
             self._spread.address,
@@ -272,37 +293,31 @@ class JumpEvidence:
             self._mean.address,
             self._variance.address,
         )
-        core.fl_jumps_of_pairs(
+
+    def _weigh_pairs(self, gathered: _Gathered, temper: float) -> None:
+        """Weighs the loss of two actuators at once."""
+        library().fl_jumps_of_pairs(
             *gathered,
             self._n_columns,
-            n,
-            jumps.strength.address,
+            self._model.n,
+            self._jumps.strength.address,
             self._works.ctypes.data,
             self._span.address,
             self._log_rate_of_pairs,
             temper,
             self._both.address,
         )
-        core.fl_jumps_of_wrench(
+
+    def _weigh_wrench(self, gathered: _Gathered, temper: float) -> None:
+        """Weighs an unknown wrench that begins at once."""
+        library().fl_jumps_of_wrench(
             *gathered,
             self._n_columns,
             self._jolt_variance.address,
             self._span.address,
-            math.log(settings.jolts),
+            math.log(self._settings.jolts),
             temper,
             self._jolt.address,
-        )
-        if of_drives is not None:
-            self._add(of_drives)
-        return Evidence(
-            log_odds=self._log_odds.array[:o].copy(),
-            jolt=self._jolt.array[:o].copy(),
-            both=self._both.array[:o].copy(),
-            mean=self._mean.array[:o],
-            variance=self._variance.array[:o],
-            span=self._span.array[:o].copy(),
-            by_kind=self._sum_kinds.of(self._log_odds, o).reshape(n, len(KINDS)),
-            of_pairs=self._sum_pairs.of(self._both, o).reshape(n, n),
         )
 
     def _add(self, of_drives: Array) -> None:

@@ -1,4 +1,4 @@
-"""What a fault monitor takes for granted of a robot, its sensors and its faults."""
+"""Settings of a fault monitor: what it assumes of a robot, its sensors and its faults."""
 
 from dataclasses import dataclass
 

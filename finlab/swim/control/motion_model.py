@@ -11,6 +11,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finlab.arrays import Array
 from finlab.core import library
@@ -20,7 +21,7 @@ from finlab.physics import plant_of
 from finlab.swim.control.contract import LEVER_M
 from finlab.swim.vehicle.actuator_motion import ActuatorMotion
 from finlab.swim.vehicle.attitude import quaternion_of, rotation_of_quaternion, to_body
-from finlab.swim.vehicle.fossen import complete_body, dynamics_of
+from finlab.swim.vehicle.fossen import Dynamics, complete_body, dynamics_of
 
 MOTION = slice(0, 6)
 """Velocity over ground and rates in the state, body frame [m/s, rad/s]."""
@@ -92,25 +93,14 @@ class MotionModel:
         self.inertia = np.array(self.dynamics.inertia)
         """Mass and moments (6,), those of the water that goes along included [kg, kg m^2]."""
         self._inertia_squared = np.square(self.inertia)
-        # In the order of `body_numbers` in the core's motion_model.c.
-        self._body = SharedArray(
-            [
-                *self.dynamics.inertia,
-                *self.dynamics.linear_damping,
-                *self.dynamics.quadratic_damping,
-                self.dynamics.buoyancy - self.dynamics.weight,
-                self.dynamics.buoyancy,
-                *self.dynamics.center_of_buoyancy,
-            ]
-        )
+        self._body = SharedArray(_body_numbers(self.dynamics))
         self._plant = plant_of(layout)
         self.motion = ActuatorMotion(layout)
         """What the actuators do, if they follow their commands."""
         n = layout.n
         self.n = n
         parts = layout.actuators
-        can_stick = ["stuck" in part.KIND.faults for part in parts]
-        self.sticks = np.array(can_stick)
+        self.sticks = np.array(["stuck" in part.KIND.faults for part in parts])
         """Which actuators (n,) may be stuck."""
         self.sticks_at_angle = self.sticks & self.motion.angles
         """Which of them keep an angle; the others keep a force."""
@@ -123,13 +113,9 @@ class MotionModel:
         for k, part in enumerate(parts):
             if part.type == "thruster":
                 self.force_limits[k] = part.lower[0], part.upper[0]
-        owners = []
-        for k in range(n):
-            if can_stick[k]:
-                owners += [k, k] if self.sticks_at_angle[k] else [k]
-        self.held_owner = np.array(owners, dtype=int)
+        self.held_owner = _owners_of_held(self.sticks, self.sticks_at_angle)
         """Actuator (h,) of each number of the state that says what a stuck one gives."""
-        self.n_held = len(owners)
+        self.n_held = len(self.held_owner)
         self.strength = slice(FIRST_ACTUATOR, FIRST_ACTUATOR + n)
         """Strengths in the state."""
         self.place = slice(self.strength.stop, self.strength.stop + 3 * n)
@@ -303,6 +289,27 @@ def motion_through_water(state: Array, yaw: float) -> Array:
     motion = state[MOTION].copy()
     motion[:3] -= to_body(rotation, *state[CURRENT].tolist())
     return np.asarray(motion)
+
+
+def _body_numbers(dynamics: Dynamics) -> list[float]:
+    """Constants of a body in the order of `body_numbers` in the core's motion_model.c."""
+    return [
+        *dynamics.inertia,
+        *dynamics.linear_damping,
+        *dynamics.quadratic_damping,
+        dynamics.buoyancy - dynamics.weight,
+        dynamics.buoyancy,
+        *dynamics.center_of_buoyancy,
+    ]
+
+
+def _owners_of_held(
+    sticks: NDArray[np.bool_], sticks_at_angle: NDArray[np.bool_]
+) -> NDArray[np.int_]:
+    """Actuator (h,) of each number that says what a stuck one gives: cosine and sine of one that
+    keeps an angle, the force of another."""
+    numbers_of_each = np.where(sticks, np.where(sticks_at_angle, 2, 1), 0)
+    return np.repeat(np.arange(len(sticks)), numbers_of_each)
 
 
 def _largest_force(part: Actuator) -> float:

@@ -1,4 +1,4 @@
-"""What integrates the bodies of simulated robots, by name."""
+"""Integrators of the bodies of simulated robots, by name."""
 
 from collections.abc import Sequence
 from pkgutil import resolve_name

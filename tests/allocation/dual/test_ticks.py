@@ -181,6 +181,30 @@ def test_what_calm_took_is_what_the_cheapest_answer_of_the_same_tick_takes_less(
     assert compared > 5  # there is something to compare
 
 
+@pytest.mark.parametrize("policy", ["closest", "direction"])
+@pytest.mark.parametrize("name", ["drillship", "catamaran", "pair"])
+def test_pods_and_fins_that_stand_the_wrong_way_turn_until_a_wrench_is_given(
+    name: str, policy: str
+) -> None:
+    robot = load_layout(name)
+    allocator = Allocator(robot, period_s=PERIOD_S)
+    at_rest = allocator.allocate(np.zeros(6)).command
+    rng = np.random.default_rng(5)
+    for _ in range(4):
+        span = np.nan_to_num(robot.upper - robot.lower)
+        command = np.nan_to_num(robot.lower) + rng.random(span.shape) * span
+        target = 0.3 * plant_of(robot).wrench(command)
+        expected = allocator.allocate(target, policy=policy)
+        previous = at_rest
+        for _ in range(500):
+            answer = allocator.allocate(target, previous=previous, policy=policy)
+            if answer.err_norm <= expected.err_norm + 1e-3:
+                break
+            assert answer.binding
+            previous = answer.command
+        assert answer.err_norm <= expected.err_norm + 1e-3
+
+
 def test_outside_of_ticks_calm_takes_nothing() -> None:
     answer = Allocator(load_layout("catamaran")).allocate([20.0, 10.0, 0.0, 0.0, 0.0, 2.0])
     assert answer.calm_power == 0.0

@@ -6,8 +6,10 @@ from itertools import cycle, islice
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finlab.allocation.methods import choose_method
+from finlab.arrays import Array
 from finlab.research.evaluation.document import Column, Row
 from finlab.research.evaluation.experiment import Experiment, check_names, paper_figures, progress
 from finlab.research.evaluation.experiments.wrench import MEASURES
@@ -91,28 +93,33 @@ def run(
         points = [candidate_points(method, case, seed) for case in cases[:shown]]
         scores = joined(parts)
         for scored_by, key, physical in SCORES:
-            error = scores[key]
-            square = scores[key] ** 2
-            rows.append(
-                {
-                    "variant": variant,
-                    "scored_by": scored_by,
-                    "n": len(error),
-                    "j_norm_mean": float(square.mean()),
-                    "j_norm_mean_interval": list(mean_interval(square, scores["layout"])),
-                    "j_norm_mean_by_layout": means_by_layout(square, scores["layout"]),
-                    "j_norm_std": float(square.std()),
-                    "err_norm_mean": float(error.mean()),
-                    "err_norm_median": float(np.median(error)),
-                    "err_phys_mean": float(scores[physical].mean()),
-                    "err_phys_mean_interval": list(
-                        mean_interval(scores[physical], scores["layout"])
-                    ),
-                    "call_ms": float(np.mean(times[1:])),
-                    **({"points": points} if points and scored_by == "surrogate" else {}),
-                }
-            )
+            row = {
+                "variant": variant,
+                "scored_by": scored_by,
+                **_errors_row(scores[key], scores[physical], scores["layout"]),
+                "call_ms": float(np.mean(times[1:])),
+            }
+            if points and scored_by == "surrogate":
+                row["points"] = points
+            rows.append(row)
     return rows
+
+
+def _errors_row(error: Array, error_phys: Array, layout: NDArray[np.int64]) -> Row:
+    """Means of normalized errors (N,), of their squares, and of errors (N,) in N and N m; `layout`
+    (N,) numbers the layout of each."""
+    square = error**2
+    return {
+        "n": len(error),
+        "j_norm_mean": float(square.mean()),
+        "j_norm_mean_interval": list(mean_interval(square, layout)),
+        "j_norm_mean_by_layout": means_by_layout(square, layout),
+        "j_norm_std": float(square.std()),
+        "err_norm_mean": float(error.mean()),
+        "err_norm_median": float(np.median(error)),
+        "err_phys_mean": float(error_phys.mean()),
+        "err_phys_mean_interval": list(mean_interval(error_phys, layout)),
+    }
 
 
 def candidate_points(

@@ -131,7 +131,7 @@ def _judge_robot(
 ) -> dict[str, Judged]:
     """What policies do on one robot. Its first answers are those that may be stored."""
     stored = _rows(answers, slice(STORED))
-    asked = _rows(answers, slice(STORED, None))
+    tested = _rows(answers, slice(STORED, None))
     robot = answers.robot
     core = robot.compiled.core
     plant = plant_of(robot.layout)
@@ -139,41 +139,43 @@ def _judge_robot(
     rng = np.random.default_rng(seed)
     for policy in policies:
         if policy in ERRORS:
-            noise = 1.0 + ERRORS[policy] * rng.normal(size=asked.multipliers.shape)
-            proposals[policy] = _same(asked.multipliers * noise)
+            noise = 1.0 + ERRORS[policy] * rng.normal(size=tested.multipliers.shape)
+            proposals[policy] = _same(tested.multipliers * noise)
         elif policy not in ("dual", "forces"):
             proposals[policy] = _start(policy, stored, networks).multipliers
 
     def answer(policy: str) -> Array:
-        first = proposals[policy](asked.wrench)
-        return core.answer_many(asked.wrench, None, robot.conditions, first).command
+        first = proposals[policy](tested.wrench)
+        return core.answer_many(tested.wrench, None, robot.conditions, first).command
 
     times = _least_times(proposals, answer)
-    proposing = _least_times(proposals, lambda policy: proposals[policy](asked.wrench))
+    proposing = _least_times(proposals, lambda policy: proposals[policy](tested.wrench))
     judged = {}
     for policy, propose in proposals.items():
-        error, residual = _errors(asked, plant, propose(asked.wrench))
-        points = core.dual_points(asked.wrench, propose(asked.wrench), MOST_STEPS, robot.conditions)
+        error, residual = _errors(tested, plant, propose(tested.wrench))
+        points = core.dual_points(
+            tested.wrench, propose(tested.wrench), MOST_STEPS, robot.conditions
+        )
         judged[policy] = Judged(
             error=error,
             residual=residual,
             steps=points.steps.astype(np.float64),
-            excess=_excess(asked, plant, answer(policy)),
+            excess=_excess(tested, plant, answer(policy)),
             time=times[policy] / times["dual"],
             proposing=proposing[policy] / times["dual"],
         )
     if "forces" in policies:
-        per_answer = times["dual"] / len(asked.wrench)
+        per_answer = times["dual"] / len(tested.wrench)
         policy_of_forces = ForcePolicy(robot, networks["forces"], plant)
-        judged["forces"] = _judge_forces(policy_of_forces, asked, plant, per_answer)
+        judged["forces"] = _judge_forces(policy_of_forces, tested, plant, per_answer)
     return {policy: judged[policy] for policy in policies}
 
 
 def _judge_forces(
-    policy: ForcePolicy, asked: ExactAnswers, plant: Plant, dual_time: float
+    policy: ForcePolicy, tested: ExactAnswers, plant: Plant, dual_time: float
 ) -> Judged:
     """What a network of forces does; `dual_time` is that of an answer of `dual` [s]."""
-    few = _rows(asked, slice(FORCE_WRENCHES))
+    few = _rows(tested, slice(FORCE_WRENCHES))
     count = len(few.wrench)
     refined = [policy.commands(few.wrench, steps) for steps in STEPS]
     times = _least_times(
@@ -225,33 +227,33 @@ def _least_times(
     return least
 
 
-def _errors(asked: ExactAnswers, plant: Plant, first: Array | None) -> tuple[Array, Array]:
+def _errors(tested: ExactAnswers, plant: Plant, first: Array | None) -> tuple[Array, Array]:
     """Errors of the wrench (3, N) after `STEPS`, over the wrench scale: of commands, by the plant,
     and of the forces, by the dual."""
-    robot = asked.robot
+    robot = tested.robot
     scale = wrench_scale_of(plant.layout)
     by_plant = []
     by_dual = []
     for steps in STEPS:
-        points = robot.compiled.core.dual_points(asked.wrench, first, steps, robot.conditions)
+        points = robot.compiled.core.dual_points(tested.wrench, first, steps, robot.conditions)
         command = robot.compiled.core.commands(points.force)
-        missed = (asked.wrench - _wrench(asked, plant, command)) / scale
+        missed = (tested.wrench - _wrench(tested, plant, command)) / scale
         by_plant.append(np.linalg.norm(missed, axis=1))
         by_dual.append(np.linalg.norm(points.residual / scale, axis=1))
     return np.array(by_plant), np.array(by_dual)
 
 
-def _wrench(asked: ExactAnswers, plant: Plant, command: Array) -> Array:
+def _wrench(tested: ExactAnswers, plant: Plant, command: Array) -> Array:
     """Wrenches (N, 6) [N, N m] of commands by the plant, without lost actuators."""
-    works = asked.robot.works
+    works = tested.robot.works
     force = plant.force(command)[:, works]
     return np.asarray(np.einsum("tna,nak->tk", force, plant.effectiveness[works]))
 
 
-def _excess(asked: ExactAnswers, plant: Plant, command: Array) -> Array:
+def _excess(tested: ExactAnswers, plant: Plant, command: Array) -> Array:
     """Power of commands by the plant over the least, less 1 (N,)."""
-    power = plant.power(command)[:, asked.robot.works].sum(axis=1)
-    return np.asarray(power / np.maximum(asked.dual_value, 1e-12) - 1.0)
+    power = plant.power(command)[:, tested.robot.works].sum(axis=1)
+    return np.asarray(power / np.maximum(tested.dual_value, 1e-12) - 1.0)
 
 
 def _figures(judged: Sequence[Judged]) -> Row:

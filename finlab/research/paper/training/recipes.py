@@ -117,9 +117,9 @@ def recipe_hash(made: PaperRecipe, verb: str) -> str:
         made: the recipe.
         verb: "surrogate" or "allocator".
     """
-    whole = asdict(made)
-    numbers = [made.normalization, whole["data"], whole[f"{verb}_training"]]
-    numbers.append(whole["surrogate" if verb == "surrogate" else "network"])
+    values = asdict(made)
+    numbers = [made.normalization, values["data"], values[f"{verb}_training"]]
+    numbers.append(values["surrogate" if verb == "surrogate" else "network"])
     return hashlib.sha256(json.dumps(numbers, sort_keys=True).encode()).hexdigest()
 
 

@@ -126,9 +126,9 @@ def samples_of(settings: DataSettings, number: int) -> dict[str, AnyArray]:
     n = layout.n
 
     def padded(values: AnyArray) -> AnyArray:
-        whole = np.zeros((N_FINS, *values.shape[1:]), np.float32)
-        whole[:n] = values
-        return whole
+        result = np.zeros((N_FINS, *values.shape[1:]), np.float32)
+        result[:n] = values
+        return result
 
     padded_command = np.zeros((settings.commands, N_FINS, 3), np.float32)
     padded_command[:, :n] = command
@@ -298,10 +298,10 @@ class SampleSet:
 
 def data_hash(folder: Path) -> str:
     """Returns the SHA-256 of a data set's files, one after the other."""
-    found = hashlib.sha256((folder / DATA_FILE).read_bytes())
+    sha256 = hashlib.sha256((folder / DATA_FILE).read_bytes())
     for path in sorted(folder.glob("part-*.npz")):
-        found.update(path.read_bytes())
-    return found.hexdigest()
+        sha256.update(path.read_bytes())
+    return sha256.hexdigest()
 
 
 @lru_cache(maxsize=1)

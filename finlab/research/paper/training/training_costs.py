@@ -1,4 +1,4 @@
-"""What a step of each of the paper's two trainings costs."""
+"""Costs of a step of each of the paper's two trainings."""
 
 from functools import partial
 from pathlib import Path
