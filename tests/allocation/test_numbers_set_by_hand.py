@@ -69,6 +69,8 @@ NO_CHOICE = {
     "FL_BOUND",
     "FL_BUDGETS",
     "FL_BUDGET_TARGET",
+    "FL_BUDGET_TARGETS",
+    "FL_BUDGET_TRIES",
     "UNKNOWNS",
     "FL_DEPTH",
     "DEPENDENT",
