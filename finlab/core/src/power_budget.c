@@ -26,6 +26,7 @@
 #define DEAR 100              /* multiple of a usual price that only what is missing explains */
 #define SHORT_SHARE R(0.1)    /* of a step, from which on mu falls */
 #define BUDGET_SLOPE_ENOUGH R(0.3) /* share of the slope that a search along a step may leave */
+#define SHARES 40                  /* that are tried of the forces without budgets */
 #define BUDGET_IDLE 12             /* steps without progress after which it ends */
 /* There, of TOLERANCE, what may be left: rounding where multipliers lie far apart. */
 #define STANDSTILL 100
@@ -1046,6 +1047,25 @@ static void close_buses(budget_problem *p) {
   }
 }
 
+/* Where Newton's method has found no answer within the budgets: a share of the forces without
+   them. Returns whether there is one. */
+static int take_share(budget_problem *p, fl_answer *out) {
+  if (p->has_settled) return 0;
+  for (int k = 0; k < SHARES; k++) {
+    const real share = share_within(p->block, p->work, p->budget, out->force);
+    if (!(share < 1)) {
+      fl_wrench_of_forces(p->block, p->work, out->force, out->wrench_served);
+      out->gap_power_bound = 0;
+      return 1;
+    }
+    for (int i = 0; i < COUNT(p->block); i++) {
+      out->force[i][0] *= share;
+      out->force[i][1] *= share;
+    }
+  }
+  return 0;
+}
+
 /* Where no answer was found within the budgets: least power of all that have one. */
 static void take_least_power(budget_problem *p, fl_answer *out) {
   for (int b = 0; b < p->budget->buses; b++) close_bus(p, b);
@@ -1120,6 +1140,7 @@ static int find_within_budget(budget_problem *p, const real *wrench, const fl_po
     status = serve_closest(p, policy, wrench, &before, &at);
   }
   if (status != FL_MET) {
+    if (take_share(p, out)) return 1;
     take_least_power(p, out);
     return 0;
   }
