@@ -22,7 +22,7 @@ CORE = Path(__file__).with_name("finlab") / "core"
 # builder.
 FLAGS = shlex.split(
     "-std=c99 -O3 -ffp-contract=off -fno-math-errno -fno-trapping-math -fPIC -shared -Wall "
-    "-DFL_WITH_FALLING"
+    "-DFL_WITH_FALLING -DFL_WITH_POWER_SETS"
 )
 ZIG = [sys.executable, "-m", "ziglang", "cc", "-s", "-mcpu=baseline", "-target"]
 # Target as zig names it: platform in the name of the wheel, ending of a library.

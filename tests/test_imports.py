@@ -27,8 +27,8 @@ CORE: Levels = (
     ("interaction",),
     ("layout",),
     ("physics", "exchange"),
-    ("forces",),
     ("allocation",),
+    ("forces",),
     ("analysis", "fit"),
     ("deploy",),
 )

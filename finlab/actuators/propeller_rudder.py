@@ -87,14 +87,15 @@ if TYPE_CHECKING:
     from typing_extensions import Self  # Python 3.10 has none of its own
 
 CURVE_ANGLES = 1025
-"""Deflections of the rudder from one peak of its lift to the other, from which angles of the force
-are turned into deflections."""
+"""Deflections of the rudder between the ends of its arc, from which angles of the force are turned
+into deflections."""
 LAW_ANGLES = 2049
 """Deflections from -90 to 90 deg of the grid from which the core evaluates the law."""
+BEYOND_ENDS = 2e-4
+"""Angle [rad] by which the core's curve goes on beyond the ends of the arc: what lies beyond is
+then told from an end itself, in single precision too."""
 OFFSET = -1.0
 """Drag coefficient by which the core takes the offset (-p, 0) of a lost one off."""
-BEYOND = 12
-"""Points of the gauge beyond each end of the arc that go on along its tangent."""
 SEARCHED = 65
 """Deflections in each of the searches for the one that is worth most at a price."""
 
@@ -204,8 +205,11 @@ class Arc(NamedTuple):
     """Half of their range [rad]."""
     gauge: Array
     """|g| (POINTS,) in each direction around the circle, from 0 on [1]."""
-    lean: Array
-    """Angle of the force minus the deflection (POINTS,) there [rad]."""
+    curve: Array
+    """Angles of the force, rising, the deflections there, both [rad], and |g| [1] (CURVE_ANGLES,
+    3)."""
+    ends: Array
+    """Angle of the force and deflection (2, 2) [rad] a little beyond both ends, for the core."""
     law: Array
     """g over all deflections, as a grid for the core."""
 
@@ -302,7 +306,12 @@ class SteeredGroup(Group):
         forms = []
         for arc, p in zip(self._arcs, self._slipstream.tolist(), strict=True):
             form = Form(
-                "steered", law=arc.law, deflection=arc.lean, pressure_area=p, zero_lift_drag=OFFSET
+                "steered",
+                law=arc.law,
+                command_table=arc.ends,
+                command_table_count=len(arc.ends),
+                pressure_area=p,
+                zero_lift_drag=OFFSET,
             )
             forms.append(form)
         return forms
@@ -349,32 +358,22 @@ def _arc_of(rudder: Rudder, race_area: float) -> Arc:
     low, high = rudder.deflection
     used_low = min(max(low, -peak), max(high, -peak))
     used_high = max(min(high, peak), min(low, peak))
-    curve_low = min(-peak, used_low)
-    curve_high = max(peak, used_high)
-    deflection = np.linspace(curve_low, curve_high, CURVE_ANGLES)
-    g = direction(deflection)
-    angle = np.arctan2(g[:, 1], g[:, 0])
-    ends = direction(np.array([used_low, used_high]))
-    first, last = np.arctan2(ends[:, 1], ends[:, 0]).tolist()
 
-    # Deflection and |g| for a force in each of POINTS directions around the circle. Beyond the ends
-    # they go on along their tangents for some points, by which the core interpolates at the ends.
+    def rows(deflection: Array) -> Array:
+        """Angle of the force, deflection, and |g| (K, 3) of deflections (K,)."""
+        g = direction(deflection)
+        return np.stack([np.arctan2(g[:, 1], g[:, 0]), deflection, np.hypot(*g.T)], axis=1)
+
+    curve = rows(np.linspace(used_low, used_high, CURVE_ANGLES))
+    first, last = curve[[0, -1], 0].tolist()
     around = wrapped(np.arange(POINTS) * (TURN / POINTS))
-    within = np.clip(around, angle[0], angle[-1])
-    beyond = np.clip(around - within, -BEYOND * TURN / POINTS, BEYOND * TURN / POINTS)
-    needed = np.interp(within, angle, deflection)
-    size = np.hypot(*direction(needed).T)
-    sizes = np.hypot(*g.T)
-    at_end = np.where(around > 0.0, -1, 0)  # the last or the first point of the curve
-    d_deflection = np.gradient(deflection, angle)[at_end]
-    d_size = np.gradient(sizes, angle)[at_end]
-    needed = needed + beyond * d_deflection
-    gauge = size + beyond * d_size
+    gauge = np.interp(around, curve[:, 0], curve[:, 2])
+    ends = rows(np.array([used_low - BEYOND_ENDS, used_high + BEYOND_ENDS]))[:, :2]
 
     knots = np.linspace(-0.5 * np.pi, 0.5 * np.pi, LAW_ANGLES)
     no_axis = np.zeros(1)
     grid = grid_numbers((no_axis, no_axis, knots), direction(knots)[None, None])
-    return Arc(0.5 * (first + last), 0.5 * (last - first), gauge, around - needed, grid)
+    return Arc(0.5 * (first + last), 0.5 * (last - first), gauge, curve, ends, grid)
 
 
 def _angle_of_peak(law: RudderLaw) -> float:
@@ -615,9 +614,9 @@ class PropellerRudder(Propeller):
         angle = math.atan2(force[1], force[0])
         if force[0] < 0.0:
             return np.array([0.0, force[0], 0.0])
-        index = int(round(angle / TURN * POINTS)) % POINTS
-        size = math.hypot(*force) / float(arc.gauge[index])
-        return np.array([angle - float(arc.lean[index]), size, 0.0])
+        deflection = np.interp(angle, arc.curve[:, 0], arc.curve[:, 1])
+        radius = np.interp(angle, arc.curve[:, 0], arc.curve[:, 2])
+        return np.array([deflection, math.hypot(*force) / radius, 0.0])
 
     def neutral(self, now: Array | None = None) -> Array:
         """See `Actuator`: the rudder stays where it is."""

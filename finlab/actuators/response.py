@@ -344,7 +344,8 @@ class Form(NamedTuple):
     """A grid of the law, see `finlab.actuators.hermite_grid.grid_numbers`."""
     command_table: Array | None = None
     """Of a fin: amplitudes [rad] and frequencies [Hz] (K + 1, 2) at (j / K)^2 of its largest force.
-    Of a foil: lift coefficients, rising [1], and angles [rad] (K, 2)."""
+    Of a foil: lift coefficients, rising [1], and angles [rad] (K, 2). Of a propeller with a rudder:
+    angles of the force and deflections at both ends of its arc [rad] (2, 2)."""
     command_table_count: int = 0
     """K of `command_table`, which the core reads before its rows: cells of a fin, points of a
     foil."""

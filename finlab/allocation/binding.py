@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.power_budget import ALL, PowerBudget
+from finlab.allocation.power_budget import PowerBudget, bus_words
 from finlab.arrays import Array
 from finlab.axes import axes_in, is_full_turn, wrapped
 from finlab.layout.effectiveness import own_effectiveness
@@ -211,7 +211,7 @@ def budget_words(budget: PowerBudget, power: Array) -> tuple[str, ...]:
     words = []
     for name, is_full in zip(budget.names, is_used_up, strict=True):
         if is_full:
-            words.append(name if name == ALL else f"bus {name}")
+            words.append(bus_words(name))
     return tuple(words)
 
 

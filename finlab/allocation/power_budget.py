@@ -61,6 +61,17 @@ def budget_of(layout: Layout) -> PowerBudget | None:
     return PowerBudget(names, members, np.array([bus.power_w for bus in layout.buses]))
 
 
+def bus_words(name: str) -> str:
+    """Returns how a bus whose power is used up is named: `power` where one feeds all actuators."""
+    return name if name == ALL else f"bus {name}"
+
+
+def layout_budget(layout: Layout, power: object = None) -> PowerBudget | None:
+    """Returns the budget that a question names, else that of the layout; arguments, results and
+    errors as of `check_power`, None for the budget of the layout."""
+    return budget_of(layout) if power is None else check_power(power, layout)
+
+
 def check_power(power: object, layout: Layout) -> PowerBudget | None:
     """Returns the budget that a question names.
 

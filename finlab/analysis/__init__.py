@@ -16,10 +16,10 @@ from finlab.analysis.goals import GOALS as GOALS
 from finlab.analysis.keep_out import KeepOut as KeepOut
 from finlab.analysis.layout_bound import LayoutBound as LayoutBound
 from finlab.analysis.layout_bound import layout_bound as layout_bound
+from finlab.analysis.layout_search import Progress as Progress
 from finlab.analysis.moves import Bounds as Bounds
 from finlab.analysis.moves import mirror_pairs as mirror_pairs
 from finlab.analysis.optimize import Improvement as Improvement
-from finlab.analysis.optimize import Progress as Progress
 from finlab.analysis.optimize import optimize_layout as optimize_layout
 from finlab.analysis.score_card import ScoreCard as ScoreCard
 from finlab.analysis.score_card import least_power as least_power

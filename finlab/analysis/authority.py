@@ -1,18 +1,19 @@
 """Axes along which the actuators can push, how evenly, and what the loss of each one costs."""
 
+import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from finlab.analysis.sizes_within_budget import sizes_within_budget
 from finlab.arrays import Array
 from finlab.axes import AXES as WRENCH
 from finlab.axes import MOTIONS, Axis, MotionAxis
 from finlab.errors import LayoutError
 from finlab.forces.force_sets import SCALE, ForceSets, force_sets
 from finlab.forces.reach import RANK_TOLERANCE, max_wrench_along_exactly, singular_values, weakest
+from finlab.forces.within_budget import counts_budget, force_sets_within
 from finlab.layout import Layout
 
 AXES = MOTIONS
@@ -64,8 +65,8 @@ class Authority(HeldAxes):
     most_negative: tuple[float, ...]
     """The same along the negative axes, as a size (6,) [N, N m]."""
     weakest: float
-    """Scaled wrench [N] that is within reach in every direction of the axes that count, whatever
-    power it takes; 0 below that rank."""
+    """Scaled wrench [N] that is within reach in every direction of the axes that count, within that
+    budget; 0 below that rank."""
     weakest_direction: tuple[float, ...]
     """Unit scaled wrench (6,) along which no more than `weakest` can be had."""
 
@@ -98,7 +99,11 @@ class Loss:
 def authority(
     layout: Layout, lost: Collection[str] = (), flow: ArrayLike | None = None
 ) -> Authority:
-    """Returns the authority of the working actuators; arguments and errors as for `losses`."""
+    """Returns the authority of the working actuators; arguments and errors as for `losses`.
+
+    The power budget of the layout counts but where the flow drives actuators, see
+    `finlab.forces.within_budget.counts_budget`.
+    """
     return _authorities(layout, [lost], flow)[0]
 
 
@@ -134,15 +139,12 @@ def _authorities(
     layout: Layout, failures: Sequence[Collection[str]], flow: ArrayLike | None
 ) -> list[Authority]:
     """The authority after each of several losses; one call for all is quicker than many."""
-    sets = force_sets(layout, flow=flow).tile(len(failures))
-    for row, lost in enumerate(failures):
-        sets.lose(row, list(layout.indices(tuple(lost), "lost")))
+    sets = _sets_after(layout, failures, flow)
     counted_rows = np.flatnonzero(layout.commanded)
     counting = sets.along(counted_rows)
     values, vectors = singular_values(counting)
     held_of = [_held(commanded_axes(layout), *pair) for pair in zip(values, vectors, strict=True)]
     size = _largest_sizes(sets, held_of, layout, flow)
-    size = sizes_within_budget(layout, failures, size, SCALE, flow)
     least = weakest(counting)
     direction = np.zeros((len(failures), 6))
     direction[:, counted_rows] = least.direction
@@ -157,6 +159,27 @@ def _authorities(
         )
         for k in range(len(failures))
     ]
+
+
+def _sets_after(
+    layout: Layout, failures: Sequence[Collection[str]], flow: ArrayLike | None
+) -> ForceSets:
+    """Feasible forces after each of several losses, within the layout's power budget where one is
+    counted."""
+    power = None if counts_budget(layout, flow) else math.inf
+    sets = force_sets_within(layout, flow=flow, power=power).tile(len(failures))
+    for row, lost in enumerate(failures):
+        sets.lose(row, list(layout.indices(tuple(lost), "lost")))
+    return sets
+
+
+def reach_alone(layout: Layout, lost: Collection[str] = (), flow: ArrayLike | None = None) -> Array:
+    """Returns the largest wrench (2, 6) [N, N m] along each axis, and against it, with the other
+    five at zero, as `largest` and `most_negative` of `Authority`; arguments and errors as for
+    `losses`."""
+    sets = _sets_after(layout, [lost], flow)
+    size = _largest_sizes(sets, held_axes(layout, sets), layout, flow)
+    return np.asarray(size.reshape(2, 6) * SCALE)
 
 
 def reachable_axes(

@@ -5,7 +5,7 @@ Headings are where the load comes from, clockwise: 0 from ahead, 90 degrees from
 kinds of plots have one form. `capability` takes a wrench for each heading, or a force alone, and
 finds how much of it can be held. `dp_capability` takes the loads of DNV-ST-0111, level 1, at each
 DP capability number (Beaufort's), and finds the highest number up to which all are held ([2.2.2],
-[2.4.4]).
+[2.4.4]). Both count the power budgets of the layout's buses.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from finlab.allocation.power_budget import PowerBudget, bus_words, layout_budget
 from finlab.analysis.capability_text import capability_blocks, capability_picture
 from finlab.analysis.dnv_loads import WEATHER, total_load
 from finlab.analysis.dnv_thrust import CONSTANT_LOSS, LOSSES, ship_sets, ship_thrusters, thrust_left
@@ -26,6 +27,8 @@ from finlab.arrays import NEARLY, NOTHING, Array
 from finlab.display import html, text
 from finlab.errors import LayoutError
 from finlab.forces.force_sets import shapes_of
+from finlab.forces.power_sides import Sides
+from finlab.forces.within_budget import check_counted, sides_of
 from finlab.layout import Layout
 from finlab.layout.effectiveness import own_effectiveness
 
@@ -37,6 +40,10 @@ HELD_MARGIN = 1e-9
 """Share by which a load may exceed what can be held and still counts as held [1]."""
 BOW_SECTOR = 30.0
 """Headings on either side of the bow that the first number of a notation is about [deg]."""
+NO_WORTH = 1e-6
+"""Share of what bounds a load below which a budget that is worth so much does not bind [1]."""
+THRUST = "thrust"
+"""What limits a heading where no budget binds."""
 DNV = "DNV-ST-0111 level 1"
 """Name of the standard."""
 
@@ -67,6 +74,15 @@ class Refusal(NamedTuple):
     """Prices that prove it; one where all sets are convex."""
 
 
+class _Buses(NamedTuple):
+    """The power budgets of a plot."""
+
+    watts: dict[str, float]
+    """By the names of buses [W]."""
+    of_actuator: dict[str, str]
+    """The bus of each actuator that has one, by names."""
+
+
 @dataclass(frozen=True)
 class Capability:
     """Loads that can be held by heading, after each single loss."""
@@ -92,6 +108,11 @@ class Capability:
     loss_costs: dict[str, Array]
     """By each loss of thrust that counts, the share (H,) that it costs of the load that the intact
     robot can hold, at the heading's limiting condition [1]."""
+    buses: dict[str, float]
+    """Power budgets by the names of B buses [W]; none where no power is limited."""
+    budget_worth: Array
+    """What each budget (C, H, K, B) is worth of all that bounds a share [1]; 0 where it does not
+    bind."""
 
     @property
     def held(self) -> NDArray[np.bool_]:
@@ -129,6 +150,44 @@ class Capability:
         return tuple(self.cases[k + 1].name for k in self.values[1:].argmin(axis=0))
 
     @property
+    def limiting(self) -> NDArray[np.intp]:
+        """The load (C, H) of each heading that limits the plot: the first that is not held, or the
+        last."""
+        if self.standard is None:
+            return np.zeros(self.values.shape, np.intp)
+        return np.minimum(self.values.astype(np.intp) + 1, len(self.conditions) - 1)
+
+    @property
+    def binding_buses(self) -> NDArray[np.bool_]:
+        """Which buses (C, H, B) have no power left at the limiting load of each heading."""
+        worth = np.take_along_axis(self.budget_worth, self.limiting[..., None, None], axis=2)
+        return np.asarray(worth[:, :, 0] > NO_WORTH)
+
+    @property
+    def worst_binding_buses(self) -> NDArray[np.bool_]:
+        """The same (H, B) after the loss that `worst` is about."""
+        if len(self.cases) == 1:
+            return np.asarray(self.binding_buses[0])
+        of_losses = self.values[1:].argmin(axis=0)
+        return np.asarray(self.binding_buses[1 + of_losses, np.arange(len(self.headings))])
+
+    @property
+    def limited_by(self) -> tuple[tuple[str, ...], ...]:
+        """What limits each heading, C rows of H: `thrust`, or buses that have no power left, as
+        `bus aft`; `power` where one budget counts for all."""
+        return tuple(self._limit_words(of_case) for of_case in self.binding_buses)
+
+    @property
+    def worst_limited_by(self) -> tuple[str, ...]:
+        """What limits each heading (H,) after the loss that `worst` is about."""
+        return self._limit_words(self.worst_binding_buses)
+
+    def _limit_words(self, binding: NDArray[np.bool_]) -> tuple[str, ...]:
+        """What limits headings (H,) where buses (H, B) have no power left."""
+        words = np.array([bus_words(name) for name in self.buses])
+        return tuple(" and ".join(words[of_heading]) or THRUST for of_heading in binding)
+
+    @property
     def notation(self) -> tuple[int, int, int, int] | None:
         """The four numbers of the standard's notation ([2.5.1]): the least within 30 degrees of the
         bow and of all headings, as the ship is and after the worst loss; None without a
@@ -149,9 +208,7 @@ class Capability:
         share = np.where(np.isfinite(self.share), self.share, np.nan)
         refusals = []
         for refusal in self.refusals:
-            leaves = [
-                {"parts": leaf.parts, "price": leaf.price.tolist()} for leaf in refusal.leaves
-            ]
+            leaves = [leaf._asdict() | {"price": leaf.price.tolist()} for leaf in refusal.leaves]
             refusals.append(refusal._asdict() | {"leaves": leaves})
         return {
             "layout": self.layout,
@@ -163,6 +220,9 @@ class Capability:
             "values": self.values.tolist(),
             "worst": self.worst.tolist(),
             "worst_case": list(self.worst_case),
+            "limited_by": [list(row) for row in self.limited_by],
+            "worst_limited_by": list(self.worst_limited_by),
+            "buses": self.buses,
             "held": self.held.tolist(),
             "share": _without_nan(share.tolist()),
             "loss_costs": {name: cost.tolist() for name, cost in self.loss_costs.items()},
@@ -179,12 +239,18 @@ class Capability:
         }
 
     def to_csv(self) -> str:
-        """Returns a table of `values`: a line for each heading, a column for each case."""
+        """Returns a table of `values`: a line for each heading, a column for each case; with power
+        budgets, also what limits the robot as it is, and after the worst loss."""
         names = [case.name for case in self.cases]
-        lines = [",".join(["heading_deg", *names, "worst", "worst_case"])]
+        limits = ["limited_by", "worst_limited_by"] if self.buses else []
+        lines = [",".join(["heading_deg", *names, "worst", "worst_case", *limits])]
+        limited_by = self.limited_by[0]
+        worst_limited_by = self.worst_limited_by
         for h, heading in enumerate(self.headings):
             cells = [f"{value:.10g}" for value in self.values[:, h]]
             cells += [f"{self.worst[h]:.10g}", self.worst_case[h]]
+            if self.buses:
+                cells += [limited_by[h], worst_limited_by[h]]
             lines.append(",".join([f"{heading:g}", *cells]))
         return "\n".join(lines) + "\n"
 
@@ -209,6 +275,7 @@ def capability(
     lost: Collection[str] = (),
     flow: ArrayLike | None = None,
     *,
+    power: object = None,
     progress: Callable[[float], object] | None = None,
 ) -> Capability:
     """Returns how much of a load a robot can hold by heading, and after each single loss.
@@ -222,15 +289,16 @@ def capability(
         headings: where the loads come from (H,) [deg], clockwise from ahead.
         lost: names of actuators that do not work already.
         flow: velocity of the robot relative to the water (6,) [m/s, rad/s]; None at rest.
+        power: the most that all actuators may take [W], or those of buses by name, as in
+            `finlab.Allocator.allocate`; None for the budget of the layout, infinity for no limit.
         progress: called with the share that is done before each case; what it raises ends the
             computation.
 
     Raises:
-        LayoutError: there is no actuator of a name, the loads do not fit, or the layout has a power
-            budget.
+        LayoutError: there is no actuator of a name, or the loads do not fit.
+        AllocationError: the power is none, or the flow drives actuators whose power is not known.
     """
     angles = _checked_headings(headings)
-    _refuse_budget(layout)
     if loads is None:
         # What comes from a heading pushes the other way.
         turn = np.deg2rad(angles)
@@ -256,7 +324,15 @@ def capability(
     layout.indices(tuple(lost), "lost")
     effectiveness = own_effectiveness(layout) * counted
     shapes = shapes_of(layout, flow)
-    every = [split_set(*each) for each in zip(layout.names, effectiveness, shapes, strict=True)]
+    budget = layout_budget(layout, power)
+    sides: Sequence[Sequence[Sides]] = [()] * layout.n
+    if budget is not None:
+        check_counted(layout, shapes)
+        sides = sides_of(layout, shapes)
+    buses = _buses(layout, budget)
+    every = []
+    for name, gain, shape, own in zip(layout.names, effectiveness, shapes, sides, strict=True):
+        every.append(split_set(name, gain, shape, own, buses.of_actuator.get(name)))
     working = [name for name in layout.names if name not in lost]
     cases = []
     for name, taken in [("intact", ()), *((name, (name,)) for name in working)]:
@@ -272,6 +348,7 @@ def capability(
         conditions=("load",),
         loads=wrench[:, None, :],
         scales=full,
+        buses=buses.watts,
         progress=progress,
     )
 
@@ -283,6 +360,7 @@ def dp_capability(
     lost: Collection[str] = (),
     losses: Collection[str] = LOSSES,
     *,
+    power: object = None,
     progress: Callable[[float], object] | None = None,
 ) -> Capability:
     """Returns the DP capability numbers of a ship by heading, and after each single loss, by
@@ -294,19 +372,21 @@ def dp_capability(
         headings: where the weather comes from (H,) [deg], clockwise from ahead.
         lost: names of actuators that do not work already.
         losses: which of `LOSSES` of thrust count besides the constant one; the standard has all.
+        power: as in `capability`. The power of a thrust is by [3.9.2] where the ship's file has
+            a power, else that of the layout's model.
         progress: as in `capability`.
 
     Raises:
-        LayoutError: there is no actuator of a name, the standard has no rule for one, or the layout
-            has a power budget.
+        LayoutError: there is no actuator of a name, or the standard has no rule for one.
+        AllocationError: the power is none.
     """
     angles = _checked_headings(headings)
-    _refuse_budget(layout)
     unknown = [name for name in losses if name not in LOSSES]
     if unknown:
         raise LayoutError(f"losses: expected some of {', '.join(LOSSES)}, got {', '.join(unknown)}")
     layout.indices(tuple(lost), "lost")
-    thrusters = ship_thrusters(layout, ship)
+    buses = _buses(layout, layout_budget(layout, power))
+    thrusters = ship_thrusters(layout, ship, buses.of_actuator if buses.watts else None)
     turn = np.deg2rad(angles)
     loads = np.zeros((len(angles), len(WEATHER), 6))
     left = np.ones((len(thrusters), len(angles), len(WEATHER)))
@@ -331,6 +411,7 @@ def dp_capability(
         conditions=tuple(f"BF {k}" for k in range(len(WEATHER))),
         loads=loads,
         scales=scales,
+        buses=buses.watts,
         progress=progress,
     )
     # The first condition that is not held, or the last of all.
@@ -346,7 +427,7 @@ def dp_capability(
         if loss == "ventilation":
             scale = np.full_like(scale, CONSTANT_LOSS)
         sets = ship_sets(thrusters, ship, lost, others)
-        share_without = largest_shares(sets, asked, scale).share
+        share_without = largest_shares(sets, asked, scale, buses.watts).share
         is_any = share_without > 0.0
         cost = np.where(is_any, 1.0 - with_all / np.where(is_any, share_without, 1.0), 0.0)
         costs[loss] = np.where(cost > NEARLY, cost, 0.0)
@@ -365,13 +446,15 @@ def _failures(
     return failures
 
 
-def _refuse_budget(layout: Layout) -> None:
-    """Raises LayoutError: a layout has a power budget, which no plot counts."""
-    if layout.power_w is not None or layout.buses:
-        raise LayoutError(
-            f"layout {layout.name}: has a power budget, which a capability plot does not count; "
-            "leave out power_w and buses, or see `finlab layout show`, which counts them"
-        )
+def _buses(layout: Layout, budget: PowerBudget | None) -> _Buses:
+    """The budgets of a plot by name."""
+    if budget is None:
+        return _Buses({}, {})
+    of_actuator = {}
+    for bus, members in zip(budget.names, budget.members, strict=True):
+        for i in np.flatnonzero(members):
+            of_actuator[layout.names[i]] = bus
+    return _Buses(dict(zip(budget.names, budget.watts.tolist(), strict=True)), of_actuator)
 
 
 def _checked_headings(headings: Sequence[float]) -> tuple[float, ...]:
@@ -394,20 +477,23 @@ def _answered(
     conditions: tuple[str, ...],
     loads: Array,
     scales: Sequence[Array],
+    buses: dict[str, float],
     progress: Callable[[float], object] | None,
 ) -> Capability:
     """A plot, by its loads (H, K, 6) and what is left of each case's actuators (C of (H, K, n));
     `progress` as in `capability`."""
     n_headings, n_conditions, _ = loads.shape
     share = np.zeros((len(cases), n_headings, n_conditions))
+    budget_worth = np.zeros((*share.shape, len(buses)))
     refusals = []
     for c, (case, scale) in enumerate(zip(cases, scales, strict=True)):
         if progress is not None:
             progress(c / len(cases))
         # The actuators' wrench is to be the opposite of the load.
         flat_scale = scale.reshape(n_headings * n_conditions, -1)
-        answer = largest_shares(case.sets, -loads.reshape(-1, 6), flat_scale)
+        answer = largest_shares(case.sets, -loads.reshape(-1, 6), flat_scale, buses)
         share[c] = answer.share.reshape(n_headings, n_conditions)
+        budget_worth[c] = answer.budget_worth.reshape(budget_worth[c].shape)
         for q, leaves in enumerate(answer.leaves):
             is_held = standard is not None and answer.share[q] >= 1.0 - HELD_MARGIN
             if leaves and not is_held:
@@ -433,4 +519,6 @@ def _answered(
         share=share,
         refusals=tuple(refusals),
         loss_costs={},
+        buses=buses,
+        budget_worth=budget_worth,
     )

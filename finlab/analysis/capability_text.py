@@ -30,6 +30,10 @@ class HeadingRow(NamedTuple):
     """After the worst single loss."""
     worst_case: str
     """Which loss that is."""
+    limited_by: str
+    """What limits the robot as it is: thrust, or power."""
+    worst_limited_by: str
+    """The same after the worst single loss."""
     costs: dict[str, float]
     """Share of the load that each loss of thrust costs at the limiting condition [1]."""
 
@@ -42,6 +46,8 @@ def _cost(row: HeadingRow, name: str) -> float:
 def heading_rows(capability: Capability) -> list[HeadingRow]:
     """Returns a row for each heading."""
     worst_case = capability.worst_case
+    limited_by = capability.limited_by[0]
+    worst_limited_by = capability.worst_limited_by
     rows = []
     for h, heading in enumerate(capability.headings):
         rows.append(
@@ -50,6 +56,8 @@ def heading_rows(capability: Capability) -> list[HeadingRow]:
                 value=float(capability.values[0, h]),
                 worst=float(capability.worst[h]),
                 worst_case=worst_case[h],
+                limited_by=limited_by[h],
+                worst_limited_by=worst_limited_by[h],
                 costs={name: float(cost[h]) for name, cost in capability.loss_costs.items()},
             )
         )
@@ -88,6 +96,11 @@ def capability_columns(capability: Capability) -> tuple[Column, ...]:
         Column("one lost", lambda row: scale * row.worst, unit, digits=digits),
         Column("worst without", lambda row: row.worst_case, is_text=True),
     ]
+    if capability.buses:
+        columns += [
+            Column("intact limited by", lambda row: row.limited_by, is_text=True),
+            Column("then limited by", lambda row: row.worst_limited_by, is_text=True),
+        ]
     for name in capability.loss_costs:
         columns.append(
             Column(
@@ -121,12 +134,27 @@ def capability_remarks(capability: Capability) -> list[str]:
         f"{capability.layout}{words} is weakest from {listed(names)} deg: {shown.words} {value}, "
         f"{lost}."
     )
+    if capability.buses:
+        sentences.append(_words_on_power(capability))
     n_refused = int((~capability.held).sum()) if capability.unit != "N" else 0
     if n_refused:
         sentences.append(
             f"{n_refused} of {capability.held.size} loads cannot be held; each has a certificate."
         )
     return sentences
+
+
+def _words_on_power(capability: Capability) -> str:
+    """Where power limits a plot with budgets."""
+    n_headings = len(capability.headings)
+    intact = int(capability.binding_buses[0].any(axis=-1).sum())
+    if not intact and not capability.worst_binding_buses.any():
+        return "The power budget limits no heading."
+    words = f"Power limits {intact} of {n_headings} headings"
+    if len(capability.cases) == 1:
+        return f"{words}."
+    lost = int(capability.worst_binding_buses.any(axis=-1).sum())
+    return f"{words}, and {lost} after the worst single loss; thrust limits the others."
 
 
 def capability_blocks(capability: Capability) -> list[Block]:
@@ -148,4 +176,10 @@ def capability_picture(capability: Capability) -> Figure:
         title = f"{capability.layout}: DP capability-L1({numbers})"
     worst = shown.scale * capability.worst if len(capability.cases) > 1 else None
     words = f"{shown.words} [{shown.unit}]" if shown.unit else shown.words
-    return polar_picture(title, words, capability.headings, curves, worst)
+    marks = None
+    if capability.buses:
+        marks = (
+            capability.binding_buses[0].any(axis=-1),
+            capability.worst_binding_buses.any(axis=-1),
+        )
+    return polar_picture(title, words, capability.headings, curves, worst, marks)

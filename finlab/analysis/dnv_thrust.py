@@ -8,7 +8,7 @@ skegs); those by the weather are factors of the whole set.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +21,9 @@ from finlab.analysis.split_sets import Piece, SplitSet
 from finlab.arrays import Array
 from finlab.axes import TURN, is_full_turn
 from finlab.errors import LayoutError
+from finlab.forces.force_sets import shapes_of
+from finlab.forces.power_sides import PowerCurve, Side
+from finlab.forces.within_budget import sides_of
 from finlab.layout import Layout
 
 LOSSES = ("ventilation", "flushing", "skeg")
@@ -49,6 +52,8 @@ MAGNET_EFFICIENCY = 0.995
 """The same of permanent magnet motors at the rim."""
 MAGNET_CYCLOIDAL_EFFICIENCY = 0.97
 """The same of permanent magnet cycloidal actuators."""
+THRUST_EXPONENT = 1.5
+"""Power grows with this power of the nominal thrust ([3.9.2])."""
 VENTILATION = (2.0, 1.5, 15.2, 0.85, 0.38)
 """k_V1 to k_V5 of the loss by ventilation ([3.9.4])."""
 FLUSHING_REACH = 15.0
@@ -92,6 +97,11 @@ class ShipThruster:
     arc: tuple[float, float] | None
     """Directions in which it may push [rad]; None all round. Of one that does not turn, that of its
     forward thrust, twice."""
+    power: tuple[PowerCurve, PowerCurve] | None = None
+    """What its forward and its reversed thrust take, as shares of the largest; None where no power
+    budget counts."""
+    bus: str | None = None
+    """Name of the bus whose budget counts; None for no limit."""
 
     @property
     def turns(self) -> bool:
@@ -104,16 +114,26 @@ class ShipThruster:
         return self.data.diameter_m
 
 
-def ship_thrusters(layout: Layout, ship: Ship) -> tuple[ShipThruster, ...]:
+def ship_thrusters(
+    layout: Layout, ship: Ship, bus_of: Mapping[str, str] | None = None
+) -> tuple[ShipThruster, ...]:
     """Returns the actuators of a layout as the standard has them.
+
+    Args:
+        layout: the actuators.
+        ship: the ship.
+        bus_of: the bus of each actuator that has one, by names; None where no power budget counts.
 
     Raises:
         LayoutError: the file of the ship names one that is not there, or the standard has no rule
             for one.
     """
     layout.indices(tuple(ship.actuators), "ship.actuators")
+    power: list[tuple[PowerCurve, PowerCurve] | None] = [None] * layout.n
+    if bus_of is not None:
+        power = [*_powers(layout, ship)]
     found = []
-    for actuator in layout.actuators:
+    for actuator, curves in zip(layout.actuators, power, strict=True):
         data = ship.actuators.get(actuator.name, ShipActuator())
         if isinstance(actuator, Azimuth):
             arc, known_type = _azimuth_arc(actuator)
@@ -149,9 +169,30 @@ def ship_thrusters(layout: Layout, ship: Ship) -> tuple[ShipThruster, ...]:
                 reverse=reverse,
                 data=data,
                 arc=arc,
+                power=curves,
+                bus=(bus_of or {}).get(actuator.name),
             )
         )
     return tuple(found)
+
+
+def _powers(layout: Layout, ship: Ship) -> Iterator[tuple[PowerCurve, PowerCurve]]:
+    """What the forward and the reversed thrust of each actuator takes: nominal thrust grows with
+    power^(2/3) ([3.9.2]), up to the brake power of the ship's file either way; without one, as the
+    model of the layout says."""
+    nothing = PowerCurve(0.0)
+    for actuator, sides in zip(layout.actuators, sides_of(layout, shapes_of(layout)), strict=True):
+        data = ship.actuators.get(actuator.name, ShipActuator())
+        if data.power_kw is not None:
+            at_most = PowerCurve(1e3 * data.power_kw, THRUST_EXPONENT)
+            yield at_most, at_most
+            continue
+        curves = [side.curve for side in sides[0]]
+        is_astern_alone = len(curves) == 1 and getattr(actuator, "force", (0.0, 0.0))[1] <= 0.0
+        if is_astern_alone:
+            curves.insert(0, nothing)
+        forward, reverse, *_ = (*curves, nothing, nothing)
+        yield forward, reverse
 
 
 def _azimuth_arc(azimuth: Azimuth) -> tuple[tuple[float, float] | None, ActuatorType]:
@@ -403,8 +444,30 @@ def ship_sets(
             cover, parts = _turning_set(thruster, zones, known)
         else:
             cover, parts = _line_set(thruster, zones, known), ()
-        sets.append(SplitSet(thruster.name, effectiveness, cover, parts))
+        if thruster.power is not None:
+            cover = _with_power(cover, thruster)
+            parts = tuple(_with_power(part, thruster) for part in parts)
+        sets.append(SplitSet(thruster.name, effectiveness, cover, parts, thruster.bus))
     return tuple(sets)
+
+
+def _with_power(piece: Piece, thruster: ShipThruster) -> Piece:
+    """A set of an actuator with what its forces take: where losses leave less of the thrust, the
+    power is still that of all."""
+    assert thruster.power is not None
+    forward, reverse = thruster.power
+    if piece.radius <= 0.0:
+        return piece
+    if thruster.turns:
+        side = Side(forward, piece.radius, piece.center, piece.half_angle, piece.corners)
+        return piece._replace(sides=(side,))
+    assert piece.corners is not None
+    sides = []
+    for corner, curve in zip(piece.corners, (forward, reverse), strict=True):
+        size = float(np.linalg.norm(corner))
+        if size > 0.0:
+            sides.append(Side(curve, size, corners=corner[None]))
+    return piece._replace(sides=tuple(sides))
 
 
 def _share_left(notches: Sequence[Notch], angle: Array) -> Array:

@@ -1,13 +1,13 @@
 """How much weakest direction no layout of some thrusters exceeds, wherever they stand and point.
 
-With f_i half of the range of forces of thruster i, or its weaker way where n = m, b_i its scaled
-wrench per newton, and m axes that count, the weakest direction r of n thrusters keeps
+With f_i the force of thruster i that counts, b_i its scaled wrench per newton, and m axes that
+count, the weakest direction r of n thrusters keeps (`zonotope_ball`)
 
-    r^2 <= K(n, m) / tr(M^-1),  M = sum_i f_i^2 b_i b_i^T,
+    r^2 <= K / tr(M^-1),  M = sum_i f_i^2 b_i b_i^T,
 
 and for any symmetric matrix C, the metric, tr(M^-1) >= (tr C)^2 / tr(C M C). So
 
-    r^2 <= K(n, m) / (tr C)^2 sum_i f_i^2 max |C b_i|^2,
+    r^2 <= K / (tr C)^2 sum_i f_i^2 max |C b_i|^2,
 
 where each thruster has its own largest value, over all of its poses. `PoseSet` encloses it. The
 bound holds for any metric; the best one is the inverse of M at an A-optimal design, whose thrusters
@@ -29,6 +29,7 @@ import numpy as np
 from finlab.analysis.keep_out import KeepOut
 from finlab.analysis.moves import Bounds, azimuth, mirror_pairs
 from finlab.analysis.pose_set import PoseSet
+from finlab.analysis.zonotope_ball import ball_factor
 from finlab.arrays import Array
 from finlab.axes import AXES as WRENCH
 from finlab.axes import Axis
@@ -60,7 +61,7 @@ class LayoutBound:
     longest: tuple[float, ...]
     """For each thruster the largest f^2 |C b|^2 of all its poses, from above (n,) [N^2]."""
     factor: float
-    """K(n, m), by which their sum is multiplied [1]."""
+    """K, by which their sum is multiplied [1]."""
     axes: tuple[Axis, ...]
     """The axes of the wrench that count (m,)."""
     rounds: int
@@ -109,35 +110,13 @@ def layout_bound(
     rows = [WRENCH.index(axis) for axis in counted]
     sets = _pose_sets(layout, names, bounds or {}, mirror, keep_outs)
     n_working = layout.n - after_loss
-    factor = inradius_factor(n_working, len(rows))
+    factor, force = ball_factor(layout.lower[:, 0], layout.upper[:, 0], n_working, len(rows))
     if factor == 0.0:
         zeros = np.zeros((len(rows), len(rows)))
         no_length = (0.0,) * layout.n
         return LayoutBound(0.0, _as_tuples(zeros), no_length, 0.0, tuple(counted), 0)
-    design = _Design(sets, _force_of_balls(layout, n_working == len(rows)) ** 2, rows)
-    best_value = math.inf
-    for n_rounds in range(1, rounds + 1):
-        metric = design.metric()
-        longest = design.longest(metric)
-        # A lost thruster is at best the one that counts most.
-        total = longest.sum() - (longest.max() if after_loss else 0.0)
-        value = math.sqrt(factor * total) * (1.0 + ROUNDING_SHARE)
-        if value < best_value:
-            best_value = value
-            certificate = LayoutBound(
-                value=value,
-                metric=_as_tuples(metric),
-                longest=tuple(longest.tolist()),
-                factor=factor,
-                axes=tuple(counted),
-                rounds=n_rounds,
-            )
-        if longest.sum() <= (1.0 + SETTLED) ** 2 * design.attained(metric):
-            break
-        if cancelled is not None and cancelled():
-            break
-        design.improve()
-    return certificate
+    design = _Design(sets, force**2, rows)
+    return _least_bound(design, factor, counted, after_loss, rounds, cancelled)
 
 
 def check_bounded(
@@ -167,39 +146,6 @@ def check_bounded(
             f"bound: expected thrusters alone, got {others[0].name}, a {others[0].type}; it holds "
             "for forces along lines"
         )
-
-
-def inradius_factor(n: int, m: int) -> float:
-    """Returns K(n, m), for which r^2 <= K / tr(M^-1) holds of the largest ball in a zonotope.
-
-    It is m (n - m + 1) by Cauchy-Schwarz. With two more columns than dimensions it is the value
-    of evenly spaced lines in a plane; multipliers in tests/analysis/planar_factor.py prove it. It
-    is 0 where n columns do not span m dimensions.
-
-    Args:
-        n: columns of the zonotope.
-        m: dimensions, 1 to 6.
-    """
-    if n < m:
-        return 0.0
-    if n == m + 2:
-        cotangent = 1.0 / math.tan(math.pi / (2.0 * n))
-        return n - 4.0 + 4.0 / n * cotangent**2
-    return float(m * (n - m + 1))
-
-
-def _force_of_balls(layout: Layout, is_square: bool) -> Array:
-    """The forces f (n,) [N] that count for balls about zero wrench.
-
-    A ball about 0 has a mirror image in the middle of all wrenches, and between both there is one
-    of the same size about that middle: half of the range of forces counts. Where as many columns
-    as dimensions leave one force for each wrench, the weaker way counts.
-    """
-    least = layout.lower[:, 0]
-    most = layout.upper[:, 0]
-    if is_square:
-        return np.maximum(np.minimum(most, -least), 0.0)
-    return np.asarray(0.5 * (most - least))
 
 
 def _pose_sets(
@@ -314,6 +260,41 @@ class _Design:
         self._columns = self._columns[is_kept]
         self._group = self._group[is_kept]
         self._share = self._share[is_kept]
+
+
+def _least_bound(
+    design: _Design,
+    factor: float,
+    axes: Sequence[Axis],
+    after_loss: bool,
+    rounds: int,
+    cancelled: Callable[[], bool] | None,
+) -> LayoutBound:
+    """The least bound by the metrics of a design that improves from round to round; arguments as
+    those of `layout_bound`."""
+    best_value = math.inf
+    for n_rounds in range(1, rounds + 1):
+        metric = design.metric()
+        longest = design.longest(metric)
+        # A lost thruster is at best the one that counts most.
+        total = longest.sum() - (longest.max() if after_loss else 0.0)
+        value = math.sqrt(factor * total) * (1.0 + ROUNDING_SHARE)
+        if value < best_value:
+            best_value = value
+            certificate = LayoutBound(
+                value=value,
+                metric=_as_tuples(metric),
+                longest=tuple(longest.tolist()),
+                factor=factor,
+                axes=tuple(axes),
+                rounds=n_rounds,
+            )
+        if longest.sum() <= (1.0 + SETTLED) ** 2 * design.attained(metric):
+            break
+        if cancelled is not None and cancelled():
+            break
+        design.improve()
+    return certificate
 
 
 def _as_tuples(matrix: Array) -> tuple[tuple[float, ...], ...]:

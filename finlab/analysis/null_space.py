@@ -2,7 +2,8 @@
 
 Forces y (m,) along the directions in which the working actuators push give the wrench B y. Where N
 (m, k) is a basis of the null space of B, y + N s gives the same wrench for every s (k,) [N], as
-long as every actuator has a command for its force. The app shows these alternatives.
+long as every actuator has a command for its force, and the power budget allows it. The app shows
+these alternatives.
 """
 
 import numpy as np
@@ -20,6 +21,8 @@ from finlab.physics import plant_of
 FORCE_TOLERANCE = 1e-3
 """Share of an actuator's largest force by which the force of its command may differ from the wanted
 one."""
+POWER_TOLERANCE = 1e-6
+"""Share by which rounding may exceed a power budget."""
 SAMPLES = 33
 """Shifts along a direction that are tried at once."""
 RANGE_ROUNDS = 3
@@ -45,6 +48,7 @@ class NullSpace:
         self._plant = plant_of(layout).at(answer.flow).counting(counts)
         compiled = Compiled(layout, self._plant, answer.scale).at(self._plant.inflow(None))
         self._compiled = compiled
+        self._budget = answer.budget
         self._command = answer.command[self._works]
         self._problem = CommandProblem.of(self._plant, answer.scale)
         self._wrench = self._problem.wrench(self._command[None])
@@ -96,7 +100,7 @@ class NullSpace:
 
         Returns:
             Least and most shift (count, 2) [N]; beyond them an actuator has no command for its
-            force.
+            force, or a bus not enough power.
         """
         directions = (
             np.repeat(np.eye(count, len(shift)), 2, axis=0) * np.tile([-1.0, 1.0], count)[:, None]
@@ -145,7 +149,7 @@ class NullSpace:
         return self._compiled.core.commands(self._forces(shift), self._command)
 
     def _has_commands(self, shift: Array) -> NDArray[np.bool_]:
-        """Whether all actuators have commands for shifts (R, k)."""
+        """Whether all actuators have commands for shifts (R, k), within the power budget."""
         force = self._forces(shift)
         command = self._start_commands(shift)
         force_of_command = self._compiled.forces_along(self._plant.force(command))
@@ -153,7 +157,17 @@ class NullSpace:
             self._compiled.is_line[:, None], [1.0, 0.0], 1.0
         )  # drag comes with the lift
         error = np.linalg.norm((force_of_command - force) * counts, axis=-1)
-        return np.asarray((error <= FORCE_TOLERANCE * self._force_max).all(axis=1))
+        is_given = (error <= FORCE_TOLERANCE * self._force_max).all(axis=1)
+        return np.asarray(is_given & self._is_within_budget(command))
+
+    def _is_within_budget(self, command: Array) -> NDArray[np.bool_]:
+        """Whether commands (R, n, 3) of the working actuators keep the power budget of the
+        answer."""
+        if self._budget is None:
+            return np.ones(len(command), bool)
+        members = self._budget.members[:, self._works]
+        taken = self._plant.power(command) @ members.T
+        return np.asarray((taken <= self._budget.watts * (1.0 + POWER_TOLERANCE)).all(axis=-1))
 
 
 def _sparse(basis: Array) -> Array:

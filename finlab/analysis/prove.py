@@ -124,7 +124,8 @@ def box_share(layout: Layout, share: float, free: Sequence[str] = ()) -> tuple[f
     if not counted:
         raise CommandError("free: names each axis that the robot commands")
     layout = replace(layout, axes=tuple(counted))
-    ranges = axis_ranges(layout, np.zeros(6))
+    # A share of what the forces can: the statement may have a power of its own.
+    ranges = axis_ranges(layout, np.zeros(6), power=math.inf)
     reach = np.nan_to_num(np.minimum(-ranges.low, ranges.high), nan=0.0, posinf=0.0, neginf=0.0)
     reach = np.where(layout.commanded, np.maximum(reach, 0.0), 0.0)
     strongest = float(force_sets(layout).unit[0])

@@ -5,6 +5,9 @@ the sum of what each one can earn by itself, its support function; a load that w
 out of reach. Actuators whose sets are not convex are covered by several prices: one for each leaf
 of a tree that chooses among their parts.
 
+Where buses have a power budget, their power has a price, too: an actuator earns what its force
+does, less the price of the power that this takes, and to the sum comes what all budgets are worth.
+
 This file imports nothing of finlab, so that it can be read, and trusted, by itself.
 """
 
@@ -16,34 +19,91 @@ def support(piece: dict[str, Any], pull: tuple[float, float]) -> float:
     """Returns the most that a force of a convex set earns at a pull (2,) [1/N]."""
     if "corners_n" in piece:
         return float(max(x * pull[0] + y * pull[1] for x, y in piece["corners_n"]))
-    center = piece["center_rad"]
-    half_angle = piece["half_angle_rad"]
+    return max(0.0, largest_pull(piece, pull))
+
+
+def largest_pull(arc: dict[str, Any], pull: tuple[float, float]) -> float:
+    """Returns the most that one of the largest forces of a sector earns at a pull (2,) [1/N]."""
+    center = arc["center_rad"]
+    half_angle = arc["half_angle_rad"]
     turn = math.remainder(math.atan2(pull[1], pull[0]) - center, 2.0 * math.pi)
     if abs(turn) <= half_angle:
-        return float(piece["radius_n"] * math.hypot(*pull))
+        return float(arc["radius_n"] * math.hypot(*pull))
     ends = []
     for end in (center - half_angle, center + half_angle):
         ends.append(math.cos(end) * pull[0] + math.sin(end) * pull[1])
-    return float(piece["radius_n"] * max(0.0, *ends))
+    return float(arc["radius_n"] * max(ends))
+
+
+def earned_by(piece: dict[str, Any], pull: tuple[float, float], watt_price: float) -> float:
+    """Returns the most that a force of a convex set earns at a pull (2,) [1/N], less the price of
+    its power [1/W]. A set with a power has sides, of which any may be taken: its largest forces,
+    and what shares of these take."""
+    if "sides" not in piece:
+        return support(piece, pull)
+    return max((profit(side, pull, watt_price) for side in piece["sides"]), default=0.0)
+
+
+def profit(side: dict[str, Any], pull: tuple[float, float], watt_price: float) -> float:
+    """Returns the same of one side."""
+    if "corners_n" in side:
+        reach = max(x * pull[0] + y * pull[1] for x, y in side["corners_n"])
+    else:
+        reach = largest_pull(side, pull)
+    if "knots" in side:
+        return best_of_knots(side["knots"], reach, watt_price)
+    # The best share g of  g reach - price watts g^exponent.
+    watts, exponent = side["watts"], side["exponent"]
+    share = 0.0
+    if reach > 0.0:
+        slope_at_most = watt_price * watts * exponent
+        share = 1.0
+        if reach < slope_at_most:
+            share = (reach / slope_at_most) ** (1.0 / (exponent - 1.0))
+    share = max(share, side["least_share"])
+    return float(share * reach - watt_price * watts * share**exponent)
+
+
+def best_of_knots(knots: list[list[float]], reach: float, watt_price: float) -> float:
+    """Returns the most of  g reach - price P(g)  where P has knots of g, P and its slope, and a
+    slope that is linear between them."""
+    best = max(share * reach - watt_price * watts for share, watts, _ in knots)
+    for (share, watts, slope), (next_share, _, next_slope) in zip(knots, knots[1:], strict=False):
+        if watt_price * slope < reach < watt_price * next_slope:
+            rise = reach / watt_price - slope
+            further = (next_share - share) * rise / (next_slope - slope)
+            power = watts + further * (slope + 0.5 * rise)
+            best = max(best, (share + further) * reach - watt_price * power)
+    return float(best)
 
 
 def proven_share(
-    sets: list[dict[str, Any]], scales: list[float], leaf: dict[str, Any], load: list[float]
+    sets: list[dict[str, Any]],
+    scales: list[float],
+    leaf: dict[str, Any],
+    load: list[float],
+    buses: dict[str, float] | None = None,
 ) -> float:
     """Returns the share of a load that forces of a leaf cannot exceed, by the leaf's price.
 
     Args:
         sets: the actuators' sets.
         scales: what is left of each actuator's forces [1].
-        leaf: `parts` by name, and `price`.
+        leaf: `parts` by name, `price`, and `watt_prices` by the names of buses.
         load: wrench (6,) that is to be held [N, N m]; the forces together oppose it.
+        buses: power budgets by name [W].
 
     Returns:
         The bound; 0 where the price refuses the load, but not multiples of it; infinity where it
         proves nothing.
     """
     price = leaf["price"]
+    watt_prices = leaf.get("watt_prices", {})
+    if any(not watt_price >= 0.0 for watt_price in watt_prices.values()):
+        return math.inf
     earned = 0.0
+    for bus, watt_price in watt_prices.items():
+        earned += watt_price * (buses or {}).get(bus, math.inf)
     for actuator, scale in zip(sets, scales, strict=True):
         first, second = (
             sum(p * w for p, w in zip(price, column, strict=True))
@@ -51,7 +111,8 @@ def proven_share(
         )
         part = leaf["parts"].get(actuator["name"])
         piece = actuator["cover"] if part is None else actuator["parts"][part]
-        earned += scale * support(piece, (first, second))
+        pull = (scale * first, scale * second)
+        earned += earned_by(piece, pull, watt_prices.get(actuator.get("bus"), 0.0))
     asked = -sum(p * w for p, w in zip(price, load, strict=True))
     if asked > 0.0:
         return float(max(earned / asked, 0.0))
@@ -103,7 +164,10 @@ def faults(capability: dict[str, Any]) -> list[str]:
         if not covers(leaves, case["sets"]):
             found.append(f"{where}: the leaves leave out a choice among parts")
             continue
-        bounds = [proven_share(case["sets"], refusal["scales"], leaf, load) for leaf in leaves]
+        bounds = [
+            proven_share(case["sets"], refusal["scales"], leaf, load, capability.get("buses", {}))
+            for leaf in leaves
+        ]
         limit = refusal["share"] * (1.0 + 1e-9) + 1e-9
         if not all(bound <= limit for bound in bounds):
             found.append(f"{where}: the prices prove {max(bounds):g}, not {refusal['share']:g}")

@@ -1,5 +1,6 @@
 """The score card of a layout: authority, losses and powers; and a quick check without powers."""
 
+import math
 from collections.abc import Collection
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -17,6 +18,7 @@ from finlab.axes import MotionAxis
 from finlab.display import html, text
 from finlab.display.pictures import ranges_picture
 from finlab.forces.force_sets import cut_actuators, force_sets, not_convex
+from finlab.forces.within_budget import counts_budget
 from finlab.layout import Layout
 from finlab.physics.objective import REACHED
 
@@ -28,7 +30,8 @@ def least_power(
     lost: Collection[str] = (),
     flow: ArrayLike | None = None,
 ) -> Array:
-    """Returns the least power for each wrench, (N,) [W]; NaN where it is out of reach.
+    """Returns the least power for each wrench, (N,) [W]; NaN where it is out of reach, or of the
+    power budget of the layout where method `dual` keeps it.
 
     Args:
         layout: the layout.
@@ -42,7 +45,10 @@ def least_power(
     wrenches_asked = np.asarray(wrenches, dtype=np.float64).reshape(-1, 6)
     if len(set(layout.indices(tuple(lost), "lost"))) == layout.n:
         return np.where((wrenches_asked == 0.0).all(-1), 0.0, np.nan)
-    answer = Allocator(layout).allocate_batch(wrenches_asked, lost=tuple(lost), flow=flow)
+    power = math.inf if budget_of(layout) is not None and _refused_by_dual(layout) else None
+    answer = Allocator(layout).allocate_batch(
+        wrenches_asked, lost=tuple(lost), flow=flow, power=power
+    )
     return np.where(answer.err_norm <= REACHED, answer.power, np.nan)
 
 
@@ -159,10 +165,7 @@ def _notes(layout: Layout, lost: Collection[str], flow: Array | None) -> tuple[s
             reason = "some actuators have several arcs"
         notes.append(f"{subject} of the convex hull: {reason}.")
     if budget_of(layout) is not None:
-        notes.append(
-            "Largest wrenches and powers are within the layout's power budget; the weakest "
-            "direction is that of the forces alone."
-        )
+        notes.append(_note_on_budget(layout, flow))
     pushed_by_flow = [name for name in layout.flow_driven if name not in lost]
     if flow is not None and pushed_by_flow:
         notes.append("Forces of the flow count with the convex hull of their lift and drag.")
@@ -180,6 +183,29 @@ def _notes(layout: Layout, lost: Collection[str], flow: Array | None) -> tuple[s
             "Reach and power are those of the actuators' laws: what their jets take is not in them."
         )
     return tuple(notes)
+
+
+def _note_on_budget(layout: Layout, flow: Array | None) -> str:
+    """What counts the power budget of a layout."""
+    if not counts_budget(layout, flow):
+        return (
+            "The layout's power budget does not count: what actuators take that the flow drives is "
+            "not the power of a force alone."
+        )
+    if _refused_by_dual(layout):
+        return (
+            "Largest wrenches and the weakest direction are within the layout's power budget, the "
+            "powers are not: method dual keeps none for such a robot."
+        )
+    return (
+        "Largest wrenches, the weakest direction and powers are within the layout's power budget."
+    )
+
+
+def _refused_by_dual(layout: Layout) -> bool:
+    """Whether method `dual` keeps no power budget for a robot."""
+    has_rudder = any(actuator.KIND.driven_by_flow for actuator in layout.actuators)
+    return has_rudder or layout.interaction is not None
 
 
 @dataclass(frozen=True)

@@ -30,17 +30,14 @@ from finlab.layout import Layout
 
 MAX_FACETS = 600
 """Most facets that are looked at, after all losses: those of eleven thrusters and six axes."""
-STEPS = 800
-"""Steps of the ascent."""
-EVEN_STEPS = 600
-"""Steps with even limits, where thrusters may be reversed."""
 FACING_ROUNDS = 2
 """How often the reversal of each thruster, and of each two, is tried."""
-SHARPNESS = (30.0, 2000.0)
-"""beta times the mean distance, at the first step and after the last."""
-STEP_SIZE = (0.03, 0.0002)
-"""Change of a number by a steady slope, at the first step and after the last, as a share of its
-bounds."""
+HOP_SIZE = 0.1
+"""Standard deviation of a hop's change of a number, as a share of its bounds."""
+HOP_PARENTS = 8
+"""Best vectors from which hops begin."""
+HOPS_OF_EACH = 3
+"""Hops from each of them."""
 FIRST_MEMORY = 0.9
 """Share of the mean slope that a step keeps (beta_1 of Adam)."""
 SECOND_MEMORY = 0.99
@@ -55,6 +52,26 @@ REPAIR_MARGIN = 1e-7
 """How far beyond the rules such a step aims [m]."""
 SPREAD = 1e-9
 """Random part of the largest column that is added to columns, so that none depend on others."""
+
+
+class Schedule(NamedTuple):
+    """How an ascent goes on in time."""
+
+    steps: int
+    """Its steps."""
+    even_steps: int
+    """How many of them have even limits, where thrusters may be reversed."""
+    sharpness: tuple[float, float]
+    """beta times the mean distance, at the first step and after the last."""
+    step_size: tuple[float, float]
+    """Change of a number by a steady slope, at the first step and after the last, as a share of its
+    bounds."""
+
+
+FIRST = Schedule(steps=800, even_steps=600, sharpness=(30.0, 2000.0), step_size=(0.03, 0.0002))
+"""From anywhere."""
+HOP = Schedule(steps=400, even_steps=0, sharpness=(60.0, 2000.0), step_size=(0.02, 0.0002))
+"""From near a vector that is good already."""
 
 
 class FacetTable:
@@ -178,32 +195,64 @@ class SoftAscent:
             vectors: where to begin (P, D).
             cancelled: called after each step; the ascent ends when it returns True.
         """
+        return self._ascended(vectors, FIRST, cancelled)
+
+    def hopped(
+        self,
+        vectors: Array,
+        random: np.random.Generator,
+        cancelled: Callable[[], bool] = lambda: False,
+    ) -> Array:
+        """Returns vectors (24 or fewer, D) after hops from the best of some: each number changes at
+        random, and an ascent follows (basin hopping, after Wales and Doye, 1997).
+
+        Args:
+            vectors: vectors (P, D) that were raised before.
+            random: draws the changes.
+            cancelled: called after each step; the ascent ends when it returns True.
+        """
+        moves = self._rules.moves
+        best = np.argsort(-self.least_distances(vectors), kind="stable")[:HOP_PARENTS]
+        parents = np.repeat(vectors[best], HOPS_OF_EACH, axis=0)
+        change = HOP_SIZE * random.standard_normal(parents.shape)
+        share = self._within_bounds((parents - moves.lower) / self._width + change)
+        return self._ascended(moves.lower + share * self._width, HOP, cancelled)
+
+    def _ascended(self, vectors: Array, schedule: Schedule, cancelled: Callable[[], bool]) -> Array:
+        """Vectors (P, D) after an ascent by Adam, brought back within the rules."""
         moves = self._rules.moves
         tilts = moves.whole_tilts
-        n_even = EVEN_STEPS if len(tilts) else 0
+        n_even = schedule.even_steps if len(tilts) else 0
         most = 0.5 * (self._most - self._least)
         least = -most
         mean = float(self._facets(vectors, least, most).distance.mean())
+        if n_even == 0:
+            least = self._least
+            most = self._most
         share = (vectors - moves.lower) / self._width
         first = np.zeros_like(share)
         second = np.zeros_like(share)
-        for t, time in enumerate(np.linspace(0.0, 1.0, STEPS)):
-            if t == n_even:
+        for t, time in enumerate(np.linspace(0.0, 1.0, schedule.steps)):
+            if 0 < t == n_even:
                 share = self._faced(share, tilts)
                 least = self._least
                 most = self._most
-            beta = np.interp(time, (0.0, 1.0), SHARPNESS) / mean
-            step_size = np.interp(time, (0.0, 1.0), STEP_SIZE)
+            beta = np.interp(time, (0.0, 1.0), schedule.sharpness) / mean
+            step_size = np.interp(time, (0.0, 1.0), schedule.step_size)
             slope = self._slope(moves.lower + share * self._width, least, most, beta, mean)
             first += (1.0 - FIRST_MEMORY) * (slope - first)
             second += (1.0 - SECOND_MEMORY) * (slope**2 - second)
             unbiased = first / (1.0 - FIRST_MEMORY ** (t + 1))
             size = np.sqrt(second / (1.0 - SECOND_MEMORY ** (t + 1)))
-            share = share + step_size * unbiased / (size + LEAST_SIZE)
-            share = np.where(moves.is_whole_turn, share % 1.0, np.clip(share, 0.0, 1.0))
+            share = self._within_bounds(share + step_size * unbiased / (size + LEAST_SIZE))
             if cancelled():
                 break
         return self._repaired(moves.lower + share * self._width)
+
+    def _within_bounds(self, share: Array) -> Array:
+        """Shares of the bounds (P, D) brought between 0 and 1; angles of a whole turn go round."""
+        is_whole_turn = self._rules.moves.is_whole_turn
+        return np.asarray(np.where(is_whole_turn, share % 1.0, np.clip(share, 0.0, 1.0)))
 
     def _facets(self, vectors: Array, least: Array, most: Array) -> Facets:
         """The facets of the robot moved by vectors (P, D), with limits (n,) [N]."""

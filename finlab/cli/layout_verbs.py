@@ -90,6 +90,7 @@ def capability(
     losses: Annotated[
         tuple[Literal["ventilation", "flushing", "skeg"], ...] | None, arg(metavar="LOSS...")
     ] = None,
+    power: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="W|BUS=W")] = (),
     plot: Annotated[Path | None, arg(metavar="FILE")] = None,
     csv: Annotated[Path | None, arg(metavar="FILE.csv")] = None,
     json: shared_options.JsonFile = None,
@@ -108,9 +109,12 @@ def capability(
         lost: name of an actuator that does not work already.
         losses: losses of thrust that count besides the constant one; all of the standard's by
             default.
+        power: the most that all actuators may take together [W], or those of a power bus of the
+            layout, such as aft=60, in place of the layout's budget; inf for no limit.
         plot: file for the polar plot, .png, .svg or .pdf (needs matplotlib, extra plot).
         csv: file for a table with a column for each loss.
     """
+    from finlab.allocation.power_budget import power_from
     from finlab.analysis.capability import MAX_HEADINGS, dp_capability
     from finlab.analysis.capability import capability as capability_by_loads
     from finlab.analysis.capability_text import capability_picture
@@ -135,14 +139,16 @@ def capability(
         raise CommandError(f"headings: expected 1 to {MAX_HEADINGS} of them, got {headings}")
     robot, lost_names = shared_options.open_robot(layout, lost)
     angles = tuple(360.0 * k / headings for k in range(headings))
+    watts = power_from(power)
     if ship is not None:
         known = LOSSES if losses is None else losses
-        answer = dp_capability(robot, in_worker(read_ship, ship), angles, lost_names, known)
+        particulars = in_worker(read_ship, ship)
+        answer = dp_capability(robot, particulars, angles, lost_names, known, power=watts)
     elif loads is not None:
         angles, wrench = in_worker(read_loads, loads)
-        answer = capability_by_loads(robot, wrench, angles, lost_names, flow)
+        answer = capability_by_loads(robot, wrench, angles, lost_names, flow, power=watts)
     else:
-        answer = capability_by_loads(robot, None, angles, lost_names, flow)
+        answer = capability_by_loads(robot, None, angles, lost_names, flow, power=watts)
     if csv is not None:
         write_whole(csv, answer.to_csv(), DataError)
     if plot is not None:

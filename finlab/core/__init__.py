@@ -35,6 +35,7 @@ SIGNATURES = {
     "fl_power_bound_of_row": "rppppp",
     "fl_dual_points": "ippppiipppppp",
     "fl_reach": "vpppppirppp",
+    "fl_reach_within": "vpppppipppirppppp",
     "fl_jets": "vppipppp",
     "fl_line_jets_length": "ip",
     "fl_prepare_line_jets": "vpp",

@@ -43,6 +43,12 @@ typedef double fl_wide; /* where differences of large numbers matter, in single 
 #ifndef FL_SLIPSTREAMS
 #define FL_SLIPSTREAMS 1 /* whether rudders in slipstreams are known; exports without any have 0 */
 #endif
+#ifndef FL_GAUGES
+#define FL_GAUGES 1 /* whether a force may differ by direction; exports without such have 0 */
+#endif
+#ifndef FL_COUPLES
+#define FL_COUPLES 1 /* whether actuators may act on each other; exports of others have 0 */
+#endif
 #ifndef FL_AIMS
 #define FL_AIMS 1 /* whether pods or fins turn; exports of robots without any have 0 */
 #endif
@@ -168,6 +174,7 @@ enum {
   FL_BAD_VERSION,  /* a block of another FL_VERSION */
   FL_BAD_NUMBER,   /* of a robot: not finite, or out of its range */
   FL_BAD_ARGUMENT, /* of a question or of settings: the same */
+  FL_OVER_BUDGET,  /* of an export's short call: commands are given, but take too much power */
   FL_ERRORS        /* how many codes there are */
 };
 
@@ -383,6 +390,25 @@ fl_real fl_power_bound_of_row(const fl_prepared_call *call, const fl_formula *la
 void fl_reach(const fl_real *block, fl_work *work, const fl_real *sets, const fl_wide *from,
               const fl_wide *ray, int count, fl_wide close, fl_wide *size, fl_wide *normal,
               fl_real *force);
+
+#ifdef FL_WITH_POWER_SETS
+/* Says the same within power budgets of buses.
+
+   @param tables     corners and curves of the sides, one behind the other; the first number is
+                     not used
+   @param sides      (., 8): sets of forces and their powers, fl_power_side of internal.h
+   @param budget     (buses,) the most power of each bus [W]
+   @param buses      how many, FL_BUSES at most
+   @param sets       (count, n, 16): of each actuator its first side and how many it has, of which
+                     any may be taken, its bus or -1, whether it works; then the wrench per newton
+   @param corners    a number for each side, 0 at first, for this function alone
+   @param multiplier (count, buses) of the budgets at the planes, in the unit of `from` over W */
+void fl_reach_within(const fl_real *block, fl_work *work, const fl_real *tables,
+                     const fl_real *sides, const fl_real *budget, int buses, const fl_real *sets,
+                     const fl_wide *from, const fl_wide *ray, int count, fl_wide close,
+                     int *corners, fl_wide *size, fl_wide *normal, fl_real *force,
+                     fl_wide *multiplier);
+#endif
 
 /* Takes some steps of Newton's method on the dual from given multipliers, and evaluates it there.
 

@@ -51,7 +51,9 @@ FL_FIELD(fl_real, is_free_angle, , "1", "1 where the angle of the command may tu
 FL_FIELD(fl_real, barred_count, , "1", "of a pod: zones between arcs that it may not push in")
 FL_FIELD(fl_real, barred, [4][2], "rad", "least and greatest angle of each such zone")
 FL_FIELD(fl_real, law_grid, , "offset", "grid of the law")
-FL_FIELD(fl_real, command_table, , "offset", "a fin's beat, or a foil's curve of lift and angle")
+FL_FIELD(fl_real, command_table, , "offset",
+         "a fin's beat, a foil's curve of lift and angle, or the ends of a steered propeller's "
+         "curve: angle of the force and deflection")
 FL_FIELD(fl_real, command_sign, , "1",
          "of the command over the force: -1 of a thruster that only pulls, else 1")
 FL_FIELD(fl_real, lean_angle, , "rad", "of a fin or foil: angle from command to force")

@@ -117,6 +117,9 @@ typedef struct {
 #define FL_DEPTH_OF(n) (16 + (n))
 #define FL_DEPTH FL_DEPTH_OF(FL_MOST)
 
+/* Sets of forces with powers, of the library alone (power_sets.c). */
+typedef struct fl_power_sets fl_power_sets;
+
 /* A mixture of points, and an orthonormal basis of their differences from the first one. */
 typedef struct {
   fl_wide force[FL_POINTS][FL_MOST][2]; /* of each point [N] */
@@ -220,6 +223,7 @@ struct fl_work {
   int is_rim_exact;        /* whether point and normal are known to rounding */
   fl_wide distance_enough; /* over the wrench scale, up to which a point is the nearest one */
   const fl_wide *ray; /* (6,) of which a mixture may take a share, in weighted axes; 0 for none */
+  fl_power_sets *power_sets; /* within whose budgets fl_reach_within asks; 0 for none */
 
   /* Sets with gaps. */
   fl_cut cut[FL_DEPTH]; /* cuts on the way to the part that is looked at */

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 import finlab
 from finlab import core
 from finlab.actuators.actuator import Kind
+from finlab.actuators.propeller_rudder import PropellerRudder
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.dual.compiled import core_policy
 from finlab.allocation.dual.method import Dual, DualSettings
@@ -34,6 +35,7 @@ from finlab.deploy.c_interaction import (
     coupled_source,
 )
 from finlab.deploy.thin_block import tables_of, thinned
+from finlab.errors import AllocationError
 from finlab.layout import Layout
 from finlab.physics.objective import wrench_scale_of
 from finlab.whole_file import write_folder
@@ -51,6 +53,7 @@ FILES_LEFT_OUT = (
     "actuator_formulas.c",
     "messages.c",
     "ray_reach.c",
+    "power_sets.c",
     "for_python.c",
     "prepared_call.c",
     "answer_many.c",
@@ -130,6 +133,7 @@ def c_sources(
     margin = 0.0
     if budget is not None:
         method.check_budget(budget, CLOSEST)
+        _check_slipstreams(layout)
         margin = _budget_margin(method, budget)
         budget = PowerBudget(budget.names, budget.members, budget.watts / (1.0 + margin))
     block = method.compiled.block
@@ -142,8 +146,9 @@ def c_sources(
     sources["fl_names.h"] = _prefixed_names(declared, name)
     zones = int(actuators_of(block)["barred_count"].max(initial=0.0))
     is_steered = actuators_of(block)["command_kind"] == constant("FL_STEERED")
+    has_gauges = bool((actuators_of(block)["gauge_table"] > 0.0).any())
     aims = any(actuator.KIND.aiming_number is not None for actuator in layout.actuators)
-    size = ExportSize(layout.n, foils, zones, bool(is_steered.any()), aims)
+    size = ExportSize(layout.n, foils, zones, bool(is_steered.any()), has_gauges, aims)
     sources["finlab.h"] = _with_size(sources["finlab.h"], size, is_coupled)
     if budget is None:
         sources["finlab.h"] = _without_budgets(sources["finlab.h"])
@@ -168,7 +173,7 @@ def c_sources(
         double=8 * len(block),
         single=4 * len(thin),
         law=4 * law,
-        budget=_budget_words(budget, margin),
+        budget=_budget_words(budget, margin, name),
         axes=", ".join(np.array(AXES)[layout.commanded]),
         flow="at rest"
         if water is None
@@ -230,6 +235,8 @@ class ExportSize(NamedTuple):
     """Most barred zones of a pod."""
     has_slipstreams: bool
     """Whether a rudder stands in the slipstream of a propeller."""
+    has_gauges: bool
+    """Whether the force of a fin differs by its direction."""
     aims: bool
     """Whether some actuator turns to aim its force."""
 
@@ -242,6 +249,8 @@ def _with_size(header: str, size: ExportSize, is_coupled: bool) -> str:
         "FL_ARCS": min(size.foils, constant("FL_ARCS")),
         "FL_ZONES": size.zones,
         "FL_SLIPSTREAMS": int(size.has_slipstreams),
+        "FL_GAUGES": int(size.has_gauges),
+        "FL_COUPLES": int(is_coupled),
         "FL_AIMS": int(size.aims),
     }
     for name, value in values.items():
@@ -277,13 +286,24 @@ def _budget_margin(method: Dual, budget: PowerBudget) -> float:
     return 2.0 * most
 
 
+def _check_slipstreams(layout: Layout) -> None:
+    """Refuses a robot with rudders in slipstreams, whose budgets the core alone does not keep."""
+    for actuator in layout.actuators:
+        if isinstance(actuator, PropellerRudder):
+            raise AllocationError(
+                f"power: no budget is kept yet by exports to C of robots with a rudder in a "
+                f"slipstream ({actuator.name}); leave out `power_w` and `buses`, or scale the "
+                "wrench down on board"
+            )
+
+
 def _without_budgets(header: str) -> str:
     """finlab.h of a robot without a power budget, which needs no code for one."""
     return header.replace("#define FL_KEEPS_BUDGETS 1", "#define FL_KEEPS_BUDGETS 0", 1)
 
 
-def _budget_words(budget: PowerBudget | None, margin: float) -> str:
-    """What the README says of the power budget."""
+def _budget_words(budget: PowerBudget | None, margin: float, identifier: str) -> str:
+    """What the README says of the power budget of a robot, with its name in C."""
     if budget is None:
         return "The layout has no power budget, and `question.budget` is refused."
     buses = ", ".join(
@@ -292,12 +312,13 @@ def _budget_words(budget: PowerBudget | None, margin: float) -> str:
     words = (
         f"`question.budget = ROBOT_BUDGET;` keeps the power within the layout's budget ({buses}), "
         "as the function `allocate` of the plain header does. `answer.exceeds_budget` says where "
-        "that was not found, or rates forbid it."
+        "that was not found, or rates forbid it; `allocate` then writes the commands and returns "
+        f"`FL_{identifier.upper()}_OVER_BUDGET`, which is not 0."
     )
     if margin > 0.0:
         words += (
-            f" That is {100.0 * margin:.2g} % less than the layout has: by so much powers by the "
-            "laws may be above those of the tables here."
+            f" It is {100.0 * margin:.2g} % below the budget of the layout: by so much powers "
+            "by the laws may be above those of the tables here."
         )
     return words
 
@@ -418,14 +439,15 @@ _PLAIN_HEADER = """/* The robot {title} in three functions, for C and C++.
 extern "C" {{
 #endif
 
-{rows}
+{rows}{budget}
 /* Finds commands of least power for a wrench; beyond reach those that give the largest share of
    it. Not for several threads at once.
 
    @param wrench    (6,) Fx, Fy, Fz [N], Tx, Ty, Tz [N m], body frame: x forward, y left, z up
    @param previous  (count, 3) commands of the tick before, from which rates hold; 0 for none
    @param command   (count, 3) becomes the commands; unused numbers are 0
-   @return          0, or a code for fl_{name}_error_text; then the commands are as they were */
+   @return          0, or a code for fl_{name}_error_text; then the commands are as they
+                    were{but} */
 int fl_{name}_allocate(const double *wrench, const double (*previous)[3], double (*command)[3]);
 
 /* @return a sentence that says what is wrong and what to do */
@@ -440,6 +462,11 @@ int fl_{name}_selftest(void);
 #endif
 """
 
+_PLAIN_BUDGET = """
+/* What `allocate` returns where the commands are written, but take more power than a bus may give:
+   rates forbid less in this tick, or none was found. */
+#define FL_{upper}_OVER_BUDGET {code}
+"""
 _PLAIN_SOURCE = """#include "robot.h"
 #include "fl_{name}.h"
 
@@ -471,9 +498,10 @@ int fl_{name}_allocate(const double *wrench, const double (*previous)[3], double
   if (code) return code;
   for (int i = 0; i < ROBOT_COUNT; i++)
     for (int k = 0; k < 3; k++) command[i][k] = (double)answer.command[i][k];
-  return FL_OK;
+{over_budget}  return FL_OK;
 }}
 """
+_OVER_BUDGET = "  if (answer.exceeds_budget) return FL_OVER_BUDGET;\n"
 
 
 def _header(layout: Layout, name: str) -> str:
@@ -487,11 +515,20 @@ def _header(layout: Layout, name: str) -> str:
 
 def _plain_header(layout: Layout, name: str) -> str:
     rows = _rows_of_commands(layout, f"FL_{name.upper()}")
-    return _PLAIN_HEADER.format(title=layout.name, name=name, upper=name.upper(), rows=rows)
+    upper = name.upper()
+    but = ""
+    budget = ""
+    if budget_of(layout) is not None:
+        but = f", but for FL_{upper}_OVER_BUDGET"
+        budget = _PLAIN_BUDGET.format(upper=upper, code=constant("FL_OVER_BUDGET"))
+    return _PLAIN_HEADER.format(
+        title=layout.name, name=name, upper=upper, rows=rows, but=but, budget=budget
+    )
 
 
 def _plain_source(layout: Layout, name: str) -> str:
-    return _PLAIN_SOURCE.format(name=name, calm=DualSettings().calm)
+    over_budget = "" if budget_of(layout) is None else _OVER_BUDGET
+    return _PLAIN_SOURCE.format(name=name, calm=DualSettings().calm, over_budget=over_budget)
 
 
 def _core_command(method: Dual, wrench: Array, policy: Policy) -> Array:

@@ -21,8 +21,6 @@ CELLS = 128
 """Most cells of a table; of a foil's angles and lifts twice as many knots."""
 POINTS = 64
 """Most directions of a gauge."""
-STEERED_POINTS = 128
-"""The same of a propeller with a rudder, whose narrow arc has few of them."""
 ANGLES = 1024
 """Angles over its period from which those of a grid of foils are chosen; more say nothing in single
 precision."""
@@ -117,8 +115,7 @@ def _thinned_table(table: Table, users: Record) -> Array:
     if table.field in ("force_table", "force_table_reverse"):
         return _radial(table.numbers)
     if table.field == "gauge_table":
-        is_steered = (users["command_kind"] == constant("FL_STEERED")).any()
-        return _gauge(table.numbers, STEERED_POINTS if is_steered else POINTS)
+        return _gauge(table.numbers)
     if table.field == "law_grid":
         return _grid(table.numbers, users)
     return _curve(table.numbers)
@@ -135,10 +132,10 @@ def _radial(table: Array) -> Array:
     return table_numbers(float(table[0]), force, np.minimum(slope, slope_max), float(table[2]))
 
 
-def _gauge(table: Array, points: int) -> Array:
-    """A gauge with every so many of its directions, as many as `points` at most."""
+def _gauge(table: Array) -> Array:
+    """A gauge with every so many of its directions."""
     rows = table[1:].reshape(-1, 4)
-    rows = rows[:: max(len(rows) // points, 1)]
+    rows = rows[:: max(len(rows) // POINTS, 1)]
     return np.concatenate([[len(rows)], rows.ravel()])
 
 
@@ -168,27 +165,30 @@ def _grid(grid: Array, users: Record) -> Array:
 
 
 def _reached(knot: Array, value: Array, period: float, users: Record) -> tuple[Array, Array, float]:
-    """Returns the knots that foils reach, and three beyond; all of them where that is no less, and
-    of a grid of fins.
+    """Returns the knots that rudders reach, and three beyond; all of them where that is no less,
+    and of a grid of fins.
 
     Args:
         knot: angles (K,) of one period [rad].
         value: coefficients (K, c) there.
         period: of the angles [rad]; 0 for none.
-        users: actuators (m,) whose law it is, all foils or all fins.
+        users: actuators (m,) whose law it is, all of one kind.
 
     Returns:
         Knots, values, and their period: 0 where only a part of it is left.
     """
-    # The first user speaks for all: a law's columns are coefficients of foils or forces of fins, so
-    # that users of one grid share a kind. A fin's angle is number 2 of its command and may go all
-    # round, so that a fin reaches each knot; the angle of a foil is number 0, within limits.
+    # The first user speaks for all: a law's columns are coefficients of foils, forces of fins or
+    # those behind propellers, so that users of one grid share a kind. A fin's angle is number 2 of
+    # its command and may go all round, so that a fin reaches each knot; the angle of a rudder is
+    # number 0, within limits.
     is_of_fins = users["command_kind"][0] == constant("FL_FIN")
-    if not period or is_of_fins:
+    if is_of_fins:
         return knot, value, period
     angle_min = (users["command_min"][:, 0] - users["lean_angle"]).min()
     angle_max = (users["command_max"][:, 0] - users["lean_angle"]).max()
-    around = np.concatenate([knot - period, knot, knot + period])
+    around = knot
+    if period:
+        around = np.concatenate([knot - period, knot, knot + period])
     begin = np.searchsorted(around, angle_min) - 3
     stop = np.searchsorted(around, angle_max) + 3
     has_room = begin >= 0 and stop <= len(around) and stop - begin < len(knot)

@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finlab.arrays import Array
 from finlab.display.figures import COLORS, panels, space
@@ -127,6 +128,7 @@ def polar_picture(
     headings: Sequence[float],
     curves: Mapping[str, Array],
     worst: Array | None,
+    marks: tuple[NDArray[np.bool_], NDArray[np.bool_]] | None = None,
 ) -> Figure:
     """Returns a polar figure by heading, ahead at the top, clockwise.
 
@@ -136,6 +138,8 @@ def polar_picture(
         headings: directions (H,) [deg].
         curves: values (H,) of each case; the first is the main one, the others are single losses.
         worst: the least of these (H,), which is filled; None where there are none.
+        marks: headings (H,) of the main curve, and of the worst, at which power is the limit; None
+            where power has none.
     """
     from matplotlib.figure import Figure
 
@@ -160,6 +164,15 @@ def polar_picture(
     if worst is not None:
         axes.plot(angle, worst[closed], color=COLORS[1], lw=2.2, label="worst single loss")
     axes.plot(angle, curves[names[0]][closed], color=COLORS[0], lw=2.2, label=names[0])
+    if marks is not None:
+        label = "limited by power"
+        turn = np.deg2rad(np.asarray(headings))
+        marked = [(curves[names[0]], marks[0], COLORS[0])]
+        if worst is not None:
+            marked.append((worst, marks[1], COLORS[1]))
+        for values, is_limited, color in marked:
+            axes.plot(turn[is_limited], values[is_limited], "o", color=color, ms=4.0, label=label)
+            label = "_"  # one row of the legend is enough
     highest = max(float(np.max(values)) for values in curves.values())
     axes.set_ylim(0.0, highest * 1.05 if highest > 0.0 else 1.0)
     axes.set_thetagrids(np.arange(0, 360, 30))

@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from finlab.arrays import Array
 from finlab.display import Table, html
 from finlab.display.pictures import body_picture
-from finlab.forces.force_sets import SCALE, ForceSets, convex_parts, force_sets
+from finlab.forces.force_sets import SCALE, ForceSets, convex_parts
 from finlab.forces.reach import UNPROVEN, largest_along_rays
+from finlab.forces.within_budget import force_sets_within
 from finlab.layout import Layout
 
 FLAT = 1e-5
@@ -146,6 +147,7 @@ def attainable_set(
     lost: Collection[str] = (),
     tolerance: float = TOLERANCE,
     flow: ArrayLike | None = None,
+    power: object = None,
 ) -> AttainableSet:
     """Returns the attainable forces or torques with the other three components at zero.
 
@@ -160,11 +162,14 @@ def attainable_set(
         tolerance: gap at which no more directions are added, over the farthest vertex [1].
         flow: velocity of the body relative to the water (6,), body frame [m/s, rad/s]; None at
             rest.
+        power: watts of all actuators, or of buses by their names, as in
+            `finlab.Allocator.allocate`; None for the budget of the layout, infinity for no limit.
 
     Raises:
         LayoutError: there is no actuator of a name.
+        AllocationError: the power is none, or the flow drives actuators whose power is not known.
     """
-    support = _support(force_sets(layout, lost, flow), kind)
+    support = _support(force_sets_within(layout, lost, flow, power), kind)
     points = support(_first_directions(support))[0]
     result = _hull_of(points, kind)
     for round_ in count():

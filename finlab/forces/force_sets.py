@@ -30,7 +30,8 @@ from finlab.actuators.kinds import groups_of, laws_of
 from finlab.actuators.response import Plane, Response
 from finlab.arrays import Array
 from finlab.axes import TURN
-from finlab.core.ray_reach import block_of_planes, ray_reach
+from finlab.core.ray_reach import block_of_planes, ray_reach, ray_reach_within
+from finlab.forces.power_sides import PowerSets
 from finlab.layout import Actuator, Layout
 from finlab.layout.effectiveness import own_effectiveness
 from finlab.physics.plant import plant_of
@@ -79,11 +80,17 @@ class ForceSets(NamedTuple):
     """Offset of the polygon in the block (R, n); 0 for a sector."""
     block: Array
     """Polygons of all robots, as the core reads them."""
+    sides: Array | None = None
+    """The first of the sides of each set, and how many it has (R, n, 2); None without a power
+    budget."""
+    powers: PowerSets | None = None
+    """Sides of all sets, what they cost, and the power budgets of all robots; None without any."""
 
     def take(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> ForceSets:
         """Returns the robots of some rows, by a mask (R,) or by indices, which may repeat."""
-        names = self._fields[:-1]
-        return self._replace(**{name: getattr(self, name)[rows] for name in names})
+        of_rows = [name for name in self._fields if name not in ("block", "powers")]
+        taken = {name: getattr(self, name)[rows] for name in of_rows if name != "sides"}
+        return self._replace(**taken, sides=None if self.sides is None else self.sides[rows])
 
     def lose(self, rows: Any, actuators: Any) -> None:
         """Sets the forces of actuators of some robots to zero, in place.
@@ -142,6 +149,9 @@ class ForceSets(NamedTuple):
             that misses all wrenches; normals (R, m) of the planes that prove them; and planar
             forces (R, n, 2) [N] whose wrench is off the end by at most twice the tolerance.
         """
+        if self.powers is not None:
+            size, normal, force, _ = self.reach_within(origin, ray, tolerance)
+            return size, normal, force
         rows, n, _, m = self.effectiveness.shape
         unit = self.unit
         records = np.zeros((rows, n, 16))
@@ -149,6 +159,49 @@ class ForceSets(NamedTuple):
         records[..., 1] = self.radius
         records[..., 2] = self.sector_center
         records[..., 3] = self.sector_half_angle
+        core_origin, core_ray = self._write_wrenches(records, origin, ray)
+        size, normal, force = ray_reach(self.block, records, core_origin, core_ray, tolerance)
+        is_working = self.radius[..., None] > 0.0
+        return size * unit, normal[:, :m], np.where(is_working, force, 0.0)
+
+    def reach_within(
+        self, origin: Array, ray: Array, tolerance: float
+    ) -> tuple[Array, Array, Array, Array]:
+        """Returns the distances to which rays stay within what is attainable within the power
+        budgets.
+
+        Args:
+            origin: as for `reach`.
+            ray: as for `reach`.
+            tolerance: as for `reach`.
+
+        Returns:
+            What `reach` returns, and the multipliers (R, b) of the budgets at the planes [N/W].
+            Minus infinity where actuators that cannot rest take more than a budget.
+        """
+        assert self.powers is not None and self.sides is not None
+        rows, n, _, m = self.effectiveness.shape
+        records = np.zeros((rows, n, 16))
+        records[..., 0:2] = self.sides
+        records[..., 2] = self.powers.bus
+        records[..., 3] = self.radius > 0.0
+        core_origin, core_ray = self._write_wrenches(records, origin, ray)
+        plain_block = block_of_planes(n)
+        size, normal, force, multiplier = ray_reach_within(
+            plain_block, self.powers.within, records, core_origin, core_ray, tolerance
+        )
+        unit = self.unit
+        is_over = self.powers.over_budget(self.sides, self.radius > 0.0).any(axis=-1)
+        size = np.where(is_over, -np.inf, size * unit)
+        is_working = self.radius[..., None] > 0.0
+        force = np.where(is_working, force, 0.0)
+        return size, normal[:, :m], force, multiplier * unit[:, None]
+
+    def _write_wrenches(self, records: Array, origin: Array, ray: Array) -> tuple[Array, Array]:
+        """Writes the effectiveness into records (R, n, 16) of the core, over the strongest
+        actuator's wrench, and returns origins and rays (R, 6) as the core has them."""
+        rows, n, _, m = self.effectiveness.shape
+        unit = self.unit
         columns = records[..., 4:].reshape(rows, n, 2, 6)  # a view
         columns[..., :m] = self.effectiveness / unit[:, None, None, None]
         # The core has six coordinates; those beyond m are zero.
@@ -156,9 +209,7 @@ class ForceSets(NamedTuple):
         core_origin[:, :m] = origin / unit[:, None]
         core_ray = np.zeros((rows, 6))
         core_ray[:, :m] = ray
-        size, normal, force = ray_reach(self.block, records, core_origin, core_ray, tolerance)
-        is_working = self.radius[..., None] > 0.0
-        return size * unit, normal[:, :m], np.where(is_working, force, 0.0)
+        return core_origin, core_ray
 
     def farthest(self, normal: Array) -> tuple[Array, Array]:
         """Returns the support function of the attainable wrenches.
@@ -413,21 +464,28 @@ def _zoned_shape(response: Plane, directions: Array) -> Shape:
     """Forces of an azimuth that pushes ahead, within several arcs: the convex hull of them all, and
     each arc as a part, of one wider than half a turn its halves."""
     force_min, force_max = response.ends
-    ends = [response.sector_center - response.sector_half_angle]
-    for begin, end in response.barred:
-        ends += [begin, end]
-    ends.append(response.sector_center + response.sector_half_angle)
-    sectors = []
-    for low, high in zip(ends[::2], ends[1::2], strict=True):
-        n_pieces = 2 if is_wide(0.5 * (high - low)) else 1
-        cuts = np.linspace(low, high, n_pieces + 1)
-        sectors += [_ring_sector(a, b, force_min, force_max) for a, b in pairwise(cuts)]
+    sectors = [_ring_sector(low, high, force_min, force_max) for low, high in zones_of(response)]
     half_angle = response.sector_half_angle
     polygons = []
     for points in (np.concatenate(sectors), *sectors):
         shape = _polygon(directions, points, half_angle, SIDES_OF_GAUGE)
         polygons.append(shape.polygons[0])
     return Shape(directions, force_max, response.sector_center, half_angle, tuple(polygons))
+
+
+def zones_of(response: Plane) -> list[tuple[float, float]]:
+    """Returns the arcs [rad] that barred zones leave an azimuth, those wider than half a turn as
+    their halves."""
+    ends = [response.sector_center - response.sector_half_angle]
+    for begin, end in response.barred:
+        ends += [begin, end]
+    ends.append(response.sector_center + response.sector_half_angle)
+    zones = []
+    for low, high in zip(ends[::2], ends[1::2], strict=True):
+        n_pieces = 2 if is_wide(0.5 * (high - low)) else 1
+        cuts = np.linspace(low, high, n_pieces + 1).tolist()
+        zones += list(pairwise(cuts))
+    return zones
 
 
 def _ring_sector(low: float, high: float, force_min: float, force_max: float) -> Array:
@@ -510,8 +568,11 @@ def convex_parts(sets: ForceSets) -> ForceSets:
     # Shift of the sector's centre over its half angle: 0 where it is not cut.
     shift = np.select([part == 1, part == 2], [0.5, -0.5], 0.0)
     half_angle_share = np.where(part == 0, 1.0, 0.5)
-    return parts._replace(
+    parts = parts._replace(
         sector_center=parts.sector_center + shift * parts.sector_half_angle,
         sector_half_angle=half_angle_share * parts.sector_half_angle,
         n_parts=np.where(part == 0, parts.n_parts, 1),
     )
+    if sets.powers is None:
+        return parts
+    return parts._replace(sides=sets.powers.sides_of_parts(part))

@@ -1,7 +1,8 @@
 """Largest attainable wrenches: along a ray, along an axis with the others fixed, and in the
-weakest direction of all. The attainable sets, the analyses and the app use them."""
+weakest direction of all, within the power budget that sets of forces may have. The attainable sets,
+the analyses and the app use them."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -12,7 +13,8 @@ from finlab.arrays import Array
 from finlab.axes import AXES
 from finlab.display import Table, html
 from finlab.display.pictures import ranges_picture
-from finlab.forces.force_sets import SCALE, ForceSets, convex_parts, force_sets
+from finlab.forces.force_sets import SCALE, ForceSets, convex_parts
+from finlab.forces.within_budget import force_sets_within
 from finlab.layout import Layout
 
 FINE = 1e-8
@@ -127,7 +129,11 @@ class Ranges(NamedTuple):
 
 
 def axis_ranges(
-    layout: Layout, wrench: ArrayLike, lost: Collection[str] = (), flow: ArrayLike | None = None
+    layout: Layout,
+    wrench: ArrayLike,
+    lost: Collection[str] = (),
+    flow: ArrayLike | None = None,
+    power: object = None,
 ) -> Ranges:
     """Returns the attainable range of each axis, too wide by about a millionth at most.
 
@@ -137,12 +143,16 @@ def axis_ranges(
         lost: names of actuators that give no force.
         flow: velocity of the body relative to the water (6,), body frame [m/s, rad/s]; None at
             rest.
+        power: watts of all actuators, or of buses by their names, as in
+            `finlab.Allocator.allocate`; None for the budget of the layout, infinity for no limit.
 
     Raises:
         LayoutError: there is no actuator of a name.
+        AllocationError: the power is none, or the flow drives actuators whose power is not known.
     """
     hashable_flow = None if flow is None else tuple(np.asarray(flow, np.float64).tolist())
-    parts = _parts_for_axes(layout, tuple(lost), hashable_flow, layout.stamps)
+    hashable_power = tuple(power.items()) if isinstance(power, Mapping) else power
+    parts = _parts_for_axes(layout, tuple(lost), hashable_flow, hashable_power, layout.stamps)
     rays = np.concatenate([np.eye(6), -np.eye(6)])
     # Each ray begins at the fixed values of the other axes.
     origins = np.where(rays == 0.0, np.asarray(wrench, np.float64) / SCALE, 0.0)
@@ -158,11 +168,16 @@ def axis_ranges(
 
 @lru_cache(maxsize=16)
 def _parts_for_axes(
-    layout: Layout, lost: tuple[str, ...], flow: tuple[float, ...] | None, stamps: object
+    layout: Layout,
+    lost: tuple[str, ...],
+    flow: tuple[float, ...] | None,
+    power: object,
+    stamps: object,
 ) -> ForceSets:
     """Convex parts of a robot, each repeated for both signs of all six axes; the stamps are part of
-    the cache's key."""
-    return convex_parts(force_sets(layout, lost, flow)).repeat(12)
+    the cache's key, and the items of a mapping are in place of it."""
+    asked = dict(power) if isinstance(power, tuple) else power
+    return convex_parts(force_sets_within(layout, lost, flow, asked)).repeat(12)
 
 
 RANK_TOLERANCE = 1e-6

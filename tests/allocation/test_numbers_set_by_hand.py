@@ -31,6 +31,7 @@ PYTHON_FILES = [
     ROOT / "finlab/analysis/layout_bound.py",
     ROOT / "finlab/analysis/pose_set.py",
     ROOT / "finlab/analysis/split_sets.py",
+    ROOT / "finlab/analysis/zonotope_ball.py",
 ]
 """Files of the default method in Python, of the search behind capability plots and of the bound over
 all layouts, whose constants the page has to have."""

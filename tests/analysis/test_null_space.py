@@ -1,6 +1,8 @@
 """The null space of an answer: the wrench stays, watts are no less, and beyond the ranges it
 ends."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,8 @@ from finlab.allocation import Allocator
 from finlab.analysis.null_space import NullSpace
 from finlab.layout import load_layout
 from finlab.layout.effectiveness import layout_effectiveness
+from finlab.layout.layout import Bus
+from finlab.physics import plant_of
 from finlab.physics.objective import REACHED
 from tests.random_robots import KINDS, load, random_flow, random_plant, random_robot, within
 from tests.sampled_cases import sampled
@@ -90,3 +94,30 @@ def test_the_mean_of_two_commands_of_fins_misses_and_of_thrusters_does_not() -> 
         np.testing.assert_allclose(
             space.mean(answer.command, answer.command), answer.command, atol=1e-12
         )
+
+
+@pytest.mark.parametrize("lost", [(), ("front_left",)])
+def test_ranges_end_where_the_power_budget_does(lost: tuple[str, ...]) -> None:
+    heavy = load_layout("bluerov2_heavy")
+    target = [15.0, 0.0, 10.0, 0.0, 0.0, 0.0]
+    free = Allocator(heavy).allocate(target, lost=lost)
+    buses = (
+        Bus("fore", 1.3 * float(free.power), heavy.names[:4]),
+        Bus("lift", 60.0, heavy.names[4:]),
+    )
+    layout = replace(heavy, buses=buses)
+    answer = Allocator(layout).allocate(target, lost=lost)
+    space = NullSpace(answer)
+    count = len(space.basis)
+    ranges = space.ranges(np.zeros(count), count)
+    plain = NullSpace(free).ranges(np.zeros(count), count)
+    assert (ranges[:, 1] - ranges[:, 0] < 0.9 * (plain[:, 1] - plain[:, 0])).any()
+    ends = []
+    for k in range(count):
+        for end in ranges[k]:
+            command = space.commands(1.0001 * end * np.eye(count)[k : k + 1])[0]
+            power = np.nan_to_num(plant_of(layout).power(command))
+            taken = np.array([power[:4].sum(), power[4:].sum()])
+            ends.append((taken / [bus.power_w for bus in buses]).max())
+    assert max(ends) <= 1.001
+    assert np.mean(np.array(ends) >= 0.99) >= 0.5

@@ -11,7 +11,15 @@ from finlab.analysis import Bounds
 from finlab.analysis.climb import CLEARANCE, ROUNDING, Rules
 from finlab.analysis.moves import Moves
 from finlab.analysis.slopes import WeakestDirection
-from finlab.analysis.soft_ascent import FacetTable, SoftAscent, facets_of, has_few_facets
+from finlab.analysis.soft_ascent import (
+    HOP_PARENTS,
+    HOP_SIZE,
+    HOPS_OF_EACH,
+    FacetTable,
+    SoftAscent,
+    facets_of,
+    has_few_facets,
+)
 from finlab.arrays import Array
 from finlab.axes import AXES
 from finlab.layout import Layout
@@ -120,6 +128,32 @@ def test_it_raises_the_goal_within_bounds_and_rules(shipped: Layouts) -> None:
     assert rules.gaps(kept).min() >= -ROUNDING and CLEARANCE == 0.1
     assert ascent.least_distances(raised).min() > 110.0
     assert ascent.least_distances(vectors).max() < 60.0
+
+
+def test_hops_raise_it_within_bounds_and_rules(shipped: Layouts) -> None:
+    ascent, moves, rules = ascent_of(shipped("bluerov2_heavy"))
+    vectors = random_vectors(moves, 1)
+    hopped = ascent.hopped(vectors, np.random.default_rng(0))
+    assert len(hopped) == HOPS_OF_EACH
+    assert (hopped >= moves.lower).all() and (hopped <= moves.upper).all()
+    assert (rules.violation(hopped) == 0.0).sum() >= 2
+    assert ascent.least_distances(vectors)[0] < 60.0 < 100.0 < ascent.least_distances(hopped).min()
+
+
+def test_hops_begin_near_the_best(shipped: Layouts) -> None:
+    ascent, moves, _ = ascent_of(shipped("bluerov2_heavy"))
+    vectors = random_vectors(moves, 20)
+    value = ascent.least_distances(vectors)
+    best = np.argsort(-value)[:HOP_PARENTS]
+    first = ascent.hopped(vectors, np.random.default_rng(1), cancelled=lambda: True)
+    again = ascent.hopped(vectors, np.random.default_rng(1), cancelled=lambda: True)
+    assert (first == again).all()
+    assert len(first) == HOP_PARENTS * HOPS_OF_EACH
+    # One step from a change at random; whole turns go round, and places stop at their bounds.
+    is_place = ~moves.is_whole_turn
+    parents = np.repeat(vectors[best], HOPS_OF_EACH, axis=0)
+    change = ((first - parents) / (moves.upper - moves.lower))[:, is_place]
+    assert 0.5 * HOP_SIZE < change.std() < 1.5 * HOP_SIZE
 
 
 def test_half_a_turn_of_a_whole_tilt_reverses_a_thruster(shipped: Layouts) -> None:

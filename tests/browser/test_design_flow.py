@@ -198,7 +198,7 @@ def test_a_search_is_watched_stopped_and_accepted(page: Any) -> None:
     page.until(lambda: session.draft.fixed == (before.names[3],))
     page.type("Reach ± [m]", "0.03", place=0)
     improver = page.view.jobs.improver
-    page.until(lambda: session.draft.move_range[0] == 0.03)
+    page.until(lambda: session.draft.range_of(session.state.layout)[0] == 0.03)
     page.press("Search")
     page.until(lambda: improver.progress is not None or improver.answer is not None)
     if improver.answer is None:

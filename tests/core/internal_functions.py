@@ -229,6 +229,7 @@ def functions() -> ctypes.PyDLL:
         "fl_force_of_price": LineResponse,
         "fl_limited_response": LineResponse,
         "fl_gauge_support": GaugePoint,
+        "fl_steered_support": GaugePoint,
         "fl_force_range": ForceRange,
         "fl_form_of": ctypes.POINTER(CommandForm),
         **dict.fromkeys(
@@ -241,7 +242,8 @@ def functions() -> ctypes.PyDLL:
                 ),
                 *("fl_gauge_radius", "fl_gauge_lean", "fl_largest_slope", "fl_refine_commands"),
                 *("fl_drag_of_lift", "fl_dual_value", "fl_error_allowed", "fl_meet_and_cheapen"),
-                *("fl_nearest_point", "fl_farthest_along_ray"),
+                *("fl_nearest_point", "fl_farthest_along_ray", "fl_radius"),
+                *("fl_steered_deflection", "fl_steered_radius"),
             ),
             REAL,
         ),
@@ -350,10 +352,7 @@ class Robot:
 
     def radius(self, i: int, angle: float) -> float:
         """Share of the table's force in a direction [rad]."""
-        gauge = self.actuators[i]["gauge_table"]
-        if gauge == 0.0:
-            return 1.0
-        return float(functions().fl_gauge_radius(at(self.table(gauge)), REAL(angle)))
+        return float(functions().fl_radius(at(self.block), i, REAL(angle)))
 
     def force(self, i: int, command: Array) -> tuple[Array, Array]:
         """Force (3,) of a command (3,) along the law's axes, and its derivatives (3 commands, 3

@@ -31,7 +31,7 @@ from finlab.layout.layout import Bus, Layout
 from finlab.physics import plant_of
 from tests.allocator_cache import AllocatorCache
 from tests.core.test_foil_arcs import beyond, tail
-from tests.random_robots import KINDS, load, random_robot, with_rates
+from tests.random_robots import KINDS, load, random_flow, random_robot, with_rates
 from tests.sampled_cases import sampled
 from tests.terminal import refused
 
@@ -134,6 +134,16 @@ def test_self_test_holds_on_any_robot(kind: str, seed: int, tmp_path: Path) -> N
     write_c(c_sources(load(with_rates(random_robot(kind, 4, 60 + seed))), 40), tmp_path)
     for single in PRECISIONS:
         ran(f"gcc -std=c99 -O1 {single} *.c -lm && ./a.out", tmp_path)
+
+
+@pytest.mark.parametrize(("number", "seed"), [(1, 61), (0, 8)])
+def test_self_test_of_rudders_in_slipstreams_holds(number: int, seed: int, tmp_path: Path) -> None:
+    """In a flow, where the slipstream is never without force, and at rest, where an arc ends beside
+    what is pushed astern."""
+    layout = load(random_robot("slipstreams", number, seed))
+    write_c(c_sources(layout, flow=random_flow("slipstreams", number, seed)), tmp_path)
+    for single in PRECISIONS:
+        ran(f"gcc -std=c99 -O0 {single} *.c -lm && ./a.out", tmp_path)
 
 
 @pytest.mark.parametrize("name", ["supply", "drillship"])
@@ -375,3 +385,35 @@ def test_a_power_budget_of_fins_is_kept_by_less_than_the_tables_are_off(tmp_path
 def test_a_power_budget_of_a_robot_with_rudders_is_refused() -> None:
     with pytest.raises(AllocationError, match="no budget is kept yet for robots with rudders"):
         c_sources(replace(load_layout("torpedo"), power_w=216.0))
+
+
+def test_a_power_budget_of_a_robot_with_a_rudder_in_a_slipstream_is_refused() -> None:
+    layout = replace(load(random_robot("slipstreams", 0, 60)), power_w=50.0)
+    with pytest.raises(AllocationError, match="no budget is kept yet by exports to C"):
+        c_sources(layout)
+
+
+def test_the_short_call_tells_where_rates_forbid_to_keep_a_budget(tmp_path: Path) -> None:
+    """From full thrust on, drives that change by a twentieth of it in a tick cannot keep 100 W."""
+    fast = load_layout("bluerov2_heavy")
+    slow = [replace(actuator, rate=0.5 * actuator.force[1]) for actuator in fast.actuators]
+    layout = replace(fast, actuators=slow, power_w=100.0)
+    write_c(c_sources(layout), tmp_path)
+    ran("gcc -std=c99 -O1 -shared -fPIC *.c -lm -o it.so", tmp_path)
+    header = (tmp_path / "fl_bluerov2_heavy.h").read_text()
+    code = int(re.findall(r"#define FL_BLUEROV2_HEAVY_OVER_BUDGET (\d+)", header)[0])
+    library = ctypes.CDLL(str(tmp_path / "it.so"))
+    library.fl_bluerov2_heavy_error_text.restype = ctypes.c_char_p
+    assert b"more power than a bus may give" in library.fl_bluerov2_heavy_error_text(code)
+
+    full = np.zeros((layout.n, 3))
+    full[:, 0] = [actuator.force[1] for actuator in layout.actuators]
+    wrench = np.zeros(6)
+    command = np.full((layout.n, 3), np.nan)
+    addresses = [each.ctypes.data_as(ctypes.c_void_p) for each in (wrench, full, command)]
+    assert library.fl_bluerov2_heavy_allocate(*addresses) == code != 0
+    np.testing.assert_allclose(command[:, 0], 0.95 * full[:, 0], rtol=1e-6)
+
+    at_rest = np.zeros((layout.n, 3))
+    addresses[1] = at_rest.ctypes.data_as(ctypes.c_void_p)
+    assert library.fl_bluerov2_heavy_allocate(*addresses) == 0

@@ -17,6 +17,7 @@ from tests.core.internal_functions import (
     MOST,
     POD,
     ROBOTS,
+    STEERED,
     Box,
     Robot,
     at,
@@ -219,6 +220,10 @@ def sizes_and_angles(robot: Robot, i: int, commands: Array) -> tuple[Array, Arra
     if actuator["command_kind"] == POD:
         return np.asarray(commands[:, 1]), np.asarray(commands[:, 0])
     force = np.array([robot.force(i, command)[0] for command in commands])
+    if actuator["command_kind"] == STEERED:
+        # The size is the thrust of the slipstream; in reverse nothing meets the rudder.
+        slipstream = np.asarray(commands[:, 1] + actuator["pressure_area"])
+        return slipstream, np.arctan2(force[:, 2], force[:, 1])
     if robot.is_plane(i):
         return np.hypot(force[:, 1], force[:, 2]), np.arctan2(force[:, 2], force[:, 1])
     sign = actuator["command_sign"] if actuator["command_kind"] == 0.0 else 1.0
@@ -246,6 +251,8 @@ def test_a_range_of_forces_holds_what_commands_of_a_box_give_and_no_more(name: s
             if angle is None:
                 continue
             pushes = np.abs(size) > slack
+            if actuator["command_kind"] == STEERED:
+                pushes = size > slack
             error = np.abs(
                 [math.remainder(one - force_range.middle, 2.0 * math.pi) for one in angle[pushes]]
             )

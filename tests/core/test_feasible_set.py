@@ -15,6 +15,7 @@ from tests.core.internal_functions import (
     FIN,
     POD,
     ROBOTS,
+    STEERED,
     Robot,
     Set,
     Work,
@@ -43,13 +44,18 @@ def commands_before(robot: Robot, rng: np.random.Generator) -> Array:
 
 def given_in_box(robot: Robot, i: int, low: Array, high: Array) -> tuple[Array, Array]:
     """Forces (N,) [N] of commands within a box along their directions, and these directions
-    [rad]."""
+    [rad]; of a propeller with a rudder thrusts of its slipstream, with no direction in reverse."""
     actuator = robot.actuators[i]
     share = np.stack(np.meshgrid(*3 * [[0.0, 0.25, 0.5, 0.75, 1.0]]), axis=-1).reshape(-1, 3)
     commands = low + share * (high - low)
     force = np.array([robot.force(i, command)[0] for command in commands])
     if actuator["command_kind"] == POD:
         return commands[:, 1], commands[:, 0]
+    if actuator["command_kind"] == STEERED:
+        slipstream = commands[:, 1] + actuator["pressure_area"]
+        return slipstream, np.where(
+            slipstream > 0.0, np.arctan2(force[:, 2], force[:, 1]), math.nan
+        )
     if actuator["command_kind"] == FIN:
         return np.hypot(force[:, 1], force[:, 2]), np.arctan2(force[:, 2], force[:, 1])
     return (actuator["command_sign"] if actuator["command_kind"] == 0.0 else 1.0) * force[
@@ -76,7 +82,7 @@ def check_set(robot: Robot, i: int, limits: Set, low: Array, high: Array) -> Non
     if robot.is_plane(i) and limits.sector_half_angle < 3.0:
         angle_errors = [
             math.remainder(one - limits.sector_center - rotation, 2.0 * math.pi)
-            for one in angle[np.abs(size) > slack]
+            for one in angle[(np.abs(size) > slack) & np.isfinite(angle)]
         ]
         if angle_errors:
             assert np.abs(angle_errors).max() == pytest.approx(limits.sector_half_angle, abs=1e-3)

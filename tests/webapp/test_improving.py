@@ -15,7 +15,7 @@ from finlab.layout import Damage, Fin, load_layout
 from tests.webapp.stand_in import LoneBell, context_of, until
 from webapp.markup.score_card import warnings
 from webapp.session import Session
-from webapp.session.looking import GOALS_BY_WORDS, SearchRequest
+from webapp.session.looking import GOALS_BY_WORDS, SearchRequest, most_reach
 from webapp.session.state import State
 from webapp.tasks.analysing import Analysis, AnalysisQuestion, analyse
 from webapp.tasks.improving import Clearance, Improver, Search, has_bound
@@ -196,3 +196,20 @@ def test_a_cancelled_bound_is_valid() -> None:
     sharp = layout_bound(rov, rov.names)
     early = layout_bound(rov, rov.names, cancelled=lambda: True)
     assert early.rounds == 1 < sharp.rounds and early.value >= sharp.value
+
+
+def test_the_range_grows_with_the_robot() -> None:
+    request = SearchRequest()
+    small = load_layout("bluerov2_heavy")
+    assert request.range_of(small) == (0.05, 0.05, 0.05, 180.0) and most_reach(small) == 0.5
+    ship = load_layout("drillship")
+    length = float(np.ptp(ship.position[:, 0]))
+    reach = request.range_of(ship)[0]
+    assert 0.02 * length < reach < 0.1 * length
+    assert most_reach(ship) == pytest.approx(length, rel=0.05)
+    wide = request.with_move_range((20.0, 5.0, 0.0, 30.0), most_reach(ship))
+    bounds = wide.bounds(ship)
+    ends = bounds[ship.names[0]].x
+    assert ends[1] - ends[0] == pytest.approx(40.0)
+    with pytest.raises(FinlabError, match="reach along x"):
+        request.with_move_range((20.0, 5.0, 0.0, 30.0), most_reach(small))

@@ -144,11 +144,11 @@ def test_marks_end_where_the_budget_does(is_of_buses: bool) -> None:
             assert abs(end[axis]) <= abs(other[axis]) + 1e-6 * width
             target = np.array(state.target)
             target[axis] = end[axis]
-            assert allocator.allocate(target).reachable
+            assert allocator.allocate(target).err_norm <= 1e-4
             if abs(end[axis] - other[axis]) > 1e-6 * width:
                 is_narrower = True
                 target[axis] += 1e-3 * width * np.sign(other[axis] - end[axis])
-                assert not allocator.allocate(target).reachable
+                assert allocator.allocate(target).err_norm > 1e-4
     assert is_narrower
 
 

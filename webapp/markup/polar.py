@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 from markupsafe import Markup
+from numpy.typing import NDArray
 
 from finlab.analysis.capability import Capability
 from finlab.analysis.capability_text import shown_values
@@ -37,6 +38,8 @@ ROW = 18
 """Where its first row stands, and the distance of rows [px]."""
 MOST_ROWS = 11
 """Rows of the list; a robot with more losses has them in its files."""
+DOT = 2.8
+"""Radius of a dot [px]."""
 MOST_LETTERS = 15
 """Letters of a name in the list; of a longer one the first are shown."""
 BOW_UP = "M0 -15C5 -9 6 -4 6 2V11Q6 14 3 14H-3Q-6 14 -6 11V2C-6 -4 -5 -9 0 -15Z"
@@ -59,6 +62,8 @@ class Curve(NamedTuple):
     """Of its line [px]."""
     is_area: bool = False
     """Whether it is filled."""
+    is_marked: NDArray[np.bool_] | None = None
+    """Headings (H,) at which power is the limit, that have a dot; None for no dots."""
 
 
 def polar_plot(capability: Capability, names: Sequence[str]) -> str:
@@ -88,15 +93,20 @@ def curves_of(capability: Capability, names: Sequence[str]) -> list[Curve]:
     the robot as it is; arguments as for `polar_plot`."""
     scale = shown_values(capability).scale
     values = scale * capability.values
+    limited: NDArray[np.bool_] | None = None
+    limited_after: NDArray[np.bool_] | None = None
+    if capability.buses:
+        limited = np.asarray(capability.binding_buses[0].any(axis=-1))
+        limited_after = np.asarray(capability.worst_binding_buses.any(axis=-1))
     curves = []
     if len(capability.cases) > 1:
         worst = scale * capability.worst
-        curves.append(Curve("worst single loss", worst, MISSING, 2.4, is_area=True))
+        curves.append(Curve("worst single loss", worst, MISSING, 2.4, True, limited_after))
     for case, row in zip(capability.cases[1:], values[1:], strict=True):
         is_one = len(case.lost) == 1 and case.lost[0] in names
         color = fin_color(list(names).index(case.lost[0])) if is_one else DEAD
         curves.append(Curve(f"without {case.name}", row, color, 1.6))
-    curves.append(Curve("all actuators", values[0], DELIVERED, 2.6))
+    curves.append(Curve("all actuators", values[0], DELIVERED, 2.6, is_marked=limited))
     return curves
 
 
@@ -109,6 +119,11 @@ def _layers(capability: Capability, names: Sequence[str]) -> list[str]:
     layers = [_grid(rings, shown_values(capability).unit)]
     for curve in curves:
         layers.append(_outline(curve, angle, curve.values[order] / rings[-1]))
+    for curve in curves:
+        if curve.is_marked is not None:
+            marked = order[curve.is_marked[order]]
+            turn = np.deg2rad(np.asarray(capability.headings)[marked])
+            layers.append(_dots(curve, turn, curve.values[marked] / rings[-1]))
     layers.append(_list(capability, curves))
     return layers
 
@@ -169,6 +184,16 @@ def _outline(curve: Curve, angle: Array, share: Array) -> str:
     return html(shape, " ".join(points), fill, css(curve.color), curve.width)
 
 
+def _dots(curve: Curve, angle: Array, share: Array) -> str:
+    """Dots on a curve at angles (K,) [rad], at shares (K,) of the largest ring."""
+    dots = []
+    for heading, value in zip(angle.tolist(), share.tolist(), strict=True):
+        across, down = _place(heading, value)
+        dot = "<circle class='dot' cx='{:.1f}' cy='{:.1f}' r='{}' fill='{}'/>"
+        dots.append(html(dot, across, down, DOT, css(curve.color)))
+    return Markup().join(dots)
+
+
 def _list(capability: Capability, curves: Sequence[Curve]) -> str:
     """What each curve is, the least that it holds, and from where; the robot as it is first."""
     shown = shown_values(capability)
@@ -181,7 +206,8 @@ def _list(capability: Capability, curves: Sequence[Curve]) -> str:
     markup = [html(head, LEAST_RIGHT, y, f"least{unit}", FROM_RIGHT, y)]
     # As it is, the worst loss, and each loss.
     ordered = [curves[-1], *curves[:-1]]
-    for k, curve in enumerate(ordered[:MOST_ROWS]):
+    n_rows = MOST_ROWS - 1 if capability.buses else MOST_ROWS
+    for k, curve in enumerate(ordered[:n_rows]):
         y = KEY_TOP + ROW * k
         weakest = int(curve.values.argmin())
         row = (
@@ -208,7 +234,14 @@ def _list(capability: Capability, curves: Sequence[Curve]) -> str:
                 capability.headings[weakest],
             )
         )
-    n_more = len(ordered) - MOST_ROWS
+    n_more = len(ordered) - n_rows
+    if capability.buses:
+        dot = (
+            "<circle cx='{}' cy='{}' r='{}' fill='{}'/>"
+            "<text class='dim' x='{}' y='{}'>limited by power</text>"
+        )
+        y = KEY_TOP + ROW * min(len(ordered), n_rows)
+        markup.append(html(dot, KEY_LEFT + 8, y - 4.5, DOT, css(DELIVERED), KEY_LEFT + 22, y))
     if n_more > 0:
         y = KEY_TOP + ROW * MOST_ROWS
         more = "<text class='dim' x='{}' y='{}'>and {} more losses</text>"

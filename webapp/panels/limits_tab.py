@@ -9,12 +9,20 @@ from markupsafe import Markup
 
 from finlab.analysis import Improvement, Progress
 from finlab.analysis.improvement_text import goal_value, improvement_remarks
+from finlab.forces.within_budget import counts_budget
 from webapp.handles import add_html
 from webapp.markup.score_card import remarks_markup, score_table
 from webapp.markup.words import fins_words, html, marker, three_digits
 from webapp.page import Page
 from webapp.panels.damage import add_fin_buttons
-from webapp.session.looking import DRAWN, GOALS_BY_WORDS, MOVE_RANGE, SearchRequest
+from webapp.session.looking import (
+    DRAWN,
+    GOALS_BY_WORDS,
+    MOVE_RANGE,
+    MoveRange,
+    SearchRequest,
+    most_reach,
+)
 from webapp.tasks.analysing import Analysis
 
 
@@ -44,8 +52,12 @@ def _analysis_card(
             "<span class='dim'>The body lacks at most {} {} of the true set.</span>", gap, unit
         )
     layout = analysis.question.layout
-    if layout.power_w is not None or layout.buses:
-        note += Markup("<span class='dim'>The power budget does not count here.</span>")
+    has_budget = layout.power_w is not None or bool(layout.buses)
+    if has_budget and not counts_budget(layout, analysis.question.flow):
+        note += Markup(
+            "<span class='dim'>The power budget does not count here: the flow drives "
+            "actuators.</span>"
+        )
     table = score_table(layout, analysis.card, analysis.before)
     return html("<div class='fl'>{}</div>{}", note, table)
 
@@ -61,7 +73,10 @@ def add_improving(page: Page) -> None:
         session.draft = how(session.draft, *values)
 
     def bound(move_range: tuple[float, ...]) -> None:
-        change(SearchRequest.with_move_range, move_range)
+        change(SearchRequest.with_move_range, move_range, most_reach(session.state.layout))
+
+    def range_now() -> MoveRange:
+        return session.draft.range_of(session.state.layout)
 
     def accept() -> None:
         result = improver.answer
@@ -83,16 +98,17 @@ def add_improving(page: Page) -> None:
         partial(change, SearchRequest.with_fixed_toggled),
         lambda layout, draft, lost: (layout.names, lost, draft.fixed),
     )
+    reach_box = gui.add_vector3("Reach ± [m]", MOVE_RANGE[:3], step=0.01, hint="Along x, y and z.")
     page.bind_number(
-        gui.add_vector3("Reach ± [m]", MOVE_RANGE[:3], step=0.01, hint="Along x, y and z."),
-        lambda reach: bound((*reach, session.draft.move_range[3])),
-        lambda draft: draft.move_range[:3],
+        reach_box,
+        lambda reach: bound((*reach, range_now()[3])),
+        lambda draft, layout: draft.range_of(layout)[:3],
     )
     hint = "How far each may turn either way; what is not kept level rises and falls, too."
     page.bind_number(
         gui.add_slider("Turn ± [°]", 0.0, 180.0, 5.0, MOVE_RANGE[3], hint=hint),
-        lambda turn: bound((*session.draft.move_range[:3], turn)),
-        lambda draft: draft.move_range[3],
+        lambda turn: bound((*range_now()[:3], turn)),
+        lambda draft, layout: draft.range_of(layout)[3],
         digits=2,
     )
     add_html(gui, marker("fl-primary"))

@@ -12,7 +12,7 @@ from webapp.markup.words import html, marker, three_digits
 from webapp.page import Page
 from webapp.panels.modes_tab import add_saving, mode_table
 from webapp.tasks.null_space_modes import MOST
-from webapp.tasks.solver import Modes
+from webapp.tasks.solver import Modes, NullSpaceDirections
 from webapp.viser_internals import slider_marks
 
 ABOUT = "Each slider changes forces and leaves the wrench as it is. Its dot is the answer."
@@ -49,8 +49,7 @@ def add_null_space(page: Page) -> None:
             set_properties(
                 slider,
                 label=f"{k + 1}: {space.names[k]} [N]",
-                hint=f"{ends_words}, as far as every actuator has a command. "
-                f"Shares: {space.about[k]}.",
+                hint=f"{ends_words}, as far as {_limits_words(space)}. Shares: {space.about[k]}.",
                 step=step,
                 _marks=marks,
                 **ends,
@@ -78,7 +77,15 @@ def _sentence(modes: Modes) -> str:
     if space is None:
         return ""
     sentence = f"{ABOUT} {space.more} more directions are not shown." if space.more else ABOUT
+    if space.has_budget:
+        sentence += " They end where the power budget does."
     return html("<div class='fl dim'>{}</div>", sentence if space.names else ALONE)
+
+
+def _limits_words(space: NullSpaceDirections) -> str:
+    """Up to where forces go along the directions."""
+    words = "every actuator has a command"
+    return f"{words}, and the power budget allows it" if space.has_budget else words
 
 
 def _mean_words(modes: Modes) -> str:

@@ -17,6 +17,7 @@ from finlab.allocation.report import missing_words
 from finlab.axes import AXES, MOTIONS, UNITS
 from finlab.display import listed
 from finlab.forces.reach import Ranges
+from finlab.forces.within_budget import counts_budget
 from finlab.layout import Layout
 from webapp.handles import add_html, placed, press
 from webapp.markup.answer import bars_of, fin_table
@@ -195,7 +196,7 @@ def _add_budgets(page: Page) -> None:
             label=partial(_bus_label, place),
             hint=partial(_bus_hint, place),
         )
-    page.add_html(_unlisted_buses)
+    page.add_html(_budget_notes)
 
 
 def _budget_of_all(layout: Layout) -> float:
@@ -222,12 +223,16 @@ def _bus_hint(place: int, layout: Layout) -> str:
     return f"The most that {fed} may take together; empty: no limit, and no such bus."
 
 
-def _unlisted_buses(layout: Layout) -> str:
-    """What is said of buses that have no box."""
+def _budget_notes(layout: Layout, flow: Flow | None) -> str:
+    """What is said of buses that have no box, and of what no budget counts in."""
+    notes = []
     n_more = len(layout.buses) - MOST_BUSES
-    if n_more <= 0:
-        return ""
-    return html("<div class='fl dim'>{} more buses keep the budgets of their file.</div>", n_more)
+    if n_more > 0:
+        notes.append(f"{n_more} more buses keep the budgets of their file.")
+    has_budget = layout.power_w is not None or bool(layout.buses)
+    if has_budget and not counts_budget(layout, flow):
+        notes.append("Marks and ends of sliders leave the budget out: the flow drives actuators.")
+    return html("<div class='fl dim'>{}</div>", " ".join(notes)) if notes else ""
 
 
 def add_speed(page: Page) -> None:

@@ -5,6 +5,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from finlab.analysis import Bounds
 from finlab.analysis.improvement_text import GOAL_WORDS
 from finlab.analysis.moves import azimuth, is_mirrored
@@ -104,7 +106,12 @@ GOALS_BY_WORDS = {words: name for name, words in GOAL_WORDS.items()}
 MoveRange = tuple[float, float, float, float]
 """How far an actuator may go along x, y and z [m] and turn [deg], either way."""
 MOVE_RANGE: MoveRange = (0.05, 0.05, 0.05, 180.0)
-"""The range that a search begins with."""
+"""The range that a search begins with, of robots up to a metre; that of larger ones grows with
+them."""
+MOST_REACH = 0.5
+"""How far an actuator of such a robot may go at most [m]; of a larger one, as far as it is long."""
+REACH_SHARE = 0.05
+"""The range along x, y and z of a robot that is longer than a metre, over its length."""
 
 
 @dataclass(frozen=True)
@@ -115,8 +122,8 @@ class SearchRequest:
     """Key of `GOALS_BY_WORDS`."""
     fixed: tuple[str, ...] = ()
     """Names of actuators that stay where they are."""
-    move_range: MoveRange = MOVE_RANGE
-    """How far each of the others may go."""
+    move_range: MoveRange | None = None
+    """How far each of the others may go; None for what fits the robot."""
 
     def with_goal(self, goal: Any) -> "SearchRequest":
         """Another goal."""
@@ -127,14 +134,26 @@ class SearchRequest:
         others = tuple([fixed for fixed in self.fixed if fixed != name])
         return replace(self, fixed=others if name in self.fixed else (*others, name))
 
-    def with_move_range(self, move_range: tuple[Any, ...]) -> "SearchRequest":
-        """Another range of all: along x, y and z [m], and turn [deg]."""
+    def with_move_range(
+        self, move_range: tuple[Any, ...], most_reach: float = MOST_REACH
+    ) -> "SearchRequest":
+        """Another range of all: along x, y and z, at most so far [m], and turn [deg]."""
         x, y, z = (
-            number(value, f"reach along {axis} [m]", 0.0, 0.5)
+            number(value, f"reach along {axis} [m]", 0.0, most_reach)
             for value, axis in zip(move_range, "xyz", strict=False)
         )
         turn = number(move_range[3], "turn [°]", 0.0, 180.0)
         return replace(self, move_range=(x, y, z, turn))
+
+    def range_of(self, layout: Layout) -> MoveRange:
+        """How far each actuator of a layout may go that may move."""
+        if self.move_range is not None:
+            return self.move_range
+        length = _length_of(layout)
+        if length <= 1.0:
+            return MOVE_RANGE
+        reach = float(f"{REACH_SHARE * length:.1g}")
+        return (reach, reach, reach, MOVE_RANGE[3])
 
     def bounds(self, layout: Layout) -> dict[str, Bounds]:
         """Where each actuator that may move may go from where it is.
@@ -143,7 +162,7 @@ class SearchRequest:
             FinlabError: none may.
         """
         bounds = {}
-        *reach, turn = self.move_range
+        *reach, turn = self.range_of(layout)
         for actuator in layout.actuators:
             if actuator.name in self.fixed:
                 continue
@@ -157,3 +176,13 @@ class SearchRequest:
         if not bounds:
             raise FinlabError("nothing may move; press the numbers of what may")
         return bounds
+
+
+def most_reach(layout: Layout) -> float:
+    """Returns how far an actuator of a layout may go at most along an axis [m]."""
+    return max(MOST_REACH, float(f"{_length_of(layout):.2g}"))
+
+
+def _length_of(layout: Layout) -> float:
+    """The longest way between two actuators of a layout along an axis [m]."""
+    return float(np.ptp(layout.position, axis=0).max())

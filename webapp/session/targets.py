@@ -1,12 +1,11 @@
 """Target wrenches to start from, and how much of each axis a layout can give."""
 
 import math
-from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 
-from finlab.analysis.authority import authority
+from finlab.analysis.authority import reach_alone
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.physics import plant_of
@@ -62,8 +61,7 @@ def _extents(layout: Layout, flow: Flow | None) -> tuple[Array, Array]:
 def lone_reach(layout: Layout, lost: tuple[str, ...] = (), flow: Flow | None = None) -> Array:
     """How far a robot goes along each axis (6,) [N, N m] with the other five at zero, the farther
     of both ways; where it pushes an axis only along with others, as far as `axis_reach` has it.
-    A power budget is left out: sliders go as far as actuators push, and their marks as far as the
-    budget lets them.
+    A power budget counts, but where the flow drives actuators.
 
     Args:
         layout: the robot, with the limits that damage has left.
@@ -73,9 +71,7 @@ def lone_reach(layout: Layout, lost: tuple[str, ...] = (), flow: Flow | None = N
     with_others = axis_reach(layout, lost, flow)
     if len(lost) == layout.n:
         return with_others
-    without_budget = replace(layout, power_w=None, buses=())
-    sizes = authority(without_budget, lost, flow)
-    alone = np.maximum(sizes.largest, sizes.most_negative)
+    alone = reach_alone(layout, lost, flow).max(axis=0)
     reach: Array = np.where(alone > 0.0, alone, with_others)
     reach.setflags(write=False)
     return reach

@@ -1,15 +1,16 @@
 """Analyses of a layout and of a question: score cards, attainable sets, and ranges of the axes."""
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 
 from finlab.analysis import AttainableSet, ScoreCard, attainable_set, score_card
 from finlab.forces.attainable import WrenchHalf
 from finlab.forces.reach import Ranges, axis_ranges
+from finlab.forces.within_budget import counts_budget
 from finlab.layout import Layout
 from webapp.session.looking import DRAWN
 from webapp.session.state import Flow, State
-from webapp.tasks.budget_ranges import ranges_within_budget
 
 
 @dataclass(frozen=True)
@@ -59,11 +60,11 @@ def analyse(question: AnalysisQuestion) -> Analysis:
     kind = DRAWN[question.drawn]
     now = reference = None
     if kind is not None:
-        now = attainable_set(layout, kind, lost=lost, flow=flow)
+        now = _set_of(layout, kind, lost, flow)
         if lost:
-            reference = attainable_set(layout, kind, flow=flow)
+            reference = _set_of(layout, kind, (), flow)
         elif before is not None:
-            reference = attainable_set(before, kind, lost=lost_before, flow=flow)
+            reference = _set_of(before, kind, lost_before, flow)
     card = score_card(layout, lost, flow)
     card_before = None
     if before is not None and len(lost_before) < before.n:
@@ -73,12 +74,16 @@ def analyse(question: AnalysisQuestion) -> Analysis:
 
 @lru_cache(maxsize=32)
 def find_ranges(question: State) -> Ranges:
-    """The range of each component of a state's target."""
-    ranges = axis_ranges(question.layout, question.target, question.lost, question.flow)
-    layout = question.layout
-    if layout.power_w is None and not layout.buses:
-        return ranges
-    return ranges_within_budget(question, ranges)
+    """The range of each component of a state's target, within the power budget of its layout but
+    where none is counted."""
+    power = counted_power(question.layout, question.flow)
+    return axis_ranges(question.layout, question.target, question.lost, question.flow, power)
+
+
+def counted_power(layout: Layout, flow: Flow | None) -> float | None:
+    """None for the power budget of a layout, and infinity where none is counted."""
+    has_budget = layout.power_w is not None or bool(layout.buses)
+    return math.inf if has_budget and not counts_budget(layout, flow) else None
 
 
 @dataclass(frozen=True)
@@ -94,4 +99,12 @@ class SetQuestion:
 
 def find_set(question: SetQuestion) -> AttainableSet:
     """The set of forces, or of torques, that a layout attains."""
-    return attainable_set(question.layout, question.kind, flow=question.flow)
+    return _set_of(question.layout, question.kind, (), question.flow)
+
+
+def _set_of(
+    layout: Layout, kind: WrenchHalf, lost: tuple[str, ...], flow: Flow | None
+) -> AttainableSet:
+    """The attainable set of a layout that has lost some actuators."""
+    power = counted_power(layout, flow)
+    return attainable_set(layout, kind, lost=lost, flow=flow, power=power)

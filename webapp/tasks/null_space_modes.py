@@ -48,6 +48,7 @@ def null_space_modes(answer: Allocation, shifts: tuple[float, ...]) -> Modes:
         about=tuple(_share_words(space, k) for k in range(count)),
         ranges=tuple((float(low), float(high)) for low, high in space.ranges(shift, count)),
         more=len(space.basis) - count,
+        has_budget=answer.budget is not None,
     )
     return Modes(tuple(modes), len(modes), null_space=directions)
 

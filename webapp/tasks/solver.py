@@ -54,6 +54,9 @@ class NullSpaceDirections(NamedTuple):
     """How far one may go along each, the others as they are [N]."""
     more: int
     """Directions that are not listed."""
+    budget_w: float | None = None
+    has_budget: bool = False
+    """Whether the ranges end where a power budget does, too."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -194,7 +194,9 @@ class _Tables:
 
     def of(self, response: Response, form: Form) -> TableOffsets:
         """Returns the offsets of an actuator's tables."""
-        gauge = response.gauge if isinstance(response, Plane) else None
+        gauge = None  # a rudder in a slipstream has its curve in place of a table of directions
+        if isinstance(response, Plane) and form.deflection is not None:
+            gauge = response.gauge
         law = form.law
         command_table = form.command_table
         return TableOffsets(

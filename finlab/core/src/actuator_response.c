@@ -25,23 +25,45 @@ typedef struct {
   real other_end;  /* angle of the other end then [rad] */
 } push_direction;
 
-/* The gauge of a plane's forces ahead; 0 where it has none, and in reverse, which only rudders in
-   slipstreams have beside a gauge. */
-static const real *gauge_of(const real *block, const fl_actuator *a, const fl_set *set) {
+/* Whether what a plane pushes depends on the direction: by a gauge, or by the curve of a rudder in a
+   slipstream. In reverse nothing meets that rudder. */
+static int has_gauge(const fl_actuator *a, const fl_set *set) {
   if (FL_SLIPSTREAMS && set->is_flipped) return 0;
-  if (a->gauge_table > 0) return block + (int)a->gauge_table;
-  return 0;
+  return has_gauge_table(a) || is_steered(a);
 }
 
-/* The radius rho of a gauge at an angle [rad]; 1 without one. */
-static real radius_at(const real *gauge, real angle) {
-  if (gauge) return fl_gauge_radius(gauge, angle);
+/* How far a plane pushes ahead in a direction [rad], over the size that limits hold: 1 of most. */
+real fl_radius(const real *block, int i, real angle) {
+  const fl_actuator *a = ACTUATOR(block, i);
+#if FL_SLIPSTREAMS
+  if (is_steered(a)) return fl_steered_radius(block, i, angle);
+#endif
+  if (has_gauge_table(a)) return fl_gauge_radius(block + (int)a->gauge_table, angle);
   return 1;
 }
 
+/* The support function of what has a gauge in the direction (x, y) of a price. */
+static gauge_point support_at(const real *block, int i, real x, real y) {
+  const fl_actuator *a = ACTUATOR(block, i);
+#if FL_SLIPSTREAMS
+  if (is_steered(a)) return fl_steered_support(block, i, x, y);
+#endif
+  return fl_gauge_support(block + (int)a->gauge_table, x, y);
+}
+
+/* Size of a plane's force [N] that the limits of its set hold: of a gauge its size over the radius
+   in its direction. */
+real fl_limited_size(const real *block, int i, const fl_set *set, const real *force) {
+  const real size = size_of(force);
+  if (!has_gauge(ACTUATOR(block, i), set)) return size;
+  return size / fl_radius(block, i, ATAN2(force[1], force[0]));
+}
+
 /* An end of an arc as a direction, which no price turns. */
-static push_direction end_of_arc(const real *gauge, real angle, const real *price) {
-  const real rho = radius_at(gauge, angle);
+static push_direction end_of_arc(const real *block, int i, const fl_set *set, real angle,
+                                 const real *price) {
+  real rho = 1;
+  if (has_gauge(ACTUATOR(block, i), set)) rho = fl_radius(block, i, angle);
   push_direction end = {0, rho * COS(angle), rho * SIN(angle), 0, 0, 0, 0, 0};
   end.v = price[0] * end.x + price[1] * end.y;
   return end;
@@ -50,15 +72,15 @@ static push_direction end_of_arc(const real *gauge, real angle, const real *pric
 /* The direction g in which a plane responds to a price s: that of s, and of a gauge
    g = sigma e + sigma' e_across with e = s / |s|. `floor_squared` is added to |s|^2: below its root
    a price is rounding. */
-static push_direction direction_of(const fl_set *set, const real *gauge, const real *price,
+static push_direction direction_of(const real *block, int i, const fl_set *set, const real *price,
                                    real floor_squared) {
   const real size = SQRT(price[0] * price[0] + price[1] * price[1] + floor_squared);
   const real x = price[0] / size;
   const real y = price[1] / size;
   real turning = 1 / size; /* of g across e per price across e; sigma + sigma'' of a gauge */
   push_direction g = {size, x, y, 0, 0, 0, 0, 0};
-  if (gauge) {
-    const gauge_point sigma = fl_gauge_support(gauge, x, y);
+  if (has_gauge(ACTUATOR(block, i), set)) {
+    const gauge_point sigma = support_at(block, i, x, y);
     g.x = sigma.value * x - sigma.slope * y;
     g.y = sigma.value * y + sigma.slope * x;
     turning *= larger(sigma.value + sigma.bend, 0);
@@ -72,8 +94,8 @@ static push_direction direction_of(const fl_set *set, const real *gauge, const r
          width. */
       real nearer = 1;
       if (price[1] * set->cos_center - price[0] * set->sin_center < 0) nearer = -1;
-      push_direction end =
-          end_of_arc(gauge, set->sector_center + nearer * set->sector_half_angle, price);
+      const real angle = set->sector_center + nearer * set->sector_half_angle;
+      push_direction end = end_of_arc(block, i, set, angle, price);
       end.is_beyond = 1;
       end.other_end = set->sector_center - nearer * set->sector_half_angle;
       g = end;
@@ -118,25 +140,24 @@ static response along_direction(line_response T, const push_direction *g) {
 }
 
 /* The response of a plane that pushes ahead alone. */
-static response sector_response(const real *block, const fl_actuator *a, const fl_set *set,
-                                const real *gauge, const real *price) {
-  const push_direction g = direction_of(set, gauge, price, set->price_floor_squared);
+static response sector_response(const real *block, int i, const fl_set *set, const real *price) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  const push_direction g = direction_of(block, i, set, price, set->price_floor_squared);
   response own = along_direction(fl_limited_response(block, a, set, 0, g.v), &g);
   if (set->is_forked && g.is_beyond) {
-    const push_direction end = end_of_arc(gauge, g.other_end, price);
+    const push_direction end = end_of_arc(block, i, set, g.other_end, price);
     const response other = along_direction(fl_limited_response(block, a, set, 0, end.v), &end);
     blend(&own, &other, blend_width(set->cost_at_max));
   }
   return own;
 }
 
-/* The response of a plane: of one that pushes either way a blend of both, the gauge ahead. */
-static response plane_response(const real *block, const fl_actuator *a, const fl_set *set,
-                               const real *price) {
-  response own = sector_response(block, a, set, gauge_of(block, a, set), price);
+/* The response of a plane: of one that pushes either way a blend of both. */
+static response plane_response(const real *block, int i, const fl_set *set, const real *price) {
+  response own = sector_response(block, i, set, price);
   if (set->force_max_reverse > 0) {
     const fl_set reversed = fl_reversed_set(set);
-    const response other = sector_response(block, a, &reversed, 0, price);
+    const response other = sector_response(block, i, &reversed, price);
     blend(&own, &other, blend_width(reversed.cost_at_max));
   }
   return own;
@@ -238,7 +259,7 @@ response fl_response(const real *block, int i, const fl_set *set, const real *pr
   if (set->tangent) return tangent_response(set, price);
   if (is_foil(a)) return foil_response(block, a, set, price);
   if (set->turn_cost > 0) return fl_response_with_turning(block, i, set, price);
-  return plane_response(block, a, set, price);
+  return plane_response(block, i, set, price);
 }
 
 /* Drag [N], beyond that at rest, of a foil's lift [N]. */
@@ -271,17 +292,18 @@ static void farthest_foil(const real *block, int i, const fl_set *set, const rea
 
 /* The direction in which a plane's farthest force lies: of an uneven fin beyond an end of its arc
    the farther end may be worth more. */
-static push_direction farthest_direction(const fl_set *set, const real *gauge, const real *price) {
+static push_direction farthest_direction(const real *block, int i, const fl_set *set,
+                                         const real *price) {
   const int is_unpriced = size_of(price) * size_of(price) <= TINY;
   if (is_unpriced) { /* any force will do, but it must be one of the set */
     const real middle[2] = {set->cos_center, set->sin_center};
-    push_direction any = direction_of(set, gauge, middle, TINY);
+    push_direction any = direction_of(block, i, set, middle, TINY);
     any.v = 0;
     return any;
   }
-  const push_direction g = direction_of(set, gauge, price, TINY);
+  const push_direction g = direction_of(block, i, set, price, TINY);
   if (g.is_beyond) {
-    const push_direction end = end_of_arc(gauge, g.other_end, price);
+    const push_direction end = end_of_arc(block, i, set, g.other_end, price);
     if (end.v > g.v) return end;
   }
   return g;
@@ -309,8 +331,7 @@ real fl_support_of_set(const real *block, int i, const fl_set *set, const real *
     farthest_foil(block, i, set, price, force);
     return price[0];
   }
-  const real *gauge = gauge_of(block, a, set);
-  const push_direction g = farthest_direction(set, gauge, price);
+  const push_direction g = farthest_direction(block, i, set, price);
   real size = set->force_min;
   if (g.v > 0) size = set->force_max;
   force[0] = g.x;
@@ -318,7 +339,7 @@ real fl_support_of_set(const real *block, int i, const fl_set *set, const real *
   /* Without a gauge its length is 1 but for rounding, which would be that of the set: a step of
      Newton's method for the inverse root takes it off. */
   wide length_squared = 1;
-  if (!gauge) length_squared = dot_wide(force, force, 2);
+  if (!has_gauge(a, set)) length_squared = dot_wide(force, force, 2);
   const wide times = size / 2 * (3 - length_squared);
   force[0] *= times;
   force[1] *= times;
@@ -344,12 +365,9 @@ real fl_support_of_set(const real *block, int i, const fl_set *set, const real *
 /* Whether a plane that pushes either way responds rather ahead than in reverse, and how far its
    blend is from that force: `off` [N]. */
 int fl_undecided(const real *block, int i, const fl_set *set, const real *price, real *off) {
-  const fl_actuator *a = ACTUATOR(block, i);
   const fl_set reversed = fl_reversed_set(set);
-  const real *gauge = 0;
-  if (FL_SLIPSTREAMS) gauge = gauge_of(block, a, set);
-  const response ahead = sector_response(block, a, set, gauge, price);
-  const response reverse = sector_response(block, a, &reversed, 0, price);
+  const response ahead = sector_response(block, i, set, price);
+  const response reverse = sector_response(block, i, &reversed, price);
   const real delta = ahead.conjugate - reverse.conjugate;
   const real omega = blend_width(reversed.cost_at_max);
   const real root = SQRT(delta * delta + omega * omega);

@@ -61,7 +61,8 @@ static int is_known_kind(const real *block, const fl_work *work, int i) {
   const fl_actuator *a = ACTUATOR(block, i);
   const fl_set *set = work->set + i;
   const int kind = (int)a->command_kind;
-  if (is_foil(a) || a->gauge_table > 0 || a->barred_count > 0 || set->tangent) return 0;
+  if (is_foil(a) || has_gauge_table(a) || is_steered(a) || a->barred_count > 0 || set->tangent)
+    return 0;
   if (kind == FL_THRUSTER) return a->rows == 1;
   if (kind == FL_POD) return set->force_max_reverse == 0 && !set->is_flipped;
   if (kind != FL_FIN) return 0;

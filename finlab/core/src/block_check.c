@@ -104,14 +104,23 @@ static int are_barred_zones(const fl_actuator *a) {
   return below <= a->command_max[0] && a->command_max[0] - a->command_min[0] <= 2 * PI;
 }
 
+/* Whether the ends of a curve lie in the block: two rows, whose deflections rise. */
+static int are_ends(const real *block, real offset) {
+  if (!is_table(block, offset, CURVE)) return 0;
+  const real *ends = block + (int)offset;
+  return ends[0] == 2 && ends[2] <= ends[4];
+}
+
 /* Whether all offsets of an actuator are those of tables that it needs. */
 static int has_tables(const real *block, const fl_actuator *a) {
   const command_form *form = fl_form_of(a);
   if (!is_table(block, a->force_table, FORCE_TABLE)) return 0;
   if (!is_table_or_none(block, a->force_table_reverse, FORCE_TABLE)) return 0;
+  if (!FL_GAUGES && a->gauge_table != 0) return 0;
   if (!is_table_or_none(block, a->gauge_table, GAUGE)) return 0;
   if (form->command_table == BEAT_TABLE && !is_table(block, a->command_table, BEAT)) return 0;
   if (form->command_table == CURVE_TABLE && !is_table(block, a->command_table, CURVE)) return 0;
+  if (form->command_table == ENDS_TABLE && !are_ends(block, a->command_table)) return 0;
   if (form->has_law_grid) return is_grid(block, a->law_grid);
   return a->law_grid == 0;
 }
@@ -133,9 +142,8 @@ static int check_actuator(const real *block, const fl_actuator *a) {
   if (!are_barred_zones(a)) return FL_BAD_NUMBER;
   const int drags = fl_form_of(a)->has_drag && a->rows == 2;
   if (is_foil(a) && !drags) return FL_BAD_BLOCK;
-  const int is_steered = (int)a->command_kind == FL_STEERED;
-  const int is_known = FL_SLIPSTREAMS && a->rows == 2 && a->gauge_table > 0;
-  if (is_steered && !is_known) return FL_BAD_BLOCK;
+  const int is_known = FL_SLIPSTREAMS && a->rows == 2;
+  if ((int)a->command_kind == FL_STEERED && !is_known) return FL_BAD_BLOCK;
   return FL_OK;
 }
 

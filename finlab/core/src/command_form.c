@@ -21,6 +21,7 @@ static const command_form FORMS[FL_KINDS] = {
     [FL_STEERED] = {.numbers = 2,
                     .angle_number = NO_NUMBER,
                     .force_number = 1,
+                    .command_table = ENDS_TABLE,
                     .has_law_grid = 1,
                     .reverses_straight = 1},
 };

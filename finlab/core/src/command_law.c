@@ -206,7 +206,7 @@ static void pod_force(const real *block, const fl_actuator *a, const real *comma
   real along_x = COS(angle);
   real along_y = SIN(angle);
   real bend = 0; /* (d rho / d angle) / rho */
-  if (a->gauge_table > 0) {
+  if (has_gauge_table(a)) {
     const real *gauge = block + (int)a->gauge_table;
     const real rho = fl_gauge_radius(gauge, angle);
     if (has_slope) {
@@ -347,7 +347,7 @@ static void fin_command(const real *block, int i, const fl_box *box, const real 
   (void)before;
   const fl_actuator *a = ACTUATOR(block, i);
   const real *gauge = 0;
-  if (a->gauge_table > 0) gauge = block + (int)a->gauge_table;
+  if (has_gauge_table(a)) gauge = block + (int)a->gauge_table;
   const real size = size_of(force);
   const real direction = ATAN2(force[1], force[0]);
   real angle = direction;
@@ -400,7 +400,7 @@ static void pod_command(const real *block, int i, const fl_box *box, const real 
   const fl_actuator *a = ACTUATOR(block, i);
   const real direction = ATAN2(force[1], force[0]);
   real size = size_of(force);
-  if (a->gauge_table > 0) size /= fl_gauge_radius(block + (int)a->gauge_table, direction);
+  if (has_gauge_table(a)) size /= fl_gauge_radius(block + (int)a->gauge_table, direction);
   real angle = 0;
   if (before) angle = before[fl_form_of(a)->angle_number];
   if (size > 0) angle = direction;
@@ -488,7 +488,7 @@ static force_range fin_range(const real *block, int i, const fl_box *box) {
   sizes_in(block, i, box, &range.low, &range.high, &direction);
   /* where the force points at the middle of the commands' arc */
   range.middle += fl_wrap_angle(direction - range.middle);
-  if (a->gauge_table > 0) {
+  if (has_gauge_table(a)) {
     const real rho = fl_gauge_radius(block + (int)a->gauge_table, range.middle);
     range.low /= rho;
     range.high /= rho;
@@ -540,7 +540,6 @@ static void steered_force(const real *block, const fl_actuator *a, const real *c
 static void steered_command(const real *block, int i, const fl_box *box, const real *force,
                             const real *before, real *command) {
   const fl_actuator *a = ACTUATOR(block, i);
-  const real *gauge = block + (int)a->gauge_table;
   const real size = size_of(force);
   const real direction = ATAN2(force[1], force[0]);
   const int is_reverse = COS(direction) < 0;
@@ -550,8 +549,8 @@ static void steered_command(const real *block, int i, const fl_box *box, const r
   if (is_reverse) {
     slipstream = -size;
   } else if (size > 0) {
-    slipstream = size / fl_gauge_radius(gauge, direction);
-    deflection = direction - fl_gauge_lean(gauge, direction);
+    slipstream = size / fl_steered_radius(block, i, direction);
+    deflection = fl_steered_deflection(block, i, direction);
   }
   command[0] = fl_clip_number(box, i, 0, NO_NUMBER, deflection);
   command[1] = fl_clip_number(box, i, 1, NO_NUMBER, slipstream - a->pressure_area);
@@ -651,8 +650,7 @@ real fl_power_of_commands(const real *block, const fl_work *work, real command[]
       size = force[i][0];
     }
     const int is_in_reverse = fl_is_in_reverse(a, command[i]);
-    if (a->gauge_table > 0 && !is_in_reverse)
-      size /= fl_gauge_radius(block + (int)a->gauge_table, ATAN2(along[2], along[1]));
+    if (is_plane(a) && !is_in_reverse) size /= fl_radius(block, i, ATAN2(along[2], along[1]));
     if (is_foil(a)) {
       fl_tangent tangent;
       fl_foil_at(block, i, command[i][0], &tangent);

@@ -8,6 +8,7 @@
 #include "internal.h"
 
 #define HOLDS 3         /* how often a step is found anew without commands that leave the box */
+#define LIMIT_ROUNDS 6  /* how often, where numbers go to their limits */
 #define MU_KEPT R(0.3)  /* damping after a kept step, over that before */
 #define MU_REFUSED 10   /* the same after a refused step */
 #define REGULAR R(0.01) /* least damping (epsilon of Eq. 11) over the rounding of numbers */
@@ -153,6 +154,54 @@ static const fl_box *box_of_steps(const real *block, const fl_box *box, real com
   return kept;
 }
 
+#if FL_COUPLES
+/* How far number c of a command goes, over the width of its limits, where a step takes it beyond
+   one: to that limit. Returns whether it does. */
+static int ends_at_limit(const real *block, const fl_box *box, int i, int c, const real *command,
+                         real step, real *to_limit) {
+  const real low = box->command_min[i][c];
+  const real high = box->command_max[i][c];
+  const real width = high - low;
+  if (c == fl_form_of(ACTUATOR(block, i))->angle_number && box->is_free_angle[i]) return 0;
+  if (!(width > 0)) return 0;
+  const real most = (high - command[c]) / width;
+  const real least = (low - command[c]) / width;
+  *to_limit = clipped(step, smaller(least, 0), larger(most, 0));
+  return *to_limit != step;
+}
+
+/* A damped step within the box whose numbers at their limits leave what they cannot do to the
+   others: those that a step takes beyond a limit go to it and are held, and the step of the others
+   is found anew for what is left of the residual. */
+static void step_to_limits(const real *block, fl_work *work, const fl_box *box, real command[][3],
+                           const real *residual, real mu, real step[][3]) {
+  unsigned char held[FL_MOST][3] = {{0}};
+  real to_limit[FL_MOST][3] = {{0}};
+  real residual_left[6];
+  memcpy(residual_left, residual, sizeof residual_left);
+  damped_step(block, work, residual_left, mu, held, step);
+  for (int round = 0; round < LIMIT_ROUNDS; round++) {
+    int any = 0;
+    for (int i = 0; i < COUNT(block); i++) {
+      const int numbers = fl_form_of(ACTUATOR(block, i))->numbers;
+      for (int c = 0; c < numbers; c++) {
+        if (held[i][c]) continue;
+        if (!ends_at_limit(block, box, i, c, command[i], step[i][c], &to_limit[i][c])) continue;
+        held[i][c] = 1;
+        any = 1;
+        for (int k = 0; k < 6; k++) residual_left[k] -= work->jacobian[i][c][k] * to_limit[i][c];
+      }
+    }
+    if (!any) break;
+    damped_step(block, work, residual_left, mu, held, step);
+  }
+  for (int i = 0; i < COUNT(block); i++) {
+    for (int c = 0; c < 3; c++) {
+      if (held[i][c]) step[i][c] = to_limit[i][c];
+    }
+  }
+}
+
 /* Commands within a box after one step by a damping mu that reduces a residual. */
 void fl_step_commands(const real *block, fl_work *work, const fl_box *box, const real *residual,
                       real mu, real command[][3], real stepped[][3]) {
@@ -160,9 +209,10 @@ void fl_step_commands(const real *block, fl_work *work, const fl_box *box, const
   fl_box kept;
   box = box_of_steps(block, box, command, &kept);
   find_jacobian(block, work, box, command);
-  step_within(block, work, box, command, residual, mu, step);
+  step_to_limits(block, work, box, command, residual, mu, step);
   take_step(block, box, command, step, stepped);
 }
+#endif
 
 /* Levenberg-Marquardt steps on commands within a box towards a wrench [N, N m]; the error
    over the wrench scale that is left. */

@@ -16,8 +16,7 @@
 /* Least thrust that is asked of an actuator whose box leaves low to high: no thrust astern of a
    propeller with a rudder in a flow from ahead, of which too little is known there. */
 static real least_thrust(const fl_actuator *a, real low, real high) {
-  const int is_steered = FL_SLIPSTREAMS && (int)a->command_kind == FL_STEERED;
-  const int is_in_flow = is_steered && a->pressure_area > 0;
+  const int is_in_flow = is_steered(a) && a->pressure_area > 0;
   if (is_in_flow && low < 0 && high >= 0) return 0;
   return low;
 }
@@ -67,9 +66,8 @@ static real power_at(const real *block, int i, const real *command, real *price)
   if (is_plane(a)) size = size_of(force + 1);
   if (fl_is_in_reverse(a, command)) {
     size = -size;
-  } else if (a->gauge_table > 0) {
-    const real direction = ATAN2(force[2], force[1]);
-    size /= fl_gauge_radius(block + (int)a->gauge_table, direction);
+  } else if (is_plane(a)) {
+    size /= fl_radius(block, i, ATAN2(force[2], force[1]));
   }
   const real within = clipped(size, a->force_min, a->force_max);
   const real power = fl_power_and_price(block, i, within, price);
@@ -269,6 +267,9 @@ int fl_prepare_question(const real *block, fl_work *work, const fl_question *q) 
 int fl_prepare(const real *block, fl_work *work) {
   memset(&work->span, 0, sizeof work->span);
   work->ray = 0;
+#ifdef FL_WITH_POWER_SETS
+  work->power_sets = 0;
+#endif
   work->refine_steps = 0;
   work->has_lambda_begin = 0;
   work->law_power = 0;

@@ -146,7 +146,7 @@ void fl_empty_set(const real *block, int i, fl_set *set) {
 void fl_fix_force(const real *block, int i, fl_set *set, const real *force) {
   const int plane = is_plane(ACTUATOR(block, i));
   real size = force[0];
-  if (plane) size = size_of(force);
+  if (plane) size = fl_limited_size(block, i, set, force);
   real signed_size = clipped(size, set->force_min, set->force_max);
   if (set->is_flipped) signed_size = -signed_size;
   const real cost = fl_power_of_force(block, i, signed_size);

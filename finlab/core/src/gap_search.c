@@ -9,7 +9,7 @@
 static int is_hollow(const real *block, int i, const fl_set *set, const real *force) {
   const int is_narrow = is_plane(ACTUATOR(block, i)) && set->turn_cost == 0 &&
                         set->sector_half_angle <= NARROW;
-  return is_narrow && size_of(force) < HOLLOW_FORCE * set->force_min;
+  return is_narrow && fl_limited_size(block, i, set, force) < HOLLOW_FORCE * set->force_min;
 }
 
 static int any_hollow(const real *block, const fl_work *work) {
@@ -73,7 +73,7 @@ static int may_be_cheaper(const fl_work *work, const fl_part_problem *problem, i
    so it is below the least force only where it jumps, and there the jump is to be cut. */
 static int is_below_least_force(const real *block, int i, const fl_set *set, const real *force) {
   const int has_free_turns = is_plane(ACTUATOR(block, i)) && set->turn_cost == 0;
-  return has_free_turns && size_of(force) < SHORTER * set->force_min;
+  return has_free_turns && fl_limited_size(block, i, set, force) < SHORTER * set->force_min;
 }
 
 /* Leaves all gaps on their nearer sides, round after round, until there are none; forces

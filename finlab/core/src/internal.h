@@ -159,6 +159,17 @@ gauge_point fl_gauge_support(const real *gauge, real x, real y);
 real fl_gauge_radius(const real *gauge, real angle);
 real fl_gauge_lean(const real *gauge, real angle);
 
+/* Whether the forces of an actuator differ by direction, by a table. */
+static inline int has_gauge_table(const fl_actuator *a) { return FL_GAUGES && a->gauge_table > 0; }
+
+/* steered_curve.c: forces of propellers with a rudder by direction */
+real fl_steered_deflection(const real *block, int i, real angle);
+real fl_steered_radius(const real *block, int i, real angle);
+gauge_point fl_steered_support(const real *block, int i, real x, real y);
+static inline int is_steered(const fl_actuator *a) {
+  return FL_SLIPSTREAMS && (int)a->command_kind == FL_STEERED;
+}
+
 /* force_set.c: what one actuator may give */
 void fl_empty_set(const real *block, int i, fl_set *set);
 line_response fl_unlimited_response(const real *block, const fl_actuator *a, real price);
@@ -183,6 +194,8 @@ response fl_response(const real *block, int i, const fl_set *set, const real *pr
 #define BLEND_REST R(1e-12) /* least width omega [W] of a blend */
 /* omega [W] of a blend of two responses whose largest force costs so much. */
 static inline real blend_width(real high_cost) { return FINE * high_cost + BLEND_REST; }
+real fl_radius(const real *block, int i, real angle);
+real fl_limited_size(const real *block, int i, const fl_set *set, const real *force);
 real fl_support_of_set(const real *block, int i, const fl_set *set, const real *price, wide *force,
                        real *slope);
 real fl_drag_of_lift(const real *block, int i, real force);
@@ -220,7 +233,7 @@ int fl_span_of_question(const real *block, fl_work *work, const unsigned char *l
 
 /* command_form.c: what the numbers of each kind of command are */
 enum { NO_NUMBER = -1 };
-enum { NO_TABLE, BEAT_TABLE, CURVE_TABLE }; /* kinds of command tables, see fl_work.h */
+enum { NO_TABLE, BEAT_TABLE, CURVE_TABLE, ENDS_TABLE }; /* kinds of command tables, see fl_work.h */
 typedef struct {
   signed char numbers;       /* how many of the three a command uses, from the first one on */
   signed char angle_number;  /* which one is an angle that wraps, or NO_NUMBER */
@@ -576,6 +589,39 @@ wide fl_farthest_along_ray(const real *block, const fl_work *work, const wide *f
                            const wide *ray, wide least, wide most, wide close, fl_mixture *m,
                            wide *plane);
 void fl_mixed_forces(const real *block, const fl_mixture *m, real force[][2]);
+
+#ifdef FL_WITH_POWER_SETS
+/* power_sets.c: the farthest forces within power budgets. A side is a convex set of forces of one
+   actuator, from a share of its largest ones on, whose power grows with that share; Python writes
+   it, as `Side.numbers` of finlab/forces/power_sides.py. */
+typedef struct {
+  real polygon; /* offset of its corners in the tables, a count and pairs [N]; 0 for a sector */
+  real radius;  /* of a sector [N] */
+  real center;  /* of its arc [rad] */
+  real half_angle;
+  real least_share; /* of the largest forces [1] */
+  real watts;       /* of the largest forces: a share g takes watts g^exponent */
+  real exponent;
+  real curve; /* offset of knots in the tables, in place of that: a count, and of each a share, its
+                 power [W], and the slope of that; else 0 */
+} fl_power_side;
+#define NUMBERS_OF_ACTUATOR 16 /* of fl_power_sets */
+struct fl_power_sets {
+  const real *tables;
+  const fl_power_side *side;
+  const real *actuator; /* (n, 16): first side, how many, bus or -1, whether it works; then the
+                           wrench (2, 6) per newton along both directions */
+  const real *budget;   /* (buses,) [W] */
+  int buses;
+  wide multiplier[FL_BUSES]; /* of the budgets, at the last normal */
+  wide expected[FL_BUSES];   /* the same over its length, where it was above 0 */
+  int *corner;               /* of each side, the farthest one at the last normal */
+};
+#define FL_SIDES_MOST 2560 /* of FL_MOST actuators: five arcs each, as two halves */
+void fl_farthest_within_budgets(fl_power_sets *sets, int n, const wide *normal, wide force[][2]);
+void fl_smooth_normal(const real *block, const fl_work *work, const wide *from, const wide *ray,
+                      wide close, wide *normal);
+#endif
 
 /* support_newton.c: the same by normals of the set */
 int fl_nearest_by_normal(const real *block, const fl_work *work, const wide *target_weighted,

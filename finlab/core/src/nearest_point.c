@@ -62,13 +62,9 @@ void fl_point_of_forces(const real *block, const fl_work *work, wide force[][2],
   }
 }
 
-/* Puts the forces that are farthest along a normal (6,), and their point, behind the points
-   of a mixture. Of a ray, where there is one, all is taken where that is farther. */
-static void append_farthest(const real *block, const fl_work *work, const wide *normal,
-                            fl_mixture *m) {
-  const int last = m->count;
-  wide(*force)[2] = m->force[last];
-  m->actuators = COUNT(block);
+/* The forces that are farthest along a normal (6,), in weighted axes. */
+static void farthest_forces(const real *block, const fl_work *work, const wide *normal,
+                            wide force[][2]) {
   for (int i = 0; i < COUNT(block); i++) {
     const wide(*column)[6] = work->effectiveness_weighted[i];
     if (ACTUATOR(block, i)->rows == 1) {
@@ -84,6 +80,21 @@ static void append_farthest(const real *block, const fl_work *work, const wide *
     else
       fl_support_of_set(block, i, work->set + i, s, force[i], 0);
   }
+}
+
+/* Puts the forces that are farthest along a normal (6,), and their point, behind the points
+   of a mixture. Of a ray, where there is one, all is taken where that is farther. */
+static void append_farthest(const real *block, const fl_work *work, const wide *normal,
+                            fl_mixture *m) {
+  const int last = m->count;
+  wide(*force)[2] = m->force[last];
+  m->actuators = COUNT(block);
+#ifdef FL_WITH_POWER_SETS
+  if (work->power_sets)
+    fl_farthest_within_budgets(work->power_sets, COUNT(block), normal, force);
+  else
+#endif
+    farthest_forces(block, work, normal, force);
   fl_point_of_forces(block, work, force, m->point[last]);
   m->ray_share[last] = 0;
   if (work->ray && dot_wide(work->ray, normal, 6) < 0) {

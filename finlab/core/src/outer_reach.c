@@ -4,8 +4,11 @@
 #include "internal.h"
 
 #define SERVED_STEPS 30 /* steps on commands to a wrench */
-#define TICK_STEPS 10   /* the same to a wrench that rates hold back */
-#define RAY_ROUNDS 12   /* shares of a ray that are tried */
+#define TICK_STEPS 120  /* the same to a wrench that rates hold back */
+/* Error over the wrench scale up to which commands of a tick may yet meet the wrench, though the
+   linear model says that it is beyond reach. */
+#define CLOSE_IN_TICK R(0.02)
+#define RAY_ROUNDS 12 /* shares of a ray that are tried */
 
 /* Finds the largest share of a wrench that steps on commands come to, by bisection, and makes the
    commands those that give it. */
@@ -61,14 +64,24 @@ void fl_serve_coupled(const fl_coupled_robot *robot, real *block, fl_work *work,
   }
   fl_box box;
   fl_box_of_question(block, work, q, &box);
-  if (answer->is_attainable) {
-    /* By the linear model. In a tick the last iteration may have stopped short of it. */
-    if (!q->previous) return;
-    answer->error =
-        fl_refine_coupled(robot, block, work, &box, wrench, EXACT, TICK_STEPS, answer->command);
-    fl_clip_commands(block, &box, answer->command);
-    return;
+  /* In a tick the last iteration may have stopped short of it, or of a reach that the linear model
+     does not have. */
+  const int may_be_met = answer->is_attainable || result->error <= CLOSE_IN_TICK;
+  if (q->previous && may_be_met) {
+    real command[FL_MOST][3];
+    copy_commands(block, answer->command, command);
+    const real error =
+        fl_refine_coupled(robot, block, work, &box, wrench, EXACT, TICK_STEPS, command);
+    fl_clip_commands(block, &box, command);
+    if (answer->is_attainable || error <= NEARLY) {
+      copy_commands(block, command, answer->command);
+      memcpy(answer->wrench_served, wrench, sizeof wrench);
+      answer->is_attainable = 1;
+      answer->error = error;
+      return;
+    }
   }
+  if (answer->is_attainable) return; /* by the linear model */
   answer->error = fl_refine_coupled(robot, block, work, &box, answer->wrench_served, EXACT,
                                     SERVED_STEPS, answer->command);
   if (q->policy && q->policy->kind == FL_DIRECTION) {

@@ -664,8 +664,8 @@ static real power_of(const real *block, const fl_work *work, int i, const real *
   const int goes_either_way = set->force_max_reverse > 0;
   if (set->is_flipped || (goes_either_way && along_middle < 0)) {
     size = -size;
-  } else if (a->gauge_table > 0) {
-    size /= fl_gauge_radius(block + (int)a->gauge_table, ATAN2(force[1], force[0]));
+  } else {
+    size /= fl_radius(block, i, ATAN2(force[1], force[0]));
   }
   return fl_power_of_force(block, i, clipped(size, a->force_min, a->force_max));
 }

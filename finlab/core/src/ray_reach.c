@@ -39,3 +39,60 @@ void fl_reach(const real *block, fl_work *work, const real *sets, const wide *fr
     force += 2 * n;
   }
 }
+
+#ifdef FL_WITH_POWER_SETS
+/* Makes a mixture the forces that are farthest along the normal of a smooth set. */
+static void begin_at_normal(const real *block, fl_work *work, const wide *from, const wide *ray,
+                            wide close, fl_mixture *m) {
+  fl_smooth_normal(block, work, from, ray, close, m->miss);
+  fl_farthest_within_budgets(work->power_sets, COUNT(block), m->miss, m->force[0]);
+  fl_point_of_forces(block, work, m->force[0], m->point[0]);
+  m->actuators = COUNT(block);
+  m->count = 1;
+  m->basis_count = 0;
+  m->weight[0] = 1;
+  m->ray_share[0] = 0;
+}
+
+/* The same within power budgets of buses, by sides of sets (fl_power_side) and their powers; and
+   the multipliers (count, buses) of the budgets at the planes. `corners` has a number for each
+   side, 0 at first, to be used by this function alone. */
+void fl_reach_within(const real *block, fl_work *work, const real *tables, const real *sides,
+                     const real *budget, int buses, const real *sets, const wide *from,
+                     const wide *ray, int count, wide close, int *corners, wide *size, wide *normal,
+                     real *force, wide *multiplier) {
+  const int n = COUNT(block);
+  const wide farthest = 1e30;
+  fl_power_sets power_sets;
+  memset(&power_sets, 0, sizeof power_sets);
+  power_sets.tables = tables;
+  power_sets.side = (const fl_power_side *)sides;
+  power_sets.budget = budget;
+  power_sets.buses = buses;
+  power_sets.corner = corners;
+  work->power_sets = &power_sets;
+  for (int k = 0; k < count; k++) {
+    power_sets.actuator = sets;
+    for (int i = 0; i < n; i++) {
+      const real *columns = sets + NUMBERS_OF_ACTUATOR * i + 4;
+      memcpy(work->effectiveness_weighted[i], columns, sizeof work->effectiveness_weighted[i]);
+    }
+    memset(power_sets.expected, 0, sizeof power_sets.expected);
+    work->mixture.count = 0;
+    if (close < farthest) begin_at_normal(block, work, from, ray, close, &work->mixture);
+    size[k] = fl_farthest_along_ray(block, work, from, ray, -farthest, farthest, close,
+                                    &work->mixture, normal);
+    fl_mixed_forces(block, &work->mixture, (real(*)[2])force);
+    wide unused[FL_MOST][2];
+    fl_farthest_within_budgets(&power_sets, n, normal, unused);
+    memcpy(multiplier, power_sets.multiplier, (size_t)buses * sizeof *multiplier);
+    sets += NUMBERS_OF_ACTUATOR * n;
+    from += 6;
+    ray += 6;
+    normal += 6;
+    force += 2 * n;
+    multiplier += buses;
+  }
+  work->power_sets = 0;
+}
+#endif

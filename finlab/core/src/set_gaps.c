@@ -17,20 +17,21 @@ static real angle_from_middle(const fl_set *set, const real *force) {
 }
 
 /* Whether a force of a size and at an angle from a direction is one of the sector that a
-   plane gives around it. */
+   plane gives around it, but for a rounding [N]. */
 static int is_in_sector(const fl_set *set, real angle, real size, real largest, real rounding) {
-  return FABS(fl_wrap_angle(angle)) - set->sector_half_angle <= CLOSE && size <= largest + rounding;
+  const real beyond_end = FABS(fl_wrap_angle(angle)) - set->sector_half_angle;
+  return beyond_end * size <= rounding && size <= largest + rounding;
 }
 
 /* How far a plane's force is from all that it can give forward and in reverse. */
-static real gap_between_ways(const real *block, const fl_actuator *a, const fl_set *set,
-                             const real *force, real size) {
+static real gap_between_ways(const real *block, int i, const fl_set *set, const real *force,
+                             real size) {
+  const fl_actuator *a = ACTUATOR(block, i);
   const fl_set reversed = fl_reversed_set(set);
   const real rounding = NEARLY * a->row_force_max[0];
   if (size <= rounding) return 0;
   real largest = set->force_max;
-  if (FL_SLIPSTREAMS && a->gauge_table > 0)
-    largest *= fl_gauge_radius(block + (int)a->gauge_table, ATAN2(force[1], force[0]));
+  if (is_steered(a)) largest *= fl_radius(block, i, ATAN2(force[1], force[0]));
   if (is_in_sector(set, angle_from_middle(set, force), size, largest, rounding)) return 0;
   const real from_back = angle_from_middle(&reversed, force);
   if (is_in_sector(&reversed, from_back, size, reversed.force_max, rounding)) return 0;
@@ -78,14 +79,18 @@ real fl_gap_of(const real *block, const fl_work *work, int i, const real *force,
   const real size = size_of(force);
   real amount = gap_in_band(a, set, force);
   if (set->force_max_reverse > 0 && !lambda)
-    return larger(gap_between_ways(block, a, set, force, size), amount);
+    return larger(gap_between_ways(block, i, set, force, size), amount);
   const int is_hollow = set->force_min > HOLLOW * largest;
-  if (!lambda && set->sector_half_angle > FLAT && is_hollow && size < set->force_min * (1 - NEARLY))
-    amount += 1 - size / set->force_min;
+  real limited_size = size;
+  if (is_hollow) limited_size = fl_limited_size(block, i, set, force);
+  const int is_short = is_hollow && limited_size < set->force_min * (1 - NEARLY);
+  if (!lambda && set->sector_half_angle > FLAT && is_short)
+    amount += 1 - limited_size / set->force_min;
   if (set->sector_half_angle > NARROW) {
     const real beyond_end = FABS(angle_from_middle(set, force)) - set->sector_half_angle;
     if (beyond_end > CLOSE && size > NEARLY * a->row_force_max[0]) amount += beyond_end;
-    if (is_hollow && size < SHORTER * set->force_min) amount += 1 - size / set->force_min;
+    if (is_hollow && limited_size < SHORTER * set->force_min)
+      amount += 1 - limited_size / set->force_min;
   }
   if (set->force_max_reverse > 0) {
     real s[2];
@@ -128,8 +133,9 @@ int fl_worst_gap(const real *block, const fl_work *work, real force[][2], const 
 int fl_may_have_gaps(const real *block, const fl_work *work, real force[][2]) {
   if (!work->is_convex) return 1;
   for (int i = 0; i < COUNT(block); i++) {
-    const int is_short = size_of(force[i]) < SHORTER * work->set[i].force_min;
-    if (is_plane(ACTUATOR(block, i)) && is_short) return 1;
+    const fl_set *set = work->set + i;
+    if (!is_plane(ACTUATOR(block, i)) || !(set->force_min > 0)) continue;
+    if (fl_limited_size(block, i, set, force[i]) < SHORTER * set->force_min) return 1;
   }
   return 0;
 }
@@ -327,6 +333,8 @@ void fl_fix_at_least_force(const real *block, int i, fl_set *set, const real *fo
   const real angle =
       clipped(angle_from_middle(set, force), -set->sector_half_angle, set->sector_half_angle);
   const real direction = set->sector_center + angle;
-  const real least[2] = {set->force_min * COS(direction), set->force_min * SIN(direction)};
+  const real e[2] = {COS(direction), SIN(direction)};
+  const real size = set->force_min / fl_limited_size(block, i, set, e);
+  const real least[2] = {size * e[0], size * e[1]};
   fl_fix_force(block, i, set, least);
 }

@@ -78,7 +78,7 @@ static int take_sets(support_problem *p) {
       p->half[i] = ((wide)set->force_max - (wide)set->force_min) / 2;
       continue;
     }
-    const int is_circle = set->sector_half_angle >= PI && !(a->gauge_table > 0);
+    const int is_circle = set->sector_half_angle >= PI && !has_gauge_table(a);
     if (!is_circle) return 0;
     p->middle[i] = 0;
     p->half[i] = larger_wide(set->force_max, set->force_max_reverse);
