@@ -167,7 +167,11 @@ typedef struct {
 } fl_span;
 
 /* Multipliers lambda, and 1 + zeta of each bus, at which a target within budgets begins. */
+#if FL_KEEPS_BUDGETS
 #define FL_BUDGET_TARGETS 8 /* the wrench itself, a policy's groups, and what is closest */
+#else
+#define FL_BUDGET_TARGETS 1
+#endif
 typedef struct {
   fl_real lambda[6];
   fl_real factor[FL_BUSES];
@@ -209,7 +213,7 @@ struct fl_work {
   unsigned char bus_binds[FL_BUSES]; /* 1 of a bus that would give more if it had more */
   fl_law_power law_power; /* of fl_use_laws, and what it reads; 0 where tables say powers */
   const fl_formula *laws;
-  const fl_real *const *curves;
+  const void *curves; /* an array of fl_real pointers */
   int has_kinks;    /* whether one of these is so of a question, or a plane cannot rest */
   int newton_steps; /* of this question */
   int is_truncated; /* whether a search ended at its bound of steps */

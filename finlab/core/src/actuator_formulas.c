@@ -113,7 +113,8 @@ static real power_on_curve(const real *curve, real thrust) {
 /* Power of an actuator by its law: fl_work.law_power. */
 static real power_by_law(const fl_work *work, int i, const real *command) {
   const fl_formula *law = work->laws + i;
-  const real *curve = work->curves[i];
+  const real *const *curves = work->curves;
+  const real *curve = curves[i];
   real force[3];
   if (!curve) return force_and_power(law, command, force);
   real wanted = command[0];
