@@ -10,7 +10,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from scipy import sparse
-from scipy.optimize import minimize
 
 from finlab.arrays import Array
 from tests.oracle_plant import OracleActuator, OraclePlant
@@ -184,39 +183,3 @@ class BudgetedPlant:
             self.program.equal({**terms, share: -float(scaled[axis])}, 0.0)
         self.program.at_most({share: 1.0}, 1.0)
         return float(self.program.least({share: -1.0})[share])
-
-
-def least_miss_by_slsqp(
-    plant: OraclePlant, wrench: Array, watts: float, starts: int = 20, seed: int = 0
-) -> float:
-    """The least norm of what is missing of a wrench (6,), over the scales, that SLSQP finds from
-    many starts over commands within a budget of all actuators [W]."""
-    rng = np.random.default_rng(seed)
-    n = len(plant.actuators)
-    low, high = (np.stack(ends) for ends in zip(*(a.limits for a in plant.actuators), strict=True))
-    width = (high - low).ravel()
-
-    def commands(x: Array) -> Array:
-        return low + x.reshape(n, 3) * (high - low)
-
-    def missing(x: Array) -> Array:
-        return np.asarray((plant.wrench(commands(x)) - wrench) / plant.scales)
-
-    def spare(x: Array) -> float:
-        return float(1.0 - plant.power(commands(x)) / watts)
-
-    best = np.inf
-    for _ in range(starts):
-        start = rng.random((n, 3))
-        start[:, :2] *= rng.uniform(0.2, 1.0)
-        end = minimize(
-            lambda x: float(missing(x) @ missing(x)),
-            start.ravel(),
-            bounds=[(0.0, 1.0 if w > 0.0 else 0.0) for w in width],
-            constraints=[{"type": "ineq", "fun": spare}],
-            method="SLSQP",
-            options={"maxiter": 400, "ftol": 1e-13},
-        )
-        if spare(end.x) >= -1e-7:
-            best = min(best, float(np.linalg.norm(missing(end.x))))
-    return best

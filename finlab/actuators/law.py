@@ -13,7 +13,7 @@ has the closed form used here: driving ends where sin = s0 with (K A / J) cos^2 
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple, final
@@ -128,6 +128,15 @@ class Formula(NamedTuple):
     """Fields of `fl_formula` by name, numbers or arrays (n,)."""
 
 
+class PowerFormula(NamedTuple):
+    """The power of n actuators as the core evaluates it, see `fl_use_laws` in `finlab.h`."""
+
+    formula: Formula
+    """Of the actuators; of those with a curve kind and dead band alone."""
+    curves: Sequence[Array | None] | None
+    """Curves of the measured ones, None of the others; None where none is measured."""
+
+
 class ActuatorLaw(ABC):
     """Command to force and power of one actuator, or of n actuators that share a law.
 
@@ -184,6 +193,11 @@ class ActuatorLaw(ABC):
     def formula(self) -> Formula | None:
         """Returns the law as the core evaluates it; None of one that is no formula there."""
         return None
+
+    def power_formula(self) -> PowerFormula | None:
+        """Returns the power as the core evaluates it; None of one that it cannot."""
+        formula = self.formula()
+        return None if formula is None else PowerFormula(formula, None)
 
 
 class FinLaw(ActuatorLaw):

@@ -11,7 +11,7 @@ from msgspec import Meta
 from numpy.typing import ArrayLike
 
 from finlab.actuators.actuator import Actuator, Command
-from finlab.actuators.law import ActuatorLaw, Formula
+from finlab.actuators.law import ActuatorLaw, Formula, PowerFormula
 from finlab.actuators.response import Form
 from finlab.actuators.thrust_model import MAX_FORCE, PowerLaw, PowerTable, ThrustModel
 from finlab.actuators.thrust_power import ThrustPower
@@ -291,6 +291,22 @@ class PropellerLaw(ActuatorLaw):
             "dead_band": self.dead_band,
         }
         return Formula(self.formula_kind, numbers)
+
+    def power_formula(self) -> PowerFormula | None:
+        formula = self.formula()
+        if formula is not None:
+            return PowerFormula(formula, None)
+        measured = self.power_curve.measured()
+        if measured is None:
+            return None
+        laws, curves = measured
+        numbers = {
+            "coefficient": laws.forward,
+            "coefficient_reverse": laws.reverse,
+            "power_exponent": laws.exponent,
+            "dead_band": self.dead_band,
+        }
+        return PowerFormula(Formula(self.formula_kind, numbers), curves)
 
 
 def power_law_margins(propellers: Sequence[Propeller]) -> list[Array | None]:

@@ -6,7 +6,7 @@ turning ones, and the rudder's, use what is here.
 """
 
 from collections.abc import Sequence
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -137,6 +137,17 @@ class TableCurves:
             if len(size) > 1:
                 self.sides.append(Side(ConvexCurve(*lower_hull(size, side_power)), sign))
 
+    @cached_property
+    def knots(self) -> Array:
+        """How many knots there are, K, then at K rising forces these [N], powers [W] and marginal
+        costs [W/N], which are linear between."""
+        columns = [np.array([[0.0], [self.power_at_rest], [0.0]])]
+        for curve, sign in self.sides:
+            side = np.stack([sign * curve.size, curve.power, sign * curve.marginal_cost])[:, 1:]
+            columns = [*columns, side] if sign > 0.0 else [side[:, ::-1], *columns]
+        knots = np.concatenate(columns, axis=1)
+        return np.concatenate([[knots.shape[1]], *knots])
+
     def power_and_marginal_cost(self, force: AnyArray) -> tuple[Array, Array]:
         """See `PowerCurve`."""
         marginal_cost = 0.0 * force  # keeps the NaN of a lost actuator
@@ -165,6 +176,8 @@ class ThrustPower:
 
     def __init__(self, models: Sequence[ThrustModel | PowerCurve]) -> None:
         """Takes n models, or curves themselves."""
+        self._n = len(models)
+        self._models = models
         power_laws = [model for model in models if isinstance(model, PowerLaw)]
         # All power laws are one group, equal tables and curves one each.
         keys = [None if isinstance(model, PowerLaw) else model for model in models]
@@ -187,6 +200,21 @@ class ThrustPower:
         _, curve = self._groups[0]
         is_only_group = len(self._groups) == 1
         return curve if is_only_group and isinstance(curve, PowerLaws) else None
+
+    def measured(self) -> tuple[PowerLaws, list[Array | None]] | None:
+        """Returns the power laws of all n propellers, any of those that were measured, and the
+        curves of these, see `TableCurves.knots`; None where a curve is of another kind."""
+        laws = [PowerLaw(1.0)] * self._n
+        curves: list[Array | None] = [None] * self._n
+        for indices, curve in self._groups:
+            for i in np.arange(self._n)[indices]:
+                if isinstance(curve, TableCurves):
+                    curves[i] = curve.knots
+                elif isinstance(curve, PowerLaws):
+                    laws[i] = self._models[i]
+                else:
+                    return None
+        return PowerLaws(laws), curves
 
     def watts(self, force: AnyArray) -> AnyArray:
         """Returns the power (..., n) [W] of forces (..., n) [N], negative ones in reverse."""

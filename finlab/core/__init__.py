@@ -29,6 +29,7 @@ SIGNATURES = {
     "fl_commands": "vpppipp",
     "fl_forces_of_commands": "vppip",
     "fl_figures_of_command": "ipipppp",
+    "fl_use_laws": "vppp",
     "fl_conjugates": "ippppipp",
     "fl_power_bounds": "ipppppipp",
     "fl_power_bound_of_row": "rppppp",

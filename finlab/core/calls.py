@@ -541,6 +541,8 @@ class Core:
         self._answer_into_row = self._core.fl_answer_into_row
         self._question = QuestionRecord(n)
         self._rows = AnswerRows(n)
+        self._laws: PowerFormulas | None = None
+        """To which the work area points, so that they live as long."""
         self._is_busy = np.zeros(1, np.int32)
         """Not 0 while a batch is answered in the work area, without the interpreter's lock."""
         self._spare_areas: list[WorkArea] = []
@@ -582,6 +584,16 @@ class Core:
                 memory.address_of(row),
             )
         return self._rows.written(memory, row, code)
+
+    def use_laws(self, laws: "PowerFormulas") -> None:
+        """Has single questions keep power budgets by the actuators' own laws from now on.
+
+        Args:
+            laws: of the actuators.
+        """
+        with self._lock:
+            self._core.fl_use_laws(self._work_address, *laws.addresses)
+            self._laws = laws
 
     def prepare_again(self) -> None:
         """Prepares the work area for numbers that were changed in the block.
@@ -982,6 +994,32 @@ class Formulas:
             return None
         numbers.setflags(write=False)
         return CommandFigures(n, numbers)
+
+
+class PowerFormulas:
+    """The powers of n actuators, as the core evaluates them to keep budgets."""
+
+    def __init__(self, laws: Record, curves: Sequence[Array | None]) -> None:
+        """Takes the laws of a robot.
+
+        Args:
+            laws: of its actuators, an `fl_formula` (n,).
+            curves: of each whose power was measured its curve, see `fl_use_laws` in `finlab.h`;
+                None of the others.
+        """
+        self._laws = laws
+        self._curves = curves
+        addresses = [0 if curve is None else curve.ctypes.data for curve in curves]
+        self._curve_addresses = np.array(addresses, np.uintp)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Copies are prepared anew: what is prepared are addresses."""
+        return type(self), (self._laws, self._curves)
+
+    @property
+    def addresses(self) -> tuple[int, int]:
+        """Of the laws and of the curves, for `fl_use_laws`."""
+        return self._laws.ctypes.data, self._curve_addresses.ctypes.data
 
 
 def error_text(code: int) -> str:

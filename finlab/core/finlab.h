@@ -84,8 +84,9 @@ typedef double fl_wide; /* where differences of large numbers matter, in single 
               first multipliers, and of points of a lattice; beyond reach those that come nearest
    FL_FOILS   steps for these: of two searches, and twice for each share of a ray (begun at the last
               commands and anew); and a target for each start of a lattice
-   FL_BUDGETS targets within power budgets: the wrench itself, and each group of a policy at once
-              and at up to seven costs of what is missing; and in a tick forces at twelve costs of
+   FL_BUDGETS targets within power budgets: the wrench itself, each group of a policy, and what is
+              closest, at up to ten costs of what is missing, and in a search each part at up to
+              two; for each correction by the laws anew; and in a tick forces at twelve costs of
               turning
    FL_BOUND   forces are found twice in a tick in which drives pass their dead bands */
 #define FL_DIVE (FL_DIVE_ROUNDS * FL_STEPS_AT_KINK)
@@ -94,7 +95,9 @@ typedef double fl_wide; /* where differences of large numbers matter, in single 
 #define FL_STARTS (FL_PARTS + 5 + FL_FOIL_VERTICES + 2 * FL_MOST + FL_LATTICE_FOLLOWED)
 #define FL_FOILS_CHEAPER (FL_FOIL_STEPS * FL_STEPS_AT_KINK * 2 * (FL_STARTS + FL_RAY_SHARES))
 #define FL_FOILS (FL_FOILS_CHEAPER + 2 * FL_LATTICE_STARTS * FL_STEPS_AT_KINK)
-#define FL_BUDGETS ((1 + 6 * 8) * FL_STEPS + 12 * FL_FORCES)
+#define FL_BUDGET_TARGET (10 * FL_STEPS + 2 * FL_STEPS * (FL_SEARCH / FL_STEPS_AT_KINK))
+#define FL_BUDGET_TRIES 9 /* the first one, and as many corrections by the laws */
+#define FL_BUDGETS (FL_KEEPS_BUDGETS * (FL_BUDGET_TRIES * 8 * FL_BUDGET_TARGET + 12 * FL_FORCES))
 #define FL_BOUND (2 * (FL_FORCES + FL_FOILS) + FL_BUDGETS)
 
 #define FL_VERSION 30  /* of all structs and functions here */
@@ -318,6 +321,15 @@ void fl_forces_of_commands(const fl_real *block, const fl_real *command, int cou
    @return               FL_OK, or FL_BAD_ARGUMENT where a command is neither finite nor lost */
 int fl_figures_of_command(const fl_formula *laws, int n, const fl_real *effectiveness,
                           const fl_real *frames, const fl_real *command, fl_real *figures);
+
+/* Has budgets be kept by the laws of all actuators, from now on.
+
+   @param work    a prepared work area
+   @param laws    (n,) of the actuators
+   @param curves  (n,) of a propeller whose power was measured its curve, else 0: K, then at K
+                  rising forces these [N], powers [W] and marginal costs [W/N], which are linear
+                  between; of it the law has kind and dead band alone */
+void fl_use_laws(fl_work *work, const fl_formula *laws, const fl_real *const *curves);
 
 /* Evaluates the conjugates of all costs at multipliers of the wrench, Eq. 4, for proofs of a lower
    bound of the power.

@@ -166,6 +166,20 @@ typedef struct {
   int rank;                 /* of the effectiveness: how many directions are driven */
 } fl_span;
 
+/* Multipliers lambda, and 1 + zeta of each bus, at which a target within budgets begins. */
+#if FL_KEEPS_BUDGETS
+#define FL_BUDGET_TARGETS 8 /* the wrench itself, a policy's groups, and what is closest */
+#else
+#define FL_BUDGET_TARGETS 1
+#endif
+typedef struct {
+  fl_real lambda[6];
+  fl_real factor[FL_BUSES];
+} fl_budget_begin;
+
+/* Gives the power of an actuator by its law at a command (3,) [W]. */
+typedef fl_real (*fl_law_power)(const fl_work *work, int i, const fl_real *command);
+
 struct fl_work {
   fl_span span;         /* of this question */
   int is_whole;         /* whether `set` and `box` are those of the robot outside of ticks */
@@ -191,6 +205,15 @@ struct fl_work {
   int has_zones;                /* whether a pod has barred zones between its arcs */
   int has_drag;                 /* whether a foil drags */
   int has_turn_cost;            /* whether turning costs */
+  fl_real over_cost[FL_MOST];   /* 1 / (1 + zeta) of the bus of each actuator, by which prices
+                                   count in searches within power budgets; else 1 */
+  fl_budget_begin budget_begin[FL_BUDGET_TARGETS]; /* where targets within budgets ended */
+  int budget_begins;                               /* how many of these are of this question */
+  int is_budget_too_small;           /* whether the first of them is proved to be beyond */
+  unsigned char bus_binds[FL_BUSES]; /* 1 of a bus that would give more if it had more */
+  fl_law_power law_power; /* of fl_use_laws, and what it reads; 0 where tables say powers */
+  const fl_formula *laws;
+  const void *curves; /* an array of fl_real pointers */
   int has_kinks;    /* whether one of these is so of a question, or a plane cannot rest */
   int newton_steps; /* of this question */
   int is_truncated; /* whether a search ended at its bound of steps */

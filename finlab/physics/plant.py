@@ -21,7 +21,7 @@ from finlab.actuators.kinds import free_angles, laws_of, wrapping_angles
 from finlab.actuators.law import ActuatorLaw, Blade, FinLaw, PlanarLaw, planar_force
 from finlab.arrays import Array
 from finlab.axes import feasible, is_full_turn
-from finlab.core.calls import CommandFigures, Formulas
+from finlab.core.calls import CommandFigures, Formulas, PowerFormulas
 from finlab.core.fields import constant, struct
 from finlab.errors import CommandError
 from finlab.layout.effectiveness import body_force, own_effectiveness, wrench_of_forces
@@ -342,6 +342,26 @@ class Plant:
             for name, values in formula.numbers.items():
                 laws[name][indices] = values
         return Formulas(laws, self.effectiveness, self.layout.frames)
+
+    @cached_property
+    def power_formulas(self) -> PowerFormulas | None:
+        """The powers of all actuators as the core evaluates them; None where it cannot evaluate
+        that of one, or one feels the flow."""
+        if self.feels_flow:
+            return None
+        laws = np.zeros(self.n, struct("fl_formula"))
+        curves: list[Array | None] = [None] * self.n
+        for indices, law in self._laws:
+            power = law.power_formula()
+            if power is None:
+                return None
+            laws["kind"][indices] = constant(power.formula.kind)
+            for name, values in power.formula.numbers.items():
+                laws[name][indices] = values
+            if power.curves is not None:
+                for i, curve in zip(np.arange(self.n)[indices], power.curves, strict=True):
+                    curves[i] = curve
+        return PowerFormulas(laws, curves)
 
     def power_gradient(self, command: Array, *, flow: Array | None = None) -> Array:
         """Returns the derivatives of the power; arguments as for `power`.

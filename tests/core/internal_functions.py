@@ -58,6 +58,8 @@ _LENGTHS = {
     "FL_POINTS": POINTS,
     "FL_SCORES": _macro("FL_SCORES"),
     "FL_DEPTH": _DEPTH,
+    "FL_BUSES": constant("FL_BUSES"),
+    "FL_BUDGET_TARGETS": _macro("FL_BUDGET_TARGETS"),
 }
 """Lengths of arrays in the headers that are macros."""
 _KINDS: dict[str, Any] = {
@@ -142,6 +144,14 @@ class PriceTable(ctypes.Structure):
     _fields_ = _members("fl_work.h", "fl_price_table")
 
 
+class BudgetBegin(ctypes.Structure):
+    """Multipliers at which a target within budgets begins: `fl_budget_begin`."""
+
+    _fields_ = _members("fl_work.h", "fl_budget_begin")
+
+
+_KINDS["fl_budget_begin"] = BudgetBegin
+_KINDS["fl_law_power"] = ctypes.c_void_p
 _KINDS["fl_set"] = Set
 _KINDS["fl_price_table"] = PriceTable
 

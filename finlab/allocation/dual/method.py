@@ -30,7 +30,6 @@ from finlab.physics.objective import judged_power
 if TYPE_CHECKING:
     from typing_extensions import Self  # Python 3.10 has none of its own
 
-    from finlab.allocation.dual.budget import BudgetedCore
     from finlab.allocation.levenberg_marquardt import CommandProblem
     from finlab.allocation.power_budget import PowerBudget
     from finlab.core.coupled_core import CoupledCore
@@ -239,13 +238,6 @@ class Dual(Method):
             conditions, question.targets, question.policy, question.multipliers
         )
 
-    @cached_property
-    def budgeted(self) -> "BudgetedCore":
-        """The robot in the core with powers that have a scale, for power budgets."""
-        from finlab.allocation.dual.budget import BudgetedCore
-
-        return BudgetedCore(self.compiled.contents, self.plant, self.scale)
-
     def check_budget(self, budget: "PowerBudget", policy: Policy) -> None:
         """Refuses budgets where the core's power is not that of the actuators alone; see
         `Method.check_budget`."""
@@ -283,6 +275,18 @@ class Dual(Method):
                 return False
         return True
 
+    @cached_property
+    def knows_power(self) -> bool:
+        """Whether the core keeps budgets by the actuators' own laws, or by tables that say the
+        same; of others Python asks for corrected budgets."""
+        if self.has_exact_power:
+            return True
+        laws = self.plant.power_formulas
+        if laws is None:
+            return False
+        self.compiled.core.use_laws(laws)
+        return True
+
     def prepared_answers(
         self,
         policy: Policy,
@@ -293,7 +297,7 @@ class Dual(Method):
         """Prepares questions about single wrenches; see `Method.prepared_answers`."""
         if not self._most_core_error >= 0.0:
             return None
-        if budget is not None and not self.has_exact_power:
+        if budget is not None and not self.knows_power:
             return None
         from finlab.core.prepared_call import RowBound, prepared_call
 

@@ -89,6 +89,45 @@ static real force_and_power(const fl_formula *law, const real *command, real *fo
   return power_of_blade(law, command);
 }
 
+/* Power of a measured propeller [W], by its curve of fl_use_laws. */
+static real power_on_curve(const real *curve, real thrust) {
+  const int count = (int)curve[0];
+  const real *force = curve + 1;
+  const real *power = force + count;
+  const real *marginal = power + count;
+  int low = 0;
+  int high = count - 1;
+  while (high - low > 1) {
+    const int middle = (low + high) / 2;
+    if (thrust < force[middle]) {
+      high = middle;
+    } else {
+      low = middle;
+    }
+  }
+  const real step = thrust - force[low];
+  const real curvature = (marginal[high] - marginal[low]) / (force[high] - force[low]);
+  return power[low] + step * (marginal[low] + curvature * step / 2);
+}
+
+/* Power of an actuator by its law: fl_work.law_power. */
+static real power_by_law(const fl_work *work, int i, const real *command) {
+  const fl_formula *law = work->laws + i;
+  const real *const *curves = work->curves;
+  const real *curve = curves[i];
+  real force[3];
+  if (!curve) return force_and_power(law, command, force);
+  real wanted = command[0];
+  if (law->kind == FL_TURNING_PROPELLER) wanted = command[1];
+  return power_on_curve(curve, thrust_of_propeller(law, wanted));
+}
+
+void fl_use_laws(fl_work *work, const fl_formula *laws, const real *const *curves) {
+  work->laws = laws;
+  work->curves = curves;
+  work->law_power = power_by_law;
+}
+
 /* Whether a command (3,) is that of a lost actuator. */
 static int is_lost(const real *command) {
   return command[0] != command[0] && command[1] != command[1] && command[2] != command[2];

@@ -7,8 +7,12 @@
 
 #define LARGEST R(1e12) /* wrench, price or command of a question */
 #define MOST_CALM 1000
-#define CALM_STEPS 10    /* halves of the range of what turning costs, to keep a budget */
-#define STEPS_BY_LAWS 12 /* on commands, to a wrench a little beyond the tables */
+#define CALM_STEPS 10       /* halves of the range of what turning costs, to keep a budget */
+#define OVER_BUDGET NOTHING /* share by which an answer may exceed a budget: rounding */
+#define SHORT_OF_BUDGET (NEARLY / 2) /* share that a bus that binds may leave of its budget */
+#define AIM_BELOW (NEARLY / 10)      /* by which share less than a budget is aimed at */
+#define LEAST_SLOPE R(0.2) /* of powers by the laws over those by tables, both as logarithms */
+#define STEPS_BY_LAWS 12   /* on commands, to a wrench a little beyond the tables */
 /* Error over the wrench scale, beyond reach, up to which the laws may yet meet the target. */
 #define BEYOND_TABLES (10 * CLOSE)
 /* A drive that passes a dead band stays within it by this share of the band. */
@@ -140,7 +144,8 @@ static int turn_within_budget(const real *block, fl_work *work, const fl_questio
 /* Finds other forces where these take more power than their buses have; returns whether they do. */
 static int keep_budget(const real *block, fl_work *work, const fl_question *q,
                        const real *wrench_desired, fl_answer *out) {
-  if (!q->budget || !fl_exceeds_budget(block, work, q->budget, out->force)) return 0;
+  memset(work->bus_binds, 0, sizeof work->bus_binds);
+  if (!fl_exceeds_budget(block, work, q->budget, out->force)) return 0;
   if (work->has_turn_cost && turn_within_budget(block, work, q, wrench_desired, out)) return 1;
   real wrench[6];
   take_off_offset(&work->span, wrench_desired, wrench);
@@ -288,22 +293,10 @@ static void meet_by_laws(const real *block, fl_work *work, const real *wrench_de
   out->error = error;
 }
 
-/* Answers a question for which the work area is prepared. */
-static void answer_question(const real *block, fl_work *work, const fl_question *q,
-                            fl_answer *out) {
+/* Finds commands for the forces of an answer. */
+static void find_commands(const real *block, fl_work *work, const fl_question *q,
+                          const real *wrench_desired, int is_budget_used_up, fl_answer *out) {
   const fl_span *span = &work->span;
-  real wrench_desired[6];
-  wrench_that_counts(span, q, wrench_desired);
-  work->newton_steps = 0;
-  work->is_truncated = 0;
-  work->command_previous = q->previous;
-
-  real lambda[6];
-  find_forces(block, work, wrench_desired, q->policy, first_multipliers(work, q, lambda), out);
-  int is_budget_used_up = 0;
-#if FL_KEEPS_BUDGETS
-  is_budget_used_up = keep_budget(block, work, q, wrench_desired, out);
-#endif
   find_multipliers(span, out);
   for (int k = 0; k < 6; k++) {
     if (out->is_attainable) {
@@ -326,6 +319,94 @@ static void answer_question(const real *block, fl_work *work, const fl_question 
     prepare_idle(block, work, q, out->command);
   }
   fl_clip_commands(block, &work->box, out->command);
+}
+
+#if FL_KEEPS_BUDGETS
+/* Powers of the buses by the laws at the commands of an answer, over what they have. */
+static void find_shares(const real *block, const fl_work *work, const fl_budget *budget,
+                        const fl_answer *out, real *share) {
+  real power[FL_BUSES + 1] = {0};
+  for (int i = 0; i < COUNT(block); i++) {
+    if (!work->span.is_lost[i])
+      power[budget->bus_of[i]] += work->law_power(work, i, out->command[i]);
+  }
+  for (int b = 0; b < budget->buses; b++) share[b] = power[b + 1] / budget->watts[b];
+}
+
+/* Changes what buses are asked to take by tables, so that by the laws they take what they have, and
+   returns 1; 0 where they do already. `log_share` and `log_asked` are of the try before. */
+static int correct_budget(const fl_work *work, const fl_budget *budget, const real *share,
+                          int tries, real *log_share, real *log_asked, fl_budget *asked) {
+  int is_kept = 1;
+  for (int b = 0; b < budget->buses; b++) {
+    const real y = LOG(larger(share[b], TINY));
+    const real x = LOG(asked->watts[b] / budget->watts[b]);
+    const int is_short = work->bus_binds[b] && y < -SHORT_OF_BUDGET;
+    const real last_log_share = log_share[b];
+    real slope = 1;
+    if (tries > 0 && FABS(x - log_asked[b]) > ROUNDING) {
+      slope = clipped((y - log_share[b]) / (x - log_asked[b]), LEAST_SLOPE, 1 / LEAST_SLOPE);
+    }
+    log_share[b] = y;
+    log_asked[b] = x;
+    const int is_stuck = tries > 0 && y == last_log_share;
+    if ((y <= OVER_BUDGET && !is_short) || is_stuck) continue;
+    is_kept = 0;
+    asked->watts[b] *= EXP(-(y + AIM_BELOW) / slope);
+  }
+  return !is_kept;
+}
+
+/* Answers within a budget, from the answer without: by the laws where these are known, which may
+   take a little more or less than the tables say. */
+static void answer_within_budget(const real *block, fl_work *work, const fl_question *q,
+                                 const real *wrench_desired, fl_answer *out) {
+  fl_question asked_question = *q;
+  fl_budget asked = *q->budget;
+  const int has_laws = work->law_power != 0;
+  real share[FL_BUSES];
+  real log_share[FL_BUSES] = {0};
+  real log_asked[FL_BUSES] = {0};
+  if (has_laws && fl_exceeds_budget(block, work, q->budget, out->force)) {
+    for (int b = 0; b < asked.buses; b++) asked.watts[b] *= 1 - AIM_BELOW;
+  }
+  fl_answer without = *out;
+  work->budget_begins = 0;
+  asked_question.budget = &asked;
+  for (int tries = 0;; tries++) {
+    const int is_used_up = keep_budget(block, work, &asked_question, wrench_desired, out);
+    find_commands(block, work, q, wrench_desired, is_used_up, out);
+    if (!has_laws) return;
+    find_shares(block, work, q->budget, out, share);
+    if (!correct_budget(work, q->budget, share, tries, log_share, log_asked, &asked)) break;
+    if (tries == FL_BUDGET_TRIES - 1) break;
+    *out = without;
+    if (q->previous) fl_limits_of_tick(block, work, q);
+  }
+  out->exceeds_budget = 0;
+  for (int b = 0; b < q->budget->buses; b++) out->exceeds_budget |= share[b] > 1 + OVER_BUDGET;
+}
+#endif
+
+/* Answers a question for which the work area is prepared. */
+static void answer_question(const real *block, fl_work *work, const fl_question *q,
+                            fl_answer *out) {
+  real wrench_desired[6];
+  real lambda[6];
+  wrench_that_counts(&work->span, q, wrench_desired);
+  work->newton_steps = 0;
+  work->is_truncated = 0;
+  work->command_previous = q->previous;
+  find_forces(block, work, wrench_desired, q->policy, first_multipliers(work, q, lambda), out);
+#if FL_KEEPS_BUDGETS
+  if (q->budget) {
+    answer_within_budget(block, work, q, wrench_desired, out);
+  } else {
+    find_commands(block, work, q, wrench_desired, 0, out);
+  }
+#else
+  find_commands(block, work, q, wrench_desired, 0, out);
+#endif
   out->newton_steps = work->newton_steps;
   out->is_truncated = work->is_truncated;
 }

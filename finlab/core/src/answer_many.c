@@ -135,6 +135,16 @@ static int read_robot(const real *block, const fl_work *work, const fl_question 
   return 1;
 }
 
+/* Answers one wrench of a batch: budgets are kept by tables there, in every work area alike. */
+static int answer_by_tables(const real *block, fl_work *work, const fl_question *q,
+                            fl_answer *out) {
+  const fl_law_power law_power = work->law_power;
+  work->law_power = 0;
+  const int code = fl_answer_one(block, work, q, out);
+  work->law_power = law_power;
+  return code;
+}
+
 int fl_answer_many(const real *block, fl_work *work, const fl_question *question, int lanes,
                    const real *wrench, int count, real *force, real *multipliers,
                    real *wrench_served, real *gap_power_bound, real *command,
@@ -161,7 +171,7 @@ int fl_answer_many(const real *block, fl_work *work, const fl_question *question
     if (is_attainable[k]) continue; /* answered in lanes */
     memcpy(q.wrench, wrench + 6 * k, sizeof q.wrench);
     if (question->multipliers) q.multipliers = question->multipliers + 6 * k;
-    const int code = fl_answer_one(block, work, &q, &out);
+    const int code = answer_by_tables(block, work, &q, &out);
     if (code) return code;
     write_answer_of(block, &out, k, &answers);
     gap_power_bound[k] = out.gap_power_bound;

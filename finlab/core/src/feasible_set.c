@@ -272,6 +272,7 @@ int fl_prepare(const real *block, fl_work *work) {
 #endif
   work->refine_steps = 0;
   work->has_lambda_begin = 0;
+  work->law_power = 0;
   work->residual_enough = TOLERANCE;
   work->power_of_use = INFEASIBLE_COST;
   fl_usual_settings(&work->settings);
@@ -279,6 +280,7 @@ int fl_prepare(const real *block, fl_work *work) {
   for (int i = 0; i < COUNT(block); i++) {
     const fl_actuator *a = ACTUATOR(block, i);
     work->slope_max[i] = 0;
+    work->over_cost[i] = 1;
     if (fl_aims_force(a)) work->slope_max[i] = fl_largest_slope(block, i);
     const real power_high = fl_power_of_force(block, i, a->force_max);
     const real power_low = fl_power_of_force(block, i, a->force_min);

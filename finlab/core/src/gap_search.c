@@ -19,17 +19,30 @@ static int any_hollow(const real *block, const fl_work *work) {
   return 0;
 }
 
+/* Finds the optimum of a part from multipliers, or from where its own solver is; returns how that
+   ended. */
+static int solve_part(const real *block, fl_work *work, const fl_part_problem *problem,
+                      const real *lambda) {
+#if FL_KEEPS_BUDGETS
+  if (problem->solve) return problem->solve(problem->data);
+#endif
+  return fl_dual_newton(block, work, problem->target_reduced, lambda, FL_STEPS_AT_KINK);
+}
+
 /* Remembers an answer without a gap, where it is the cheapest so far: its forces in
    work->best_force. With foils it also changes work->state_found, as fl_improve_commands does. */
-static void keep_answer(const real *block, fl_work *work, const real *target_reduced,
+static void keep_answer(const real *block, fl_work *work, const fl_part_problem *problem,
                         real *best_cost) {
   if (work->has_drag) {
-    fl_improve_commands(block, work, target_reduced, best_cost);
+    fl_improve_commands(block, work, problem->target_reduced, best_cost);
     return;
   }
   if (!(work->state_found->dual_value < *best_cost)) return;
   *best_cost = work->state_found->dual_value;
   copy_forces(block, work->state_found->force, work->best_force);
+#if FL_KEEPS_BUDGETS
+  if (problem->keep) problem->keep(problem->data);
+#endif
 }
 
 /* Whether the forces of work->state_found are an answer: they meet the target, and none of them is
@@ -40,15 +53,19 @@ static int is_without_gap(const real *block, const fl_work *work, int status, in
 
 /* Share of a cost that is worth another search. Zones leave few parts, each with an answer of its
    own that may be the best: all of them are looked at. */
-static real worth_search(const fl_work *work) {
+static real worth_search(const fl_work *work, const fl_part_problem *problem) {
   if (FL_ZONES > 0 && work->has_zones) return NEARLY;
+#if FL_KEEPS_BUDGETS
+  if (problem->solve) return NEARLY;
+#endif
   return CLOSE;
 }
 
 /* Whether forces of a part that has no answer yet could still be cheaper than the best answer. */
-static int may_be_cheaper(const fl_work *work, int status, int gap, real best_cost) {
+static int may_be_cheaper(const fl_work *work, const fl_part_problem *problem, int status, int gap,
+                          real best_cost) {
   const int is_bound = status == FL_MET || (status == FL_NO_PROGRESS && gap >= 0);
-  return is_bound && work->state_found->dual_value < best_cost * (1 - worth_search(work));
+  return is_bound && work->state_found->dual_value < best_cost * (1 - worth_search(work, problem));
 }
 
 /* Whether the force of a plane is below its least one, at which it is then frozen. Pods whose
@@ -62,17 +79,17 @@ static int is_below_least_force(const real *block, int i, const fl_set *set, con
 /* Leaves all gaps on their nearer sides, round after round, until there are none; forces
    that cannot rest keep their direction. The sets become those of the last round, and
    work->state_found the dual of these. */
-static void dive(const real *block, fl_work *work, const real *target_reduced, int status,
+static void dive(const real *block, fl_work *work, const fl_part_problem *problem, int status,
                  real *best_cost) {
   for (int round = 0; round < FL_DIVE_ROUNDS; round++) {
     fl_state *state = work->state_found;
     const real largest = fl_largest_force(block, state->force);
     const int gap = fl_worst_gap(block, work, state->force, state->lambda_reduced);
     if (is_without_gap(block, work, status, gap)) {
-      keep_answer(block, work, target_reduced, best_cost);
+      keep_answer(block, work, problem, best_cost);
       return;
     }
-    if (!may_be_cheaper(work, status, gap, *best_cost)) return;
+    if (!may_be_cheaper(work, problem, status, gap, *best_cost)) return;
     for (int i = 0; i < COUNT(block); i++) {
       fl_set *set = work->set + i;
       const real *force = state->force[i];
@@ -88,13 +105,14 @@ static void dive(const real *block, fl_work *work, const real *target_reduced, i
     fl_prepare_sets(block, work);
     real lambda[6];
     memcpy(lambda, state->lambda_reduced, sizeof lambda);
-    status = fl_dual_newton(block, work, target_reduced, lambda, FL_STEPS_AT_KINK);
+    status = solve_part(block, work, problem, lambda);
   }
 }
 
 /* Solves both sides of a cut from the multipliers so far and stays at the cheaper one: of that
    are the sets, work->state_found, and the status of Newton's method that it returns. */
-static int cheaper_side(const real *block, fl_work *work, const real *target_reduced, fl_cut *cut) {
+static int cheaper_side(const real *block, fl_work *work, const fl_part_problem *problem,
+                        fl_cut *cut) {
   const int nearer = fl_nearer_side(block, cut->actuator, &cut->set_before, cut->force);
   const int side[2] = {nearer, -nearer};
   real lambda_begin[6];
@@ -104,7 +122,7 @@ static int cheaper_side(const real *block, fl_work *work, const real *target_red
   memcpy(lambda_begin, work->state_found->lambda_reduced, sizeof lambda_begin);
   for (int k = 0; k < 2; k++) {
     fl_take_side(block, work, cut, side[k]);
-    status[k] = fl_dual_newton(block, work, target_reduced, lambda_begin, FL_STEPS_AT_KINK);
+    status[k] = solve_part(block, work, problem, lambda_begin);
     cost[k] = work->state_found->dual_value;
     if (status[k] == FL_BEYOND) cost[k] = INFEASIBLE_COST;
     memcpy(lambda[k], work->state_found->lambda_reduced, sizeof lambda[k]);
@@ -116,7 +134,7 @@ static int cheaper_side(const real *block, fl_work *work, const real *target_red
   memcpy(cut->lambda_reduced, lambda[other], sizeof cut->lambda_reduced);
   if (cheaper == 1) return status[1];
   fl_take_side(block, work, cut, side[0]);
-  return fl_dual_newton(block, work, target_reduced, lambda[0], FL_STEPS_AT_KINK);
+  return solve_part(block, work, problem, lambda[0]);
 }
 
 /* How many parts a search may look at. */
@@ -129,24 +147,36 @@ static int most_parts_of_search(const fl_work *work) {
 
 /* Dives with the sets as they are, and leaves these as they were; work->state_found is the dual
    of the last round of the dive. */
-static void dive_and_return(const real *block, fl_work *work, const real *target_reduced,
+static void dive_and_return(const real *block, fl_work *work, const fl_part_problem *problem,
                             int status, real *best_cost) {
   fl_set before[FL_MOST];
   copy_sets(block, work->set, before);
-  dive(block, work, target_reduced, status, best_cost);
+  dive(block, work, problem, status, best_cost);
   copy_sets(block, before, work->set);
 }
 
 /* Goes back to the last cut whose other side may be cheaper than the best so far, and makes
    the bound no larger than those of the sides that are left out; 0 where there is none. */
-static fl_cut *last_cheaper_cut(const real *block, fl_work *work, int *depth, real best_cost,
-                                real *bound) {
+static fl_cut *last_cheaper_cut(const real *block, fl_work *work, const fl_part_problem *problem,
+                                int *depth, real best_cost, real *bound) {
   for (;;) {
     fl_cut *cut = fl_last_open_cut(block, work, depth);
     if (!cut) return 0;
-    if (cut->score[0] < best_cost * (1 - worth_search(work))) return cut;
+    if (cut->score[0] < best_cost * (1 - worth_search(work, problem))) return cut;
     *bound = smaller(*bound, cut->score[0]);
   }
+}
+
+/* Goes back to the multipliers with which a search began. */
+static void begin_again(const real *block, fl_work *work, const fl_part_problem *problem,
+                        const real *lambda) {
+#if FL_KEEPS_BUDGETS
+  if (problem->solve) {
+    problem->solve(problem->data);
+    return;
+  }
+#endif
+  fl_dual_start(block, work, problem->target_reduced, lambda);
 }
 
 /* Least power for a target at whose multipliers some force is in a gap, from what Newton's
@@ -156,6 +186,12 @@ static fl_cut *last_cheaper_cut(const real *block, fl_work *work, int *depth, re
    the target. The sets are left as they were, work->state_found as that of the last part. */
 int fl_search_gaps(const real *block, fl_work *work, const real *target_reduced, int status,
                    real *bound) {
+  const fl_part_problem problem = {target_reduced, 0, 0, 0};
+  return fl_search_parts(block, work, &problem, status, bound);
+}
+
+int fl_search_parts(const real *block, fl_work *work, const fl_part_problem *problem, int status,
+                    real *bound) {
   const int most_parts = most_parts_of_search(work);
   const int status_begin = status;
   real best_cost = INFEASIBLE_COST;
@@ -166,14 +202,14 @@ int fl_search_gaps(const real *block, fl_work *work, const real *target_reduced,
   copy_sets(block, work->set, work->set_before);
   memcpy(lambda_begin, work->state_found->lambda_reduced, sizeof lambda_begin);
   if (work->has_drag) {
-    fl_improve_from_starts(block, work, target_reduced, &best_cost);
-    fl_dual_start(block, work, target_reduced, lambda_begin);
+    fl_improve_from_starts(block, work, problem->target_reduced, &best_cost);
+    fl_dual_start(block, work, problem->target_reduced, lambda_begin);
   }
   if (!fl_is_done_by_foils(block, work, best_cost)) {
-    dive(block, work, target_reduced, status, &best_cost);
+    dive(block, work, problem, status, &best_cost);
   }
   fl_restore_sets(block, work, work->set_before);
-  fl_dual_start(block, work, target_reduced, lambda_begin);
+  begin_again(block, work, problem, lambda_begin);
   status = status_begin;
   for (;;) {
     fl_state *state = work->state_found;
@@ -181,11 +217,11 @@ int fl_search_gaps(const real *block, fl_work *work, const real *target_reduced,
     const int gap = fl_worst_gap(block, work, state->force, state->lambda_reduced);
     int is_open = 0;
     if (is_without_gap(block, work, status, gap))
-      keep_answer(block, work, target_reduced, &best_cost);
+      keep_answer(block, work, problem, &best_cost);
     else
-      is_open = may_be_cheaper(work, status, gap, best_cost);
+      is_open = may_be_cheaper(work, problem, status, gap, best_cost);
     if (is_open && gap < 0) { /* hollow: at their least forces */
-      dive_and_return(block, work, target_reduced, status, &best_cost);
+      dive_and_return(block, work, problem, status, &best_cost);
       least_bound = smaller(least_bound, dual_value);
       status = FL_BEYOND;
       is_open = 0;
@@ -196,16 +232,16 @@ int fl_search_gaps(const real *block, fl_work *work, const real *target_reduced,
       cut = fl_cut_set(block, work, &depth, gap, state->force[gap]);
     }
     if (cut) {
-      status = cheaper_side(block, work, target_reduced, cut);
+      status = cheaper_side(block, work, problem, cut);
       parts += 2;
       continue;
     }
     work->is_truncated |= can_cut;
     if (status != FL_BEYOND) least_bound = smaller(least_bound, dual_value);
-    cut = last_cheaper_cut(block, work, &depth, best_cost, &least_bound);
+    cut = last_cheaper_cut(block, work, problem, &depth, best_cost, &least_bound);
     if (!cut) break;
     fl_take_side(block, work, cut, -cut->first_side);
-    status = fl_dual_newton(block, work, target_reduced, cut->lambda_reduced, FL_STEPS_AT_KINK);
+    status = solve_part(block, work, problem, cut->lambda_reduced);
   }
   fl_restore_sets(block, work, work->set_before);
   *bound = least_bound;

@@ -410,8 +410,18 @@ void fl_take_side(const real *block, fl_work *work, const fl_cut *cut, int side)
 fl_cut *fl_last_open_cut(const real *block, fl_work *work, int *depth);
 
 /* gap_search.c: least power where sets have gaps */
+/* What is solved for each part of the sets: the dual of a target, or with `solve` another problem,
+   whose dual value work->state_found has afterwards. */
+typedef struct {
+  const real *target_reduced;
+  int (*solve)(void *data); /* finds the optimum from where it is; returns FL_MET ... */
+  void (*keep)(void *data); /* what it has found is the best so far */
+  void *data;
+} fl_part_problem;
 int fl_search_gaps(const real *block, fl_work *work, const real *target_reduced, int status,
                    real *bound);
+int fl_search_parts(const real *block, fl_work *work, const fl_part_problem *problem, int status,
+                    real *bound);
 real fl_gap_power_bound(const fl_work *work, real bound);
 int fl_answer_with_drag(const real *block, fl_work *work, const real *wrench_wanted,
                         const real *target_reduced, int status, fl_answer *out);

@@ -20,19 +20,37 @@
 
 #define MISS_COST R(1e6)      /* K over the robot's largest power, of a miss of the wrench scale */
 #define HELD_AXIS R(1e4)      /* weight of axes that are served over those that follow */
+#define ACROSS_RAY 100        /* weight of what is across a ray over what is along it */
 #define BUDGET_KEPT TOLERANCE /* share of a budget by which a power may be off */
 #define BUDGET_STEPS FL_STEPS /* of Newton's method for one target */
 #define DEAR 100              /* multiple of a usual price that only what is missing explains */
 #define SHORT_SHARE R(0.1)    /* of a step, from which on mu falls */
-#define BUDGET_IDLE 12        /* steps without progress after which it ends */
+#define BUDGET_SLOPE_ENOUGH R(0.3) /* share of the slope that a search along a step may leave */
+#define SHARES 40                  /* that are tried of the forces without budgets */
+#define BUDGET_IDLE 12             /* steps without progress after which it ends */
 /* There, of TOLERANCE, what may be left: rounding where multipliers lie far apart. */
 #define STANDSTILL 100
 /* The cost of a miss with which the way along costs begins, over MISS_COST, and its steps. */
 #define COST_BEGIN R(1e-6)
 #define COST_TIMES 10
+#define COST_FIRST R(1e-4) /* cost of a miss, over MISS_COST, from which multipliers are told */
+#define COST_STEP R(1e-3)  /* share by which it changes, to find how they change with it */
 #define EXPONENT_GUESS (R(2.0) / 3) /* of forces over powers, to begin with: costs ~ T^1.5 */
 
-enum { NOTHING_MISSES, AXES_MISS, RAY_MISSES };
+enum { NOTHING_MISSES, AXES_MISS = 1, RAY_MISSES = 2 }; /* or both: what is near to a ray */
+
+/* Multipliers, and what they give. `state` has forces and their derivatives. */
+typedef struct {
+  real lambda[6];
+  real factor[FL_BUSES + 1]; /* mu of each bus; the last one, of no bus, is 1 */
+  real residual[6];          /* r */
+  real power[FL_BUSES + 1];  /* of each bus [W] */
+  real missing[6];           /* scaled wrench along axes */
+  real missing_share;        /* of a ray */
+  real value;                /* g [W] */
+  real size;                 /* of residual and excess powers, over the budgets */
+  fl_state *state;
+} budget_point;
 
 /* A target, and what may miss of it. */
 typedef struct {
@@ -54,19 +72,17 @@ typedef struct {
   real settled_force[FL_MOST][2]; /* [N] */
   real settled_power[FL_MOST];    /* [W] */
   int is_open[FL_BUSES];          /* whether a bus feeds any that are not settled */
+  int has_settled;                /* whether any is settled */
+  int exceeds;                    /* whether a bus takes more whatever is given */
+  /* What is found of sets with gaps. */
+  int targets;             /* that were looked for */
+  int begins_anew;         /* whether a target begins at a guess */
+  int may_not_bind;        /* whether a bus may bind while another does not */
+  budget_point part;       /* of the part that is looked at */
+  budget_point part_begin; /* of all parts together */
+  budget_point part_best;  /* of the best part */
+  real force[FL_MOST][2];  /* that are in no gap [N] */
 } budget_problem;
-
-/* Multipliers, and what they give. `state` has forces and their derivatives. */
-typedef struct {
-  real lambda[6];
-  real factor[FL_BUSES + 1]; /* mu of each bus; the last one, of no bus, is 1 */
-  real residual[6];          /* r */
-  real power[FL_BUSES + 1];  /* of each bus [W] */
-  real missing[6];           /* scaled wrench; of a ray the share in missing[0] */
-  real value;                /* g [W] */
-  real size;                 /* of residual and excess powers, over the budgets */
-  fl_state *state;
-} budget_point;
 
 /* A step of all multipliers. */
 typedef struct {
@@ -106,17 +122,22 @@ static void along_axes(const budget_problem *p, const real *reduced, real *wrenc
   }
 }
 
-/* What misses at multipliers, and h(lambda) [W]. */
-static real find_missing(const budget_problem *p, const real *lambda, real *missing) {
-  memset(missing, 0, 6 * sizeof *missing);
-  if (p->misses == RAY_MISSES) {
-    const real worth = dot(lambda, p->target, 6);
-    missing[0] = clipped(worth / p->ray_cost, 0, 1);
-    return missing[0] * (worth - p->ray_cost * missing[0] / 2);
+/* What misses at the multipliers of a point; returns h(lambda) [W]. */
+static real find_missing(const budget_problem *p, budget_point *at) {
+  real conjugate = 0;
+  at->missing_share = 0;
+  memset(at->missing, 0, sizeof at->missing);
+  if (p->misses & RAY_MISSES) {
+    const real worth = dot(at->lambda, p->target, 6);
+    const real share = clipped(worth / p->ray_cost, 0, 1);
+    at->missing_share = share;
+    conjugate += share * (worth - p->ray_cost * share / 2);
   }
-  if (p->misses == NOTHING_MISSES) return 0;
-  for (int k = 0; k < 6; k++) missing[k] = p->looseness[k] * lambda[k];
-  return dot(missing, lambda, 6) / 2;
+  if (p->misses & AXES_MISS) {
+    for (int k = 0; k < 6; k++) at->missing[k] = p->looseness[k] * at->lambda[k];
+    conjugate += dot(at->missing, at->lambda, 6) / 2;
+  }
+  return conjugate;
 }
 
 /* By how much a bus takes more than it has, over that, or less where that costs it something. */
@@ -141,7 +162,7 @@ static void evaluate(const budget_problem *p, budget_point *at) {
   fl_state *state = at->state;
   real wrench[6] = {0}; /* sum B y, in the basis */
   real given[6];
-  real conjugate = find_missing(p, at->lambda, at->missing);
+  real conjugate = find_missing(p, at);
   in_basis(p, at->lambda, state->lambda_reduced);
   memset(at->power, 0, sizeof at->power);
   for (int i = 0; i < COUNT(p->block); i++) {
@@ -170,8 +191,7 @@ static void evaluate(const budget_problem *p, budget_point *at) {
   along_axes(p, wrench, given);
   at->value = dot(at->lambda, p->target, 6) - conjugate;
   for (int j = 0; j < 6; j++) {
-    real missing = at->missing[j];
-    if (p->misses == RAY_MISSES) missing = at->missing[0] * p->target[j];
+    const real missing = at->missing[j] + at->missing_share * p->target[j];
     at->residual[j] = p->target[j] - given[j] - missing;
   }
   real squared = dot(at->residual, at->residual, 6);
@@ -287,11 +307,11 @@ static void find_hessian(const budget_problem *p, const budget_point *at, real m
     for (int k = 0; k <= j; k++) h->G[j][k] += weight * p->work->metric[j][k];
   }
   if (p->is_in_axes) turn_to_axes(p, h);
-  if (p->misses == AXES_MISS) {
+  if (p->misses & AXES_MISS) {
     for (int k = 0; k < 6; k++) h->G[k][k] += p->looseness[k];
   }
-  const int is_share_free = at->missing[0] > 0 && at->missing[0] < 1;
-  if (p->misses == RAY_MISSES && is_share_free) {
+  const int is_share_free = at->missing_share > 0 && at->missing_share < 1;
+  if (is_share_free) {
     fl_add_square(h->G, p->target, 1 / p->ray_cost);
   }
 }
@@ -386,7 +406,7 @@ static real share_kept_at_top(const budget_problem *p, const budget_step *step,
     share = low + part * (high - low);
     go_along(p, at, step, share, trial);
     const real slope = slope_along(p, trial, step);
-    if (FABS(slope) <= SLOPE_ENOUGH * result->slope_begin) break;
+    if (FABS(slope) <= BUDGET_SLOPE_ENOUGH * result->slope_begin) break;
     if (slope > 0) {
       low = share;
       slope_low = slope;
@@ -448,7 +468,7 @@ static int find_optimum(const budget_problem *p, budget_point *at) {
       is_next = share > 0;
       mu_next = larger(mu * MU_KEPT_LEAST, ROUNDING);
       /* Where sets end, Newton's steps alone go from side to side. */
-      if (share < SHORT_SHARE) mu_next = MU_SINGULAR * larger(mu, NEARLY);
+      if (share < SHORT_SHARE) mu_next = MU_SINGULAR * larger(mu, CLOSE);
     }
     if (is_next) {
       budget_point *before = from;
@@ -488,11 +508,45 @@ static void follow_cost(const budget_problem *p, real times, budget_point *at) {
   if (grown.value > at->value) *at = grown;
 }
 
+/* Makes multipliers so many times as large, those of the budgets at least 1. */
+static void scale_point(const budget_problem *p, real times, budget_point *at) {
+  for (int j = 0; j < 6; j++) at->lambda[j] *= times;
+  for (int b = 0; b < p->budget->buses; b++) at->factor[b] = larger(at->factor[b] * times, 1);
+}
+
+/* Newton's method from a point where one bus may not bind. At the whole cost K of what is missing
+   its mu would have to fall from where the others are, K over the power, to 1. So K is small at
+   first; and as multipliers are K l + m + O(1 / K), their slope there tells them at the whole one. */
+static int find_by_small_cost(budget_problem *p, budget_point *at) {
+  budget_step step;
+  make_dearer(p, COST_FIRST);
+  scale_point(p, COST_FIRST, at);
+  int status = find_optimum(p, at);
+  make_dearer(p, 1 + COST_STEP);
+  if (status == FL_MET) {
+    evaluate(p, at);
+    if (find_step(p, at, ROUNDING, &step)) {
+      const real times = (1 / COST_FIRST - 1) / COST_STEP;
+      add_to(at->lambda, times, step.lambda);
+      for (int b = 0; b < p->budget->buses; b++) {
+        at->factor[b] = larger(at->factor[b] + times * step.factor[b], 1);
+      }
+    }
+  }
+  make_dearer(p, 1 / (COST_FIRST * (1 + COST_STEP)));
+  if (status != FL_MET) return status;
+  return find_optimum(p, at);
+}
+
 /* Newton's method where something may miss, from a point. Where it makes no progress, it begins
    anew at a cost of what is missing that saturates no actuator, and follows that cost up. */
 static int find_best(budget_problem *p, budget_point *at) {
   const budget_point begin = *at;
-  int status = find_optimum(p, at);
+  int status = FL_NO_PROGRESS;
+  if (p->begins_anew && p->may_not_bind) status = find_by_small_cost(p, at);
+  if (status == FL_MET) return status;
+  *at = begin;
+  status = find_optimum(p, at);
   if (status != FL_NO_PROGRESS) return status;
   real dearness = COST_BEGIN;
   *at = begin;
@@ -508,6 +562,95 @@ static int find_best(budget_problem *p, budget_point *at) {
     dearness *= COST_TIMES;
     follow_cost(p, COST_TIMES, at);
   }
+}
+
+/* Tells searches of gaps of what Newton's method came to. */
+static void tell_point(const budget_problem *p, const budget_point *at) {
+  at->state->dual_value = at->value;
+  for (int i = 0; i < COUNT(p->block); i++) p->work->over_cost[i] = 1 / at->factor[p->bus[i]];
+}
+
+/* The least power of each bus [W]. */
+static void find_least_power(const budget_problem *p, real *least) {
+  const real nothing[2] = {0, 0};
+  for (int b = 0; b <= p->budget->buses; b++) least[b] = 0;
+  for (int i = 0; i < COUNT(p->block); i++)
+    least[p->bus[i]] -= response_to(p, i, nothing).conjugate;
+}
+
+/* Whether the sets of forces leave a bus no answer within its budget. */
+static int is_any_too_small(const budget_problem *p) {
+  real least[FL_BUSES + 1];
+  find_least_power(p, least);
+  for (int b = 0; b < p->budget->buses; b++) {
+    if (p->is_open[b] && !(least[b] < p->budget->watts[b])) return 1;
+  }
+  return 0;
+}
+
+/* Newton's method for one part of sets with gaps: fl_part_problem.solve. */
+static int solve_part(void *data) {
+  budget_problem *p = data;
+  int status = FL_BEYOND;
+  if (!is_any_too_small(p)) status = find_optimum(p, &p->part);
+  if (status == FL_NO_PROGRESS) { /* from anew */
+    p->part = p->part_begin;
+    status = find_optimum(p, &p->part);
+  }
+  if (status == FL_MET) {
+    tell_point(p, &p->part);
+    return status;
+  }
+  tell_point(p, &p->part);
+  const budget_point found = p->part;
+  p->part = p->part_begin;
+  p->part.state = found.state;
+  return status;
+}
+
+/* What it has found is the best so far: fl_part_problem.keep. */
+static void keep_part(void *data) {
+  budget_problem *p = data;
+  p->part_best = p->part;
+}
+
+/* Forces that are in no gap of their sets, and multipliers, of a problem from a point on; returns
+   FL_MET ... */
+static int find_forces_within(budget_problem *p, budget_point *at) {
+  fl_work *work = p->work;
+  int status;
+  fl_budget_begin *begin = work->budget_begin + p->targets;
+  if (p->targets < work->budget_begins) {
+    memcpy(at->lambda, begin->lambda, sizeof begin->lambda);
+    memcpy(at->factor, begin->factor, sizeof begin->factor);
+    p->begins_anew = 0;
+  }
+  if (p->misses == NOTHING_MISSES) {
+    status = find_optimum(p, at);
+  } else {
+    status = find_best(p, at);
+  }
+  memcpy(begin->lambda, at->lambda, sizeof begin->lambda);
+  memcpy(begin->factor, at->factor, sizeof begin->factor);
+  p->targets++;
+  p->begins_anew = 0;
+  work->budget_begins = p->targets;
+  copy_forces(p->block, at->state->force, p->force);
+  if (status == FL_BEYOND || !fl_may_have_gaps(p->block, work, p->force)) return status;
+  tell_point(p, at);
+  if (fl_worst_gap(p->block, work, p->force, at->state->lambda_reduced) < 0) return status;
+
+  const fl_part_problem parts = {p->target, solve_part, keep_part, p};
+  real bound;
+  p->part = *at;
+  p->part_begin = *at;
+  if (!fl_search_parts(p->block, work, &parts, status, &bound)) return FL_NO_PROGRESS;
+  copy_forces(p->block, work->best_force, p->force);
+  *at = p->part_best;
+  at->state = work->state;
+  work->state_found = work->state;
+  evaluate(p, at);
+  return FL_MET;
 }
 
 /* Power [W] of a force (2,) of an actuator, by its tables. */
@@ -584,13 +727,14 @@ typedef struct {
 
 /* Begins at prices, with a scale mu of all multipliers at which those of what misses are the
    same. */
-static void begin_at(const budget_problem *p, const budget_begin *begin, budget_point *at) {
+static void begin_at(budget_problem *p, const budget_begin *begin, budget_point *at) {
   real factor = 1;
-  if (p->misses == RAY_MISSES) {
+  p->begins_anew = 1;
+  if (p->misses & RAY_MISSES) {
     const real worth = dot(begin->nu, p->target, 6);
     const real share = dot(begin->given, p->target, 6) / dot(p->target, p->target, 6);
     if (worth > 0) factor = p->ray_cost * clipped(1 - share, 0, 1) / worth;
-  } else if (p->misses == AXES_MISS) {
+  } else if (p->misses & AXES_MISS) {
     real worth = 0;
     real squared = 0;
     for (int k = 0; k < 6; k++) {
@@ -631,18 +775,31 @@ static void let_axes_miss(budget_problem *p, const real *weight, const real *wre
   }
 }
 
-/* Asks for a wrench of which a share may miss. */
-static void let_ray_miss(budget_problem *p, const real *wrench) {
+/* What the whole of a wrench costs that misses [W]. */
+static real cost_of_ray(const budget_problem *p, const real *wrench) {
   real squared = 0;
   for (int k = 0; k < 6; k++) {
     const real normalized = wrench[k] / HEAD(p->block)->wrench_scale[k];
     squared += normalized * normalized;
   }
+  return p->miss_cost * larger(squared, NOTHING);
+}
+
+/* Asks for a wrench of which a share may miss. */
+static void let_ray_miss(budget_problem *p, const real *wrench) {
   p->misses = RAY_MISSES;
   p->is_in_axes = 0;
   p->most_power = INFEASIBLE_COST;
-  p->ray_cost = p->miss_cost * larger(squared, NOTHING);
+  p->ray_cost = cost_of_ray(p, wrench);
   fl_reduce_wrench(p->work, wrench, p->target);
+}
+
+/* Asks for a wrench of which a share may miss, and for more, any wrench across it. */
+static void let_all_miss(budget_problem *p, const real *wrench) {
+  const real weight[6] = {ACROSS_RAY, ACROSS_RAY, ACROSS_RAY, ACROSS_RAY, ACROSS_RAY, ACROSS_RAY};
+  let_axes_miss(p, weight, wrench);
+  p->misses = AXES_MISS | RAY_MISSES;
+  p->ray_cost = cost_of_ray(p, wrench);
 }
 
 /* The least power for a wrench within the budgets, where that is not the least of all. */
@@ -654,7 +811,7 @@ static int meet_wrench(budget_problem *p, const real *wrench, const real *lambda
   fl_reduce_wrench(p->work, wrench, p->target);
   memcpy(at->lambda, lambda_reduced, sizeof at->lambda);
   for (int b = 0; b < p->budget->buses; b++) at->factor[b] = 1;
-  return find_optimum(p, at);
+  return find_forces_within(p, at);
 }
 
 /* An answer without budgets, from which policies begin. */
@@ -686,16 +843,22 @@ static int serve_closest(budget_problem *p, const fl_policy *policy, const real 
   let_axes_miss(p, weight, wrench);
   begin_with_share(p, before, &begin);
   begin_at(p, &begin, at);
-  return find_best(p, at);
+  return find_forces_within(p, at);
 }
 
+/* Where actuators that cannot rest give no share of the wrench alone, what is nearest to one. */
 static int serve_direction(budget_problem *p, const real *wrench, const budget_free_answer *before,
                            budget_point *at) {
   budget_begin begin;
   let_ray_miss(p, wrench);
   begin_with_share(p, before, &begin);
   begin_at(p, &begin, at);
-  return find_best(p, at);
+  const int status = find_forces_within(p, at);
+  if (status == FL_MET) return status;
+  let_all_miss(p, wrench);
+  begin_with_share(p, before, &begin);
+  begin_at(p, &begin, at);
+  return find_forces_within(p, at);
 }
 
 /* Weights of axes when a group is served: those of groups before it are held. Returns whether it
@@ -765,29 +928,30 @@ static int has_no_choice(const budget_problem *p, const budget_point *at, int i)
   return factor >= DEAR || size_of(price) >= DEAR * factor * usual;
 }
 
+/* Leaves an actuator a force [N] and nothing else. */
+static void settle_at(budget_problem *p, int i, const real *force) {
+  p->settled_power[i] = power_of(p->block, p->work, i, force);
+  p->settled_force[i][0] = force[0];
+  p->settled_force[i][1] = force[1];
+  p->is_settled[i] = 1;
+  p->has_settled = 1;
+  fl_fix_force(p->block, i, p->work->set + i, force);
+}
+
 /* Settles the forces of actuators of which what is missing leaves no choice. Returns whether that
    are all. */
 static int settle(budget_problem *p, budget_point *at) {
-  const fl_state *state = at->state;
   int has_choice = 0;
   int is_open[FL_BUSES + 1] = {0};
   for (int i = 0; i < COUNT(p->block); i++) {
     if (p->is_settled[i] || p->work->span.is_lost[i]) continue;
-    if (!has_no_choice(p, at, i)) {
+    const int goes_either_way = p->work->set[i].force_max_reverse > 0;
+    if (goes_either_way || !has_no_choice(p, at, i)) {
       has_choice = 1;
       is_open[p->bus[i]] = 1;
       continue;
     }
-    const real factor = at->factor[p->bus[i]];
-    real v[2];
-    actuator_price(p->work, i, state->lambda_reduced, v);
-    v[0] /= factor;
-    v[1] /= factor;
-    const response y = fl_response(p->block, i, p->work->set + i, v);
-    p->is_settled[i] = 1;
-    p->settled_force[i][0] = y.force[0];
-    p->settled_force[i][1] = y.force[1];
-    p->settled_power[i] = dot(v, y.force, 2) - y.conjugate;
+    settle_at(p, i, p->force[i]);
   }
   for (int b = 0; b < p->budget->buses; b++) {
     p->is_open[b] = is_open[b];
@@ -821,7 +985,7 @@ static int serve_groups(budget_problem *p, const fl_policy *policy, const real *
       if (first > 0) begin_with_held(p, weight, before, &held, power_held, &begin);
       begin_at(p, &begin, at);
     }
-    status = find_best(p, at);
+    status = find_forces_within(p, at);
     if (status != FL_MET) return status;
     real missed = 0;
     int binds = 0;
@@ -839,10 +1003,8 @@ static int serve_groups(budget_problem *p, const fl_policy *policy, const real *
   return status;
 }
 
-/* Takes what Newton's method came to, whose wrench is `out->wrench_served`, into an answer; 0 where
-   forces lie in gaps of their sets. */
-static int take_point(const budget_problem *p, const budget_point *at, fl_answer *out) {
-  fl_work *work = p->work;
+/* Takes what was found, whose wrench is `out->wrench_served`, into an answer. */
+static void take_point(budget_problem *p, const budget_point *at, fl_answer *out) {
   real weighted = 0;
   real sum = 0;
   for (int b = 0; b <= p->budget->buses; b++) {
@@ -852,35 +1014,114 @@ static int take_point(const budget_problem *p, const budget_point *at, fl_answer
   real mean = 1; /* the price of the power itself: buses share it by what they take */
   if (sum > 0) mean = weighted / sum;
   for (int j = 0; j < 6; j++) out->lambda_reduced[j] = at->state->lambda_reduced[j] / mean;
-  copy_forces(p->block, at->state->force, out->force);
-  if (!fl_may_have_gaps(p->block, work, out->force)) return 1;
-  return fl_worst_gap(p->block, work, out->force, out->lambda_reduced) < 0;
+  for (int b = 0; b < p->budget->buses; b++) p->work->bus_binds[b] = at->factor[b] > 1;
+  copy_forces(p->block, p->force, out->force);
+  out->gap_power_bound = 0;
 }
 
-int fl_keep_budget(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,
-                   const fl_budget *budget, fl_answer *out) {
-  budget_problem p;
+/* Has the actuators of a bus take as little as they can. */
+static void close_bus(budget_problem *p, int bus) {
+  const real nothing[2] = {0, 0};
+  p->is_open[bus] = 0;
+  for (int i = 0; i < COUNT(p->block); i++) {
+    const fl_set *set = p->work->set + i;
+    if (p->bus[i] != bus || p->work->span.is_lost[i]) continue;
+    response y = response_to(p, i, nothing);
+    if (is_plane(ACTUATOR(p->block, i)) && size_of(y.force) < set->force_min) {
+      y.force[0] = set->force_min * set->cos_center;
+      y.force[1] = set->force_min * set->sin_center;
+    }
+    settle_at(p, i, y.force);
+  }
+}
+
+/* Closes buses that take more than they have whatever is given, as where rates hold their
+   actuators. */
+static void close_buses(budget_problem *p) {
+  real least[FL_BUSES + 1];
+  find_least_power(p, least);
+  for (int b = 0; b < p->budget->buses; b++) {
+    if (least[b] < p->budget->watts[b]) continue;
+    p->exceeds |= least[b] > (1 + BUDGET_KEPT) * p->budget->watts[b];
+    close_bus(p, b);
+  }
+}
+
+/* Where Newton's method has found no answer within the budgets: a share of the forces without
+   them. Returns whether there is one. */
+static int take_share(budget_problem *p, fl_answer *out) {
+  if (p->has_settled) return 0;
+  for (int k = 0; k < SHARES; k++) {
+    const real share = share_within(p->block, p->work, p->budget, out->force);
+    if (!(share < 1)) {
+      fl_wrench_of_forces(p->block, p->work, out->force, out->wrench_served);
+      out->gap_power_bound = 0;
+      return 1;
+    }
+    for (int i = 0; i < COUNT(p->block); i++) {
+      out->force[i][0] *= share;
+      out->force[i][1] *= share;
+    }
+  }
+  return 0;
+}
+
+/* Where no answer was found within the budgets: least power of all that have one. */
+static void take_least_power(budget_problem *p, fl_answer *out) {
+  for (int b = 0; b < p->budget->buses; b++) close_bus(p, b);
+  for (int i = 0; i < COUNT(p->block); i++) {
+    if (!p->is_settled[i]) continue;
+    out->force[i][0] = p->settled_force[i][0];
+    out->force[i][1] = p->settled_force[i][1];
+  }
+  fl_wrench_of_forces(p->block, p->work, out->force, out->wrench_served);
+  out->gap_power_bound = 0;
+  p->exceeds = 1;
+}
+
+/* Prepares the problem of a question. */
+static void begin_problem(const real *block, fl_work *work, const fl_budget *budget,
+                          budget_problem *p) {
+  p->block = block;
+  p->work = work;
+  p->budget = budget;
+  p->keeps_budgets = 1;
+  p->exceeds = 0;
+  p->has_settled = 0;
+  p->targets = 0;
+  p->may_not_bind = !feeds_all(block, work, budget);
+  p->miss_cost = 0;
+  for (int b = 0; b < FL_BUSES; b++) p->is_open[b] = 1;
+  for (int i = 0; i < COUNT(block); i++) {
+    p->bus[i] = bus_of(budget, i);
+    p->is_settled[i] = 0;
+    p->miss_cost += MISS_COST * work->power_max[i];
+  }
+}
+
+/* Finds forces for a wrench within the budgets, or for what a policy gives in its place; returns
+   whether it has. */
+static int find_within_budget(budget_problem *p, const real *wrench, const fl_policy *policy,
+                              fl_answer *out) {
+  const real *block = p->block;
+  fl_work *work = p->work;
+  const fl_budget *budget = p->budget;
   budget_point at;
   budget_free_answer before;
-  if (work->has_turn_cost || work->has_drag || !policy) return 0;
-  p.block = block;
-  p.work = work;
-  p.budget = budget;
-  p.keeps_budgets = 1;
-  p.miss_cost = 0;
-  for (int b = 0; b < FL_BUSES; b++) p.is_open[b] = 1;
-  for (int i = 0; i < COUNT(block); i++) {
-    p.bus[i] = bus_of(budget, i);
-    p.is_settled[i] = 0;
-    p.miss_cost += MISS_COST * work->power_max[i];
-  }
+  close_buses(p);
   const int is_bus_of_all = feeds_all(block, work, budget);
   before.is_met = out->is_attainable;
   before.share = share_within(block, work, budget, out->force);
   if (before.is_met && !is_bus_of_all) {
-    if (meet_wrench(&p, wrench, out->lambda_reduced, &at) == FL_MET) {
-      return take_point(&p, &at, out);
+    const int is_known = work->budget_begins > 0 && work->is_budget_too_small;
+    if (is_known) {
+      p->targets = 1;
+    } else if (meet_wrench(p, wrench, out->lambda_reduced, &at) == FL_MET) {
+      work->is_budget_too_small = 0;
+      take_point(p, &at, out);
+      return !p->exceeds;
     }
+    work->is_budget_too_small = 1;
   }
 
   memcpy(before.lambda_reduced, out->lambda_reduced, sizeof before.lambda_reduced);
@@ -889,17 +1130,38 @@ int fl_keep_budget(const real *block, fl_work *work, const real *wrench, const f
   out->is_attainable = 0;
   int status;
   if (policy->kind == FL_DIRECTION) {
-    status = serve_direction(&p, wrench, &before, &at);
+    status = serve_direction(p, wrench, &before, &at);
   } else if (policy->kind == FL_PRIORITY) {
-    status = serve_groups(&p, policy, wrench, is_bus_of_all, &before, &at);
+    status = serve_groups(p, policy, wrench, is_bus_of_all, &before, &at);
   } else {
-    status = serve_closest(&p, policy, wrench, &before, &at);
+    status = serve_closest(p, policy, wrench, &before, &at);
   }
-  if (status != FL_MET) return 0;
-  if (policy->kind == FL_DIRECTION) {
-    for (int k = 0; k < 6; k++) out->wrench_served[k] = (1 - at.missing[0]) * wrench[k];
+  if (status != FL_MET && policy->kind != FL_CLOSEST) {
+    status = serve_closest(p, policy, wrench, &before, &at);
+  }
+  if (status != FL_MET) {
+    if (take_share(p, out)) return 1;
+    take_least_power(p, out);
+    return 0;
+  }
+  if (p->misses == RAY_MISSES) {
+    for (int k = 0; k < 6; k++) out->wrench_served[k] = (1 - at.missing_share) * wrench[k];
   } else {
-    fl_wrench_of_forces(block, work, at.state->force, out->wrench_served);
+    fl_wrench_of_forces(block, work, p->force, out->wrench_served);
   }
-  return take_point(&p, &at, out);
+  take_point(p, &at, out);
+  return !p->exceeds;
+}
+
+int fl_keep_budget(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,
+                   const fl_budget *budget, fl_answer *out) {
+  budget_problem p;
+  fl_set before[FL_MOST];
+  if (work->has_turn_cost || work->has_drag || !policy) return 0;
+  copy_sets(block, work->set, before);
+  begin_problem(block, work, budget, &p);
+  const int is_kept = find_within_budget(&p, wrench, policy, out);
+  if (p.has_settled) fl_restore_sets(block, work, before);
+  for (int i = 0; i < COUNT(block); i++) work->over_cost[i] = 1;
+  return is_kept && !p.exceeds;
 }

@@ -96,6 +96,10 @@ real fl_gap_of(const real *block, const fl_work *work, int i, const real *force,
     real s[2];
     real between;
     actuator_price(work, i, lambda, s);
+#if FL_KEEPS_BUDGETS
+    s[0] *= work->over_cost[i];
+    s[1] *= work->over_cost[i];
+#endif
     const int is_ahead = fl_undecided(block, i, set, s, &between);
     if (between > CLOSE * a->row_force_max[0]) return PI;
     if (!is_ahead) return 0;
