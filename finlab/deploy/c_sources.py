@@ -72,8 +72,8 @@ FILES_LEFT_OUT = (
 )
 """Files of the core that an export does not need: judgement by formulas, messages of networks,
 attainable sets, batches, what Python alone calls, and what swims in a simulation."""
-FILE_OF_BUDGETS = "power_budget.c"
-"""The file of the core that only robots with a power budget need."""
+FILES_OF_BUDGETS = ("command_budget.c", "power_budget.c")
+"""Files of the core that only robots with a power budget need."""
 QUESTIONS: tuple[tuple[PolicyName, float], ...] = (
     ("closest", 0.9),
     ("closest", 3.0),
@@ -212,7 +212,8 @@ def _core_sources(
     if not any(_is_pod(actuator.KIND) for actuator in layout.actuators):
         sources[STUB_OF_PODS] = (STUBS / STUB_OF_PODS).read_text("utf-8")
     if not has_budget:
-        del sources[FILE_OF_BUDGETS]
+        for name in FILES_OF_BUDGETS:
+            del sources[name]
     if not is_coupled:
         for file in FILES_OF_INTERACTION:
             del sources[file]

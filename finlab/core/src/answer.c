@@ -7,8 +7,7 @@
 
 #define LARGEST R(1e12) /* wrench, price or command of a question */
 #define MOST_CALM 1000
-#define CALM_STEPS 10       /* halves of the range of what turning costs, to keep a budget */
-#define OVER_BUDGET NOTHING /* share by which an answer may exceed a budget: rounding */
+#define CALM_STEPS 10 /* halves of the range of what turning costs, to keep a budget */
 #define SHORT_OF_BUDGET (NEARLY / 2) /* share that a bus that binds may leave of its budget */
 #define AIM_BELOW (NEARLY / 10)      /* by which share less than a budget is aimed at */
 #define LEAST_SLOPE R(0.2) /* of powers by the laws over those by tables, both as logarithms */
@@ -322,17 +321,6 @@ static void find_commands(const real *block, fl_work *work, const fl_question *q
 }
 
 #if FL_KEEPS_BUDGETS
-/* Powers of the buses by the laws at the commands of an answer, over what they have. */
-static void find_shares(const real *block, const fl_work *work, const fl_budget *budget,
-                        const fl_answer *out, real *share) {
-  real power[FL_BUSES + 1] = {0};
-  for (int i = 0; i < COUNT(block); i++) {
-    if (!work->span.is_lost[i])
-      power[budget->bus_of[i]] += work->law_power(work, i, out->command[i]);
-  }
-  for (int b = 0; b < budget->buses; b++) share[b] = power[b + 1] / budget->watts[b];
-}
-
 /* Changes what buses are asked to take by tables, so that by the laws they take what they have, and
    returns 1; 0 where they do already. `log_share` and `log_asked` are of the try before. */
 static int correct_budget(const fl_work *work, const fl_budget *budget, const real *share,
@@ -341,7 +329,7 @@ static int correct_budget(const fl_work *work, const fl_budget *budget, const re
   for (int b = 0; b < budget->buses; b++) {
     const real y = LOG(larger(share[b], TINY));
     const real x = LOG(asked->watts[b] / budget->watts[b]);
-    const int is_short = work->bus_binds[b] && y < -SHORT_OF_BUDGET;
+    const int is_short = work->law_power && work->bus_binds[b] && y < -SHORT_OF_BUDGET;
     const real last_log_share = log_share[b];
     real slope = 1;
     if (tries > 0 && FABS(x - log_asked[b]) > ROUNDING) {
@@ -350,24 +338,39 @@ static int correct_budget(const fl_work *work, const fl_budget *budget, const re
     log_share[b] = y;
     log_asked[b] = x;
     const int is_stuck = tries > 0 && y == last_log_share;
-    if ((y <= OVER_BUDGET && !is_short) || is_stuck) continue;
+    if ((share[b] <= MOST_SHARE && !is_short) || is_stuck) continue;
     is_kept = 0;
     asked->watts[b] *= EXP(-(y + AIM_BELOW) / slope);
   }
   return !is_kept;
 }
 
+/* Makes an answer of commands: the wrench that they give, by tables. */
+static void serve_commands(const real *block, const fl_work *work, fl_answer *out) {
+  fl_power_of_commands(block, work, out->command, out->force);
+  for (int i = 0; i < COUNT(block); i++) {
+    if (!fl_is_in_dead_band(ACTUATOR(block, i), out->command[i])) continue;
+    out->force[i][0] = 0;
+    out->force[i][1] = 0;
+  }
+  fl_wrench_of_forces(block, work, out->force, out->wrench_served);
+  for (int k = 0; k < 6; k++) out->wrench_served[k] += work->span.wrench_offset[k];
+  out->is_attainable = 0;
+  out->error = 0;
+  out->gap_power_bound = 0;
+}
+
 /* Answers within a budget, from the answer without: by the laws where these are known, which may
-   take a little more or less than the tables say. */
+   take a little more or less than the tables say; and so may what a gap of a set leaves of a
+   force. */
 static void answer_within_budget(const real *block, fl_work *work, const fl_question *q,
                                  const real *wrench_desired, fl_answer *out) {
   fl_question asked_question = *q;
   fl_budget asked = *q->budget;
-  const int has_laws = work->law_power != 0;
   real share[FL_BUSES];
   real log_share[FL_BUSES] = {0};
   real log_asked[FL_BUSES] = {0};
-  if (has_laws && fl_exceeds_budget(block, work, q->budget, out->force)) {
+  if (work->law_power && fl_exceeds_budget(block, work, q->budget, out->force)) {
     for (int b = 0; b < asked.buses; b++) asked.watts[b] *= 1 - AIM_BELOW;
   }
   fl_answer without = *out;
@@ -376,15 +379,17 @@ static void answer_within_budget(const real *block, fl_work *work, const fl_ques
   for (int tries = 0;; tries++) {
     const int is_used_up = keep_budget(block, work, &asked_question, wrench_desired, out);
     find_commands(block, work, q, wrench_desired, is_used_up, out);
-    if (!has_laws) return;
-    find_shares(block, work, q->budget, out, share);
+    fl_budget_shares(block, work, q->budget, out->command, share);
     if (!correct_budget(work, q->budget, share, tries, log_share, log_asked, &asked)) break;
     if (tries == FL_BUDGET_TRIES - 1) break;
     *out = without;
     if (q->previous) fl_limits_of_tick(block, work, q);
   }
-  out->exceeds_budget = 0;
-  for (int b = 0; b < q->budget->buses; b++) out->exceeds_budget |= share[b] > 1 + OVER_BUDGET;
+  if (!fl_is_within_shares(q->budget, share)) {
+    fl_come_within_budget(block, work, q, out->command, share);
+    serve_commands(block, work, out);
+  }
+  out->exceeds_budget = !fl_is_within_shares(q->budget, share);
 }
 #endif
 

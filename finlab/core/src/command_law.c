@@ -629,37 +629,40 @@ void fl_commands_for_forces(const real *block, const fl_box *box, real force[][2
   }
 }
 
+/* The force along the rows of a command, and its cost [W]. */
+real fl_power_of_command(const real *block, int i, const real *command, real *force) {
+  const fl_actuator *a = ACTUATOR(block, i);
+  real along[3];
+  fl_force_of_command(block, i, command, along, 0);
+  const int is_in_reverse = fl_is_in_reverse(a, command);
+  real size;
+  if (is_plane(a)) {
+    force[0] = along[1];
+    force[1] = along[2];
+    size = size_of(force);
+    if (!is_in_reverse) size /= fl_radius(block, i, ATAN2(along[2], along[1]));
+  } else {
+    force[0] = a->command_sign * along[0];
+    size = force[0];
+  }
+  if (is_foil(a)) {
+    fl_tangent tangent;
+    fl_foil_at(block, i, command[0], &tangent);
+    force[1] = tangent.force[1];
+    return tangent.cost;
+  }
+  if (is_in_reverse) size = -size;
+  return fl_power_of_force(block, i, size);
+}
+
 /* Forces along the rows of commands, and their cost [W]. */
 real fl_power_of_commands(const real *block, const fl_work *work, real command[][3],
                           real force[][2]) {
   real cost = 0;
   for (int i = 0; i < COUNT(block); i++) {
-    const fl_actuator *a = ACTUATOR(block, i);
     force[i][0] = 0;
     force[i][1] = 0;
-    if (work->span.is_lost[i]) continue;
-    real along[3];
-    fl_force_of_command(block, i, command[i], along, 0);
-    real size;
-    if (is_plane(a)) {
-      force[i][0] = along[1];
-      force[i][1] = along[2];
-      size = size_of(force[i]);
-    } else {
-      force[i][0] = a->command_sign * along[0];
-      size = force[i][0];
-    }
-    const int is_in_reverse = fl_is_in_reverse(a, command[i]);
-    if (is_plane(a) && !is_in_reverse) size /= fl_radius(block, i, ATAN2(along[2], along[1]));
-    if (is_foil(a)) {
-      fl_tangent tangent;
-      fl_foil_at(block, i, command[i][0], &tangent);
-      force[i][1] = tangent.force[1];
-      cost += tangent.cost;
-      continue;
-    }
-    if (is_in_reverse) size = -size;
-    cost += fl_power_of_force(block, i, size);
+    if (!work->span.is_lost[i]) cost += fl_power_of_command(block, i, command[i], force[i]);
   }
   return cost;
 }

@@ -57,6 +57,8 @@ static real worth_search(const fl_work *work, const fl_part_problem *problem) {
   if (FL_ZONES > 0 && work->has_zones) return NEARLY;
 #if FL_KEEPS_BUDGETS
   if (problem->solve) return NEARLY;
+#else
+  (void)problem;
 #endif
   return CLOSE;
 }

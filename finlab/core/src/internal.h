@@ -309,6 +309,7 @@ void fl_command_for_force(const real *block, int i, const fl_box *box, const rea
 force_range fl_force_range(const real *block, int i, const fl_box *box);
 void fl_commands_for_forces(const real *block, const fl_box *box, real force[][2],
                             const real *previous, real command[][3]);
+real fl_power_of_command(const real *block, int i, const real *command, real *force);
 real fl_power_of_commands(const real *block, const fl_work *work, real command[][3],
                           real force[][2]);
 
@@ -393,6 +394,15 @@ int fl_exceeds_budget(const real *block, const fl_work *work, const fl_budget *b
                       real force[][2]);
 int fl_keep_budget(const real *block, fl_work *work, const real *wrench, const fl_policy *policy,
                    const fl_budget *budget, fl_answer *out);
+void fl_least_power_force(const real *block, const fl_work *work, int i, real *force);
+
+/* command_budget.c: commands within power budgets */
+void fl_budget_shares(const real *block, const fl_work *work, const fl_budget *budget,
+                      real command[][3], real *share);
+#define MOST_SHARE (1 + 10 * TOLERANCE) /* of its budget that a bus may take: rounding */
+int fl_is_within_shares(const fl_budget *budget, const real *share);
+void fl_come_within_budget(const real *block, const fl_work *work, const fl_question *q,
+                           real command[][3], real *share);
 
 /* set_gaps.c: sets with gaps */
 #define NARROW R(0.2)   /* half of an arc up to which its chord stands for its least forces */

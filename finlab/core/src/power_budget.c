@@ -1019,19 +1019,27 @@ static void take_point(budget_problem *p, const budget_point *at, fl_answer *out
   out->gap_power_bound = 0;
 }
 
+/* The force (2,) [N] of least power that its set leaves an actuator. */
+void fl_least_power_force(const real *block, const fl_work *work, int i, real *force) {
+  const fl_set *set = work->set + i;
+  const real nothing[2] = {0, 0};
+  const response y = fl_response(block, i, set, nothing);
+  force[0] = y.force[0];
+  force[1] = y.force[1];
+  if (is_plane(ACTUATOR(block, i)) && size_of(force) < set->force_min) {
+    force[0] = set->force_min * set->cos_center;
+    force[1] = set->force_min * set->sin_center;
+  }
+}
+
 /* Has the actuators of a bus take as little as they can. */
 static void close_bus(budget_problem *p, int bus) {
-  const real nothing[2] = {0, 0};
   p->is_open[bus] = 0;
   for (int i = 0; i < COUNT(p->block); i++) {
-    const fl_set *set = p->work->set + i;
-    if (p->bus[i] != bus || p->work->span.is_lost[i]) continue;
-    response y = response_to(p, i, nothing);
-    if (is_plane(ACTUATOR(p->block, i)) && size_of(y.force) < set->force_min) {
-      y.force[0] = set->force_min * set->cos_center;
-      y.force[1] = set->force_min * set->sin_center;
-    }
-    settle_at(p, i, y.force);
+    if (p->bus[i] != bus || p->work->span.is_lost[i] || p->is_settled[i]) continue;
+    real force[2];
+    fl_least_power_force(p->block, p->work, i, force);
+    settle_at(p, i, force);
   }
 }
 
@@ -1064,19 +1072,6 @@ static int take_share(budget_problem *p, fl_answer *out) {
     }
   }
   return 0;
-}
-
-/* Where no answer was found within the budgets: least power of all that have one. */
-static void take_least_power(budget_problem *p, fl_answer *out) {
-  for (int b = 0; b < p->budget->buses; b++) close_bus(p, b);
-  for (int i = 0; i < COUNT(p->block); i++) {
-    if (!p->is_settled[i]) continue;
-    out->force[i][0] = p->settled_force[i][0];
-    out->force[i][1] = p->settled_force[i][1];
-  }
-  fl_wrench_of_forces(p->block, p->work, out->force, out->wrench_served);
-  out->gap_power_bound = 0;
-  p->exceeds = 1;
 }
 
 /* Prepares the problem of a question. */
@@ -1140,8 +1135,10 @@ static int find_within_budget(budget_problem *p, const real *wrench, const fl_po
     status = serve_closest(p, policy, wrench, &before, &at);
   }
   if (status != FL_MET) {
+    real force[FL_MOST][2];
+    copy_forces(block, out->force, force);
     if (take_share(p, out)) return 1;
-    take_least_power(p, out);
+    copy_forces(block, force, out->force);
     return 0;
   }
   if (p->misses == RAY_MISSES) {
