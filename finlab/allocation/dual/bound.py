@@ -15,6 +15,36 @@ TABLE_ERROR = 10.0 * CLOSE
 """Share of a power by which the core's tables may be off."""
 
 
+def conjugates_by_laws(
+    compiled: Compiled, multipliers: Array, conditions: Conditions = NOMINAL
+) -> Array:
+    """Returns upper bounds of the conjugates of costs (Eq. 4) by the actuators' laws.
+
+    Args:
+        compiled: the robot of n actuators.
+        multipliers: lambda (N, 6) [W/N, W/(N m)].
+        conditions: what holds of the robot.
+
+    Returns:
+        Conjugates (N, n) [W], 0 of lost actuators.
+    """
+    by_tables = compiled.core.conjugates(multipliers, compiled.conjugate_margins, conditions)
+    conjugate = by_tables.conjugate.copy()
+    for index, (indices, group) in enumerate(compiled.groups):
+        along_price = compiled.conjugates_by_laws(index, by_tables)
+        in_all_directions = group.conjugate_bound(multipliers)
+        for by_laws in (along_price, in_all_directions):
+            if by_laws is None:
+                continue
+            is_left = np.isnan(by_laws)
+            if is_left.any():
+                by_laws = np.where(is_left, conjugate[:, indices], by_laws)
+            conjugate[:, indices] = by_laws
+    if conditions.lost is not None:
+        conjugate[:, conditions.lost] = 0.0
+    return conjugate
+
+
 def power_bound(
     compiled: Compiled, wrench: Array, multipliers: Array, conditions: Conditions = NOMINAL
 ) -> Array:
@@ -29,21 +59,9 @@ def power_bound(
     Returns:
         Power (N,) [W] that no answer undercuts which gives these wrenches under the conditions.
     """
-    by_tables = compiled.core.conjugates(multipliers, compiled.conjugate_margins, conditions)
-    conjugate = by_tables.conjugate.copy()
-    for index, (indices, group) in enumerate(compiled.groups):
-        along_price = compiled.conjugates_by_laws(index, by_tables)
-        in_all_directions = group.conjugate_bound(multipliers)
-        for by_laws in (along_price, in_all_directions):
-            if by_laws is None:
-                continue
-            is_left = np.isnan(by_laws)
-            if is_left.any():
-                by_laws = np.where(is_left, conjugate[:, indices], by_laws)
-            conjugate[:, indices] = by_laws
+    conjugate = conjugates_by_laws(compiled, multipliers, conditions)
     wrench_offset = compiled.wrench_offset
     if conditions.lost is not None:
-        conjugate[:, conditions.lost] = 0.0
         wrench_offset = compiled.wrench_offset_of(~conditions.lost)
     paid = multipliers * (wrench - wrench_offset)
     rounding = ROUNDING * (np.abs(paid).sum(axis=1) + np.abs(conjugate).sum(axis=1))

@@ -109,7 +109,8 @@ def solve_within(
         command[row] = answer.command[0]
         if answer.multipliers is not None:
             multipliers[row] = answer.multipliers[0]
-    return method.solution_of(conditions, targets, command, multipliers, exceeds)
+    within = conditions._replace(budget=budget.record)
+    return method.solution_of(within, targets, command, multipliers, exceeds)
 
 
 def _solve_one(
@@ -128,6 +129,7 @@ def _solve_one(
     solved = method.solve_under(asked, targets, policy, multipliers)
     if knows_power and not isinstance(solved, Solution):
         return solved
+    first = solved
     correction = _Correction(budget)
     for _ in range(CORRECTIONS):
         power = np.asarray(budget.power_of_buses(method.plant.power(solved.command))[0])
@@ -136,12 +138,17 @@ def _solve_one(
         record = budget_record(budget.members, correction.watts)
         asked = conditions._replace(budget=record)
         solved = method.solve_under(asked, targets, policy, multipliers)
-    if correction.most_over <= EXACT:
-        return correction.best
     best = correction.best
+    is_kept = correction.most_over <= EXACT
+    if is_kept and best is first:
+        return best
+    # What it was asked for is not what holds: bounds are those of the budget itself.
+    if is_kept:
+        conditions = conditions._replace(budget=budget.record)
     zeros = np.zeros((1, 6))
     found = zeros if best.multipliers is None else best.multipliers
-    return method.solution_of(conditions, targets, best.command, found, None, {_EXCEEDS})
+    sentences = set(best.notes()) if is_kept else {_EXCEEDS}
+    return method.solution_of(conditions, targets, best.command, found, None, sentences)
 
 
 class _Correction:

@@ -316,15 +316,17 @@ class Dual(Method):
             return None
 
         def solved(row: AnswerRow, question: MethodQuestion) -> FinishedSolution:
-            asked = conditions
+            asked = conditions._replace(budget=record)
             if question.previous is not None:
-                asked = Conditions(question.previous, lost, free, self.settings.calm)
+                asked = asked._replace(previous=question.previous, calm=self.settings.calm)
             return FinishedSolution(self, asked, question.targets, row)
 
         @cache
         def bounds() -> RowBound | None:
             formulas = self.plant.formulas
             if self.has_no_bound or formulas is None or not self.compiled.is_certified:
+                return None
+            if budget is not None:  # whose prices are looked for in Python
                 return None
             return call.power_bounds(formulas, self.compiled.conjugate_margins)
 
@@ -698,12 +700,14 @@ class Dual(Method):
         if compiled.is_certified:
             margins = compiled.conjugate_margins
             bound = compiled.core.power_bounds(multipliers, wrench, margins, conditions)
+            bound = self._bound_within_budgets(bound, multipliers, conditions, command, wrench)
             if np.count_nonzero(gap_power_bound) == 0:
                 return np.asarray(bound * (1.0 - ROUNDING))
         else:
             from finlab.allocation.dual.bound import bound_by_laws
 
             bound = bound_by_laws(compiled, wrench, multipliers, conditions)
+            bound = self._bound_within_budgets(bound, multipliers, conditions, command, wrench)
         return self._bound_below_power(
             bound, wrench_served, multipliers, gap_power_bound, conditions, command, wrench
         )
@@ -717,6 +721,31 @@ class Dual(Method):
                 return figures.wrench[None]
         wrench: Array = wrench_of_forces(force, self.plant.effectiveness)
         return wrench
+
+    def _bound_within_budgets(
+        self,
+        bound: Array,
+        multipliers: Array,
+        conditions: Conditions,
+        command: Array,
+        wrench: Array,
+    ) -> Array:
+        """Raises bounds (N,) [W] of answers that budgets may have made dearer (Eq. 28); arguments
+        as of `_bound_below_power`."""
+        budget = conditions.budget
+        if budget is None:
+            return bound
+        from finlab.allocation.dual.bound import TABLE_ERROR
+        from finlab.allocation.dual.budget_bound import bounds_within_budgets
+
+        power = judged_power(self.plant, command)
+        low = np.flatnonzero(bound < (1.0 - TABLE_ERROR) * power)
+        if len(low) == 0:
+            return bound
+        within = bounds_within_budgets(self.compiled, wrench[low], multipliers[low], conditions)
+        raised = bound.copy()
+        raised[low] = np.maximum(bound[low], np.minimum(within, power[low]))
+        return raised
 
     def _bound_below_power(
         self,
