@@ -201,9 +201,11 @@ def doubts(result: Allocation) -> tuple[str, ...]:
         )
     else:
         rates = "" if result.previous is None else ", or is held by its rates"
+        has_buses = result.budget is not None and len(result.budget.names) > 1
+        buses = ", or where several power buses bind" if has_buses else ""
         cause = (
             "where an actuator cannot rest, or has a wide arc, a dead band, drag or a measured "
-            f"table{rates}, the least is not proved"
+            f"table{rates}{buses}, the least is not proved"
         )
     return (*sentences, f"{_gap_words(_power_gap(result.power, least))}: {cause}")
 

@@ -214,9 +214,9 @@ struct fl_work {
   fl_law_power law_power; /* of fl_use_laws, and what it reads; 0 where tables say powers */
   const fl_formula *laws;
   const void *curves; /* an array of fl_real pointers */
-  int has_kinks;    /* whether one of these is so of a question, or a plane cannot rest */
-  int newton_steps; /* of this question */
-  int is_truncated; /* whether a search ended at its bound of steps */
+  int has_kinks;      /* whether one of these is so of a question, or a plane cannot rest */
+  int newton_steps;   /* of this question */
+  int is_truncated;   /* whether a search ended at its bound of steps */
 
   /* Points of the attainable set near to a wrench out of reach. */
   fl_mixture mixture;                            /* that comes nearest */

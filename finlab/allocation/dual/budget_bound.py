@@ -42,7 +42,7 @@ def bounds_within_budgets(
         Power (N,) [W] that no answer undercuts which gives these wrenches within the budgets.
     """
     pairs = zip(wrench, multipliers, strict=True)
-    return np.array([_BusDual(compiled, w, l, conditions).bound() for w, l in pairs])
+    return np.array([_BusDual(compiled, w, each, conditions).bound() for w, each in pairs])
 
 
 class _BusDual:
