@@ -58,6 +58,7 @@ def answer(**fields: Any) -> Any:
         "calm_power": 0.0,
         "previous": None,
         "layout": SimpleNamespace(interaction=None),
+        "budget": None,
         "power": 100.0,
     }
     return SimpleNamespace(**(usual | fields))

@@ -23,8 +23,8 @@ CANDIDATES = 48
 """Numbers that a round of a search tries."""
 ROUNDS = 6
 """Rounds of a search, each between the neighbours of the best number of the one before."""
-LOG_RANGE = np.log(1e9)
-"""Logarithm of the largest factor of prices: a miss costs `MISS_COST` times the power."""
+LARGEST_FACTOR = 1e9
+"""Of prices, over those of an answer: a miss costs `MISS_COST` times the power."""
 
 
 def bounds_within_budgets(
@@ -71,13 +71,14 @@ class _BusDual:
     def bound(self) -> float:
         """The largest bound along the multipliers [W]."""
         buses = len(self._watts)
-        low = np.full(buses, -LOG_RANGE)
-        ratio = np.exp(_argmax(self._profit_of_budgets, low, -low))  # r_b
+        end = np.log(LARGEST_FACTOR)
+        ends = np.full(buses, end)
+        ratio = np.exp(_argmax(self._profit_of_budgets, -ends, ends))  # r_b
 
         def dual(log_size: Array) -> Array:
             return self._dual(np.exp(log_size[0]), ratio)[None]
 
-        log_size = _argmax(dual, np.array([-LOG_RANGE]), np.array([LOG_RANGE]))
+        log_size = _argmax(dual, np.array([-end]), np.array([end]))
         return float(self._dual(np.exp(log_size), ratio)[0])
 
     def _conjugates(self, factor: Array) -> Array:
@@ -102,9 +103,9 @@ class _BusDual:
         bought = (mu - 1.0) * self._watts[:, None]
         usual = conjugate[-1] @ self._unfed
         paid = size * self._paid
-        parts = np.concatenate([dear, bought, usual[None]])
-        rounding = ROUNDING * (np.abs(paid) + np.abs(parts).sum(axis=0))
-        return np.asarray(paid - parts.sum(axis=0) - rounding)
+        costs = np.concatenate([dear, bought, usual[None]])
+        rounding = ROUNDING * (np.abs(paid) + np.abs(costs).sum(axis=0))
+        return np.asarray(paid - costs.sum(axis=0) - rounding)
 
 
 def _argmax(score: Callable[[Array], Array], low: Array, high: Array) -> Array:
