@@ -207,7 +207,7 @@ def test_pods_and_fins_that_stand_the_wrong_way_turn_until_a_wrench_is_given(
 
 def test_an_idle_pod_whose_command_before_is_unknown_gets_a_command() -> None:
     allocator = Allocator(load_layout("drillship"), period_s=PERIOD_S)
-    previous = allocator.allocate(np.zeros(6)).command
+    previous = allocator.allocate(np.zeros(6)).command.copy()
     previous[1] = np.nan
     answer = allocator.allocate(
         [-4e5, 0.0, 0.0, 0.0, 0.0, 0.0], previous=previous, policy="direction"
