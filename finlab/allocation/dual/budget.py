@@ -16,12 +16,14 @@ from numpy.typing import NDArray
 from finlab.allocation.policy import Policy
 from finlab.allocation.solution import Solution, Solved
 from finlab.arrays import EXACT, Array
+from finlab.axes import wrapped
 from finlab.core.calls import Conditions, budget_record
 from finlab.physics.plant import Plant
 
 if TYPE_CHECKING:
     from finlab.allocation.power_budget import PowerBudget
     from finlab.allocation.question import MethodQuestion
+    from finlab.allocation.rates import Rates
 
 SLACK = 1e-9
 """Share by which an answer may exceed a budget and count as within it: rounding."""
@@ -35,6 +37,8 @@ CORRECTIONS = 8
 """Budgets at which the core is asked, until powers are exact by the laws."""
 LEAST_RISE = 0.2
 """Least slope of powers by the laws over those by tables, both as logarithms."""
+HALVES = 40
+"""Of the way from commands within a budget to some beyond it."""
 LEAST_SHARE = 1e-300
 """Least power over a budget of which a logarithm is taken."""
 
@@ -52,6 +56,10 @@ class BudgetMethod(Protocol):
     @property
     def plant(self) -> Plant:
         """The actuators' own laws."""
+
+    @property
+    def rates(self) -> Rates:
+        """How far commands may change in a tick."""
 
     @property
     def knows_power(self) -> bool:
@@ -147,8 +155,49 @@ def _solve_one(
         conditions = conditions._replace(budget=budget.record)
     zeros = np.zeros((1, 6))
     found = zeros if best.multipliers is None else best.multipliers
-    sentences = set(best.notes()) if is_kept else {_EXCEEDS}
-    return method.solution_of(conditions, targets, best.command, found, None, sentences)
+    command = best.command
+    if not is_kept and conditions.previous is not None:
+        kept = _on_the_way(method, budget, conditions.previous, command[0])
+        if kept is not None:
+            command = kept[None]
+            is_kept = True
+    notes = best.notes() if is_kept and best.notes is not None else ()
+    sentences = set(notes) if is_kept else {_EXCEEDS}
+    return method.solution_of(conditions, targets, command, found, None, sentences)
+
+
+def _on_the_way(
+    method: BudgetMethod, budget: PowerBudget, before: Array, command: Array
+) -> Array | None:
+    """Commands (n, 3) within a budget as far as it allows from those of the tick before (n, 3)
+    towards commands (n, 3) that exceed it, NaN of lost actuators; None where those before exceed
+    it, too, or are not known."""
+    works = np.isfinite(command).all(axis=-1)
+    if not np.isfinite(before[works]).all():
+        return None
+
+    box = method.rates.box(before)
+    is_angle = box.turns | box.any_angle
+    way = np.where(is_angle, wrapped(command - before), command - before)
+
+    def at(share: float) -> Array:
+        made: Array = before + share * way
+        return made
+
+    def is_within(made: Array) -> bool:
+        power = budget.power_of_buses(method.plant.power(made))
+        return bool((power <= (1.0 + SLACK) * budget.watts).all())
+
+    low, high = 0.0, 1.0
+    if not is_within(at(low)):
+        return None
+    for _ in range(HALVES):
+        middle = (low + high) / 2.0
+        if is_within(at(middle)):
+            low = middle
+        else:
+            high = middle
+    return at(low)
 
 
 class _Correction:

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from finlab.allocation import Allocator
+from finlab.allocation.dual.budget import _on_the_way
 from finlab.allocation.policy import PolicyName
+from finlab.allocation.power_budget import PowerBudget
 from finlab.arrays import Array
 from finlab.core.calls import budget_record
 from finlab.layout.layout import Bus
@@ -187,6 +189,25 @@ def test_the_last_resort_takes_least_where_rates_leave_no_command_within() -> No
     made, share = brought_within(robot, previous, previous=previous, budget=record)
     np.testing.assert_allclose(made[:2, 1], 50.0, rtol=1e-9)  # 10 N less in a tick
     assert share[0] * 100.0 == pytest.approx(plant.power(made), rel=1e-6)
+
+
+def test_python_goes_as_far_from_the_tick_before_as_a_budget_allows() -> None:
+    """Where laws are known to Python alone, and the core cannot correct what it is off."""
+    layout = random_robot("fins uneven", 1, 11)
+    plant = OraclePlant(layout)
+    parsed = load(layout)
+    method: Any = Allocator(parsed)._whole.method  # type: ignore[attr-defined]
+    before = 0.7 * parsed.lower + 0.3 * parsed.upper
+    beyond = 0.2 * parsed.lower + 0.8 * parsed.upper
+    members = np.ones((1, parsed.n), bool)
+    for share, is_kept in ((0.5, True), (-0.1, False)):
+        least = plant.power(before)
+        watts = np.array([least + share * (plant.power(beyond) - least)])
+        made = _on_the_way(method, PowerBudget(("all",), members, watts), before, beyond)
+        assert (made is not None) == is_kept
+        if made is not None:
+            assert plant.power(made) == pytest.approx(watts[0], rel=1e-8)
+            assert plant.power(made) <= watts[0] * (1.0 + WITHIN)
 
 
 @pytest.mark.parametrize("number", [0, 2, 3, 6, 7])
