@@ -1,8 +1,8 @@
 /* One target after the other: commands of least power where it is within what may be given now,
    else for what a policy gives in its place.
 
-   Forces come first (`fl_find_forces`), by the dual; then commands for the forces; then steps on the
-   commands, which make up for what the tables of forces leave. */
+   Forces come first (`fl_find_forces`), by the dual; then commands for the forces; then steps on
+   the commands, which make up for what the tables of forces leave. */
 #include "internal.h"
 
 #define LARGEST R(1e12) /* wrench, price or command of a question */

@@ -1,5 +1,5 @@
-/* Idle actuators in ticks: drives that pass through their dead bands, pods and fins that turn towards
-   what they will give. */
+/* Idle actuators in ticks: drives that pass through their dead bands, pods and fins that turn
+   towards what they will give. */
 #include "internal.h"
 
 /* A drive that passes a dead band stays within it by this share of the band. */
