@@ -45,9 +45,9 @@ function columnsOf(actuator) {
 
 // The sectors of an actuator, ahead and astern: from u to v, least and largest force, and its sign.
 function sidesOf({ sectors }, [low, high]) {
-  const ahead = sectors.map(([u, v]) => ({ u, v, low: largest([low, ZERO]), high, sign: 1 }));
+  const ahead = sectors.map(([u, v]) => ({ u, v, least: largest([low, ZERO]), most: high, sign: 1 }));
   if (!isNegative(low)) return ahead;
-  const astern = sectors.map(([u, v]) => ({ u: negated(u), v: negated(v), low: ZERO, high: low.negative(), sign: -1 }));
+  const astern = sectors.map(([u, v]) => ({ u: negated(u), v: negated(v), least: ZERO, most: low.negative(), sign: -1 }));
   return [...ahead, ...astern];
 }
 
@@ -59,22 +59,20 @@ function isToward({ u, v }, p) {
 }
 
 // Whether a sector has the force p, or one of its direction that is larger.
-const reaches = (side, p) => isToward(side, p) && dot(p, p).isAtMost(side.high.times(side.high));
+const reaches = (side, p) => isToward(side, p) && dot(p, p).isAtMost(side.most.times(side.most));
 
-// Whether sectors have the forces between 0, a and b, but for small ones; b is left of a.
+// Whether sectors have the forces between 0, a and b, but for small ones. The way from a to b is cut
+// where a sector ends; one sector has both ends of each piece.
 function holdTriangle(sides, a, b) {
-  if (cross(a, b).sign() === 0) return sides.some((side) => reaches(side, a)) && sides.some((side) => reaches(side, b));
-  return sides.some((side) => {
-    if (!reaches(side, a)) return false;
-    if (reaches(side, b)) return true;
-    const [before, after] = [cross(a, side.v), cross(side.v, b)];
-    if (!isPositive(before) || !isPositive(after)) return false;
-    // The sector ends between them: on to the next one from there.
-    const share = before.over(before.plus(after));
-    const end = a.map((x, k) => x.plus(share.times(b[k].minus(x))));
-    const others = sides.filter((other) => other !== side);
-    return reaches(side, end) && holdTriangle(others, end, b);
-  });
+  if (cross(a, b).sign() === 0) return [a, b].every((p) => sides.some((side) => reaches(side, p)));
+  const shares = [ZERO, ONE];
+  for (const end of sides.flatMap(({ u, v }) => [u, v])) {
+    const [before, after] = [cross(a, end), cross(end, b)];
+    if (before.sign() * after.sign() > 0) shares.push(before.over(before.plus(after)));
+  }
+  shares.sort((x, y) => x.minus(y).sign());
+  const points = shares.map((share) => a.map((x, k) => x.plus(share.times(b[k].minus(x)))));
+  return points.slice(1).every((q, k) => sides.some((side) => reaches(side, points[k]) && reaches(side, q)));
 }
 
 // Whether all between a and b are as long as the least force.
@@ -90,10 +88,10 @@ function isFar(a, b, least) {
 
 // Whether p is a mean of forces of a sector: beyond the chord of least ones at both ends.
 function isMean(side, p) {
-  const { u, v, low } = side;
+  const { u, v, least } = side;
   const normal = [v[1].minus(u[1]), u[0].minus(v[0])];
-  const isBeyond = isAtLeast(dot(normal, p), low.times(cross(u, v)));
-  return reaches(side, p) && isBeyond && (isPositive(cross(u, v)) || isAtLeast(dot(p, p), low.times(low)));
+  const isBeyond = isAtLeast(dot(normal, p), least.times(cross(u, v)));
+  return reaches(side, p) && isBeyond && (isPositive(cross(u, v)) || isAtLeast(dot(p, p), least.times(least)));
 }
 
 const compare = (a, b) => difference(a, b).map((x) => x.sign()).find((sign) => sign !== 0) ?? 0;
@@ -125,7 +123,7 @@ function holdHull(actuator, sides, points) {
   const edges = corners.map((a, k) => [a, corners[(k + 1) % corners.length]]);
   if (isHeld && edges.every(([a, b]) => isPositive(cross(a, b)))) return false; // around 0
   if (isHeld && !edges.every(([a, b]) => isFar(a, b, least))) return false;
-  return edges.every(([a, b]) => (isNegative(cross(a, b)) ? holdTriangle(sides, b, a) : holdTriangle(sides, a, b)));
+  return edges.every(([a, b]) => holdTriangle(sides, a, b));
 }
 
 // An upper bound of price.p over forces p of a sector with sizes from low to high.
@@ -159,7 +157,7 @@ function mostWatts(actuator, force, isAhead) {
 
 // An upper bound of price.p - wattPrice P(p) over the forces p of a sector.
 function mostProfit({ power }, side, price, wattPrice) {
-  if (wattPrice.sign() === 0) return mostGain(side, price, side.low, side.high);
+  if (wattPrice.sign() === 0) return mostGain(side, price, side.least, side.most);
   const gain = mostGain(side, price, ZERO, ONE); // per newton
   const own = power.points.filter(([x]) => side.sign * x.sign() >= 0);
   return largest(own.map(([x, watts]) => gain.times(x.size()).minus(wattPrice.times(watts.minus(power.error_w)))));
@@ -253,6 +251,7 @@ const keyOf = (names) => JSON.stringify([...new Set(names)].sort());
 // Whether there is each case, and its box is given.
 function checkProved(cases, robot) {
   const { actuators, statement } = robot;
+  need(cases.every(({ lost }) => Array.isArray(lost)), "a case has no list of who is lost");
   const caseOf = new Map(cases.map((each) => [keyOf(each.lost), each]));
   const high = statement.halfWidths;
   for (let n = 0; n <= Number(statement.lost.numerator); n++) {

@@ -26,9 +26,9 @@ for each.
 import json
 import sys
 from fractions import Fraction
-from itertools import combinations, product
+from itertools import combinations, pairwise, product
 from math import isqrt
-from typing import Any
+from typing import Any, NamedTuple
 
 AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
 FINE = 10**30  # square roots are rounded to this part of one
@@ -76,46 +76,59 @@ def columns(actuator: Any) -> Any:
 # Sets of forces.
 
 
-def sides_of(actuator: Any, limits: Any) -> Any:
-    """The sectors of an actuator, ahead and astern: u, v, least and largest force, and its sign."""
+class Side(NamedTuple):
+    """A sector of directions, and how far forces reach along them."""
+
+    u: Any
+    v: Any
+    least: Any
+    most: Any
+    sign: int  # 1 ahead, -1 astern
+
+
+def sides_of(actuator: Any, limits: Any) -> list[Side]:
+    """The sectors of an actuator, ahead, and astern where it pushes that way."""
     low, high = actuator[limits]
     sides = []
     for u, v in actuator["sectors"]:
-        sides.append((u, v, max(low, Fraction(0)), high, 1))
-    for u, v in actuator["sectors"]:
-        if low < 0:
-            sides.append(([-x for x in u], [-x for x in v], Fraction(0), -low, -1))
+        sides.append(Side(u, v, max(low, Fraction(0)), high, 1))
+    if low < 0:
+        for u, v in actuator["sectors"]:
+            sides.append(Side([-x for x in u], [-x for x in v], Fraction(0), -low, -1))
     return sides
 
 
-def is_toward(side: Any, p: Any) -> Any:
+def is_toward(side: Side, p: Any) -> Any:
     """Whether p lies in the directions of a sector."""
-    u, v = side[:2]
+    u, v = side.u, side.v
     is_wide = cross(u, v) > 0 or dot(u, v) < 0  # else both are one direction
     return cross(u, p) >= 0 and cross(p, v) >= 0 and (is_wide or dot(u, p) >= 0)
 
 
-def reaches(side: Any, p: Any) -> Any:
+def reaches(side: Side, p: Any) -> Any:
     """Whether a sector has the force p, or one of its direction that is larger."""
-    return is_toward(side, p) and dot(p, p) <= side[3] ** 2
+    return is_toward(side, p) and dot(p, p) <= side.most**2
 
 
-def holds_triangle(sides: Any, a: Any, b: Any) -> Any:
-    """Whether sectors have the forces between 0, a and b, but for small ones; b is left of a."""
+def hold_triangle(sides: Any, a: Any, b: Any) -> Any:
+    """Whether sectors have the forces between 0, a and b, but for small ones.
+
+    The way from a to b is cut where a sector ends; one sector has both ends of each piece."""
     if cross(a, b) == 0:
         return any(reaches(side, a) for side in sides) and any(reaches(side, b) for side in sides)
-    for i, side in enumerate(sides):
-        v = side[1]
-        if reaches(side, a) and reaches(side, b):
-            return True
-        if reaches(side, a) and cross(a, v) > 0 and cross(v, b) > 0:
-            # The sector ends between them: on to the next one from there.
-            share = cross(a, v) / (cross(a, v) + cross(v, b))
-            end = [x + share * (y - x) for x, y in zip(a, b, strict=True)]
-            others = sides[:i] + sides[i + 1 :]
-            if reaches(side, end) and holds_triangle(others, end, b):
-                return True
-    return False
+    shares = [Fraction(0), Fraction(1)]
+    for side in sides:
+        for end in (side.u, side.v):
+            before = cross(a, end)
+            after = cross(end, b)
+            if before * after > 0:
+                shares.append(before / (before + after))
+    shares.sort()
+    points = [[x + share * (y - x) for x, y in zip(a, b, strict=True)] for share in shares]
+    for p, q in pairwise(points):
+        if not any(reaches(side, p) and reaches(side, q) for side in sides):
+            return False
+    return True
 
 
 def is_far(a: Any, b: Any, least: Any) -> Any:
@@ -126,9 +139,9 @@ def is_far(a: Any, b: Any, least: Any) -> Any:
     return min(dot(a, a), dot(b, b)) >= least**2
 
 
-def is_mean(side: Any, p: Any) -> Any:
+def is_mean(side: Side, p: Any) -> Any:
     """Whether p is a mean of forces of a sector: beyond the chord of least ones at both ends."""
-    u, v, least = side[:3]
+    u, v, least = side.u, side.v, side.least
     normal = (v[1] - u[1], u[0] - v[0])
     is_beyond = dot(normal, p) >= least * cross(u, v)
     return reaches(side, p) and is_beyond and (cross(u, v) > 0 or dot(p, p) >= least**2)
@@ -142,7 +155,7 @@ def hull_of(points: Any) -> Any:
     for chain_points in (in_order, in_order[::-1]):
         chain: Any = []
         for p in chain_points:
-            while len(chain) > 1 and turn(*chain[-2:], p) <= 0:
+            while len(chain) > 1 and turn(chain[-2], chain[-1], p) <= 0:
                 chain.pop()
             chain.append(p)
         corners += chain[:-1]
@@ -154,7 +167,7 @@ def turn(a: Any, b: Any, c: Any) -> Any:
     return cross((b[0] - a[0], b[1] - a[1]), (c[0] - a[0], c[1] - a[1]))
 
 
-def holds_hull(actuator: Any, sides: Any, points: Any) -> Any:
+def hold_hull(actuator: Any, sides: Any, points: Any) -> Any:
     """Whether sectors of an actuator have the convex hull of some forces.
 
     A ray from 0 through a force of the hull leaves it across an edge, and enters it across another
@@ -168,16 +181,15 @@ def holds_hull(actuator: Any, sides: Any, points: Any) -> Any:
         is_around = all(cross(a, b) > 0 for a, b in edges)  # around 0
         if is_around or not all(is_far(a, b, least) for a, b in edges):
             return False
-    to_left = [(a, b) if cross(a, b) >= 0 else (b, a) for a, b in edges]
-    return all(holds_triangle(sides, a, b) for a, b in to_left)
+    return all(hold_triangle(sides, a, b) for a, b in edges)
 
 
-def most_gain(side: Any, price: Any, low: Any, high: Any) -> Any:
+def most_gain(side: Side, price: Any, low: Any, high: Any) -> Any:
     """An upper bound of price.p over forces p of a sector with sizes from low to high."""
     if is_toward(side, price):
         return high * length_above(price)
     gains = []
-    for edge in side[:2]:
+    for edge in (side.u, side.v):
         along = dot(price, edge)  # an edge is no shorter than 1
         gains.append(high * along if along > 0 else low * along / length_above(edge))
     return max(gains)
@@ -188,7 +200,7 @@ def most_gain(side: Any, price: Any, low: Any, high: Any) -> Any:
 
 def watts_at(points: Any, size: Any) -> Any:
     """The power of a force by the chord between two points of the curve."""
-    for (x0, p0), (x1, p1) in zip(points, points[1:], strict=False):  # noqa: B007
+    for (x0, p0), (x1, p1) in pairwise(points):  # noqa: B007
         if size <= x1:
             break
     return p0 + (p1 - p0) * (size - x0) / (x1 - x0)
@@ -204,16 +216,15 @@ def most_watts(actuator: Any, force: Any, is_ahead: Any) -> Any:
     return watts if is_ahead else max(watts, watts_at(points, -size))
 
 
-def most_profit(actuator: Any, side: Any, price: Any, watt_price: Any) -> Any:
+def most_profit(actuator: Any, side: Side, price: Any, watt_price: Any) -> Any:
     """An upper bound of price.p - watt_price P(p) over the forces p of a sector."""
-    _, _, low, high, sign = side
     if watt_price == 0:
-        return most_gain(side, price, low, high)
+        return most_gain(side, price, side.least, side.most)
     gain = most_gain(side, price, Fraction(0), Fraction(1))  # per newton
     error = actuator["power"]["error_w"]
     profits = []
     for x, watts in actuator["power"]["points"]:
-        if sign * x >= 0:
+        if side.sign * x >= 0:
             profits.append(gain * abs(x) - watt_price * (watts - error))
     return max(profits)
 
@@ -246,7 +257,7 @@ def check_actuator(actuator: Any) -> None:
 def check_power(name: Any, power: Any, low: Any, high: Any) -> None:
     points = power["points"]
     slopes = []
-    for (x0, p0), (x1, p1) in zip(points, points[1:], strict=False):
+    for (x0, p0), (x1, p1) in pairwise(points):
         need(x0 < x1, f"{name}: the points of its power do not rise")
         slope = (p1 - p0) / (x1 - x0)
         need((slope >= 0 and x0 >= 0) or (slope <= 0 and x1 <= 0), f"{name}: its power falls")
@@ -316,7 +327,7 @@ def check_box(box: Any, lost: Any, low: Any, high: Any, robot: Any) -> None:
     who = f"lost {', '.join(lost) or 'nobody'}"
     for name, points in forces_of.items():
         sides = sides_of(actuators[name], "force_n")
-        need(holds_hull(actuators[name], sides, points), f"{who}: {name} cannot push so")
+        need(hold_hull(actuators[name], sides, points), f"{who}: {name} cannot push so")
     if statement["power_w"] is not None:
         most = max(watts_of_corners(forces_of, actuators), default=0)
         need(most <= statement["power_w"], f"{who}: takes more power")
@@ -327,8 +338,8 @@ def watts_of_corners(forces_of: Any, actuators: Any) -> Any:
     by_actuator = []
     for name, points in forces_of.items():
         actuator = actuators[name]
-        ahead = [side for side in sides_of(actuator, "force_n") if side[4] > 0]
-        is_ahead = holds_hull(actuator, ahead, points)
+        ahead = [side for side in sides_of(actuator, "force_n") if side.sign > 0]
+        is_ahead = hold_hull(actuator, ahead, points)
         own_axes = len(actuator["axes"])
         by_actuator.append([most_watts(actuator, p[:own_axes], is_ahead) for p in points])
     return [sum(watts) for watts in zip(*by_actuator, strict=True)]

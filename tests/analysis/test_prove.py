@@ -371,7 +371,7 @@ def pod(sectors: Any, least: float = 0, mean: bool = False) -> dict[str, Any]:
 def holds(actuator: dict[str, Any], points: Any) -> bool:
     """Whether the checker says that an actuator has the hull of forces."""
     sides = check_proof.sides_of(actuator, "force_n")
-    return bool(check_proof.holds_hull(actuator, sides, [list(map(F, p)) for p in points]))
+    return bool(check_proof.hold_hull(actuator, sides, [list(map(F, p)) for p in points]))
 
 
 @pytest.mark.parametrize(
