@@ -259,7 +259,8 @@ def _gauge_step(gauge: Array) -> float:
 def _propeller_power(propeller: Any, least: float, most: float) -> dict[str, Any]:
     """Chords of its power, over forces from the least to the largest, negative ones astern."""
     side = np.linspace(0.0, 1.0, POWER_POINTS) ** 2
-    force = most * side if most > 0.0 else np.zeros(1)
+    largest = most if least < most else 1.0  # a curve of one that gives no force has two ends, too
+    force = largest * side if largest > 0.0 else np.zeros(1)
     if least < 0.0:
         force = np.append(least * side[:0:-1], force)
     between = np.interp(
@@ -276,10 +277,15 @@ def _propeller_power(propeller: Any, least: float, most: float) -> dict[str, Any
 
 
 def _convex(x: Array, y: Array) -> Array:
-    """Points' values (K,), raised by rounding errors so that their slopes rise."""
-    slope = np.maximum.accumulate(np.diff(y) / np.diff(x))
-    start = y[0]
-    return np.asarray(start + np.append(0.0, np.cumsum(slope * np.diff(x))))
+    """Values (K,) at points around 0, raised where needed so that slopes rise and the value at 0 is
+    the least."""
+    zero = int(np.searchsorted(x, 0.0))
+    raised = y.copy()
+    for side in (slice(zero, None), slice(zero, None, -1)):
+        steps = np.abs(np.diff(x[side]))
+        slopes = np.maximum.accumulate(np.maximum(np.diff(y[side]) / steps, 0.0))
+        raised[side] = y[zero] + np.append(0.0, np.cumsum(slopes * steps))
+    return raised
 
 
 def _points(x: Array, y: Array) -> list[list[float]]:
