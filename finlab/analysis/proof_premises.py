@@ -2,9 +2,10 @@
 forces and its power, as `check_proof` reads them.
 
 What a file of a proof says of an actuator is a premise: the proof holds of the robot in the file.
-Positions, axes and arcs are those of the layout, rounded to `PLACES` decimals, and force limits and
-power laws are the layout's own. A fin's largest force and its power come from its law, rounded to
-the safe side by `FIN_MARGIN`: in mean over a stroke, as everywhere in finlab.
+Positions, axes and arcs are those of the layout, rounded to `PLACES` decimals, and force limits are
+the layout's own; power is written as chords above the curve of its law or table. A fin's largest
+force and its power come from its law, rounded to the safe side by `FIN_MARGIN`: in mean over a
+stroke, as everywhere in finlab.
 """
 
 from __future__ import annotations
@@ -310,11 +311,6 @@ class _Arc(NamedTuple):
     def is_round(self) -> bool:
         """Whether it has all directions."""
         return self.half_angle >= math.pi
-
-    @property
-    def is_half_turn(self) -> bool:
-        """Whether it is half a turn."""
-        return abs(self.half_angle - 0.5 * math.pi) <= HALF_TURN_TOLERANCE
 
     @property
     def is_narrow(self) -> bool:
