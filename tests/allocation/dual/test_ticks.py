@@ -237,13 +237,23 @@ def test_idle_pods_turn_within_their_arc_where_the_shorter_way_is_past_its_ends(
 
 
 def test_an_idle_pod_of_unknown_angle_takes_the_angle_that_it_will_have() -> None:
-    boat = load_layout("catamaran")
-    allocator = Allocator(boat, period_s=0.02)
-    before = np.array([[3.0, 0.0, 0.0], [np.nan] * 3, [np.nan] * 3])
-    ahead = [20.0, 0.0, 0.0, 0.0, 0.0, 0.0]
-    answer = allocator.allocate(ahead, lost=["bow"], previous=before, policy="direction")
-    assert answer.command[:2, 1].tolist() == [0.0, 0.0]  # as the other one still points back
-    assert answer.command[1, 0] == pytest.approx(0.0, abs=1e-6)
+    allocator = Allocator(load_layout("catamaran"), period_s=0.02)
+    target = [20.0, 10.0, 0.0, 0.0, 0.0, 2.0]
+    later = allocator.allocate(target, lost=["bow"], policy="direction").command
+    before = np.array([[0.5, 0.0, 0.0], [np.nan] * 3, [np.nan] * 3])
+    now = allocator.allocate(target, lost=["bow"], previous=before, policy="direction").command
+    assert now[:2, 1].tolist() == [0.0, 0.0]  # of one that is turned elsewhere, neither gives any
+    assert now[1, 0] == pytest.approx(later[1, 0], abs=1e-6)
+
+
+def test_an_idle_pod_whose_command_before_is_unknown_gets_a_command() -> None:
+    allocator = Allocator(load_layout("drillship"), period_s=PERIOD_S)
+    previous = allocator.allocate(np.zeros(6)).command.copy()
+    previous[1] = np.nan
+    answer = allocator.allocate(
+        [-4e5, 0.0, 0.0, 0.0, 0.0, 0.0], previous=previous, policy="direction"
+    )
+    assert np.isfinite(answer.command).all()
 
 
 def test_outside_of_ticks_calm_takes_nothing() -> None:
