@@ -236,6 +236,19 @@ def test_idle_pods_turn_within_their_arc_where_the_shorter_way_is_past_its_ends(
     assert answer.err_norm <= expected.err_norm + 1e-3
 
 
+@pytest.mark.parametrize("policy", ["closest", "direction"])
+def test_idle_pods_whose_jets_meet_others_turn_until_a_wrench_is_given(policy: str) -> None:
+    robot = replace(load_layout("catamaran"), interaction=Jets())
+    allocator = Allocator(robot, period_s=PERIOD_S)
+    target = [-30.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+    expected = allocator.allocate(target, policy=policy)
+    command = np.zeros((3, 3))
+    for _ in range(40):
+        answer = allocator.allocate(target, previous=command, policy=policy)
+        command = answer.command
+    assert answer.err_norm <= expected.err_norm + 1e-3
+
+
 def test_an_idle_pod_of_unknown_angle_takes_the_angle_that_it_will_have() -> None:
     allocator = Allocator(load_layout("catamaran"), period_s=0.02)
     target = [20.0, 10.0, 0.0, 0.0, 0.0, 2.0]
