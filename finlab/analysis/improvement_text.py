@@ -47,7 +47,9 @@ def improvement_remarks(improvement: Improvement) -> list[Remark]:
     after = goal_value(goal, improvement.value_after)
     remarks = [Remark(as_sentence(f"{GOAL_WORDS[goal]}{axes}: {before} before, {after} after"))]
     if goal != POWER_GOAL and budget_of(improvement.layout) is not None:
-        remarks.append(Remark("The search leaves the power budget out; the score cards are within it."))
+        remarks.append(
+            Remark("The search leaves the power budget out; the score cards are within it.")
+        )
     remarks += _bound_remarks(improvement)
     if improvement.cancelled:
         remarks.append(Remark("The search was stopped early."))
