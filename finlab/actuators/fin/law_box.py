@@ -18,7 +18,7 @@ from finlab.arrays import NEARLY, NOTHING, ROUNDING, ROUNDS, Array
 
 GRID = (17, 33)
 """Amplitudes and frequencies of the first grid; half as many where directions are compared."""
-PEAK = 5e-4
+PEAK = 1e-6
 """Share of the largest force that is given up where the price of the last newton has no bound."""
 ANY_PRICE = 1e12
 """A price at which power does not count [W/N]."""
