@@ -41,7 +41,6 @@ TURN_OF_A_LOOP = re.compile(r"\bfor \(?(?:int )?turns?\b")
 """A loop that calls its iterations turns."""
 FREE_AXES = {
     "finlab/allocation/allocator.py",
-    "finlab/allocation/dual/budget.py",
     "finlab/allocation/dual/method.py",
     "finlab/allocation/method.py",
     "finlab/allocation/question.py",

@@ -1,7 +1,7 @@
 /* One target after the other: commands of least power where it is within what may be given now,
    else for what a policy gives in its place.
 
-   Forces come first (`find_forces`), by the dual; then commands for the forces; then steps on the
+   Forces come first (`fl_find_forces`), by the dual; then commands for the forces; then steps on the
    commands, which make up for what the tables of forces leave. */
 #include "internal.h"
 
@@ -15,12 +15,8 @@
 #define STEPS_BY_LAWS 12   /* on commands, to a wrench a little beyond the tables */
 /* Error over the wrench scale, beyond reach, up to which the laws may yet meet the target. */
 #define BEYOND_TABLES (10 * CLOSE)
-/* A drive that passes a dead band stays within it by this share of the band. */
-#define INSIDE_BAND (1 - 10 * NEARLY)
 /* Error over the wrench scale up to which a wrench counts as reached. */
 #define REACHED R(1e-3)
-/* Least share of what its drive allows by which an idle actuator turns where a wrench is missed. */
-#define LEAST_TURN R(0.05)
 
 int fl_version(void) { return FL_VERSION; }
 
@@ -66,8 +62,8 @@ static void take_off_offset(const fl_span *span, const real *wrench, real *of_fo
 /* Forces for a wrench that the commands are to give [N, N m]; `lambda` are reduced multipliers to
    begin with [W], 0 for none. Out of reach a policy, where there is one, gives another wrench in
    its place: `out->wrench_served`, here without the wrench beside the forces. */
-static void find_forces(const real *block, fl_work *work, const real *wrench_wanted,
-                        const fl_policy *policy, const real *lambda, fl_answer *out) {
+void fl_find_forces(const real *block, fl_work *work, const real *wrench_wanted,
+                    const fl_policy *policy, const real *lambda, fl_answer *out) {
   const fl_span *span = &work->span;
   real wrench[6];
   real target_reduced[6];
@@ -118,7 +114,7 @@ static int exceeds_at_calm(const real *block, fl_work *work, const fl_question *
   fl_question calmer = *q;
   calmer.calm = calm;
   fl_limits_of_tick(block, work, &calmer);
-  find_forces(block, work, wrench_desired, q->policy, 0, out);
+  fl_find_forces(block, work, wrench_desired, q->policy, 0, out);
   return fl_exceeds_budget(block, work, q->budget, out->force);
 }
 
@@ -166,106 +162,12 @@ static const real *first_multipliers(const fl_work *work, const fl_question *q, 
   return 0;
 }
 
-/* Whether a command gives no force, or the least that its actuator can: it rests, is inside a dead
-   band, or is the smallest beat of a fin. */
-static int is_idle(const fl_actuator *a, const real *command) {
-  const command_form *form = fl_form_of(a);
-  const int force = form->force_number;
-  if (!FL_AIMS) return fl_is_in_dead_band(a, command);
-  if (force != NO_NUMBER) {
-    const real rest = larger(a->dead_band, NEARLY * a->command_max[force]);
-    return FABS(command[force]) <= rest * (1 - NEARLY);
-  }
-  if (form->angle_number == NO_NUMBER) return 0;
-  for (int k = 0; k < 3; k++) {
-    const real range = a->command_max[k] - a->command_min[k];
-    if (k != form->angle_number && command[k] > a->command_min[k] + NEARLY * range) return 0;
-  }
-  return 1;
-}
-
-/* Whether a tick allows less of a number of a command than its actuator. */
-static int is_limited_by_tick(const fl_actuator *a, const fl_box *box, int i, int k) {
-  return box->command_min[i][k] > a->command_min[k] || box->command_max[i][k] < a->command_max[k];
-}
-
-/* Share of what drives allow in a tick that commands have changed by since the last one: of the
-   actuator that has changed most. */
-static real activity(const real *block, const fl_work *work, const real *previous,
-                     real command[][3]) {
-  real most = 0;
-  for (int i = 0; i < COUNT(block); i++) {
-    const fl_actuator *a = ACTUATOR(block, i);
-    const real *before = previous + 3 * i;
-    if (work->span.is_lost[i] || !fl_is_known_command(before)) continue;
-    for (int k = 0; k < 3; k++) {
-      if (!(a->max_change[k] > 0)) continue;
-      real change = command[i][k] - before[k];
-      if (k == fl_form_of(a)->angle_number) change = fl_wrap_angle(change);
-      most = larger(most, FABS(change) / a->max_change[k]);
-    }
-  }
-  return smaller(most, 1);
-}
-
-/* Whether a tick keeps an idle actuator from what it may give later: a drive that cannot leave its
-   dead band at once, or that may have to pass it; or, where a wrench is missed, a pod or a fin that
-   is turned elsewhere. */
-static int may_give_later(const real *block, const fl_work *work, int has_missed,
-                          real command[][3]) {
-  for (int i = 0; i < COUNT(block); i++) {
-    const fl_actuator *a = ACTUATOR(block, i);
-    const command_form *form = fl_form_of(a);
-    if (work->span.is_lost[i] || !is_idle(a, command[i])) continue;
-    const int has_band = form->force_number != NO_NUMBER && a->dead_band > 0;
-    if (has_band && is_limited_by_tick(a, &work->box, i, form->force_number)) return 1;
-    const int angle = form->angle_number;
-    if (has_missed && angle != NO_NUMBER && is_limited_by_tick(a, &work->box, i, angle)) return 1;
-  }
-  return 0;
-}
-
 /* The wrench [N, N m] that a question asks for, 0 in axes that do not count. */
 static void wrench_that_counts(const fl_span *span, const fl_question *q, real *wrench) {
   for (int k = 0; k < 6; k++) {
     wrench[k] = 0;
     if (span->axis_counts[k]) wrench[k] = q->wrench[k];
   }
-}
-
-/* Has idle actuators prepare in a tick for the command that they would have if drives were as quick
-   as can be: they turn towards it, and pass through their dead bands. Else a policy that gives
-   nothing of a wrench would do so for ever, where pods or fins are turned elsewhere. Where others
-   give a part of it, and change all the time, turning after it costs more than it gains: the busier
-   the others are, the slower the idle ones turn. */
-static void prepare_idle(const real *block, fl_work *work, const fl_question *q,
-                         real command[][3]) {
-  const fl_box box = work->box;
-  real turn_share = 1;
-  if (FL_AIMS) turn_share = larger(LEAST_TURN, 1 - activity(block, work, q->previous, command));
-  fl_answer later;
-  real wrench[6];
-  fl_limits_without_tick(block, work);
-  wrench_that_counts(&work->span, q, wrench);
-  find_forces(block, work, wrench, q->policy, 0, &later);
-  for (int i = 0; i < COUNT(block); i++) {
-    const fl_actuator *a = ACTUATOR(block, i);
-    const int force = fl_form_of(a)->force_number;
-    const int angle = fl_form_of(a)->angle_number;
-    const real most = a->dead_band * INSIDE_BAND;
-    if (work->span.is_lost[i] || !is_idle(a, command[i])) continue;
-    if (size_of(later.force[i]) < larger(most, NEARLY * a->force_max)) continue;
-    real wanted[3];
-    fl_command_for_force(block, i, &box, later.force[i], q->previous + 3 * i, wanted);
-    if (force != NO_NUMBER) command[i][force] = clipped(wanted[force], -most, most);
-    if (FL_AIMS && angle != NO_NUMBER) {
-      const real before = q->previous[3 * i + angle];
-      const real turn = fl_wrap_angle(wanted[angle] - before);
-      command[i][angle] = before + turn_share * turn;
-    }
-  }
-  work->box = box;
-  work->is_whole = 0;
 }
 
 /* Error over the wrench scale of what an answer serves. */
@@ -315,8 +217,8 @@ static void find_commands(const real *block, fl_work *work, const fl_question *q
   fl_rest_in_dead_bands(block, &work->box, out->command);
   const int has_missed = FL_AIMS && !out->is_attainable &&
                          error_of_served(block, wrench_desired, out) > REACHED;
-  if (q->previous && may_give_later(block, work, has_missed, out->command)) {
-    prepare_idle(block, work, q, out->command);
+  if (q->previous && fl_may_give_later(block, work, has_missed, out->command)) {
+    fl_prepare_idle(block, work, q, wrench_desired, out->command);
   }
   fl_clip_commands(block, &work->box, out->command);
 }
@@ -397,7 +299,7 @@ static void answer_question(const real *block, fl_work *work, const fl_question 
   work->newton_steps = 0;
   work->is_truncated = 0;
   work->command_previous = q->previous;
-  find_forces(block, work, wrench_desired, q->policy, first_multipliers(work, q, lambda), out);
+  fl_find_forces(block, work, wrench_desired, q->policy, first_multipliers(work, q, lambda), out);
 #if FL_KEEPS_BUDGETS
   if (q->budget) {
     answer_within_budget(block, work, q, wrench_desired, out);

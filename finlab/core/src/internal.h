@@ -231,6 +231,15 @@ void fl_forget_span(fl_work *work);
 int fl_span_of_question(const real *block, fl_work *work, const unsigned char *lost,
                         const unsigned char *free);
 
+/* answer.c: forces for one wrench */
+void fl_find_forces(const real *block, fl_work *work, const real *wrench_wanted,
+                    const fl_policy *policy, const real *lambda, fl_answer *out);
+
+/* idle_actuators.c: actuators that give nothing in a tick */
+int fl_may_give_later(const real *block, const fl_work *work, int has_missed, real command[][3]);
+void fl_prepare_idle(const real *block, fl_work *work, const fl_question *q,
+                     const real *wrench_desired, real command[][3]);
+
 /* command_form.c: what the numbers of each kind of command are */
 enum { NO_NUMBER = -1 };
 enum { NO_TABLE, BEAT_TABLE, CURVE_TABLE, ENDS_TABLE }; /* kinds of command tables, see fl_work.h */

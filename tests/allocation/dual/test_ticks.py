@@ -205,6 +205,16 @@ def test_pods_and_fins_that_stand_the_wrong_way_turn_until_a_wrench_is_given(
         assert answer.err_norm <= expected.err_norm + 1e-3
 
 
+def test_an_idle_pod_whose_command_before_is_unknown_gets_a_command() -> None:
+    allocator = Allocator(load_layout("drillship"), period_s=PERIOD_S)
+    previous = allocator.allocate(np.zeros(6)).command.copy()
+    previous[1] = np.nan
+    answer = allocator.allocate(
+        [-4e5, 0.0, 0.0, 0.0, 0.0, 0.0], previous=previous, policy="direction"
+    )
+    assert np.isfinite(answer.command).all()
+
+
 def test_outside_of_ticks_calm_takes_nothing() -> None:
     answer = Allocator(load_layout("catamaran")).allocate([20.0, 10.0, 0.0, 0.0, 0.0, 2.0])
     assert answer.calm_power == 0.0
