@@ -8,6 +8,8 @@
 #define GAUGE_STEP R(1e-3) /* angle [rad] over which the derivative of a gauge is taken */
 #define BEAT_STEPS 6       /* sizes that the table of a fin is asked for, at most */
 #define NEAR_BEAT R(1e-5)  /* error of a size, over it, of which the next step leaves rounding */
+/* Error of a size, over the force of the wrench scale, that steps on commands may give. */
+#define BEAT_ENOUGH (10 * EXACT)
 #define LEAST_BEAT_SLOPE R(1e-3) /* of sizes by the law over those by the table: limits hold it */
 
 /* Weights of four neighbours on an axis of knots, in value and in derivative, and the
@@ -357,6 +359,7 @@ static void fin_command(const real *block, int i, const fl_box *box, const real 
   const real direction = ATAN2(force[1], force[0]);
   real angle = direction;
   real wanted = size; /* what the table is asked for */
+  const real enough = BEAT_ENOUGH * HEAD(block)->wrench_scale[0];
   real wanted_before = 0;
   real given_before = 0;
   for (int k = 0; k < BEAT_STEPS; k++) {
@@ -375,6 +378,7 @@ static void fin_command(const real *block, int i, const fl_box *box, const real 
     real force[3];
     fl_force_of_command(block, i, command, force, 0);
     const real given = size_of(force + 1);
+    if (k > 0 && FABS(size - given) <= enough) break;
     real slope = 1; /* of what is given over what is asked for */
     if (k > 0) slope = (given - given_before) / (wanted - wanted_before);
     if (!(slope > LEAST_BEAT_SLOPE)) break; /* NaN where both are the same */
