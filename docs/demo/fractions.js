@@ -15,6 +15,7 @@ export class Fraction {
 
   // Of a decimal such as "-1.5e-3", or of a fraction such as "2/3".
   static of(text) {
+    if (typeof text !== "string") throw new Error(`expected a number as text, got ${typeof text}`);
     const [, exponent] = /e([-+]?\d+)$/i.exec(text) ?? [];
     if (text.length >= 5000 || Math.abs(Number(exponent ?? 0)) >= 40) throw new Error(`a number is out of range: ${text.slice(0, 40)}`);
     const ratio = /^([-+]?\d+)\/(\d+)$/.exec(text);

@@ -95,10 +95,10 @@ class ExactForces:
         """The directions in which forces of a part may change: the actuator's axes, or a line."""
         own = self._columns[index]
         zero = Fraction(0)
-        if "line" not in part.values:
+        if part.line is None:
             directions = [[Fraction(1), zero], [zero, Fraction(1)]][: len(own)]
         else:
-            directions = [[fraction_of(value) for value in part.values["line"]]]
+            directions = [[fraction_of(value) for value in part.line]]
         frame = []
         for direction in directions:
             column = []

@@ -3,6 +3,7 @@ the app's panel (`webapp/panels/limits_tab.py`) shows them."""
 
 from collections.abc import Mapping
 
+from finlab.allocation.power_budget import budget_of
 from finlab.analysis.authority import AXES
 from finlab.analysis.card_text import Remark
 from finlab.analysis.goals import MISSION, UNREACHED, GoalName
@@ -45,6 +46,10 @@ def improvement_remarks(improvement: Improvement) -> list[Remark]:
     before = goal_value(goal, improvement.value_before)
     after = goal_value(goal, improvement.value_after)
     remarks = [Remark(as_sentence(f"{GOAL_WORDS[goal]}{axes}: {before} before, {after} after"))]
+    if goal != POWER_GOAL and budget_of(improvement.layout) is not None:
+        remarks.append(
+            Remark("The search leaves the power budget out; the score cards are within it.")
+        )
     remarks += _bound_remarks(improvement)
     if improvement.cancelled:
         remarks.append(Remark("The search was stopped early."))

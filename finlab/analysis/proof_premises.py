@@ -2,9 +2,10 @@
 forces and its power, as `check_proof` reads them.
 
 What a file of a proof says of an actuator is a premise: the proof holds of the robot in the file.
-Positions, axes and arcs are those of the layout, rounded to `PLACES` decimals, and force limits and
-power laws are the layout's own. A fin's largest force and its power come from its law, rounded to
-the safe side by `FIN_MARGIN`: in mean over a stroke, as everywhere in finlab.
+Positions, axes and arcs are those of the layout, rounded to `PLACES` decimals, and force limits are
+the layout's own; power is written as chords above the curve of its law or table. A fin's largest
+force and its power come from its law, rounded to the safe side by `FIN_MARGIN`: in mean over a
+stroke, as everywhere in finlab.
 """
 
 from __future__ import annotations
@@ -21,7 +22,6 @@ from finlab.actuators.fin.fin import Fin
 from finlab.actuators.fin.fin_response import fin_table
 from finlab.actuators.propeller import usable_force
 from finlab.actuators.rudder import Rudder
-from finlab.actuators.thrust_model import PowerLaw
 from finlab.actuators.thrust_power import ThrustPower
 from finlab.actuators.thruster import Thruster
 from finlab.analysis.force_pieces import Piece
@@ -30,16 +30,16 @@ from finlab.axes import is_full_turn
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 
+LINE = [[[1.0, 0.0], [1.0, 0.0]]]
+"""The sectors of an actuator of one axis."""
 PLACES = 12
 """Decimals of positions [m], axes and directions [1]."""
 FIN_MARGIN = 1e-6
 """Share by which a fin's largest force and its power are rounded to the safe side [1]."""
 POWER_POINTS = 65
-"""Points of a power that is no power law, on each side."""
+"""Points of a curve of power, on each side."""
 EDGE_LENGTH = 1.0 + 1e-6
 """Length of the directions that end an arc [1]: at least 1, whatever rounding does."""
-AHEAD_LENGTH = 1.0 - 1e-9
-"""Length of the direction ahead of a part without small forces [1]: at most 1."""
 HALF_TURN_TOLERANCE = 1e-9
 """Most by which an arc that counts as half a turn differs from it [rad]."""
 INNER_SHARE = 0.3
@@ -53,6 +53,8 @@ SMALL_LEAST = 1e-6
 """Least force over the largest one up to which the search takes a sector whole [1]."""
 RING_PARTS = 8
 """Convex parts of the forces of one that turns all round and cannot stop."""
+ROUND_PIECE = 2.0 * math.pi / 3.0
+"""Widest sector of all directions [rad]."""
 RING_PIECE = math.pi / 8.0
 """Widest arc of a piece of forces that cannot be small [rad]."""
 SHIFTS = (0.0, 1.0, -1.0)
@@ -66,23 +68,14 @@ class NotSettledError(FinlabError):
 class Part(NamedTuple):
     """A convex part of an actuator's forces, in coordinates along its axes."""
 
-    values: dict[str, Any]
-    """Its keys in the file; none where the whole set is convex."""
     piece: Piece
     """The part as the search takes it."""
     inner_point: Array
     """A force (2,) [N] well inside."""
-
-
-class Cut(NamedTuple):
-    """A piece of the arcs of an actuator, by which a refutation takes them one by one."""
-
-    arc: list[list[float]]
-    """Its ends as a file has them."""
-    is_astern: bool
-    """Whether the forces are those against its directions."""
-    piece: Piece
-    """Convex set that contains all forces in it."""
+    is_ahead: bool = True
+    """Whether all its forces are ahead."""
+    line: list[float] | None = None
+    """The direction (2,) that its forces lie along, as decimals; None of a part that is wide."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,9 +92,11 @@ class ProofActuator:
     """A convex set that contains these."""
     outer_cover: Piece
     """A convex set that contains all forces that it may have."""
-    cuts: tuple[Cut, ...] = ()
-    """Pieces of its arcs, which together have all forces that it may have; none where
+    cuts: tuple[Piece, ...] = ()
+    """Convex sets that contain all forces in each of its sectors, ahead and then astern; none where
     `outer_cover` is the set itself."""
+    arcs: tuple[tuple[float, float], ...] = ()
+    """First and last direction of each of its arcs [rad]; none of a line."""
 
     @property
     def name(self) -> str:
@@ -174,7 +169,7 @@ def _premises(
         "torque_per_newton_m": decimals(getattr(actuator, "torque_per_newton", 0.0)),
         "force_n": list(map(float, force)),
         "outer_force_n": list(map(float, outer_force)),
-        "arcs": None,
+        "sectors": LINE,
         "mean": False,
         "power": power,
     }
@@ -186,12 +181,12 @@ def _thruster(thruster: Thruster, axes: Array, with_power: bool) -> ProofActuato
         raise NotSettledError("has a dead band, within which its power is not convex")
     if not least <= 0.0 <= most:
         raise NotSettledError(f"hangs at {most:g} N")
-    power = _propeller_power(thruster, least, most, is_plane=False)
+    power = _propeller_power(thruster, least, most)
     radius = max(-least, most)
     values = _premises(thruster, axes, (least, most), (least, most), power)
     values["mean"] = thruster.dead_band > 0.0
     piece = Piece(radius, corners=np.array([[least, 0.0], [most, 0.0]]))
-    part = Part({}, piece, np.array([0.25 * (least + most), 0.0]))
+    part = Part(piece, np.array([0.25 * (least + most), 0.0]))
     return ProofActuator(values, radius, (part,), piece, piece)
 
 
@@ -199,11 +194,11 @@ def _azimuth(azimuth: Azimuth, axes: Array, with_power: bool) -> ProofActuator:
     least, most = usable_force(azimuth)
     if 0.0 < least < azimuth.dead_band:
         least = 0.0  # a command within the dead band gives no force
-    if with_power and (azimuth.dead_band or (least < 0.0 and not _has_law(azimuth))):
-        raise NotSettledError("has a dead band or a table of power astern, and so no convex power")
+    if with_power and azimuth.dead_band:
+        raise NotSettledError("has a dead band, within which its power is not convex")
     if most <= 0.0:
         raise NotSettledError("pushes astern alone; turn its zero direction round")
-    power = _propeller_power(azimuth, least, most, is_plane=True)
+    power = _propeller_power(azimuth, least, most)
     values = _premises(azimuth, axes, (least, most), (least, most), power)
     values["mean"] = azimuth.dead_band > 0.0 and least <= 0.0
     arcs = []
@@ -250,7 +245,7 @@ def _fin(fin: Fin, axes: Array) -> ProofActuator:
     }
     arc = _Arc(table.directions.sector_center, table.directions.sector_half_angle)
     if not arc.is_narrow:
-        outer_least = 0.0  # small forces are means over time
+        least = outer_least = 0.0  # small forces are means over time
     values = _premises(fin, axes, (least, most), (outer_least, outer), power)
     values["mean"] = True
     return _plane(values, [arc])
@@ -262,24 +257,18 @@ def _gauge_step(gauge: Array) -> float:
     return float(np.abs(np.diff(gauge, append=gauge[:1])).max() / gauge.min())
 
 
-def _has_law(propeller: Any) -> bool:
-    return isinstance(propeller.model, PowerLaw)
-
-
-def _propeller_power(propeller: Any, least: float, most: float, *, is_plane: bool) -> Any:
-    """A power law as it is, or the points of a table's curve, for a force along a line or the size
-    of one in a plane."""
-    model = propeller.model
-    if isinstance(model, PowerLaw):
-        reverse = model.forward if model.reverse is None else model.reverse
-        return {"forward": model.forward, "reverse": reverse, "exponent": model.exponent}
+def _propeller_power(propeller: Any, least: float, most: float) -> dict[str, Any]:
+    """Chords of its power, over forces from the least to the largest, negative ones astern."""
     side = np.linspace(0.0, 1.0, POWER_POINTS) ** 2
-    force = most * side
-    if not is_plane and least < 0.0:
+    largest = most if least < most else 1.0  # a curve of one that gives no force has two ends, too
+    force = largest * side if largest > 0.0 else np.zeros(1)
+    if least < 0.0:
         force = np.append(least * side[:0:-1], force)
-    curve = ThrustPower([model])
+    between = np.interp(
+        np.linspace(0.0, len(force) - 1.0, 32 * len(force)), np.arange(len(force)), force
+    )
+    curve = ThrustPower([propeller.model])
     watts = _convex(force, curve.watts(force[:, None])[:, 0])
-    between = np.linspace(force[0], force[-1], 32 * POWER_POINTS)
     error = np.interp(between, force, watts) - curve.watts(between[:, None])[:, 0]
     margin = FIN_MARGIN * float(watts.max())
     return {
@@ -289,10 +278,15 @@ def _propeller_power(propeller: Any, least: float, most: float, *, is_plane: boo
 
 
 def _convex(x: Array, y: Array) -> Array:
-    """Points' values (K,), raised by rounding errors so that their slopes rise."""
-    slope = np.maximum.accumulate(np.diff(y) / np.diff(x))
-    start = y[0]
-    return np.asarray(start + np.append(0.0, np.cumsum(slope * np.diff(x))))
+    """Values (K,) at points around 0, raised where needed so that slopes rise and the value at 0 is
+    the least."""
+    zero = int(np.searchsorted(x, 0.0))
+    raised = y.copy()
+    for side in (slice(zero, None), slice(zero, None, -1)):
+        steps = np.abs(np.diff(x[side]))
+        slopes = np.maximum.accumulate(np.maximum(np.diff(y[side]) / steps, 0.0))
+        raised[side] = y[zero] + np.append(0.0, np.cumsum(slopes * steps))
+    return raised
 
 
 def _points(x: Array, y: Array) -> list[list[float]]:
@@ -300,7 +294,7 @@ def _points(x: Array, y: Array) -> list[list[float]]:
     curved = _convex(x, y)
     # A parabola far below the margin keeps slopes apart that rounding would bring out of order.
     span = x[-1] - x[0]
-    curved = curved + 1e-9 * (curved.max() + 1e-12) * ((x - x[0]) / span) ** 2
+    curved = curved + 1e-9 * (curved.max() + 1e-12) * (x / span) ** 2
     points: list[list[float]] = np.stack([x, curved], axis=-1).tolist()
     return points
 
@@ -317,11 +311,6 @@ class _Arc(NamedTuple):
     def is_round(self) -> bool:
         """Whether it has all directions."""
         return self.half_angle >= math.pi
-
-    @property
-    def is_half_turn(self) -> bool:
-        """Whether it is half a turn."""
-        return abs(self.half_angle - 0.5 * math.pi) <= HALF_TURN_TOLERANCE
 
     @property
     def is_narrow(self) -> bool:
@@ -346,35 +335,36 @@ def _plane(values: dict[str, Any], arcs: Sequence[_Arc]) -> ProofActuator:
     least, most = values["force_n"]
     outer_least, outer_most = values["outer_force_n"]
     is_round = arcs[0].is_round
-    values["arcs"] = None if is_round else [arc.edges for arc in arcs]
     parts = []
     for arc in arcs:
         parts += _parts(arc, max(least, 0.0), most, values["mean"])
         if least < 0.0 and not is_round:
             parts += _reversing_parts(arc, least, most)
-    if len(arcs) == 1 and len(parts) == 1:
-        parts[0].values.pop("arc", None)
     cover = _cover([part.piece for part in parts])
 
-    # What cannot stop, or has no convex arc, is cut into pieces for a refutation.
-    cuts = []
+    # Sectors are narrow where an actuator cannot stop: what their hulls have beyond them is little.
+    sectors = []
+    ahead = []
+    astern = []
     is_ring = outer_least > 0.0 and not values["mean"]
     for arc in arcs:
-        width = RING_PIECE if is_ring else math.pi
+        width = RING_PIECE if is_ring else (ROUND_PIECE if is_round else math.pi)
         chain = [arc] if arc.is_narrow and not is_ring else arc.pieces(width)
         edges = [arc.edges[0], *(piece.edges[0] for piece in chain[1:])]
         edges.append(edges[0] if is_round else arc.edges[1])
         for piece, *ends in zip(chain, edges, edges[1:], strict=False):
-            cuts.append(Cut(ends, False, _outer_piece(piece, max(outer_least, 0.0), outer_most)))
-        for piece, *ends in zip(chain, edges, edges[1:], strict=False):
+            sectors.append(ends)
+            ahead.append(_outer_piece(piece, max(outer_least, 0.0), outer_most))
             if outer_least < 0.0:
-                astern = _outer_piece(piece, 0.0, -outer_least)
-                cuts.append(Cut(ends, True, _mirrored(astern)))
-    outer_cover = _cover([cut.piece for cut in cuts])
+                astern.append(_mirrored(_outer_piece(piece, 0.0, -outer_least)))
+    values["sectors"] = sectors
+    cuts = ahead + astern
+    outer_cover = _cover(cuts)
     if len(cuts) == 1 or (is_round and not is_ring):
         cuts = []
         outer_cover = _outer_piece(arcs[0], outer_least, outer_most)
-    return ProofActuator(values, most, tuple(parts), cover, outer_cover, tuple(cuts))
+    spans = [(arc.center - arc.half_angle, arc.center + arc.half_angle) for arc in arcs]
+    return ProofActuator(values, most, tuple(parts), cover, outer_cover, tuple(cuts), tuple(spans))
 
 
 def _parts(arc: _Arc, least: float, most: float, has_means: bool) -> list[Part]:
@@ -384,7 +374,7 @@ def _parts(arc: _Arc, least: float, most: float, has_means: bool) -> list[Part]:
     room = max(arc.half_angle - quarter, 0.0)
     if least == 0.0 or has_means:
         if arc.is_round:
-            return [Part({}, Piece(most), np.zeros(2))]
+            return [Part(Piece(most), np.zeros(2))]
         if room <= HALF_TURN_TOLERANCE:
             return [_sector(arc, least, most)]
         shifted = [_Arc(arc.center + shift * (room - 1e-9), quarter) for shift in SHIFTS]
@@ -409,16 +399,16 @@ def _reversing_parts(arc: _Arc, least: float, most: float) -> list[Part]:
     across 0, and of a wide arc all forces up to some size."""
     parts = []
     for ahead in _parts(arc, 0.0, -least, has_means=False):
-        values = {**ahead.values, "astern": True}
-        parts.append(Part(values, _mirrored(ahead.piece), -ahead.inner_point))
+        parts.append(Part(_mirrored(ahead.piece), -ahead.inner_point, is_ahead=False))
     if not arc.is_narrow:
-        parts.append(Part({"disc": True}, Piece(min(most, -least)), np.zeros(2)))
+        parts.append(Part(Piece(min(most, -least)), np.zeros(2), is_ahead=False))
         return parts
     for shift in SHIFTS:
         direction = decimals(_direction(arc.center + shift * (1.0 - 1e-9) * arc.half_angle))
         unit = np.array(direction) / np.linalg.norm(direction)
         piece = Piece(max(most, -least), corners=np.outer([least, most], unit))
-        parts.append(Part({"line": direction}, piece, 0.25 * (least + most) * unit))
+        inner_point = 0.25 * (least + most) * unit
+        parts.append(Part(piece, inner_point, is_ahead=False, line=direction))
     return parts
 
 
@@ -442,16 +432,12 @@ def _sector(arc: _Arc, least: float, most: float) -> Part:
         # An edge is a little longer than 1, so that the chord between edges is farther out.
         inner = least * EDGE_LENGTH * rim[[-1, 0]]
         piece = Piece(most, corners=np.concatenate([most * rim, inner]))
-    return Part({"arc": arc.edges}, piece, inner_point)
+    return Part(piece, inner_point)
 
 
 def _beyond(arc: _Arc, ahead: float, least: float, most: float) -> Part:
     """Forces within an arc of at most half a turn that push with at least the least force along a
     direction [rad]."""
-    values: dict[str, Any] = {"arc": arc.edges}
-    direction = np.array([math.cos(ahead), math.sin(ahead)])
-    if least > 0.0:
-        values["ahead"] = decimals(AHEAD_LENGTH * direction)
     # Up to the ends of the arc, or up to the rim where that is nearer.
     to_rim = math.acos(min(least / most, 1.0)) if most > 0.0 else 0.0
     low = max(arc.center - arc.half_angle, ahead - to_rim)
@@ -462,7 +448,7 @@ def _beyond(arc: _Arc, ahead: float, least: float, most: float) -> Part:
     corners = np.concatenate([rim, inner])
     if arc.half_angle == 0.0:
         corners = corners[[0, -1]]
-    return Part(values, Piece(most, corners=corners), corners.mean(axis=0))
+    return Part(Piece(most, corners=corners), corners.mean(axis=0))
 
 
 def _outer_piece(arc: _Arc, least: float, most: float) -> Piece:

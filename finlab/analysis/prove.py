@@ -18,7 +18,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from itertools import combinations, product
+from itertools import combinations
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -264,7 +264,7 @@ class _Search:
         pieces_of = []
         inner_points = []
         for actuator in self._actuators:
-            pieces = [actuator.outer_cover, *(cut.piece for cut in actuator.cuts)]
+            pieces = [actuator.outer_cover, *actuator.cuts]
             pieces_of.append(pieces)
             inner_points.append([piece.middle for piece in pieces])
         return PartSearch(self._effectiveness, pieces_of, inner_points)
@@ -275,9 +275,9 @@ class _Search:
 
     def _corners_of(self, low: list[Fraction], high: list[Fraction]) -> _Corners:
         """The corners of a box."""
-        signs = [("+", "-") if a < b else ("0",) for a, b in zip(low, high, strict=True)]
-        names = ["".join(corner) for corner in product(*signs)]
-        exact = [check_proof.corner_wrench(low, high, name) for name in names]
+        corners = check_proof.corners_of(low, high)
+        names = [name for name, _ in corners]
+        exact = [wrench for _, wrench in corners]
         wrench = np.zeros((len(names), 6))
         wrench[:, self._rows] = np.array(exact, np.float64)
         return _Corners(low, high, names, exact, wrench)
@@ -286,9 +286,8 @@ class _Search:
         """Wrench of 1 N along each axis of each actuator, of the axes that count."""
         result = []
         for actuator in self._actuators:
-            values = check_proof.numbers_in(_as_text(actuator.values))
             columns = []
-            for column in check_proof.columns(values):
+            for column in check_proof.columns(_as_read(actuator.values)):
                 columns.append([column[row] for row in self._rows])
             result.append(columns)
         return result
@@ -329,7 +328,7 @@ class _Search:
         for axis, value in example["wrench"].items():
             wrench.append(f"{axis} {float(Fraction(value)):g}")
         without = f"without {lost}" if lost else "with everything working"
-        is_too_dear = example["tree"].get("watt_price", "0") != "0"
+        is_too_dear = bool(example["tree"].get("watt_price", 0))
         limit = f" within {self._power:g} W" if is_too_dear else ""
         reason = f"{without} there is no wrench {', '.join(wrench)}{limit}."
         return ProofResult(
@@ -355,7 +354,7 @@ class _Search:
         """The values of a file."""
         return {
             "format": "finlab-proof",
-            "version": 2,
+            "version": 3,
             "layout": self._layout.name,
             "verdict": verdict,
             "statement": {
@@ -438,7 +437,7 @@ class _Search:
         answers = np.linalg.pinv(matrix, rcond=RANK_TOLERANCE) @ scaled_box
         found = []
         for row, i in enumerate(working):
-            for direction in _directions_between(self._actuators[i].values["arcs"]):
+            for direction in _directions_between(self._actuators[i].arcs):
                 force = answers[2 * row : 2 * row + 2]
                 alone = own[row].T @ direction
                 shares = [np.linalg.pinv(force) @ direction]
@@ -511,14 +510,9 @@ class _Search:
             affordable = self._within_budget(lost, parts, corners, index, forces[index])
             wrench = corners.exact[index]
             written[name] = self._exact_forces.forces(lost, basis, wrench, affordable)
-        own_parts = {}
-        for actuator, part in zip(self._actuators, parts, strict=True):
-            if part.values and actuator.name not in lost:
-                own_parts[actuator.name] = part.values
-        box = {"parts": own_parts, "corners": written}
-        proof = check_proof.numbers_in(_as_text(self._file("proved", cases=[box])))
-        premises = check_proof.checked_premises(proof)
-        check_proof.check_box(proof["cases"][0], lost, corners.low, corners.high, premises)
+        box = {"corners": written}
+        robot = check_proof.checked_robot(_as_read(self._file("proved")))
+        check_proof.check_box(box, lost, corners.low, corners.high, robot)
         return box
 
     def _within_budget(
@@ -544,7 +538,7 @@ class _Search:
                 cheapest[i, k] = body[row] @ axis
         if self._watts(lost, parts, cheapest) > self._power:
             wrench = corners.exact[index]
-            example = self._too_dear(lost, wrench, result.multipliers, cheapest)
+            example = self._too_dear(lost, wrench, result.multipliers)
             if example is not None:
                 raise _CounterexampleError(example)
         for blend in BLENDS:
@@ -570,25 +564,17 @@ class _Search:
         for actuator, part, own in zip(self._actuators, parts, forces.tolist(), strict=True):
             if actuator.name not in lost:
                 exact = [rounded(size, actuator.radius) for size in own[: actuator.n_axes]]
-                values = check_proof.numbers_in(_as_text(actuator.values))
-                chosen = None
-                if actuator.n_axes == 2:
-                    in_file = check_proof.numbers_in(_as_text(part.values))
-                    chosen = check_proof.convex_part(values, in_file)
-                total += check_proof.most_watts(values, exact, chosen)
+                total += check_proof.most_watts(_as_read(actuator.values), exact, part.is_ahead)
         return float(total)
 
     def _too_dear(
-        self, lost: Sequence[str], wrench: list[Fraction], multipliers: Array | None, forces: Array
+        self, lost: Sequence[str], wrench: list[Fraction], multipliers: Array | None
     ) -> dict[str, Any] | None:
         """A counterexample by the multipliers of the least power, None where they prove nothing."""
         if multipliers is None:
             return None
-        touch = {}
-        for actuator, own in zip(self._actuators, forces, strict=True):
-            touch[actuator.name] = decimals(np.hypot(*own))
         price = decimals(np.asarray(multipliers)[self._rows])
-        tree = {"price": price, "watt_price": "1", "touch": touch}
+        tree = {"price": price, "watt_price": 1}
         return self._accepted(lost, wrench, tree)
 
     def _refutation(
@@ -620,46 +606,28 @@ class _Search:
             if written is None:
                 return None
             branches.append(written)
-        actuator = self._actuators[tree.actuator]
-        sides = []
-        for is_astern in (False, True):
-            taken = [k for k, cut in enumerate(actuator.cuts) if cut.is_astern is is_astern]
-            each = [branches[k] for k in taken]
-            arcs = [actuator.cuts[k].arc for k in taken]
-            sides.append({"cut": actuator.name, "arcs": arcs, "each": each})
-        if not sides[1]["each"]:
-            return sides[0]
-        return {"cut": actuator.name, "sides": sides}
+        return {"cut": self._actuators[tree.actuator].name, "each": branches}
 
     def _separating_price(
         self, lost: Sequence[str], wrench: list[Fraction], tree: Tree
     ) -> dict[str, Any] | None:
         """A price that parts a wrench from all forces of a choice of pieces; None: none is
         known."""
-        premises = check_proof.numbers_in(_as_text(self._file("refuted")))
-        actuators, statement = check_proof.checked_premises(premises)
+        robot = check_proof.checked_robot(_as_read(self._file("refuted")))
+        sides = {}
         for own, number in zip(self._actuators, tree.choice, strict=True):
-            if not number:
+            if own.name in lost:
                 continue
-            cut = own.cuts[number - 1]
-            actuator = actuators[own.name]
-            actuator["arcs"] = check_proof.numbers_in(_as_text([cut.arc]))
-            low, high = actuator["outer_force_n"]
-            if cut.is_astern:
-                actuator["outer_force_n"] = [low, Fraction(0)]
-            else:
-                actuator["outer_force_n"] = [max(low, Fraction(0)), high]
-        working = [each for name, each in actuators.items() if name not in lost]
+            every = check_proof.sides_of(robot[0][own.name], "outer_force_n")
+            sides[own.name] = [every[number - 1]] if number else every
         for normal in self._normals(lost, wrench, tree):
             price = (normal / SCALE)[self._rows]
             largest = np.abs(price).max()
             if not 0.0 < largest < math.inf:
                 continue
-            leaf = {"price": decimals(price / largest), "watt_price": "0", "touch": {}}
+            leaf = {"price": decimals(price / largest), "watt_price": 0}
             try:
-                check_proof.check_price(
-                    check_proof.numbers_in(_as_text(leaf)), wrench, working, statement
-                )
+                check_proof.check_price(_as_read(leaf), wrench, sides, robot)
             except check_proof.WrongProof:
                 continue
             return leaf
@@ -710,24 +678,23 @@ class _CounterexampleError(Exception):
         self.example = example
 
 
-def _directions_between(arcs: list[list[list[float]]] | None) -> list[Array]:
+def _directions_between(arcs: Sequence[tuple[float, float]]) -> list[Array]:
     """Directions (2,) in the middle of what several arcs, or one that is wider than half a turn,
     leave out, and beside its ends."""
-    if arcs is None or (len(arcs) == 1 and check_proof.turns_left(arcs[0])):
+    if not arcs or (len(arcs) == 1 and arcs[0][1] - arcs[0][0] <= math.pi):
         return []
     found = []
-    for arc, following in zip(arcs, [*arcs[1:], arcs[0]], strict=True):
-        low = math.atan2(*arc[1][::-1])
-        width = (math.atan2(*following[0][::-1]) - low) % (2.0 * math.pi)
+    for (_, low), (following, _) in zip(arcs, [*arcs[1:], arcs[0]], strict=True):
+        width = (following - low) % (2.0 * math.pi)
         for share in (0.5, 0.1, 0.9):
             angle = low + share * width
             found.append(np.array([math.cos(angle), math.sin(angle)]))
     return found
 
 
-def _as_text(value: Any) -> Any:
-    """Values with their numbers as text, as the checker reads them."""
-    return json.loads(json.dumps(value), parse_float=str, parse_int=str)
+def _as_read(values: Any) -> Any:
+    """Values with their numbers as fractions, as the checker reads them."""
+    return check_proof.read(json.dumps(values))
 
 
 def _verify(proof: dict[str, Any]) -> None:

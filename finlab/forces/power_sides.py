@@ -115,7 +115,10 @@ class Side:
         along = force @ outward.T
         # An edge through the rest, such as those of a sector, bounds no share.
         is_rim = offset > LEAST_RIM * self.radius
-        share = (along[:, is_rim] / offset[is_rim]).max(axis=-1)
+        if is_rim.any():
+            share = (along[:, is_rim] / offset[is_rim]).max(axis=-1)
+        else:  # flat: a line from the rest
+            share = np.linalg.norm(force, axis=-1) / self.radius
         return share, (along - offset).max(axis=-1) / self.radius
 
     def to_dict(self) -> dict[str, Any]:

@@ -1,7 +1,7 @@
 """Whether a file of a proof is true, by decimals of 60 digits: shares no code with the checker.
 
-Arcs are taken by angles, and by samples of their directions. Anything that cannot be read counts as
-false.
+Sectors are taken by angles, and by samples of their directions; hulls by samples of means. Anything
+that cannot be read counts as false.
 """
 
 import json
@@ -20,8 +20,12 @@ NEAR = 1e-9
 """Most by which angles [rad] that are the same differ, and forces over the largest one [1]."""
 SAMPLES = 181
 """Directions of an arc that are looked at."""
+MEANS = np.random.default_rng(65).dirichlet(np.full(3, 0.3), 60)
+"""Weights (60, 3) of means of three forces."""
 Angles = tuple[float, float]
-"""Where an arc begins, and how far it goes on counterclockwise [rad]."""
+"""Where a sector begins, and how far it goes on counterclockwise [rad]."""
+Side = tuple[Angles, Decimal, Decimal, int]
+"""A sector, its least and largest force [N], and 1 ahead or -1 astern."""
 
 
 def is_true(text: str) -> bool:
@@ -49,7 +53,7 @@ def _holds(proof: dict[str, Any]) -> bool:
     axes = [axis for axis in AXES if axis in statement["box"]]
     box = dict(zip(axes, (_decimal(statement["box"][axis]) for axis in axes), strict=True))
     complete = sorted([*statement["box"], *statement["free"]]) == sorted(AXES)
-    if proof["format"] != "finlab-proof" or proof["version"] != "2" or not complete:
+    if proof["format"] != "finlab-proof" or proof["version"] != "3" or not complete:
         return False
     if min(box.values()) < 0:
         return False
@@ -99,43 +103,45 @@ def _covers_box(
         below = _covers_box(case["below"], working, axes, low, top, budget, tolerance)
         above = _covers_box(case["above"], working, axes, bottom, high, budget, tolerance)
         return below and above
-    parts = {}
-    for name, part in working.items():
-        parts[name] = case["parts"].get(name, {})
-        if not part.is_convex(parts[name]):
-            return False
-    ends = [("+", "-") if a < b else ("0",) for a, b in zip(low, high, strict=True)]
-    for signs in product(*ends):
-        target = []
-        for sign, a, b in zip(signs, low, high, strict=True):
-            target.append(b if sign == "+" else a)
-        forces = case["corners"]["".join(signs)]
-        if not _gives(forces, working, parts, np.array(target), budget, tolerance):
-            return False
-    return True
+    return _gives_corners(case["corners"], working, low, high, budget, tolerance)
 
 
-def _gives(
-    forces: dict[str, Any],
+def _gives_corners(
+    forces_at: dict[str, Any],
     working: dict[str, "_Oracle"],
-    parts: dict[str, Any],
-    target: Any,
+    low: list[Decimal],
+    high: list[Decimal],
     budget: Decimal | None,
     tolerance: Decimal,
 ) -> bool:
-    if set(forces) != set(working):
-        return False
-    wrench = target * 0
-    watts = Decimal(0)
-    for name, force in forces.items():
-        size = _array(force)
-        if not working[name].can(size, parts[name]):
+    """Whether the corners of a box, and means of them, are given."""
+    ends = [("+", "-") if a < b else ("0",) for a, b in zip(low, high, strict=True)]
+    corners = ["".join(signs) for signs in product(*ends)]
+    forces_of = {}
+    for name, part in working.items():
+        forces = [_array(forces_at[corner][name]) for corner in corners]
+        if any(len(force) != len(part.columns) for force in forces):
             return False
-        wrench = wrench + size @ working[name].columns
-        if budget is not None:
-            watts += working[name].watts(size, parts[name])
-    is_near = max(abs(wrench - target)) <= tolerance + EXACT
-    return bool(is_near and (budget is None or watts <= budget))
+        forces_of[name] = np.array(forces)
+        if not part.has_hull(forces_of[name], part.sides(part.inner)):
+            return False
+    for number, corner in enumerate(corners):
+        target = []
+        for sign, a, b in zip(corner, low, high, strict=True):
+            target.append(b if sign == "+" else a)
+        if set(forces_at[corner]) != set(working):
+            return False
+        wrench = np.array(target) * 0
+        for name, part in working.items():
+            wrench = wrench + forces_of[name][number] @ part.columns
+        if max(abs(wrench - np.array(target))) > tolerance + EXACT:
+            return False
+    if budget is None:
+        return True
+    watts = np.zeros(len(corners), dtype=object)
+    for name, part in working.items():
+        watts = watts + part.watts_of(forces_of[name])
+    return bool(max(watts) <= budget)
 
 
 def _separates(
@@ -153,38 +159,24 @@ def _separates(
     if any(abs(w) > half for w, half in zip(target, box.values(), strict=True)):
         return False
     working = {name: part for name, part in robot.items() if name not in lost}
-    sets = {name: (part.arcs, part.outer) for name, part in working.items()}
+    sets = {name: part.sides(part.outer) for name, part in working.items()}
     return _tree_separates(example["tree"], working, sets, target, budget, tolerance)
 
 
 def _tree_separates(
     tree: dict[str, Any],
     working: dict[str, "_Oracle"],
-    sets: dict[str, tuple[list[Angles] | None, list[Decimal]]],
+    sets: dict[str, list[Side]],
     target: Any,
     budget: Decimal | None,
     tolerance: Decimal,
 ) -> bool:
-    """Whether each choice of pieces of the arcs has a price that separates."""
+    """Whether each choice of sectors has a price that separates."""
     if "cut" in tree:
         name = tree["cut"]
-        arcs, (low, high) = sets[name]
-        if "sides" in tree:
-            if low > 0 or len(tree["sides"]) != 2:
-                return False
-            halves = []
-            for ends, branch in zip(
-                ([Decimal(0), high], [low, Decimal(0)]), tree["sides"], strict=True
-            ):
-                chosen = {**sets, name: (arcs, ends)}
-                halves.append(_tree_separates(branch, working, chosen, target, budget, tolerance))
-            return all(halves)
-        pieces = [_angles(piece) for piece in tree["arcs"]]
-        if not working[name].may_cut(arcs, pieces):
-            return False
         branches = []
-        for piece, branch in zip(pieces, tree["each"], strict=True):
-            chosen = {**sets, name: ([piece], [low, high])}
+        for side, branch in zip(sets[name], tree["each"], strict=True):
+            chosen = {**sets, name: [side]}
             branches.append(_tree_separates(branch, working, chosen, target, budget, tolerance))
         return all(branches)
     price = _array(tree["price"])
@@ -193,7 +185,7 @@ def _tree_separates(
         return False
     profit = per_watt * (budget or 0)
     for name, part in working.items():
-        profit += part.most_profit(part.columns @ price, per_watt, *sets[name])
+        profit += part.most_profit(part.columns @ price, per_watt, sets[name])
     # The profit here is a little too small, by samples: what it does not separate is false.
     return bool(profit < price @ target - tolerance * sum(abs(price)))
 
@@ -206,23 +198,10 @@ def _angles(arc: Any) -> Angles:
     return first, 0.0 if width > 2.0 * math.pi - NEAR else width
 
 
-def _is_in(arcs: list[Angles] | None, angle: float) -> bool:
-    """Whether some arc has a direction [rad]."""
-    if arcs is None:
-        return True
-    for first, width in arcs:
-        beyond = (angle - first + NEAR) % (2.0 * math.pi)
-        if beyond <= width + 2.0 * NEAR:
-            return True
-    return False
-
-
-def _directions(arcs: list[Angles] | None) -> Any:
-    """Samples of the directions of arcs [rad]."""
-    found = []
-    for first, width in arcs or [(0.0, 2.0 * math.pi)]:
-        found.append(first + width * np.linspace(0.0, 1.0, SAMPLES))
-    return np.concatenate(found)
+def _is_in(sector: Angles, angle: Any) -> Any:
+    """Whether a sector has directions [rad]."""
+    first, width = sector
+    return (angle - first + NEAR) % (2.0 * math.pi) <= width + 2.0 * NEAR
 
 
 class _Oracle:
@@ -233,140 +212,116 @@ class _Oracle:
         torque = np.cross(position, directions) + reaction * directions
         whole = np.concatenate([directions, torque], axis=1)
         self.columns = whole[:, [AXES.index(axis) for axis in axes]]
-        self.least, self.most = map(_decimal, actuator["force_n"])
+        self.inner = [_decimal(end) for end in actuator["force_n"]]
         self.outer = [_decimal(end) for end in actuator["outer_force_n"]]
+        self.least = max(self.inner[0], Decimal(0))
         self.power = actuator["power"]
         self.mean = actuator["mean"]
-        own = actuator["arcs"]
-        self.arcs = None if own is None else [_angles(arc) for arc in own]
-        lengths = [float(_array(edge) @ _array(edge)) for arc in own or [] for edge in arc]
+        self.sectors = [_angles(sector) for sector in actuator["sectors"]]
+        lengths = [
+            float(_array(edge) @ _array(edge)) for arc in actuator["sectors"] for edge in arc
+        ]
         is_long = all(1.0 <= length < 2.0 for length in lengths)
         norms = (directions * directions).sum(axis=1)
         square = len(directions) == 1 or abs(directions[0] @ directions[1]) < Decimal("1e-9")
         unit = max(abs(norms - 1)) < Decimal("1e-9")
         low, high = self.outer
-        narrow = self.arcs is not None and all(w < math.pi - NEAR for _, w in self.arcs)
-        has_means = self.mean and not narrow and len(directions) == 2
-        covered = low <= self.least and high >= self.most and (low <= 0 or not has_means)
-        ordered = self.most >= self.least and self.most >= 0
-        kind = unit and square and is_long and len(directions) < 3
-        self.sane = bool(kind and covered and ordered)
+        least, most = self.inner
+        narrow = all(width <= math.pi + NEAR for _, width in self.sectors)
+        one = not self.mean or low <= 0 or len(self.sectors) == 1
+        ordered = low <= least <= most <= high and most >= 0
+        kind = unit and square and is_long and narrow and one and len(directions) < 3
+        line = len(directions) == 2 or self.sectors == [(0.0, 0.0)]
+        self.sane = bool(kind and ordered and line)
 
-    def is_convex(self, part: dict[str, Any]) -> bool:
-        """Whether the part that a file names is convex, and one of the forces'."""
-        if len(self.columns) == 1:
-            return True
-        if "line" in part:
-            x, y = np.array(_array(part["line"]), float)
-            return bool(self.least <= 0 and _is_in(self.arcs, math.atan2(y, x)))
-        if "disc" in part:
-            wide = self.arcs is None or max(width for _, width in self.arcs) >= math.pi - NEAR
-            return bool(self.least <= 0 and wide)
-        if "astern" in part and self.least > 0:
-            return False
-        if "arc" not in part:
-            return self.arcs is None or (len(self.arcs) == 1 and self.arcs[0][1] <= math.pi + NEAR)
-        arc = _angles(part["arc"])
-        is_inside = all(_is_in(self.arcs, angle) for angle in _directions([arc]))
-        return bool(arc[1] <= math.pi + NEAR and is_inside)
+    def sides(self, limits: list[Decimal]) -> list[Side]:
+        """The sectors ahead, and astern."""
+        low, high = limits
+        found: list[Side] = [(each, max(low, Decimal(0)), high, 1) for each in self.sectors]
+        if low < 0:
+            for first, width in self.sectors:
+                found.append(((first + math.pi, width), Decimal(0), -low, -1))
+        return found
 
-    def can(self, force: Any, part: dict[str, Any]) -> bool:
-        """Whether a force is within a part."""
-        if len(force) != len(self.columns):
-            return False
-        if len(force) == 1:
-            return bool(self.least <= force[0] <= self.most)
+    def has_hull(self, forces: Any, sides: list[Side]) -> bool:
+        """Whether sectors have forces (C, 1 or 2), and means of them."""
+        plane = np.zeros((len(forces), 2), dtype=object)
+        plane[:, : forces.shape[1]] = forces
+        if self.mean and self.least > 0:
+            return any(all(self._is_mean(side, force) for force in plane) for side in sides)
+        for force in plane:
+            if not any(self._has(side, force) for side in sides):
+                return False
+        points = plane.astype(float)
+        rng = np.random.default_rng(66)
+        chosen = rng.integers(0, len(points), (300, 3))
+        means = np.einsum("mk,tkx->tmx", MEANS, points[chosen]).reshape(-1, 2)
+        size = np.linalg.norm(means, axis=1)
+        angle = np.arctan2(means[:, 1], means[:, 0])
+        near = NEAR * float(self.inner[1] - min(self.inner[0], 0))
+        found = np.zeros(len(means), bool)
+        for sector, least, most, _ in sides:
+            is_size = (size <= float(most) + near) & (size >= float(least) - near)
+            found |= is_size & ((size <= near) | _is_in(sector, angle))
+        return bool(found.all())
+
+    def _has(self, side: Side, force: Any) -> bool:
+        """Whether a sector has a force."""
+        sector, least, most, _ = side
         square = force @ force
-        if "line" in part:
-            line = _array(part["line"])
-            end = self.most if line @ force >= 0 else self.least
-            off = abs(line[0] * force[1] - line[1] * force[0])
-            return bool(off <= EXACT and square <= end**2 * (1 + EXACT))
-        if "disc" in part:
-            return bool(square <= min(self.most, -self.least) ** 2 * (1 + EXACT))
-        if "astern" in part:
-            force = -force
-        most = -self.least if "astern" in part else self.most
-        arc = _angles(part["arc"]) if "arc" in part else (self.arcs or [None])[0]
         x, y = np.array(force, float)
-        size = math.hypot(x, y)
-        inside = size < NEAR * float(most) or arc is None
-        inside = inside or _is_in([arc], math.atan2(y, x))
-        if self.least > 0:
-            if arc is not None and self.mean and arc[1] > 0.0:
-                # Beyond the chord between the least forces at both ends.
-                half = 0.5 * arc[1]
-                along = x * math.cos(arc[0] + half) + y * math.sin(arc[0] + half)
-                inside = inside and along >= float(self.least) * math.cos(half) - NEAR
-            elif not self.mean or arc is not None:
-                ahead = _array(part["ahead"])
-                inside = inside and ahead @ ahead <= 1 and ahead @ force >= self.least
-        return bool(inside and square <= most**2 * (1 + EXACT))
+        inside = math.hypot(x, y) < NEAR * float(most) or _is_in(sector, math.atan2(y, x))
+        return bool(inside and least**2 * (1 - EXACT) <= square <= most**2 * (1 + EXACT))
 
-    def may_cut(self, arcs: list[Angles] | None, pieces: list[Angles]) -> bool:
-        """Whether pieces have all directions of arcs, and no means of forces go across them."""
-        if self.mean and self.outer[0] > 0:
-            return arcs is not None and np.allclose(arcs, pieces, atol=NEAR)
-        return all(_is_in(pieces, angle) for angle in _directions(arcs))
+    def _is_mean(self, side: Side, force: Any) -> bool:
+        """Whether a force is a mean of those of a sector: beyond the chord of its least ones."""
+        (first, width), least, most, _ = side
+        x, y = np.array(force, float)
+        half = 0.5 * width
+        along = x * math.cos(first + half) + y * math.sin(first + half)
+        inside = self._has(((first, width), Decimal(0), most, 1), force)
+        return bool(inside and along >= float(least) * math.cos(half) - NEAR)
 
-    def watts(self, force: Any, part: dict[str, Any] | None = None) -> Decimal:
-        size = (force @ force).sqrt()
-        if len(force) == 2:
-            size = max(size, self.least)
-        along = force[0]
-        if len(force) == 2:
-            line = _array(part["line"]) if part and "line" in part else force
-            along = -size if part and "astern" in part else line @ force
-        sides = ["reverse" if along < 0 else "forward"]
-        if part and "disc" in part:
-            sides = ["reverse", "forward"]
-        if "exponent" in self.power:
-            power: Decimal = size ** _decimal(self.power["exponent"])
-            return max(_decimal(self.power[side]) for side in sides) * power
+    def watts_of(self, forces: Any) -> Any:
+        """The power of forces (C, 1 or 2) [W], a convex function of all their means."""
+        if forces.shape[1] == 1:
+            return np.array([self._watts(force[0]) for force in forces], dtype=object)
+        ahead = [side for side in self.sides(self.inner) if side[3] > 0]
+        is_ahead = self.has_hull(forces, ahead)
+        watts = []
+        for force in forces:
+            size = max((force @ force).sqrt(), self.least)
+            forward = self._watts(size)
+            watts.append(forward if is_ahead else max(forward, self._watts(-size)))
+        return np.array(watts, dtype=object)
+
+    def _watts(self, size: Decimal) -> Decimal:
+        """The power of a force by the curve [W]."""
         x, y = _array(self.power["points"]).T
-        along = force[0] if len(force) == 1 else size
-        i = min(max(int(np.searchsorted(x, along)), 1), len(x) - 1)
+        i = min(max(int(np.searchsorted(x, size)), 1), len(x) - 1)
         slope = (y[i] - y[i - 1]) / (x[i] - x[i - 1])
-        watts: Decimal = y[i - 1] + slope * (along - x[i - 1])
+        watts: Decimal = y[i - 1] + slope * (size - x[i - 1])
         return watts
 
-    def most_profit(
-        self, own_price: Any, per_watt: Decimal, arcs: list[Angles] | None, outer: list[Decimal]
-    ) -> Decimal:
-        best = Decimal(0) if per_watt else Decimal("-Infinity")
-        error = _decimal(self.power["error_w"]) if self.power and "error_w" in self.power else 0
-        for force, part in self._forces(own_price, arcs, outer):
-            profit = own_price @ force
-            if per_watt:
-                profit -= per_watt * (self.watts(force, part) - error)
-            best = max(best, profit)
+    def most_profit(self, own_price: Any, per_watt: Decimal, sides: list[Side]) -> Decimal:
+        """The largest profit among samples of the forces of sectors."""
+        price = np.zeros(2, dtype=object)
+        price[: len(own_price)] = own_price
+        toward = math.atan2(float(price[1]), float(price[0]))
+        best = Decimal("-Infinity")
+        for sector, least, most, sign in sides:
+            first, width = sector
+            angles = [*(first + width * np.linspace(0.0, 1.0, SAMPLES))]
+            angles += [toward] if _is_in(sector, toward) else []
+            # They are a little shorter than 1, whatever rounding does.
+            gains = []
+            for angle in angles:
+                unit = np.array([Decimal(math.cos(angle)), Decimal(math.sin(angle))])
+                gains.append(price @ unit * (1 - Decimal("1e-14")))
+            for size in [least + (most - least) * k / 40 for k in range(41)]:
+                profit = max(gains) * size
+                if per_watt:
+                    error = _decimal(self.power["error_w"])
+                    profit -= per_watt * (self._watts(sign * size) - error)
+                best = max(best, profit)
         return best
-
-    def _forces(
-        self, own_price: Any, arcs: list[Angles] | None, outer: list[Decimal]
-    ) -> list[tuple[Any, dict[str, Any]]]:
-        """Forces among which that of the largest profit is nearly, and whether it is astern."""
-        low, high = outer
-        if len(own_price) == 1:
-            ends = [end * k / 40 for end in outer for k in range(1, 41)]
-            return [(np.array([size]), {}) for size in ends]
-        toward = math.atan2(float(own_price[1]), float(own_price[0]))
-        angles = [] if arcs is None else [*_directions(arcs)]
-        angles += [turn for turn in (toward, toward + math.pi) if _is_in(arcs, turn)]
-        least = max(low, Decimal(0))
-        sizes = [least + (high - least) * k / 40 for k in range(41)]
-        sizes += [low * k / 40 for k in range(1, 41) if low < 0]
-        # Of the directions only that with the largest gain ahead, and astern, counts. They are a
-        # little shorter than 1, whatever rounding does.
-        gains = []
-        for angle in angles:
-            unit = np.array([Decimal(math.cos(angle)), Decimal(math.sin(angle))])
-            direction = unit * (1 - Decimal("1e-14"))
-            gains.append((own_price @ direction, direction))
-        ahead = max(gains, key=lambda gain: gain[0])[1]
-        astern = min(gains, key=lambda gain: gain[0])[1]
-        found = []
-        for size in sizes:
-            direction = ahead if size >= 0 else astern
-            found.append((size * direction, {} if size >= 0 else {"astern": True}))
-        return found

@@ -12,6 +12,8 @@ from finlab.allocation.power_budget import budget_of
 from finlab.analysis import score_card
 from finlab.analysis.capability import Capability, capability, dp_capability
 from finlab.analysis.capability_text import capability_picture
+from finlab.analysis.improvement_text import improvement_remarks
+from finlab.analysis.optimize import optimize_layout
 from finlab.analysis.refusal_check import faults
 from finlab.analysis.ship_file import Ship, read_ship
 from finlab.errors import AllocationError
@@ -61,6 +63,17 @@ def test_the_weakest_direction_is_within_the_budget() -> None:
     judge = BudgetedPlant(OraclePlant(bluerov2_heavy()), np.ones((1, 8), bool), np.array([WATTS]))
     assert 500.0 * judge.largest_share(500.0 * wrench) == pytest.approx(card.weakest, rel=1e-5)
     assert card.weakest < 0.5 * score_card(load(bluerov2_heavy())).authority.weakest
+
+
+@pytest.mark.parametrize("power_w", [None, WATTS])
+def test_a_search_that_leaves_a_budget_out_says_so(power_w: float | None) -> None:
+    layout = replace(load_layout("bluerov2"), power_w=power_w)
+    found = optimize_layout(layout, ["lift_left", "lift_right"], rounds=1)
+    words = " ".join(remark.text for remark in improvement_remarks(found))
+    assert found.improved
+    assert ("leaves the power budget out" in words) == (power_w is not None)
+    is_free_value = found.value_before == pytest.approx(found.card_before.authority.weakest)
+    assert is_free_value == (power_w is None)
 
 
 def test_cards_count_what_they_can_of_a_budget() -> None:

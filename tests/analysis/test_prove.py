@@ -349,64 +349,141 @@ def test_files_with_a_changed_digit(files: list[str]) -> None:
 
 RIGHT, LEFT, UP, DOWN = ([F(1), F(0)], [F(-1), F(0)], [F(0), F(1)], [F(0), F(-1)])
 NARROW = [[F(1), F("-0.2")], [F(1), F("0.2")]]
-"""An arc about the first axis."""
+"""A sector about the first axis."""
+ROUND = [[RIGHT, UP], [UP, LEFT], [LEFT, DOWN], [DOWN, RIGHT]]
+"""All directions."""
 
 
-def pod(arcs: Any, least: float = 0, mean: bool = False) -> dict[str, Any]:
+def pod(sectors: Any, least: float = 0, mean: bool = False) -> dict[str, Any]:
     """An actuator of a plane, as far as the checker asks about its forces."""
-    low = 0 if mean and check_proof.is_wide(arcs) else F(least)
-    return {"name": "pod", "axes": [0, 0], "arcs": arcs, "mean": mean} | {
-        "force_n": [F(least), F(10)],
-        "outer_force_n": [low, F(10)],
+    limits = [F(least), F(10)]
+    return {
+        "name": "pod",
+        "axes": [[F(1), F(0), F(0)], [F(0), F(1), F(0)]],
+        "sectors": sectors,
+        "mean": mean,
+        "force_n": limits,
+        "outer_force_n": limits,
+        "power": None,
     }
 
 
+def holds(actuator: dict[str, Any], points: Any) -> bool:
+    """Whether the checker says that an actuator has the hull of forces."""
+    sides = check_proof.sides_of(actuator, "force_n")
+    return bool(check_proof.hold_hull(actuator, sides, [list(map(F, p)) for p in points]))
+
+
 @pytest.mark.parametrize(
-    ("arcs", "least", "mean", "part"),
+    ("sectors", "least", "mean", "points", "expected"),
     [
-        ([[RIGHT, LEFT]], 0, False, {"arc": [LEFT, RIGHT]}),  # the other half
-        ([[RIGHT, UP], [LEFT, DOWN]], 0, False, {"arc": [RIGHT, LEFT]}),  # across a gap
-        ([[RIGHT, UP], [LEFT, DOWN]], 0, False, {}),  # both
-        ([[RIGHT, DOWN]], 0, False, {"arc": [LEFT, RIGHT]}),  # across the end
-        ([[RIGHT, DOWN]], 0, False, {}),  # wider than half a turn
-        ([[RIGHT, UP]], 0, False, {"arc": [RIGHT, [F(1), F("-0.1")]]}),  # nearly all round
-        (None, 1, False, {"arc": [RIGHT, LEFT]}),  # with its small forces
-        (None, 1, False, {"ahead": [F(2), F(0)]}),  # with most of them
-        ([NARROW], 1, True, {"arc": [[F("0.5"), F("-0.1")], NARROW[1]]}),  # a chord too near
-        ([NARROW], -5, False, {"line": UP}),  # a line that it does not push along
-        ([NARROW], -5, False, {"disc": True}),  # directions that it does not push in
-        ([NARROW], 1, False, {"disc": True}),  # small forces that it does not have
-        ([NARROW], 1, False, {"astern": True}),  # it pushes ahead alone
+        ([[RIGHT, LEFT]], 0, False, [(1, 0), (-1, 0), (0, 1)], True),
+        ([[RIGHT, LEFT]], 0, False, [(1, 0), (-1, 0), (0, -1)], False),  # the other half
+        ([[RIGHT, LEFT]], 0, False, [(6, 8)], True),
+        ([[RIGHT, LEFT]], 0, False, [(6, "8.0001")], False),  # too large
+        (ROUND, 0, False, [(9, 1), (-9, 1), (0, -9)], True),  # across all sectors
+        (ROUND[:3], 0, False, [(9, 0), (-9, 0), (0, 9)], True),
+        (ROUND[:3], 0, False, [(9, 0), (0, -9)], False),  # across the gap
+        (ROUND[:3], 0, False, [(9, 1), (-9, 0), (0, -9)], False),  # the same, with others
+        ([ROUND[0], ROUND[2]], 0, False, [(9, 0), (0, 9)], True),
+        ([ROUND[0], ROUND[2]], 0, False, [(9, 0), (-9, 0)], True),  # a line through 0
+        ([ROUND[0], ROUND[2]], 0, False, [(9, 1), (-9, 0)], False),  # passes 0 across a gap
+        (ROUND, 1, False, [(2, 1), (2, -1), (1, 0)], True),
+        (ROUND, 1, False, [(2, 1), (2, -1), ("0.9", 0)], False),  # too small
+        (ROUND, 1, False, [("0.8", 1), ("0.8", -1)], False),  # small forces between them
+        (ROUND, 1, False, [(9, 9), (-9, 0), (9, -9)], False),  # small forces among them
+        (ROUND, 1, False, [(9, -2), (-9, 0), (0, 5), (0, -5)], False),
+        ([NARROW], 1, True, [(1, "0.1"), (1, 0)], True),  # beyond the chord
+        ([NARROW], 1, True, [("0.99", 0)], False),  # before it
+        ([NARROW], 1, True, [(2, "0.5")], False),
+        ([[RIGHT, RIGHT]], 1, True, [("0.9", 0)], False),  # no chord along a line
+        ([[RIGHT, RIGHT]], 1, True, [(1, 0), (5, 0)], True),
+        ([NARROW], -5, False, [(9, 0), (-5, 0)], True),  # a line ahead and astern
+        ([NARROW], -5, False, [(9, 0), (-6, 0)], False),  # too far astern
+        ([NARROW], -5, False, [(9, 0), (-5, "0.5")], False),  # aside of 0
+        ([NARROW], -5, False, [(-4, "0.5"), (-4, "-0.5")], True),
+        ([[RIGHT, LEFT]], -5, False, [(4, 0), (0, 4), (-4, 0), (0, -4)], True),  # a disc
+        ([[RIGHT, LEFT]], -5, False, [(4, 0), (0, 4), (-4, 0), (0, -6)], False),
     ],
 )
-def test_parts_that_are_not_convex_or_leave_the_arcs(
-    arcs: Any, least: float, mean: bool, part: dict[str, Any]
+def test_hulls_of_forces(
+    sectors: Any, least: float, mean: bool, points: Any, expected: bool
 ) -> None:
-    """The checker refuses them."""
-    with pytest.raises(check_proof.WrongProof):
-        check_proof.convex_part(pod(arcs, least, mean), part)
+    """The checker says whether an actuator has all means of some forces."""
+    assert holds(pod(sectors, least, mean), points) is expected
+
+
+@pytest.mark.parametrize("number", range(40))
+def test_hulls_of_random_forces_are_as_samples_say(number: int) -> None:
+    """What the checker holds has no mean outside of the sectors; what it does not has one."""
+    rng = np.random.default_rng([67, number])
+    width = rng.dirichlet(np.ones(4)) * 2.0 * np.pi
+    ends = rng.uniform(-np.pi, np.pi) + np.cumsum(width)
+    sectors = []
+    for first, last in ((ends[0], ends[1]), (ends[1], ends[2]), (ends[2], ends[3])):
+        middle = 0.5 * (first + last)
+        for low, high in ((first, middle), (middle, last)):
+            edge = [1.0001 * np.array([np.cos(angle), np.sin(angle)]) for angle in (low, high)]
+            sectors.append([[F(str(round(x, 12))) for x in each] for each in edge])
+    least = float(rng.choice([0.0, 0.5, -4.0]))
+    actuator = pod(sectors, least)
+    sides = check_proof.sides_of(actuator, "force_n")
+    for spread in (0.3, 1.0, 3.0):
+        middle_force = rng.normal(size=2) * 4.0
+        points = middle_force + spread * rng.normal(size=(4, 2))
+        exact = [[F(str(round(x, 6))) for x in each] for each in points.tolist()]
+        weights = rng.dirichlet(np.full(4, 0.4), 2000)
+        means = weights @ np.array(exact, float)
+        size = np.linalg.norm(means, axis=1)
+        angle = np.arctan2(means[:, 1], means[:, 0])
+        is_in = {}
+        for tolerance in (1e-3, -1e-3):
+            found = np.zeros(len(means), bool)
+            for u, _, low, high, _ in sides:
+                first = math.atan2(float(u[1]), float(u[0]))
+                v = sides[[side[0] for side in sides].index(u)][1]
+                span = (math.atan2(float(v[1]), float(v[0])) - first) % (2.0 * np.pi)
+                turned = (angle - first + tolerance) % (2.0 * np.pi) <= span + 2.0 * tolerance
+                found |= (
+                    turned & (size <= float(high) + tolerance) & (size >= float(low) - tolerance)
+                )
+            is_in[tolerance] = found.all()
+        if holds(actuator, exact):
+            assert is_in[1e-3]
+        else:
+            assert not is_in[-1e-3]
 
 
 @pytest.mark.parametrize(
-    ("arcs", "pieces", "mean"),
+    ("sectors", "least", "mean", "words"),
     [
-        (None, [[RIGHT, RIGHT]], False),  # no turn
-        (None, [[RIGHT, UP], [UP, LEFT]], False),  # half of it
-        ([[RIGHT, DOWN]], [[RIGHT, DOWN]], False),  # a piece that is not convex
-        ([[RIGHT, DOWN]], [[RIGHT, UP], [LEFT, DOWN]], False),  # a gap
-        ([[RIGHT, UP], [LEFT, DOWN]], [[RIGHT, UP]], False),  # an arc is missing
-        ([[RIGHT, UP]], [[[F("0.5"), F(0)], UP]], False),  # another end
-        ([NARROW], [[NARROW[0], RIGHT], [RIGHT, NARROW[1]]], True),  # means of both pieces
+        ([[RIGHT, DOWN]], 0, False, "wider than half a turn"),
+        ([[[F("0.5"), F(0)], UP]], 0, False, "too short"),
+        ([[[F(2), F(0)], UP]], 0, False, "too long"),
+        ([], 0, False, "sectors"),
+        ([[NARROW[0], RIGHT], [RIGHT, NARROW[1]]], 1, True, "between its sectors"),
+        ([NARROW], 11, False, "in no order"),
     ],
 )
-def test_pieces_that_leave_out_forces(arcs: Any, pieces: Any, mean: bool) -> None:
-    """The checker refuses a counterexample by such pieces, whatever the prices."""
-    price = {"price": [F(1)], "watt_price": F(0), "touch": {}}
-    tree = {"cut": "pod", "arcs": pieces, "each": [price for _ in pieces]}
-    actuator = pod(arcs, least=1, mean=mean) | {"columns": [[F(0)], [F(0)]], "power": None}
-    statement = {"power_w": None, "wrench_tolerance": F(0)}
-    with pytest.raises(check_proof.WrongProof, match=r"leave out|cannot be cut|too short"):
-        check_proof.check_tree(tree, [F(1)], {"pod": actuator}, statement)
+def test_sectors_that_are_none(sectors: Any, least: float, mean: bool, words: str) -> None:
+    """The checker refuses them."""
+    with pytest.raises(check_proof.WrongProof, match=words):
+        check_proof.check_actuator(pod(sectors, least, mean))
+
+
+def test_a_tree_without_a_branch_for_each_sector() -> None:
+    """The checker refuses a counterexample that leaves a sector out, whatever the prices."""
+    price = {"price": [F(1)], "watt_price": F(0)}
+    actuators = {"pod": pod(ROUND[:2], -1) | {"columns": [[F(0)], [F(0)]]}}
+    robot = (actuators, {"power_w": None, "wrench_tolerance": F(0)})
+    sides = {"pod": check_proof.sides_of(actuators["pod"], "outer_force_n")}
+    for count in (1, 3, 4, 5):
+        tree = {"cut": "pod", "each": [price] * count}
+        if count == 4:
+            check_proof.check_tree(tree, [F(1)], sides, robot)
+            continue
+        with pytest.raises(ValueError, match="zip"):
+            check_proof.check_tree(tree, [F(1)], sides, robot)
 
 
 def test_wrenches_out_of_the_box_refute_nothing(files: list[str]) -> None:

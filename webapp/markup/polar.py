@@ -44,6 +44,8 @@ MOST_LETTERS = 15
 """Letters of a name in the list; of a longer one the first are shown."""
 BOW_UP = "M0 -15C5 -9 6 -4 6 2V11Q6 14 3 14H-3Q-6 14 -6 11V2C-6 -4 -5 -9 0 -15Z"
 """Outline of a ship from above, its bow up, about the middle of the plot [px]."""
+OUTLINED = "paint-order='stroke' stroke='#fff' stroke-width='3' stroke-linejoin='round'"
+"""Attributes of a text that is read above curves."""
 FILE_STYLE = (
     "<style>text {{ font-family: sans-serif; font-size: 13px; }} .grid {{ stroke: #ccd3d8; "
     "fill: none; }} .dim {{ fill: #6a747c; }}</style>"
@@ -116,7 +118,7 @@ def _layers(capability: Capability, names: Sequence[str]) -> list[str]:
     rings = _rings(max(float(curve.values.max(initial=0.0)) for curve in curves))
     order = np.argsort(np.asarray(capability.headings) % 360.0)
     angle = np.deg2rad(np.asarray(capability.headings)[order])
-    layers = [_grid(rings, shown_values(capability).unit)]
+    layers = [_grid(rings)]
     for curve in curves:
         layers.append(_outline(curve, angle, curve.values[order] / rings[-1]))
     for curve in curves:
@@ -124,6 +126,7 @@ def _layers(capability: Capability, names: Sequence[str]) -> list[str]:
             marked = order[curve.is_marked[order]]
             turn = np.deg2rad(np.asarray(capability.headings)[marked])
             layers.append(_dots(curve, turn, curve.values[marked] / rings[-1]))
+    layers.append(_ring_values(rings, shown_values(capability).unit))
     layers.append(_list(capability, curves))
     return layers
 
@@ -142,8 +145,8 @@ def _rings(largest: float) -> list[float]:
     return [step * k for k in range(1, count + 1)]
 
 
-def _grid(rings: Sequence[float], unit: str) -> str:
-    """Rings with their values, headings, and a ship whose bow is up."""
+def _grid(rings: Sequence[float]) -> str:
+    """Rings, headings, and a ship whose bow is up."""
     x, y = CENTER
     markup = []
     for value in rings:
@@ -158,11 +161,17 @@ def _grid(rings: Sequence[float], unit: str) -> str:
     markup.append(
         html("<path d='{}' transform='translate({} {})' class='dim ship'/>", BOW_UP, x, y)
     )
+    return html("{}", markup)
+
+
+def _ring_values(rings: Sequence[float], unit: str) -> str:
+    """The values of the rings, above the curves."""
+    markup = []
     for value in rings:
         across, down = _place(math.radians(45.0), value / rings[-1])
         words = f"{value:g} {unit}".rstrip() if value == rings[-1] else f"{value:g}"
-        label = "<text class='dim ring' x='{:.1f}' y='{:.1f}'>{}</text>"
-        markup.append(html(label, across + 2.0, down + 1.0, words))
+        label = "<text class='dim ring' x='{:.1f}' y='{:.1f}' {}>{}</text>"
+        markup.append(html(label, across + 2.0, down + 1.0, Markup(OUTLINED), words))
     return html("{}", markup)
 
 

@@ -25,8 +25,8 @@ typedef struct {
   real other_end;  /* angle of the other end then [rad] */
 } push_direction;
 
-/* Whether what a plane pushes depends on the direction: by a gauge, or by the curve of a rudder in a
-   slipstream. In reverse nothing meets that rudder. */
+/* Whether what a plane pushes depends on the direction: by a gauge, or by the curve of a rudder in
+   a slipstream. In reverse nothing meets that rudder. */
 static int has_gauge(const fl_actuator *a, const fl_set *set) {
   if (FL_SLIPSTREAMS && set->is_flipped) return 0;
   return has_gauge_table(a) || is_steered(a);

@@ -1,8 +1,8 @@
 /* One target after the other: commands of least power where it is within what may be given now,
    else for what a policy gives in its place.
 
-   Forces come first (`fl_find_forces`), by the dual; then commands for the forces; then steps on the
-   commands, which make up for what the tables of forces leave. */
+   Forces come first (`fl_find_forces`), by the dual; then commands for the forces; then steps on
+   the commands, which make up for what the tables of forces leave. */
 #include "internal.h"
 
 #define LARGEST R(1e12) /* wrench, price or command of a question */
@@ -195,6 +195,9 @@ static void meet_by_laws(const real *block, fl_work *work, const real *wrench_de
   out->error = error;
 }
 
+/* Whether an error over the wrench scale is one for which idle actuators turn, where any turn. */
+int fl_is_missed(real error) { return FL_AIMS && error > REACHED; }
+
 /* Finds commands for the forces of an answer. */
 static void find_commands(const real *block, fl_work *work, const fl_question *q,
                           const real *wrench_desired, int is_budget_used_up, fl_answer *out) {
@@ -215,8 +218,8 @@ static void find_commands(const real *block, fl_work *work, const fl_question *q
   out->error = fl_refine_commands(block, work, &work->box, out->wrench_served, out->command, steps);
   if (!is_budget_used_up) meet_by_laws(block, work, wrench_desired, out);
   fl_rest_in_dead_bands(block, &work->box, out->command);
-  const int has_missed = FL_AIMS && !out->is_attainable &&
-                         error_of_served(block, wrench_desired, out) > REACHED;
+  const int has_missed = !out->is_attainable &&
+                         fl_is_missed(error_of_served(block, wrench_desired, out));
   if (q->previous && fl_may_give_later(block, work, has_missed, out->command)) {
     fl_prepare_idle(block, work, q, wrench_desired, out->command);
   }

@@ -55,9 +55,7 @@ static int is_without_gap(const real *block, const fl_work *work, int status, in
    own that may be the best: all of them are looked at. */
 static real worth_search(const fl_work *work, const fl_part_problem *problem) {
   if (FL_ZONES > 0 && work->has_zones) return NEARLY;
-#if FL_KEEPS_BUDGETS
-  if (problem->solve) return NEARLY;
-#endif
+  if (FL_KEEPS_BUDGETS && problem->solve) return NEARLY;
   return CLOSE;
 }
 

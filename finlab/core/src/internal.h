@@ -234,6 +234,7 @@ int fl_span_of_question(const real *block, fl_work *work, const unsigned char *l
 /* answer.c: forces for one wrench */
 void fl_find_forces(const real *block, fl_work *work, const real *wrench_wanted,
                     const fl_policy *policy, const real *lambda, fl_answer *out);
+int fl_is_missed(real error);
 
 /* idle_actuators.c: actuators that give nothing in a tick */
 int fl_may_give_later(const real *block, const fl_work *work, int has_missed, real command[][3]);

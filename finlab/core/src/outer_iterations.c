@@ -409,6 +409,21 @@ static int iterate(outer_search *search, int is_first, fl_answer *out, int *has_
   return FL_OK;
 }
 
+/* Has idle actuators turn in a tick that misses its wrench, by the linear model. */
+static void turn_idle(outer_search *search, real command[][3]) {
+  const fl_question *q = &search->question;
+  const int has_missed = fl_is_missed(search->error);
+  if (!q->previous || !has_missed) return;
+  if (!fl_prepare_span(search->block, search->work, 0)) return;
+  real wrench[6]; /* in axes that count */
+  for (int k = 0; k < 6; k++) {
+    wrench[k] = 0;
+    if (search->work->span.axis_counts[k]) wrench[k] = q->wrench[k];
+  }
+  if (!fl_may_give_later(search->block, search->work, has_missed, command)) return;
+  fl_prepare_idle(search->block, search->work, q, wrench, command);
+}
+
 /* Commands by the laws for the best forces, as exact as the whole model can tell. */
 static void finish_search(outer_search *search, fl_answer *out) {
   const fl_question *q = &search->question;
@@ -423,6 +438,7 @@ static void finish_search(outer_search *search, fl_answer *out) {
                                    q->wrench, EXACT, 0, 0, out->command);
   }
   fl_rest_in_dead_bands(search->block, &search->box, out->command);
+  turn_idle(search, out->command);
   fl_clip_commands(search->block, &search->box, out->command);
 }
 

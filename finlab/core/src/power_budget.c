@@ -516,7 +516,8 @@ static void scale_point(const budget_problem *p, real times, budget_point *at) {
 
 /* Newton's method from a point where one bus may not bind. At the whole cost K of what is missing
    its mu would have to fall from where the others are, K over the power, to 1. So K is small at
-   first; and as multipliers are K l + m + O(1 / K), their slope there tells them at the whole one. */
+   first; and as multipliers are K l + m + O(1 / K), their slope there tells them at the whole
+   one. */
 static int find_by_small_cost(budget_problem *p, budget_point *at) {
   budget_step step;
   make_dearer(p, COST_FIRST);

@@ -205,6 +205,60 @@ def test_pods_and_fins_that_stand_the_wrong_way_turn_until_a_wrench_is_given(
         assert answer.err_norm <= expected.err_norm + 1e-3
 
 
+@pytest.mark.parametrize("policy", ["closest", "direction"])
+@pytest.mark.parametrize(
+    ("start", "target"),
+    [
+        (2.6, [-30.0, -10.0, 0.0, 0.0, 0.0, 0.0]),
+        (2.0, [-30.0, -30.0, 0.0, 0.0, 0.0, 0.0]),
+        (-2.6, [0.0, 30.0, 0.0, 0.0, 0.0, 0.0]),
+    ],
+)
+def test_idle_pods_turn_within_their_arc_where_the_shorter_way_is_past_its_ends(
+    start: float, target: list[float], policy: str
+) -> None:
+    boat = load_layout("catamaran")
+    robot = boat.with_actuators(
+        tuple(
+            replace(pod, arc=(-2.7, 2.7)) if pod.type == "azimuth" else pod
+            for pod in boat.actuators
+        )
+    )
+    allocator = Allocator(robot, period_s=PERIOD_S)
+    expected = allocator.allocate(target, policy=policy)
+    turn_per_tick = robot.actuators[0].turn_rate * PERIOD_S
+    most_ticks = 2 * round(2 * 2.7 / turn_per_tick)
+    command = np.array([[start, 0.0, 0.0], [start, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    for _ in range(most_ticks):
+        answer = allocator.allocate(target, previous=command, policy=policy)
+        assert beyond_what_is_allowed(robot, command, answer.command) <= 1e-9
+        command = answer.command
+    assert answer.err_norm <= expected.err_norm + 1e-3
+
+
+@pytest.mark.parametrize("policy", ["closest", "direction"])
+def test_idle_pods_whose_jets_meet_others_turn_until_a_wrench_is_given(policy: str) -> None:
+    robot = replace(load_layout("catamaran"), interaction=Jets())
+    allocator = Allocator(robot, period_s=PERIOD_S)
+    target = [-30.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+    expected = allocator.allocate(target, policy=policy)
+    command = np.zeros((3, 3))
+    for _ in range(40):
+        answer = allocator.allocate(target, previous=command, policy=policy)
+        command = answer.command
+    assert answer.err_norm <= expected.err_norm + 1e-3
+
+
+def test_an_idle_pod_of_unknown_angle_takes_the_angle_that_it_will_have() -> None:
+    allocator = Allocator(load_layout("catamaran"), period_s=0.02)
+    target = [20.0, 10.0, 0.0, 0.0, 0.0, 2.0]
+    later = allocator.allocate(target, lost=["bow"], policy="direction").command
+    before = np.array([[0.5, 0.0, 0.0], [np.nan] * 3, [np.nan] * 3])
+    now = allocator.allocate(target, lost=["bow"], previous=before, policy="direction").command
+    assert now[:2, 1].tolist() == [0.0, 0.0]  # of one that is turned elsewhere, neither gives any
+    assert now[1, 0] == pytest.approx(later[1, 0], abs=1e-6)
+
+
 def test_an_idle_pod_whose_command_before_is_unknown_gets_a_command() -> None:
     allocator = Allocator(load_layout("drillship"), period_s=PERIOD_S)
     previous = allocator.allocate(np.zeros(6)).command.copy()
