@@ -29,8 +29,6 @@ AMPLITUDES = 400
 """Amplitudes of a grid on which the cheapest is looked for, before it is refined."""
 NEAR_LEAST = 3.0
 """Times its least thrust up to which a fin is near to it."""
-NEAR_LARGEST = 0.998
-"""Share of its largest thrust from which on a fin is near to that."""
 STEP = 1e-5
 """Share of a thrust by which the slope of its cost is found."""
 
@@ -161,13 +159,12 @@ class BudgetedFins:
         ]
         self._held: list[tuple[Array, list[int], float]] = []
 
-    def are_between_ends(self, command: Array) -> bool:
-        """Whether at a command (n, 3) no fin is near to its least thrust, or to the largest one
-        of its limits."""
+    def are_beyond_least(self, command: Array) -> bool:
+        """Whether at a command (n, 3) no fin is near to its least thrust."""
         for fin, own_command in zip(self.plant.actuators, command, strict=True):
             cost = FinCost(fin)
             thrust = float(fin.thrust(own_command[0], own_command[1]))
-            if not NEAR_LEAST * cost.least < thrust < NEAR_LARGEST * cost.largest:
+            if thrust <= NEAR_LEAST * cost.least:
                 return False
         return True
 

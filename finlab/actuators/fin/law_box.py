@@ -18,7 +18,7 @@ from finlab.arrays import NEARLY, NOTHING, ROUNDING, ROUNDS, Array
 
 GRID = (17, 33)
 """Amplitudes and frequencies of the first grid; half as many where directions are compared."""
-PEAK = 5e-4
+PEAK = 1e-6
 """Share of the largest force that is given up where the price of the last newton has no bound."""
 ANY_PRICE = 1e12
 """A price at which power does not count [W/N]."""
@@ -145,7 +145,9 @@ class LawBox:
         best_profit = profit.max(axis=1)
         for _ in range(ROUNDS):
             gradient, hessian = self._profit_derivatives(price, beat, NEARLY * span + LEAST_PROBE)
-            step = np.clip(_uphill_steps(beat, gradient, hessian), -longest, longest)
+            straight = np.clip(_uphill_steps(beat, gradient, hessian), -longest, longest)
+            curved = self._steps_of_product(beat, gradient, hessian, longest)
+            step = np.concatenate([straight, curved[None]])
             trial = np.clip(np.concatenate([step, SHORTER_STEP * step]) + beat, low, high)
             trial_profit = self.profit(price, self.command(trial))
             best_trial = trial_profit.argmax(axis=0)
@@ -156,6 +158,29 @@ class LawBox:
             if not (gain > least_gain * np.abs(best_profit)).any():
                 break
         return Optimum(self.command(beat), best_profit)
+
+    def _steps_of_product(
+        self, beat: Array, gradient: Array, hessian: Array, longest: Array
+    ) -> Array:
+        """Steps (K, 2) uphill from amplitudes and frequencies (K, 2) along which their product
+        stays, (A exp t, f exp -t), within the limits and no longer than `longest` (2,): the ridge
+        of a fin whose force depends on the product, where a straight step leaves it."""
+        with np.errstate(divide="ignore", invalid="ignore"):  # a limit, or a number, may be 0
+            above = np.log(self.upper[:2] / beat)
+            below = np.log(beat / self.lower[:2])
+            most = np.log1p(longest / beat).min(axis=-1)
+        high = np.minimum(np.minimum(above[:, 0], below[:, 1]), most)
+        low = -np.minimum(np.minimum(below[:, 0], above[:, 1]), most)
+        direction = beat * [1.0, -1.0]
+        slope = np.einsum("ki,ki->k", direction, gradient)  # d profit / dt
+        # d2 profit / dt2; the second derivative of (A exp t, f exp -t) is (A, f) itself.
+        of_line = np.einsum("ki,kij,kj->k", direction, hessian, direction)
+        curvature = of_line + np.einsum("ki,ki->k", beat, gradient)
+        with np.errstate(all="ignore"):
+            t = slope / np.where(curvature < 0.0, -curvature, np.abs(slope) + NO_SIZE)
+            t = np.clip(np.nan_to_num(t, posinf=0.0, neginf=0.0), low, high)
+            step = beat * np.expm1(np.stack([t, -t], axis=-1))
+        return np.asarray(np.nan_to_num(step, posinf=0.0, neginf=0.0))
 
     def _profit_derivatives(self, price: Array, beat: Array, probe: Array) -> tuple[Array, Array]:
         """Gradient (K, 2) and Hessian (K, 2, 2) of the profit at prices (K,), by amplitude and
@@ -214,16 +239,14 @@ class LawBox:
 
 
 def _uphill_steps(beat: Array, gradient: Array, hessian: Array) -> Array:
-    """Steps (4, K, 2) uphill from amplitudes and frequencies (K, 2): Newton's, and those along the
-    amplitude, the frequency, and both with a constant product. A step is 0 where the profit is not
-    concave."""
+    """Steps (3, K, 2) uphill from amplitudes and frequencies (K, 2): Newton's, and those along the
+    amplitude and the frequency. A step is 0 where the profit is not concave."""
     a = hessian[:, 0, 0]
     b = hessian[:, 0, 1]
     c = hessian[:, 1, 1]
     determinant = a * c - b * b
     along_amplitude = np.broadcast_to([1.0, 0.0], beat.shape)
     along_frequency = np.broadcast_to([0.0, 1.0], beat.shape)
-    along_product = beat * [1.0, -1.0]
     steps = []
     with np.errstate(all="ignore"):
         # -H^-1 g, with the inverse of a 2 x 2 matrix
@@ -233,7 +256,7 @@ def _uphill_steps(beat: Array, gradient: Array, hessian: Array) -> Array:
         )
         is_concave = (a < 0.0) & (determinant > 0.0)
         steps.append(np.where(is_concave[:, None], newton / determinant[:, None], 0.0))
-        for direction in (along_amplitude, along_frequency, along_product):
+        for direction in (along_amplitude, along_frequency):
             slope = np.einsum("ki,ki->k", direction, gradient)
             curvature = np.einsum("ki,kij,kj->k", direction, hessian, direction)
             # Where the profit is not concave along it, by 1: the step is clipped.

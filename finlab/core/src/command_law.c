@@ -6,6 +6,11 @@
 #include "internal.h"
 
 #define GAUGE_STEP R(1e-3) /* angle [rad] over which the derivative of a gauge is taken */
+#define BEAT_STEPS 6       /* sizes that the table of a fin is asked for, at most */
+#define NEAR_BEAT R(1e-5)  /* error of a size, over it, of which the next step leaves rounding */
+/* Error of a size, over the force of the wrench scale, that steps on commands may give. */
+#define BEAT_ENOUGH (10 * EXACT)
+#define LEAST_BEAT_SLOPE R(1e-3) /* of sizes by the law over those by the table: limits hold it */
 
 /* Weights of four neighbours on an axis of knots, in value and in derivative, and the
    offsets of their values: a cubic whose slope at a knot is that of the line through its
@@ -341,7 +346,9 @@ static void foil_command(const real *block, int i, const fl_box *box, const real
   command[2] = 0;
 }
 
-/* Beat of a fin for a force in its plane. */
+/* Beat of a fin for a force in its plane: the tables are asked for what gives its size by the law,
+   by the secant method. Steps on the commands, which would give the rest, leave the cheapest beat
+   of a size. */
 static void fin_command(const real *block, int i, const fl_box *box, const real *force,
                         const real *before, real *command) {
   (void)before;
@@ -351,22 +358,34 @@ static void fin_command(const real *block, int i, const fl_box *box, const real 
   const real size = size_of(force);
   const real direction = ATAN2(force[1], force[0]);
   real angle = direction;
-  real wanted = size;
-  for (int k = 0; k < 2; k++) { /* what the tables leave undone is asked for on top */
+  real wanted = size; /* what the table is asked for */
+  const real enough = BEAT_ENOUGH * HEAD(block)->wrench_scale[0];
+  real wanted_before = 0;
+  real given_before = 0;
+  for (int k = 0; k < BEAT_STEPS; k++) {
     real most = a->force_max;
     real lean = a->lean_angle;
     if (gauge) {
       most = a->force_max * fl_gauge_radius(gauge, angle);
       lean = fl_gauge_lean(gauge, angle);
     }
+    wanted = clipped(wanted, 0, most);
     beat_at(block + (int)a->command_table, wanted / most, command);
     command[2] = angle - lean;
     for (int c = 0; c < 3; c++) command[c] = fl_clip_number(box, i, c, 2, command[c]);
-    if (k == 1) break;
-    real delivered[3];
-    fl_force_of_command(block, i, command, delivered, 0);
-    wanted = larger(wanted + size - size_of(delivered + 1), 0);
-    if (gauge && size > 0) angle += fl_wrap_angle(direction - ATAN2(delivered[2], delivered[1]));
+    const int is_exact_next = k > 0 && FABS(size - given_before) <= NEAR_BEAT * size;
+    if (is_exact_next || k == BEAT_STEPS - 1) break;
+    real force[3];
+    fl_force_of_command(block, i, command, force, 0);
+    const real given = size_of(force + 1);
+    if (k > 0 && FABS(size - given) <= enough) break;
+    real slope = 1; /* of what is given over what is asked for */
+    if (k > 0) slope = (given - given_before) / (wanted - wanted_before);
+    if (!(slope > LEAST_BEAT_SLOPE)) break; /* NaN where both are the same */
+    wanted_before = wanted;
+    given_before = given;
+    wanted += (size - given) / slope;
+    if (gauge && size > 0) angle += fl_wrap_angle(direction - ATAN2(force[2], force[1]));
   }
 }
 

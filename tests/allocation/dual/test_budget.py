@@ -31,8 +31,7 @@ MISS = 1e-5
 MANY = int(os.environ.get("FINLAB_BUDGET_TARGETS", "0"))
 """Targets of each kind beside the judges, where there is time."""
 END_MISS = 3e-3
-"""The same where a fin is at an end of its thrusts: the least one has no direction that the dual
-knows, and tables end below the largest one of a fin that saturates."""
+"""The same where a fin is near to its least thrust: the judge lets it rest, which it cannot."""
 ROBOTS = 9
 """Random robots of each kind."""
 POLICIES: tuple[PolicyName, ...] = ("closest", "direction", "priority")
@@ -165,27 +164,27 @@ def test_many_thrusters_and_pods_beside_clarabel(kind: str, buses: int) -> None:
 
 def check_beside_hulls(question: Question) -> None:
     """Checks answers of fins, which no command can be better than on the hulls of their forces; and
-    where none of them is at an end of its thrusts, which tables meet less closely, as good."""
+    where none of them is near to its least thrust, as good."""
     allocator, wrench = question.allocator, question.wrench
     fins = BudgetedFins(question.plant, question.members, question.watts)
     answer = allocator.allocate(wrench)
     question.check_power(answer)
     worse = miss_of(answer) - fins.least_miss(wrench)
-    assert -MISS <= worse <= (MISS if fins.are_between_ends(answer.command) else END_MISS)
-    if miss_of(answer) <= EXACT and fins.are_between_ends(answer.command):
+    assert -MISS <= worse <= (MISS if fins.are_beyond_least(answer.command) else END_MISS)
+    if miss_of(answer) <= EXACT and fins.are_beyond_least(answer.command):
         assert answer.power == pytest.approx(fins.least_power(wrench), rel=WATTS)
 
     answer = allocator.allocate(wrench, policy="direction")
     question.check_power(answer)
     worse = fins.largest_share(wrench) - answer.share
-    assert -MISS <= worse <= (MISS if fins.are_between_ends(answer.command) else END_MISS)
+    assert -MISS <= worse <= (MISS if fins.are_beyond_least(answer.command) else END_MISS)
 
     answer = allocator.allocate(wrench, policy="priority")
     question.check_power(answer)
     missing = np.abs(answer.unallocated / answer.scale)
     first = fins.least_miss(wrench, [2])
     worse = missing[2] - first
-    assert -MISS <= worse <= (MISS if fins.are_between_ends(answer.command) else END_MISS)
+    assert -MISS <= worse <= (MISS if fins.are_beyond_least(answer.command) else END_MISS)
 
 
 FINS = ("fins", "fins any shaft", "fins uneven")
