@@ -38,6 +38,8 @@ LAYOUT_FOLDER = Path(finlab.__file__).parents[1] / "layouts"
 """The shipped layouts."""
 C_FLAGS = ["-std=c99", "-O0", "-ffp-contract=off", "-Wall", "-Wextra", "-Wno-cpp", "-Werror"]
 """Options of the C compiler; warnings are errors."""
+OF_LIBRARY = ["-fPIC", "-shared", "-DFL_WITH_POWER_SETS"]
+"""More of them for the library that Python loads."""
 
 
 def copied(folder: Path) -> Path:
@@ -60,7 +62,7 @@ def test_a_field_more_in_the_middle_changes_no_answer(tmp_path: Path) -> None:
     sources = sorted(map(str, (copy / "core" / "src").glob("*.c")))
     library = str(copy / "core" / "libfinlab.so")
     subprocess.run(
-        ["gcc", *C_FLAGS, f"-I{copy / 'core'}", "-fPIC", "-shared", *sources, "-o", library, "-lm"],
+        ["gcc", *C_FLAGS, *OF_LIBRARY, f"-I{copy / 'core'}", *sources, "-o", library, "-lm"],
         check=True,
     )
     said = {}

@@ -375,9 +375,9 @@ static void fin_command(const real *block, int i, const fl_box *box, const real 
     for (int c = 0; c < 3; c++) command[c] = fl_clip_number(box, i, c, 2, command[c]);
     const int is_exact_next = k > 0 && FABS(size - given_before) <= NEAR_BEAT * size;
     if (is_exact_next || k == BEAT_STEPS - 1) break;
-    real force[3];
-    fl_force_of_command(block, i, command, force, 0);
-    const real given = size_of(force + 1);
+    real delivered[3];
+    fl_force_of_command(block, i, command, delivered, 0);
+    const real given = size_of(delivered + 1);
     if (k > 0 && FABS(size - given) <= enough) break;
     real slope = 1; /* of what is given over what is asked for */
     if (k > 0) slope = (given - given_before) / (wanted - wanted_before);
@@ -385,7 +385,7 @@ static void fin_command(const real *block, int i, const fl_box *box, const real 
     wanted_before = wanted;
     given_before = given;
     wanted += (size - given) / slope;
-    if (gauge && size > 0) angle += fl_wrap_angle(direction - ATAN2(force[2], force[1]));
+    if (gauge && size > 0) angle += fl_wrap_angle(direction - ATAN2(delivered[2], delivered[1]));
   }
 }
 
