@@ -42,7 +42,7 @@ MOST_STEPS = {
     "thrusters": NewtonSteps(119, 718, 80),
     "azimuths": NewtonSteps(82, 543, 34),
     "fins": NewtonSteps(99, 888, 145),
-    "fins any shaft": NewtonSteps(69, 838, 66),
+    "fins any shaft": NewtonSteps(67, 938, 22),
     "fins uneven": NewtonSteps(80, 1015, 29),
     "wide arcs": NewtonSteps(257, 1853, 68),
     "holes": NewtonSteps(507, 2549, 37),
