@@ -1,7 +1,9 @@
 // The core in C (finlab/core/finlab.h) as WebAssembly: one robot, questions and answers.
 import { constantsOf, fieldAt, structsOf } from "./fields.js";
 
-const math = { atan2: Math.atan2, cos: Math.cos, sin: Math.sin, exp: Math.exp, pow: Math.pow, tanh: Math.tanh };
+const math = {
+  atan2: Math.atan2, cos: Math.cos, exp: Math.exp, log: Math.log, pow: Math.pow, sin: Math.sin, tanh: Math.tanh,
+};
 
 export async function loadCore(url) {
   const { instance } = await WebAssembly.instantiateStreaming(fetch(url), { env: math });
