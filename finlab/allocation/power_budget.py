@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 ALL = "power"
 """Name of the bus that feeds all actuators, where a layout names none."""
+ROUNDING = 1e-6
+"""Share by which rounding may exceed a budget."""
 MOST_WATTS = 1e12
 """Largest budget [W]; beyond it something is wrong upstream."""
 
@@ -46,6 +48,12 @@ class PowerBudget:
         """Returns the power (..., b) [W] of each bus at powers (..., n) [W] of the actuators, NaN
         of lost ones."""
         return np.asarray(np.nan_to_num(power) @ self.members.T)
+
+    def are_kept(self, power: Array) -> NDArray[np.bool_]:
+        """Returns whether powers (..., n) [W] of the actuators, NaN of lost ones, are within the
+        budgets of all buses, but for rounding."""
+        most = self.watts * (1.0 + ROUNDING)
+        return np.asarray((self.power_of_buses(power) <= most).all(axis=-1))
 
 
 def budget_of(layout: Layout) -> PowerBudget | None:

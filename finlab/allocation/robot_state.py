@@ -215,7 +215,7 @@ class RobotState:
     @cached_property
     def budget(self) -> PowerBudget | None:
         """What the layout lets actuators take together; None for no limit."""
-        if self.layout.power_w is None and not self.layout.buses:
+        if not self.layout.has_budget:
             return None
         from finlab.allocation.power_budget import budget_of
 

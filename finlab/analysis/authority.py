@@ -1,6 +1,5 @@
 """Axes along which the actuators can push, how evenly, and what the loss of each one costs."""
 
-import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
@@ -13,7 +12,7 @@ from finlab.axes import MOTIONS, Axis, MotionAxis
 from finlab.errors import LayoutError
 from finlab.forces.force_sets import SCALE, ForceSets, force_sets
 from finlab.forces.reach import RANK_TOLERANCE, max_wrench_along_exactly, singular_values, weakest
-from finlab.forces.within_budget import counts_budget, force_sets_within
+from finlab.forces.within_budget import counted_power, force_sets_within
 from finlab.layout import Layout
 
 AXES = MOTIONS
@@ -166,8 +165,8 @@ def _sets_after(
 ) -> ForceSets:
     """Feasible forces after each of several losses, within the layout's power budget where one is
     counted."""
-    power = None if counts_budget(layout, flow) else math.inf
-    sets = force_sets_within(layout, flow=flow, power=power).tile(len(failures))
+    sets = force_sets_within(layout, flow=flow, power=counted_power(layout, flow))
+    sets = sets.tile(len(failures))
     for row, lost in enumerate(failures):
         sets.lose(row, list(layout.indices(tuple(lost), "lost")))
     return sets

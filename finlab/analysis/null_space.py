@@ -21,8 +21,6 @@ from finlab.physics import plant_of
 FORCE_TOLERANCE = 1e-3
 """Share of an actuator's largest force by which the force of its command may differ from the wanted
 one."""
-POWER_TOLERANCE = 1e-6
-"""Share by which rounding may exceed a power budget."""
 SAMPLES = 33
 """Shifts along a direction that are tried at once."""
 RANGE_ROUNDS = 3
@@ -165,9 +163,9 @@ class NullSpace:
         answer."""
         if self._budget is None:
             return np.ones(len(command), bool)
-        members = self._budget.members[:, self._works]
-        taken = self._plant.power(command) @ members.T
-        return np.asarray((taken <= self._budget.watts * (1.0 + POWER_TOLERANCE)).all(axis=-1))
+        power = np.zeros((len(command), len(self._works)))
+        power[:, self._works] = self._plant.power(command)
+        return self._budget.are_kept(power)
 
 
 def _sparse(basis: Array) -> Array:

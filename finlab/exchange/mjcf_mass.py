@@ -7,7 +7,6 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.exchange.description import numbers
 from finlab.exchange.links import LinkMass
-from finlab.exchange.mjcf_file import MjcfFile
 from finlab.exchange.mjcf_geom import Geom
 
 DENSITY = "1000"
@@ -18,12 +17,11 @@ WITHOUT_MASS = ("plane", "hfield")
 """Geoms that have no mass."""
 
 
-def geom_mass(file: MjcfFile, geom: Geom) -> LinkMass | None:
+def geom_mass(geom: Geom) -> LinkMass | None:
     """Returns the mass of a geom.
 
     Args:
-        file: the model.
-        geom: one of its geoms.
+        geom: a geom.
 
     Returns:
         Its mass in the frame of the robot; None of a mesh, or of a shell.
@@ -36,7 +34,9 @@ def geom_mass(file: MjcfFile, geom: Geom) -> LinkMass | None:
     density = numbers(attributes.get("density", DENSITY), 1, f"density of {what}")[0]
     mass = numbers(attributes["mass"], 1, f"mass of {what}")[0] if "mass" in attributes else None
     group = numbers(attributes.get("group", "0"), 1, f"group of {what}")[0]
-    least, most = numbers(file.compiler.get("inertiagrouprange", GROUPS), 2, "inertiagrouprange")
+    least, most = numbers(
+        geom.file.compiler.get("inertiagrouprange", GROUPS), 2, "inertiagrouprange"
+    )
     has_mass = density != 0.0 if mass is None else mass != 0.0
     if geom.kind in WITHOUT_MASS or not least <= group <= most or not has_mass:
         return LinkMass(0.0, np.zeros(3), np.zeros((3, 3)))

@@ -396,7 +396,7 @@ def _add_mass(
         robot.masses += [_inertial(file, part) for part in inertials[:1]]
         return
     for geom in geoms:
-        mass = geom_mass(file, geom)
+        mass = geom_mass(geom)
         if mass is None:
             robot.without_mass.append(f"{geom.name or 'one'} of {link}")
         else:

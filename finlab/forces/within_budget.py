@@ -7,6 +7,7 @@ tables by parabolas between knots.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 
@@ -41,6 +42,18 @@ def counts_budget(layout: Layout, flow: ArrayLike | None = None) -> bool:
     not where this drives actuators."""
     is_any_driven = any(actuator.KIND.driven_by_flow for actuator in layout.actuators)
     return not is_any_driven or not driven_by_flow(layout, shapes_of(layout, flow))
+
+
+def leaves_budget_out(layout: Layout, flow: ArrayLike | None = None) -> bool:
+    """Returns whether a robot has a power budget that is not counted in a flow (6,) [m/s, rad/s],
+    None at rest."""
+    return layout.has_budget and not counts_budget(layout, flow)
+
+
+def counted_power(layout: Layout, flow: ArrayLike | None = None) -> float | None:
+    """Returns the argument `power` that counts the budget of a layout where one can be counted in a
+    flow (6,) [m/s, rad/s], None at rest: None for that budget, and infinity where none is."""
+    return math.inf if leaves_budget_out(layout, flow) else None
 
 
 def force_sets_within(

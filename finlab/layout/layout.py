@@ -288,6 +288,11 @@ class Layout(Checked):
                 f"{problem}; method dual of `finlab allocate` takes any actuator"
             )
 
+    @property
+    def has_budget(self) -> bool:
+        """Whether it limits the power of all actuators together, or of those of a bus."""
+        return self.power_w is not None or bool(self.buses)
+
     @cached_property
     def commanded(self) -> NDArray[np.bool_]:
         """Which axes of a wrench the robot commands (6,)."""

@@ -9,7 +9,7 @@ from markupsafe import Markup
 
 from finlab.analysis import Improvement, Progress
 from finlab.analysis.improvement_text import goal_value, improvement_remarks
-from finlab.forces.within_budget import counts_budget
+from finlab.forces.within_budget import leaves_budget_out
 from webapp.handles import add_html
 from webapp.markup.score_card import remarks_markup, score_table
 from webapp.markup.words import fins_words, html, marker, three_digits
@@ -52,8 +52,7 @@ def _analysis_card(
             "<span class='dim'>The body lacks at most {} {} of the true set.</span>", gap, unit
         )
     layout = analysis.question.layout
-    has_budget = layout.power_w is not None or bool(layout.buses)
-    if has_budget and not counts_budget(layout, analysis.question.flow):
+    if leaves_budget_out(layout, analysis.question.flow):
         note += Markup(
             "<span class='dim'>The power budget does not count here: the flow drives "
             "actuators.</span>"

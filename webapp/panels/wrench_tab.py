@@ -17,7 +17,7 @@ from finlab.allocation.report import missing_words
 from finlab.axes import AXES, MOTIONS, UNITS
 from finlab.display import listed
 from finlab.forces.reach import Ranges
-from finlab.forces.within_budget import counts_budget
+from finlab.forces.within_budget import leaves_budget_out
 from finlab.layout import Layout
 from webapp.handles import add_html, placed, press
 from webapp.markup.answer import bars_of, fin_table
@@ -229,8 +229,7 @@ def _budget_notes(layout: Layout, flow: Flow | None) -> str:
     n_more = len(layout.buses) - MOST_BUSES
     if n_more > 0:
         notes.append(f"{n_more} more buses keep the budgets of their file.")
-    has_budget = layout.power_w is not None or bool(layout.buses)
-    if has_budget and not counts_budget(layout, flow):
+    if leaves_budget_out(layout, flow):
         notes.append("Marks and ends of sliders leave the budget out: the flow drives actuators.")
     return html("<div class='fl dim'>{}</div>", " ".join(notes)) if notes else ""
 

@@ -1,13 +1,12 @@
 """Analyses of a layout and of a question: score cards, attainable sets, and ranges of the axes."""
 
-import math
 from dataclasses import dataclass
 from functools import lru_cache
 
 from finlab.analysis import AttainableSet, ScoreCard, attainable_set, score_card
 from finlab.forces.attainable import WrenchHalf
 from finlab.forces.reach import Ranges, axis_ranges
-from finlab.forces.within_budget import counts_budget
+from finlab.forces.within_budget import counted_power
 from finlab.layout import Layout
 from webapp.session.looking import DRAWN
 from webapp.session.state import Flow, State
@@ -76,14 +75,9 @@ def analyse(question: AnalysisQuestion) -> Analysis:
 def find_ranges(question: State) -> Ranges:
     """The range of each component of a state's target, within the power budget of its layout but
     where none is counted."""
-    power = counted_power(question.layout, question.flow)
-    return axis_ranges(question.layout, question.target, question.lost, question.flow, power)
-
-
-def counted_power(layout: Layout, flow: Flow | None) -> float | None:
-    """None for the power budget of a layout, and infinity where none is counted."""
-    has_budget = layout.power_w is not None or bool(layout.buses)
-    return math.inf if has_budget and not counts_budget(layout, flow) else None
+    layout = question.layout
+    power = counted_power(layout, question.flow) if layout.has_budget else None
+    return axis_ranges(layout, question.target, question.lost, question.flow, power)
 
 
 @dataclass(frozen=True)

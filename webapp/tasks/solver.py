@@ -158,8 +158,6 @@ MAX_ALLOCATORS = 24
 """Most allocators in the cache: to make one takes as long as a hundred answers."""
 ALTERNATIVE_ERROR = 1e-4
 """Normalized error up to which another answer is an alternative."""
-OVER_BUDGET = 1e-6
-"""Share by which rounding may exceed a power budget."""
 SHIPPED = NetworkConfig.shipped
 """Name of the shipped network of method `paper`."""
 POLICIES: dict[str, Policy] = {kind: Policy(kind) for kind in POLICY_NAMES}
@@ -366,12 +364,11 @@ class Solver:
 def _within_budget(candidates: Candidates, layout: Layout) -> Candidates:
     """Those candidates that keep the power budget of a layout."""
     budget = None
-    if layout.power_w is not None or layout.buses:
+    if layout.has_budget:
         budget = budget_of(layout)
     if budget is None:
         return candidates
-    taken = budget.power_of_buses(plant_of(layout).power(candidates.command))
-    is_kept = (taken <= budget.watts * (1.0 + OVER_BUDGET)).all(axis=-1)
+    is_kept = budget.are_kept(plant_of(layout).power(candidates.command))
     return candidates.rows(np.flatnonzero(is_kept).tolist())
 
 
